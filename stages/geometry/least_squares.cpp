@@ -61,24 +61,27 @@ void GroupedLeastSquares::add(std::span<const Term> shared, std::size_t group, s
 bool GroupedLeastSquares::solve(double relative, std::span<double> shared, std::span<double> own) const {
   const std::size_t count = shared_.right_.size(), size = group_.empty() ? 0 : group_.front().right_.size();
   LeastSquares reduced = shared_;
-  // What a group's unknowns are of each shared one: own x shared, and without them: own.
-  std::vector<double> share(mixed_.size()), free(own.size()), column(size);
+  // A group's unknowns are free - share * shared ones.
+  std::vector<double> share(mixed_.size(), 0), free(own.size(), 0), inverse(size * size);
   for (std::size_t g = 0; g < group_.size(); ++g) {
-    LeastSquares equations = group_[g];
-    if (!equations.solve(std::span(free).subspan(g * size, size))) return false;
-    const double* mixed = mixed_.data() + g * size * count;
-    double* of_group = share.data() + g * size * count;
-    for (std::size_t k = 0; k < count; ++k) {
-      for (std::size_t i = 0; i < size; ++i) equations.right_[i] = mixed[i * count + k];
-      if (!equations.solve(column)) return false;
-      for (std::size_t i = 0; i < size; ++i) {
-        of_group[i * count + k] = column[i];
-        reduced.right_[k] -= mixed[i * count + k] * free[g * size + i];
+    LeastSquares unit = group_[g];
+    for (std::size_t i = 0; i < size; ++i) {
+      std::ranges::fill(unit.right_, 0);
+      unit.right_[i] = 1;
+      if (!unit.solve(std::span(inverse).subspan(i * size, size))) return false;
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      for (std::size_t j = 0; j < size; ++j) {
+        const double factor = inverse[i * size + j], *mixed = mixed_.data() + (g * size + j) * count;
+        free[g * size + i] += factor * group_[g].right_[j];
+        for (std::size_t k = 0; k < count; ++k) share[(g * size + i) * count + k] += factor * mixed[k];
       }
     }
     for (std::size_t i = 0; i < size; ++i) {
+      const double *mixed = mixed_.data() + (g * size + i) * count, *of_group = share.data() + (g * size + i) * count;
       for (std::size_t k = 0; k < count; ++k) {
-        for (std::size_t l = 0; l <= k; ++l) reduced.at(k, l) -= mixed[i * count + k] * of_group[i * count + l];
+        reduced.right_[k] -= mixed[k] * free[g * size + i];
+        for (std::size_t l = 0; l <= k; ++l) reduced.at(k, l) -= mixed[k] * of_group[l];
       }
     }
   }

@@ -1,19 +1,22 @@
 #include "stages/calibration/scan/compare.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
-#include "stages/calibration/scan/extra.h"
+#include "stages/calibration/scan/robust.h"
+#include "stages/geometry/least_squares.h"
 
 namespace lamina::scan {
 namespace {
 
 constexpr double kMostTurnDeg = 6;
 constexpr double kLeastMissingMm = 0.2;
+constexpr double kAwayMm = 0.5, kLeastMm2 = 1, kLeastShare = 0.5;  // of extra ink; the last of full ink
+constexpr double kMostCells = 2000;                                // along an axis of the image, where it is looked for
 
 /// The layer in cells as large as pixels of the photograph: the share of each that is set.
 struct Cells {
@@ -157,8 +160,7 @@ void refine(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, View
   }
   const std::size_t step = samples.size() / 20'000 + 1;
   for (int round = 0; round < 15; ++round) {
-    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-    Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
+    LeastSquares linear(9);
     double vv = 1e-9, pv = 0;
     for (std::size_t i = 0; i < samples.size(); i += step) {
       const Spot p = view.at(samples[i].place.x, samples[i].place.y);
@@ -174,18 +176,15 @@ void refine(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, View
       const double u = (m.x - view.middle.x) / view.unit, v = (m.y - view.middle.y) / view.unit,
                    w = 1 + view.h[6] * u + view.h[7] * v;
       const double g = -(gx * p.x + gy * p.y);
-      Eigen::Matrix<double, 9, 1> j;
-      j << gx * u, gx * v, gx, gy * u, gy * v, gy, g * u, g * v, -samples[i].value * w;
-      j /= w;
-      const double off = gain * samples[i].value - darkness_at(photo, p.x, p.y);
-      normal += j * j.transpose();
-      right += j * off;
+      const std::array<double, 9> slope{gx * u / w, gx * v / w, gx / w,    gy * u / w,       gy * v / w,
+                                        gy / w,     g * u / w,  g * v / w, -samples[i].value};
+      linear.add(slope, gain * samples[i].value - darkness_at(photo, p.x, p.y));
     }
-    normal.diagonal() *= 1 + 1e-9;
-    const Eigen::Matrix<double, 9, 1> change = normal.ldlt().solve(right);
-    if (!change.allFinite()) return;
-    for (std::size_t i = 0; i < 8; ++i) view.h[i] += change(static_cast<Eigen::Index>(i));
-    if (change.head<6>().cwiseAbs().maxCoeff() < 1e-4) return;
+    linear.damp(1e-9, 0);
+    std::array<double, 9> change{};
+    if (!linear.solve(change)) return;
+    for (std::size_t i = 0; i < 8; ++i) view.h[i] += change[i];
+    if (std::ranges::all_of(change.begin(), change.begin() + 6, [](double one) { return std::abs(one) < 1e-4; })) return;
   }
 }
 
@@ -202,40 +201,36 @@ cv::Mat in_cells(const cv::Mat& image, const Cells& layer, const View& view) {
   return seen;
 }
 
-/// Darkness of the cells against the light of blank ones, of which a surface of second degree is made.
-cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank) {
-  using Terms = Eigen::Matrix<double, 6, 1>;
+/// Darkness against the light of blank cells, to which a surface of second degree is fitted. In further rounds those that are
+/// darker by it than `most` are left out. light  CV_32F, below 0 where it is not known: dark is 0 there
+cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, double most) {
   const auto terms = [&](int x, int y) {
     const double u = 2.0 * x / light.cols - 1, v = 2.0 * y / light.rows - 1;
-    return Terms{{1, u, v, u * u, u * v, v * v}};
+    return std::array{1.0, u, v, u * u, u * v, v * v};
   };
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Identity() * 1e-9;
-  Terms right = Terms::Zero();
-  for (int y = 0; y < light.rows; y += 2) {
-    for (int x = 0; x < light.cols; x += 2) {
-      const double value = static_cast<double>(light.at<float>(y, x));
-      if (blank.at<std::uint8_t>(y, x) == 0 || value < 0) continue;
-      const Terms t = terms(x, y);
-      normal += t * t.transpose();
-      right += t * value;
+  cv::Mat dark = cv::Mat::zeros(light.size(), CV_32F);
+  for (int round = 0; round < rounds; ++round) {
+    LeastSquares linear(6);
+    for (int y = 0; y < light.rows; y += 2) {
+      for (int x = 0; x < light.cols; x += 2) {
+        const double value = static_cast<double>(light.at<float>(y, x));
+        if (value < 0 || blank.at<std::uint8_t>(y, x) == 0 || static_cast<double>(dark.at<float>(y, x)) > most) continue;
+        linear.add(terms(x, y), value);
+      }
     }
-  }
-  const Terms surface = normal.ldlt().solve(right);
-  cv::Mat dark(light.size(), CV_32F);
-  for (int y = 0; y < light.rows; ++y) {
-    for (int x = 0; x < light.cols; ++x) {
-      const double value = static_cast<double>(light.at<float>(y, x));
-      dark.at<float>(y, x) = value < 0 ? 0.0f : static_cast<float>(1 - value / std::max(surface.dot(terms(x, y)), 1e-3));
+    linear.damp(0, 1e-9);
+    std::array<double, 6> surface{};
+    if (!linear.solve(surface)) return dark;
+    for (int y = 0; y < light.rows; ++y) {
+      for (int x = 0; x < light.cols; ++x) {
+        const double value = static_cast<double>(light.at<float>(y, x));
+        const auto at = terms(x, y);
+        const double blank_light = std::inner_product(at.begin(), at.end(), surface.begin(), 0.0);
+        dark.at<float>(y, x) = value < 0 ? 0.0f : static_cast<float>(1 - value / std::max(blank_light, 1e-3));
+      }
     }
   }
   return dark;
-}
-
-double median_of(std::vector<float>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
 }
 
 /// Stripes of cells along the scan that are much brighter than ink. full  cells that are to be printed, away from edges
@@ -321,6 +316,72 @@ double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const Cells
   return best;
 }
 
+cv::Mat disc_of(double across_cells) {
+  const int side = 2 * static_cast<int>(std::ceil(across_cells / 2)) + 1;
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side});
+}
+
+/// The image of the layer in cells from its upper left corner.
+struct Field {
+  double side = 0;  // mm
+  cv::Mat light;    // CV_32F; -1 where the photograph does not reach
+  cv::Mat wanted;   // CV_8U: something of the cell, or near it, was to be printed
+};
+
+Field field_of(const Photo& photo, const ExpectedLayer& layer, const View& view) {
+  const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6;
+  const double wide = layer.image.columns * px, deep = layer.image.rows() * py;
+  Field field;
+  field.side = std::max(layer.photo_um * 1e-3, std::max(wide, deep) / kMostCells);
+  const int columns = static_cast<int>(wide / field.side) + 1, rows = static_cast<int>(deep / field.side) + 1;
+  field.wanted = cv::Mat::zeros(rows, columns, CV_8U);
+  for (std::uint32_t r = 0; r < layer.image.rows(); ++r) {
+    const auto row = layer.image.row(r);
+    const int top = static_cast<int>(r * py / field.side), bottom = static_cast<int>((r + 1) * py / field.side);
+    for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+      const int left = static_cast<int>(row[i] * px / field.side), right = static_cast<int>(row[i + 1] * px / field.side);
+      for (int y = top; y <= std::min(bottom, rows - 1); ++y)
+        std::fill(field.wanted.ptr(y) + left, field.wanted.ptr(y) + std::min(right + 1, columns), std::uint8_t{1});
+    }
+  }
+  cv::dilate(field.wanted, field.wanted, disc_of(2 * kAwayMm / field.side));
+  field.light = cv::Mat(rows, columns, CV_32F);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const Spot p = view.at((x + 0.5) * field.side, (y + 0.5) * field.side);
+      const bool inside = p.x >= 0 && p.y >= 0 && p.x < photo.light.cols - 1 && p.y < photo.light.rows - 1;
+      field.light.at<float>(y, x) = inside ? static_cast<float>(darkness_at(photo.light, p.x, p.y)) : -1.0f;
+    }
+  }
+  return field;
+}
+
+/// Connected dark places of a square millimetre and more, half a millimetre wide and more, of half of full ink and more, half a
+/// millimetre away from what was to be printed. Looked for wherever the photograph shows the image of the layer; what reaches
+/// the image's edge is taken for the edge of the bed.
+/// view  of the photograph
+/// ink   darkness of full ink, of the light of the blank sheet
+/// cost  O(cells of the image, 4 million at most)
+std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, const View& view, double ink) {
+  const Field field = field_of(photo, layer, view);
+  const cv::Mat dark = darkness_of(field.light, field.wanted == 0, 8, 0.3 * ink);
+  cv::Mat soft, found, labels, stats, middles;
+  cv::GaussianBlur(dark, soft, {}, 1);
+  cv::bitwise_and(soft > kLeastShare * ink, field.wanted == 0, found);
+  cv::morphologyEx(found, found, cv::MORPH_OPEN, disc_of(kAwayMm / field.side));
+  const int count = cv::connectedComponentsWithStats(found, labels, stats, middles, 8);
+  std::vector<ExtraInk> extra;
+  for (int i = 1; i < count; ++i) {
+    const int left = stats.at<int>(i, cv::CC_STAT_LEFT), top = stats.at<int>(i, cv::CC_STAT_TOP);
+    const bool at_edge = left == 0 || top == 0 || left + stats.at<int>(i, cv::CC_STAT_WIDTH) == dark.cols ||
+                         top + stats.at<int>(i, cv::CC_STAT_HEIGHT) == dark.rows;
+    const double mm2 = field.side * field.side * stats.at<int>(i, cv::CC_STAT_AREA);
+    if (at_edge || mm2 < kLeastMm2) continue;
+    extra.push_back({(middles.at<double>(i, 0) + 0.5) * field.side, (middles.at<double>(i, 1) + 0.5) * field.side, mm2});
+  }
+  return extra;
+}
+
 }  // namespace
 
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
@@ -349,11 +410,10 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
     refine(soft, soft_cells, cells, comparison.view);
   }
   cv::Mat blank, full;
-  const auto disc = [](int side) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}); };
-  cv::dilate(cells.share > 0.01, blank, disc(9));
+  cv::dilate(cells.share > 0.01, blank, disc_of(8));
   blank = blank == 0;
-  cv::erode(cells.share > 0.99, full, disc(5));
-  const cv::Mat dark = darkness_of(in_cells(photo.light, cells, comparison.view), blank);
+  cv::erode(cells.share > 0.99, full, disc_of(4));
+  const cv::Mat dark = darkness_of(in_cells(photo.light, cells, comparison.view), blank, 1, 1);
   std::vector<float> inked;
   for (int y = 0; y < dark.rows; ++y) {
     for (int x = 0; x < dark.cols; ++x) {
@@ -365,7 +425,7 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
         Fault::kInput,
         "cannot be compared: no place of the layer, several pixels of the photograph wide, is printed in full, to tell "
         "the darkness of ink by; where drops are strewn, take the layer of a job without --saturation"};
-  const double ink = median_of(inked);
+  const double ink = upper_median_of(inked);
   if (ink < 0.05)
     return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};
   comparison.bands = missing_bands(dark, full, cells, layer.scan_along_x, ink);

@@ -14,6 +14,15 @@ inline double median_of(std::vector<double> values) {
   return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }
 
+/// Of an even number, the upper of the two in the middle; 0 of none. values  are left in another order
+template <class T>
+double upper_median_of(std::vector<T>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
 /// The standard deviation that normal values of this median distance from `middle` have.
 inline double scatter_of(const std::vector<double>& values, double middle) {
   std::vector<double> distances;

@@ -1,8 +1,10 @@
 #include "stages/calibration/scan/shape.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "stages/geometry/least_squares.h"
 
 namespace lamina::scan {
 
@@ -43,27 +45,25 @@ ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, do
   ShapeFit fit{.middle = middle};
   for (int step = 0; step < 5; ++step) {
     // First ground and height, then the middle too.
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    LeastSquares linear(3);
     double squares = 0, count = 0;
     for (std::size_t i = 0; i < profile.value.size(); ++i) {
       const double at = profile.place(i) - fit.middle;
       if (std::abs(at) > reach) continue;
-      const Eigen::Vector3d slope(1, shape.at(at), step == 0 ? 0 : -fit.height * shape.slope_at(at));
-      const double left = profile.value[i] - fit.ground - fit.height * slope(1);
-      normal += slope * slope.transpose();
-      right += slope * left;
+      const std::array<double, 3> slope{1, shape.at(at), step == 0 ? 0 : -fit.height * shape.slope_at(at)};
+      const double left = profile.value[i] - fit.ground - fit.height * slope[1];
+      linear.add(slope, left);
       squares += left * left;
       ++count;
     }
     if (count < 5) return fit;
     fit.misfit = std::sqrt(squares / count);
-    for (Eigen::Index k = 0; k < 3; ++k) normal(k, k) += 1e-9 * std::max(normal(k, k), 1e-9);
-    const Eigen::Vector3d change = normal.ldlt().solve(right);
-    if (!change.allFinite()) return fit;
-    fit.ground += change(0);
-    fit.height += change(1);
-    if (step > 0) fit.middle = std::clamp(fit.middle + change(2), middle - most, middle + most);
+    linear.damp(1e-9, 1e-18);
+    std::array<double, 3> change{};
+    if (!linear.solve(change)) return fit;
+    fit.ground += change[0];
+    fit.height += change[1];
+    if (step > 0) fit.middle = std::clamp(fit.middle + change[2], middle - most, middle + most);
   }
   return fit;
 }

@@ -1,44 +1,39 @@
 #include "stages/calibration/scan/sheet_fit.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
+
+#include "stages/calibration/scan/robust.h"
+#include "stages/geometry/least_squares.h"
 
 namespace lamina::scan {
 namespace {
 
-constexpr Eigen::Index kViewUnknowns = 9;
+constexpr std::size_t kViewUnknowns = 9;
 constexpr double kSmall = 1e-6;   // step of slopes
 constexpr double kKeptSmall = 1;  // pixels^2 / mm^2: an offset of 50 um weighs as much as a twentieth of a pixel of one dash
 constexpr double kLeastScale = 0.02;  // pixels
 
-using Both = Eigen::Matrix2d;
-using Pair = Eigen::Vector2d;
+double& unknown(View& view, std::size_t i) { return i < 8 ? view.h[i] : view.lens; }
 
-double& unknown(View& view, Eigen::Index i) { return i < 8 ? view.h[static_cast<std::size_t>(i)] : view.lens; }
+/// Pixels a mm of x and of y.
+struct Slopes {
+  Spot x, y;
+};
 
-double median_of(std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-/// Pixels a mm of x and of y there, as columns.
-Both slopes_at(const View& view, const Spot& at, const Spot& seen) {
+Slopes slopes_at(const View& view, const Spot& at, const Spot& seen) {
   const Spot x = view.at(at.x + kSmall, at.y), y = view.at(at.x, at.y + kSmall);
-  Both slopes;
-  slopes << (x.x - seen.x) / kSmall, (y.x - seen.x) / kSmall, (x.y - seen.y) / kSmall, (y.y - seen.y) / kSmall;
-  return slopes;
+  return {{(x.x - seen.x) / kSmall, (x.y - seen.y) / kSmall}, {(y.x - seen.x) / kSmall, (y.y - seen.y) / kSmall}};
 }
 
 class Fitter {
  public:
   Fitter(const std::vector<Sighting>& sightings, std::uint32_t first, bool lens, SheetFit& fit)
       : sightings_(sightings), first_(first), lens_(lens), fit_(fit), nozzles_(fit.offset.size()) {
-    unknowns_ = kViewUnknowns + 2 * (static_cast<Eigen::Index>(fit.shift.size()) - 1);
+    unknowns_ = kViewUnknowns + 2 * (fit.shift.size() - 1);
   }
 
   void run() {
@@ -51,12 +46,6 @@ class Fitter {
   }
 
  private:
-  struct Nozzle {
-    Both square = kKeptSmall * Both::Identity();
-    Pair right = Pair::Zero();
-    Eigen::MatrixXd mixed;  // unknowns x 2
-  };
-
   Spot place_of(const Sighting& one) const {
     const Spot shift = fit_.shift[one.swath], offset = fit_.offset[one.nozzle];
     return {one.place.x + shift.x + offset.x, one.place.y + shift.y + offset.y};
@@ -69,27 +58,29 @@ class Fitter {
       const Spot at = place_of(one), p = fit_.view.at(at.x, at.y);
       distances.push_back(std::hypot(p.x - one.seen.x, p.y - one.seen.y));
     }
-    return median_of(distances);
+    return upper_median_of(distances);
   }
 
   /// How far a dash lies from where it should, in mm of the sheet.
-  Pair off_by(const Sighting& one) const {
-    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y);
-    return slopes_at(fit_.view, at, p).inverse() * Pair(one.seen.x - p.x, one.seen.y - p.y);
+  Spot off_by(const Sighting& one) const {
+    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y), off{one.seen.x - p.x, one.seen.y - p.y};
+    const auto [x, y] = slopes_at(fit_.view, at, p);
+    const double area = x.x * y.y - y.x * x.y;
+    return {(y.y * off.x - y.x * off.y) / area, (x.x * off.y - x.y * off.x) / area};
   }
 
   /// Shifts as the medians of their dashes have them, so that a swath that lies far from the others is no outlier.
   void place_swaths() {
     std::vector<std::vector<double>> x(fit_.shift.size()), y(fit_.shift.size());
     for (const Sighting& one : sightings_) {
-      const Pair off = off_by(one);
-      x[one.swath].push_back(off.x());
-      y[one.swath].push_back(off.y());
+      const Spot off = off_by(one);
+      x[one.swath].push_back(off.x);
+      y[one.swath].push_back(off.y);
     }
-    const Spot first{median_of(x[first_]), median_of(y[first_])};
+    const Spot first{upper_median_of(x[first_]), upper_median_of(y[first_])};
     for (std::size_t s = 0; s < fit_.shift.size(); ++s) {
       if (s != first_ && !x[s].empty())
-        fit_.shift[s] = {fit_.shift[s].x + median_of(x[s]) - first.x, fit_.shift[s].y + median_of(y[s]) - first.y};
+        fit_.shift[s] = {fit_.shift[s].x + upper_median_of(x[s]) - first.x, fit_.shift[s].y + upper_median_of(y[s]) - first.y};
     }
   }
 
@@ -97,87 +88,71 @@ class Fitter {
   void place_nozzles() {
     std::vector<std::vector<double>> x(nozzles_), y(nozzles_);
     for (const Sighting& one : sightings_) {
-      const Pair off = off_by(one);
-      x[one.nozzle].push_back(fit_.offset[one.nozzle].x + off.x());
-      y[one.nozzle].push_back(fit_.offset[one.nozzle].y + off.y());
+      const Spot off = off_by(one);
+      x[one.nozzle].push_back(fit_.offset[one.nozzle].x + off.x);
+      y[one.nozzle].push_back(fit_.offset[one.nozzle].y + off.y);
     }
     for (std::size_t n = 0; n < nozzles_; ++n) {
-      if (!x[n].empty()) fit_.offset[n] = {median_of(x[n]), median_of(y[n])};
+      if (!x[n].empty()) fit_.offset[n] = {upper_median_of(x[n]), upper_median_of(y[n])};
     }
   }
 
-  /// Where the unknowns of a swath's shift begin; -1 of the first one.
-  Eigen::Index shift_at(std::uint32_t swath) const {
-    if (swath == first_) return -1;
-    return kViewUnknowns + 2 * static_cast<Eigen::Index>(swath < first_ ? swath : swath - 1);
+  /// Where the unknowns of a swath's shift begin; not of the first one.
+  std::size_t shift_at(std::uint32_t swath) const {
+    return kViewUnknowns + 2 * std::size_t{swath < first_ ? swath : swath - 1};
   }
 
-  void add(const Sighting& one, const std::array<View, kViewUnknowns>& moved, double reach) {
-    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y);
-    const Pair error(one.seen.x - p.x, one.seen.y - p.y);
-    const double share = error.norm() / reach;
+  void add(const Sighting& one, const std::array<View, kViewUnknowns>& moved, double reach, GroupedLeastSquares& linear) const {
+    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y), error{one.seen.x - p.x, one.seen.y - p.y};
+    const double share = std::hypot(error.x, error.y) / reach;
     if (share >= 1) return;
     const double weight = (1 - share * share) * (1 - share * share);
-    Eigen::Matrix<double, 2, kViewUnknowns> slope;
-    for (Eigen::Index i = 0; i < kViewUnknowns; ++i) {
-      const Spot q = moved[static_cast<std::size_t>(i)].at(at.x, at.y);
-      slope.col(i) << (q.x - p.x) / kSmall, (q.y - p.y) / kSmall;
+    std::array<GroupedLeastSquares::Term, kViewUnknowns + 2> x{}, y{};
+    for (std::size_t i = 0; i < kViewUnknowns; ++i) {
+      const Spot q = moved[i].at(at.x, at.y);
+      const bool known = i == kViewUnknowns - 1 && !lens_;
+      x[i] = {i, known ? 0 : (q.x - p.x) / kSmall};
+      y[i] = {i, known ? 0 : (q.y - p.y) / kSmall};
     }
-    if (!lens_) slope.col(kViewUnknowns - 1).setZero();
-    const Both place = slopes_at(fit_.view, at, p);
-    Nozzle& nozzle = by_nozzle_[one.nozzle];
-    normal_.topLeftCorner<kViewUnknowns, kViewUnknowns>() += weight * slope.transpose() * slope;
-    right_.head<kViewUnknowns>() += weight * slope.transpose() * error;
-    nozzle.mixed.topRows<kViewUnknowns>() += weight * slope.transpose() * place;
-    nozzle.square += weight * place.transpose() * place;
-    nozzle.right += weight * place.transpose() * error;
-    const Eigen::Index s = shift_at(one.swath);
-    if (s < 0) return;
-    normal_.block<2, 2>(s, s) += weight * place.transpose() * place;
-    normal_.block<kViewUnknowns, 2>(0, s) += weight * slope.transpose() * place;
-    normal_.block<2, kViewUnknowns>(s, 0) += weight * place.transpose() * slope;
-    right_.segment<2>(s) += weight * place.transpose() * error;
-    nozzle.mixed.middleRows<2>(s) += weight * place.transpose() * place;
+    const Slopes slopes = slopes_at(fit_.view, at, p);
+    const std::array<double, 2> own_x{slopes.x.x, slopes.y.x}, own_y{slopes.x.y, slopes.y.y};
+    const std::size_t terms = kViewUnknowns + (one.swath == first_ ? 0 : 2);
+    for (std::size_t i = kViewUnknowns; i < terms; ++i) {
+      const std::size_t axis = i - kViewUnknowns;
+      x[i] = {shift_at(one.swath) + axis, own_x[axis]};
+      y[i] = {shift_at(one.swath) + axis, own_y[axis]};
+    }
+    linear.add(std::span(x).first(terms), one.nozzle, own_x, error.x, weight);
+    linear.add(std::span(y).first(terms), one.nozzle, own_y, error.y, weight);
   }
 
   /// returns the largest change of view and shifts
   double take_step() {
     const double reach = 4.7 * std::max(1.4826 * scatter(), kLeastScale);
-    normal_ = Eigen::MatrixXd::Zero(unknowns_, unknowns_);
-    right_ = Eigen::VectorXd::Zero(unknowns_);
-    by_nozzle_.assign(nozzles_, {});
+    GroupedLeastSquares linear(unknowns_, nozzles_, 2);
     for (std::size_t n = 0; n < nozzles_; ++n) {
-      by_nozzle_[n].mixed = Eigen::MatrixXd::Zero(unknowns_, 2);
-      by_nozzle_[n].right = -kKeptSmall * Pair(fit_.offset[n].x, fit_.offset[n].y);
+      linear.add({}, n, std::array{1.0, 0.0}, -fit_.offset[n].x, kKeptSmall);
+      linear.add({}, n, std::array{0.0, 1.0}, -fit_.offset[n].y, kKeptSmall);
     }
     std::array<View, kViewUnknowns> moved;
-    for (Eigen::Index i = 0; i < kViewUnknowns; ++i) {
-      moved[static_cast<std::size_t>(i)] = fit_.view;
-      unknown(moved[static_cast<std::size_t>(i)], i) += kSmall;
+    for (std::size_t i = 0; i < kViewUnknowns; ++i) {
+      moved[i] = fit_.view;
+      unknown(moved[i], i) += kSmall;
     }
-    for (const Sighting& one : sightings_) add(one, moved, reach);
-    // Nozzles are eliminated one by one: each has two unknowns of its own.
-    for (const Nozzle& nozzle : by_nozzle_) {
-      const Eigen::MatrixXd share = nozzle.mixed * nozzle.square.inverse();
-      normal_ -= share * nozzle.mixed.transpose();
-      right_ -= share * nozzle.right;
-    }
-    const Eigen::VectorXd scale = (normal_.diagonal().array() > 0).select(normal_.diagonal().array().rsqrt(), 1).matrix();
-    Eigen::MatrixXd scaled = scale.asDiagonal() * normal_ * scale.asDiagonal();
-    scaled.diagonal().array() += 1e-12;
-    const Eigen::VectorXd change = scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right_)));
-    if (!change.allFinite()) return 0;
-    for (Eigen::Index i = 0; i < kViewUnknowns; ++i) unknown(fit_.view, i) += change(i);
+    for (const Sighting& one : sightings_) add(one, moved, reach, linear);
+    std::vector<double> change(unknowns_), offset(2 * nozzles_);
+    if (!linear.solve(1e-12, change, offset)) return 0;
+    for (std::size_t i = 0; i < kViewUnknowns; ++i) unknown(fit_.view, i) += change[i];
     for (std::uint32_t s = 0; s < fit_.shift.size(); ++s) {
-      if (const Eigen::Index at = shift_at(s); at >= 0)
-        fit_.shift[s] = {fit_.shift[s].x + change(at), fit_.shift[s].y + change(at + 1)};
+      if (s == first_) continue;
+      const std::size_t at = shift_at(s);
+      fit_.shift[s] = {fit_.shift[s].x + change[at], fit_.shift[s].y + change[at + 1]};
     }
-    for (std::size_t n = 0; n < nozzles_; ++n) {
-      const Nozzle& nozzle = by_nozzle_[n];
-      const Pair moved_by = nozzle.square.inverse() * (nozzle.right - nozzle.mixed.transpose() * change);
-      fit_.offset[n] = {fit_.offset[n].x + moved_by.x(), fit_.offset[n].y + moved_by.y()};
-    }
-    return change.cwiseAbs().maxCoeff();
+    for (std::size_t n = 0; n < nozzles_; ++n)
+      fit_.offset[n] = {fit_.offset[n].x + offset[2 * n], fit_.offset[n].y + offset[2 * n + 1]};
+    double most = 0;
+    for (const double one : change) most = std::max(most, std::abs(one));
+    return most;
   }
 
   const std::vector<Sighting>& sightings_;
@@ -185,10 +160,7 @@ class Fitter {
   bool lens_;
   SheetFit& fit_;
   std::size_t nozzles_;
-  Eigen::Index unknowns_ = 0;
-  Eigen::MatrixXd normal_;
-  Eigen::VectorXd right_;
-  std::vector<Nozzle> by_nozzle_;
+  std::size_t unknowns_ = 0;
 };
 
 }  // namespace
@@ -206,9 +178,9 @@ HeadLine line_of(const std::vector<std::pair<double, double>>& values) {
       slopes.push_back((values[j].second - values[i].second) / (values[j].first - values[i].first));
   }
   HeadLine line;
-  line.slope = median_of(slopes);
+  line.slope = upper_median_of(slopes);
   for (const auto& [index, value] : values) rest.push_back(value - line.slope * index);
-  line.middle = median_of(rest);
+  line.middle = upper_median_of(rest);
   return line;
 }
 
