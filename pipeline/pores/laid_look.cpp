@@ -7,7 +7,7 @@
 #include "pipeline/pores/bead_rules.h"
 #include "pipeline/pores/pore_drawing.h"
 #include "stages/pores/throat.h"
-#include "stages/segment/predict.h"  // the gap that bonds
+#include "stages/segment/pore_geometry.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

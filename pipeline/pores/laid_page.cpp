@@ -10,6 +10,7 @@
 #include "pipeline/pores/pore_page.h"
 #include "stages/data/ticks.h"
 #include "stages/formats/plot/plot.h"
+#include "stages/segment/pore_geometry.h"
 #include "stages/segment/predict.h"
 #include "stages/support/text/json.h"
 #include "stages/support/text/readable.h"

@@ -5,11 +5,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/segment/pore_geometry.h"
+
 namespace lamina::segment {
 namespace {
 
 double group_distance(const Segmentation& s) {
   return 2 * s.spacing_sc_mm + (static_cast<double>(s.continuous) - 1) * s.spacing_cc_mm;
+}
+
+PoreSize planned_pore(const Segmentation& s) {
+  return pore_geometry({s.thick_width_mm, s.thin_width_mm, s.continuous_width_mm}, s.thin_mm, s.spacing_sc_mm);
 }
 
 }  // namespace
@@ -94,15 +100,15 @@ std::vector<std::string> warnings(const Segmentation& s, const Calibration& cali
                       s.thick_speed, s.thick_extrusion, reading.thick_speed_percent));
     }
   }
-  const double gap = s.spacing_sc_mm - (s.thick_width_mm + s.continuous_width_mm) / 2;
+  const PoreSize pore = planned_pore(s);
+  const double gap = pore.gap_mm;
   if (gap > kBondGap) {
     lines.push_back(
         fmt::format("segment.spacing_sc_mm: thick stretches and continuous lines will be {:.3f} mm apart and not bond; "
                     "give {:.3f} mm",
                     gap, s.spacing_sc_mm - gap));
   }
-  const double pore = predict_pores(s).length_mm;
-  if (pore <= 0) {
+  if (pore.length_mm <= 0) {
     lines.push_back(
         fmt::format("segment.thin_mm: {} mm is not longer than a thick bead is wide ({:.2f} mm): its round ends meet and "
                     "close the pore; give more",
@@ -113,8 +119,9 @@ std::vector<std::string> warnings(const Segmentation& s, const Calibration& cali
 
 Pores predict_pores(const Segmentation& s) {
   Pores pores{};
-  pores.length_mm = s.thin_mm - s.thick_width_mm;
-  pores.width_mm = s.spacing_sc_mm - (s.thin_width_mm + s.continuous_width_mm) / 2;
+  const PoreSize size = planned_pore(s);
+  pores.length_mm = size.length_mm;
+  pores.width_mm = size.width_mm;
   pores.aspect = pores.length_mm > 0 ? pores.width_mm / pores.length_mm : 0;
   pores.density_mm2 = 2 / ((s.thin_mm + s.thick_mm) * group_distance(s));
   return pores;

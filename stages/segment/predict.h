@@ -42,16 +42,11 @@ Status check(const Segmentation& segmentation, double bead_width_mm);
 /// What a user should know: a pore that closes, speeds outside of what was measured, beads that do not touch.
 std::vector<std::string> warnings(const Segmentation& segmentation, const Calibration& calibration);
 
-/// Beads that are no further apart than this, mm, bond: they spread by as much.
-inline constexpr double kBondGap = 0.02;
-
-/// A pore beside a thin stretch. Beads are laid as by a round pen: thick stretches end in half circles that reach into
-/// the thin one, so a pore is shorter than the thin stretch by one thick width; across, it is what the spacing leaves
-/// between the thin stretch and the continuous line.
+/// A pore between a thin stretch and the continuous line next to it (pore_geometry.h).
 struct Pores {
   double length_mm, width_mm;
   double aspect;       // width / length
-  double density_mm2;  // pores in a mm2 of a layer: two beside each thin stretch
+  double density_mm2;  // pores in a mm2 of a layer: two at each thin stretch
 };
 Pores predict_pores(const Segmentation& segmentation);
 

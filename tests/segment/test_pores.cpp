@@ -7,6 +7,7 @@
 #include "stages/segment/laid/crossing.h"
 #include "stages/segment/laid/pores.h"
 #include "stages/segment/layer_cut.h"
+#include "stages/segment/pore_geometry.h"
 
 namespace lamina::segment {
 namespace {

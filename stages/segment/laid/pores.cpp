@@ -4,6 +4,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "stages/segment/pore_geometry.h"
+
 namespace lamina::segment {
 namespace {
 
@@ -126,19 +128,19 @@ void PoreCounter::judge(const std::optional<double>& distance_mm, double other_m
     ++counts_.edges;
     return;
   }
-  if (*distance_mm - (plan_.thick_width_mm + other_mm) / 2 > kBondGap + 2 * kNear * 1e-6) {
+  const PoreSize pore = pore_geometry({plan_.thick_width_mm, thin_mm_, other_mm}, length_mm_, *distance_mm);
+  if (pore.gap_mm > kBondGap + 2 * kNear * 1e-6) {
     ++counts_.open;
     counts_.distance_mm += *distance_mm;
     return;
   }
-  const double length = length_mm_ - plan_.thick_width_mm, width = *distance_mm - (thin_mm_ + other_mm) / 2;
-  if (length <= 0 || width <= 0) {
+  if (pore.length_mm <= 0 || pore.width_mm <= 0) {
     ++counts_.filled;
     return;
   }
   ++counts_.closed;
-  counts_.length_mm += length;
-  counts_.width_mm += width;
+  counts_.length_mm += pore.length_mm;
+  counts_.width_mm += pore.width_mm;
 }
 
 }  // namespace lamina::segment

@@ -1,7 +1,6 @@
 // stages/segment/laid/pores.h: the pores that thin stretches leave, counted from the toolpaths that are laid.
 //
-// A pore lies between a thin stretch and the line beside it. Its length is that of the thin stretch less one thick width, since
-// beads end round; its width is what the distance of the two lines, as they lie, leaves between their beads.
+// Their sizes are those of pore_geometry.h, at the distances that the lines have.
 #pragma once
 
 #include <array>
