@@ -1,6 +1,6 @@
 // stages/program/raw/README.md tells the format.
 #include "stages/replay/bytes.h"
-#include "stages/replay/care/records.h"
+#include "stages/replay/care_records.h"
 #include "stages/replay/dialects.h"
 
 namespace lamina::replay {

@@ -1,4 +1,4 @@
-// stages/replay/care/records.h: care of head and powder in programs of raw and planes, as their READMEs tell it.
+// stages/replay/care_records.h: care of head and powder in programs of raw and planes, as their READMEs tell it.
 #pragma once
 
 #include "stages/replay/bytes.h"

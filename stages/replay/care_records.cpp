@@ -1,5 +1,5 @@
 // stages/program/raw/README.md and planes/README.md tell the format.
-#include "stages/replay/care/records.h"
+#include "stages/replay/care_records.h"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stages/replay/bytes.h"
-#include "stages/replay/care/records.h"
+#include "stages/replay/care_records.h"
 #include "stages/replay/dialects.h"
 
 namespace lamina::replay {
