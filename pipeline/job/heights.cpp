@@ -58,8 +58,7 @@ const JobKey kHeightsKeys[] = {
         kLength),
     word<kCuspsOf, kHeights, &Request::cusp_of>(
         {"heights", "cusp_of", "--cusp-of", "printed|nominal",
-         "with --shrink: the steps that are printed, or those of the part once it has shrunk", decides::all})
-        .unsaid_at("printed"),
+         "with --shrink: the steps that are printed, or those of the part once it has shrunk", decides::all}),
     field<kHeights, &Request::adapt_angle_deg>(
         {"heights", "adapt_angle_deg", "--adapt-angle", "DEG",
          "angle: slopes at least this flat, before --shrink, get thinner layers; 0 is a wall, 90 a horizontal face",
@@ -80,12 +79,10 @@ const JobKey kHeightsKeys[] = {
         {"heights", "facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing", decides::all}, kArea),
     word<kPeaks, kHeights, &Request::peaks>(
         {"heights", "peaks", "--peaks", "flats|facets",
-         "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all})
-        .unsaid_at("flats"),
+         "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all}),
     field<kHeights, &Request::cover_top>({"heights", "cover_top", "--cover-top", "",
                                           "angle and optimal: the last layer ends at the top or above it", decides::all,
-                                          "true"})
-        .unsaid_at("false"),
+                                          "true"}),
     field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",
                                       "optimal: do not aim at horizontal faces and tops, only keep the step", decides::all,
                                       "false"}),

@@ -194,7 +194,6 @@ struct Job {
   bool quote = false;                   // tell what each part uses up, without prices too
   bool json = false;
   bool quiet = false;
-  std::vector<std::string> notes;  // notes from reading it: old forms and their replacements
   std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"
   bool leave_to_machine = false;   // toolpaths: walls and layers that nobody named are the extruder's, not those here
   /// Profiles that its file names and that are not there, with what to say of each.

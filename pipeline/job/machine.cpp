@@ -82,9 +82,7 @@ const JobKey kDoseKeys[] = {
         .shown_if([](const Job& job) { return job.levels > 0; }),
     field<&Job::dose, &DoseRequest::dithered>({"dose", "dithered", "--no-dither", "",
                                                "round drops to whole ones (with --levels or --saturation)", decides::images,
-                                               "false"})
-        .unsaid_at("true"),
-    // The default is omitted, so that jobs without beads keep their earlier text.
+                                               "false"}),
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
         {"dose", "bead_ends", "--bead-ends", "round|square",
          "of the beads that fill a part, and of their thick and thin stretches", decides::images})

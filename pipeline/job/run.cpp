@@ -51,7 +51,7 @@ std::string write_share(const Pair& share) {
   return share ? fmt::format("{}/{}", (*share)[0] + 1, (*share)[1]) : std::string();
 }
 
-// true and false are older words for auto and off; written still, so that jobs keep their text.
+// true and false mean auto and off; they are what is written.
 std::string read_repair(std::string_view text, Job& job) {
   const bool winding = text == "winding" || text == "\"winding\"", off = text == "off" || text == "false";
   if (!winding && !off && text != "auto" && text != "true") return "has to be auto, winding or off";

@@ -30,13 +30,6 @@ class LineWriter {
     char text[32];
     out_.append(text, fmt::format_to(text, FMT_COMPILE("{}"), value));
   }
-  /// A number that older manifests lack.
-  template <class Number>
-  void added(std::string_view key, const Number& value) {
-    number(key, value);
-  }
-  /// A number that only older manifests have.
-  void retired(std::string_view) {}
   /// A text determined by the rest of the line.
   void fixed(std::string_view key, std::string_view value) {
     begin(key);
@@ -98,14 +91,6 @@ class LineReader {
     expect(error == std::errc());
     if constexpr (std::is_floating_point_v<Number>) expect(std::isfinite(value));
     if (good()) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
-  }
-  template <class Number>
-  void added(std::string_view key, Number& value) {
-    if (follows(key)) number(key, value);
-  }
-  void retired(std::string_view key) {
-    double unused = 0;
-    if (follows(key)) number(key, unused);
   }
   void fixed(std::string_view key, std::string_view value) {
     begin(key);

@@ -69,41 +69,16 @@ std::string difference_of_jobs(std::string_view now, std::string_view earlier) {
   return said.empty() ? "" : fmt::format("{} is set no more, or {}", said.begin()->first, kOtherBuild);
 }
 
-/// The head with profiles and presets by their files' names.
-ManifestHead by_file_names(ManifestHead head) {
-  std::string text, section;
-  for (const std::string_view line : split(head.job_toml, "\n")) {
-    if (line.starts_with('[')) section = line;
-    const bool names = section == "[machine]" && (line.starts_with("profile = ") || line.starts_with("presets = "));
-    bool quoted = false;
-    std::size_t begin = 0;  // of the string at hand
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      text += line[i];
-      if (line[i] == '\\' && i + 1 < line.size()) {
-        text += line[++i];
-      } else if (line[i] == '"') {
-        quoted = !quoted;
-        begin = text.size();
-      } else if (names && quoted && line[i] == '/') {
-        text.resize(begin);
-      }
-    }
-    text += '\n';
-  }
-  head.job_toml = std::move(text);
-  return head;
-}
-
 }  // namespace
 
 bool same_job(const ManifestHead& one, const ManifestHead& other) {
-  return one.id() == other.id() || by_file_names(one).id() == by_file_names(other).id();
+  return one.id() == other.id();
 }
 
 std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   if (same_job(now, earlier)) return {};
   if (now.version != earlier.version) return fmt::format("lamina is {}, was {}", now.version, earlier.version);
-  if (std::string what = difference_of_jobs(by_file_names(now).job_toml, by_file_names(earlier).job_toml); !what.empty()) {
+  if (std::string what = difference_of_jobs(now.job_toml, earlier.job_toml); !what.empty()) {
     return what.starts_with("part.") && now.parts.size() != earlier.parts.size() ? "the parts are others" : what;
   }
   for (std::size_t i = 0; i < std::min(now.parts.size(), earlier.parts.size()); ++i) {

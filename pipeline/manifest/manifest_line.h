@@ -10,15 +10,15 @@ namespace lamina {
 
 template <class Io, class Pores>
 void describe_pores(Io& io, Pores& pores) {
-  io.added("pores", pores.closed);
-  io.added("pores_open", pores.open);
-  io.added("pores_filled", pores.filled);
-  io.added("pores_at_edges", pores.edges);
-  io.added("pores_length_mm", pores.length_mm);
-  io.added("pores_width_mm", pores.width_mm);
-  io.added("pores_distance_mm", pores.distance_mm);
-  io.added("crossing", pores.crossing);
-  io.added("crossed", pores.crossed);
+  io.number("pores", pores.closed);
+  io.number("pores_open", pores.open);
+  io.number("pores_filled", pores.filled);
+  io.number("pores_at_edges", pores.edges);
+  io.number("pores_length_mm", pores.length_mm);
+  io.number("pores_width_mm", pores.width_mm);
+  io.number("pores_distance_mm", pores.distance_mm);
+  io.number("crossing", pores.crossing);
+  io.number("crossed", pores.crossed);
 }
 
 template <class Io, class Paths>
@@ -31,16 +31,16 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("laid_mm", t.bead_mm);
   io.number("travel_mm", t.travel_mm);
   io.number("volume_mm3", t.volume_mm3);
-  io.added("beside_mm3", t.beside_mm3);
+  io.number("beside_mm3", t.beside_mm3);
   io.number("filament_mm", t.filament_mm);
   io.number("seconds", t.seconds);
   io.number("low_x_nm", t.lo_x);
   io.number("low_y_nm", t.lo_y);
   io.number("high_x_nm", t.hi_x);
   io.number("high_y_nm", t.hi_y);
-  io.added("beside_moves", t.beside_moves);
-  io.added("beside_mm", t.beside_mm);
-  io.added("beside_filament_mm", t.beside_filament_mm);
+  io.number("beside_moves", t.beside_moves);
+  io.number("beside_mm", t.beside_mm);
+  io.number("beside_filament_mm", t.beside_filament_mm);
   auto& laid = paths.laid;
   io.number("segmented_lines", laid.segments.lines);
   io.number("pieces", laid.segments.pieces);
@@ -48,13 +48,12 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("thin", laid.segments.thin);
   io.number("solid_mm3", laid.porosity.solid_mm3);
   io.number("extruded_mm3", laid.porosity.extruded_mm3);
-  io.retired("ellipses_mm3");
   io.number("measured_mm3", laid.porosity.measured_mm3);
   describe_pores(io, laid.pores);
-  io.added("too_short", laid.shorts.count);
-  io.added("shortest_mm", laid.shorts.shortest_mm);
-  io.added("reached_mm_s", laid.shorts.reached_mm_s);
-  io.added("told_mm_s", laid.shorts.told_mm_s);
+  io.number("too_short", laid.shorts.count);
+  io.number("shortest_mm", laid.shorts.shortest_mm);
+  io.number("reached_mm_s", laid.shorts.reached_mm_s);
+  io.number("told_mm_s", laid.shorts.told_mm_s);
   io.list("ranges", paths.by_range, [&](auto& range) {
     io.number("area_mm2", range.area_mm2);
     describe_pores(io, range.pores);
@@ -96,7 +95,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
       io.number("bytes", image.bytes);
       io.number("set_pixels", image.set_pixels);
       if (head.grey_drops()) io.number("drops", image.drops);
-      if (!head.machine.empty()) io.added("unfed_pixels", image.unfed_pixels);
+      if (!head.machine.empty()) io.number("unfed_pixels", image.unfed_pixels);
       io.hash("xxh3_128", image.hash);
       io.close("}");
     }
@@ -111,8 +110,8 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("drops", record.program.drops);
   io.number("moved", record.program.moved);
   io.number("lost", record.program.lost);
-  io.added("microseconds", record.program.microseconds);
-  io.added("spat", record.program.spat);
+  io.number("microseconds", record.program.microseconds);
+  io.number("spat", record.program.spat);
   if (head.head_drops > 1) {
     io.number("added_sweeps", record.program.added_sweeps);
     io.number("added_microseconds", record.program.added_microseconds);

@@ -20,7 +20,6 @@ std::string read_head_text(FileReader& file) {
   std::string head;
   for (std::string_view line; file.next(line);) {
     head += line;
-    // Heads of an earlier version are indented.
     if (line.ends_with(kLayers) || head.size() > kLongestHead) return head;
     if (file.line_number() == 1 && line != "{") return head;
     head += '\n';

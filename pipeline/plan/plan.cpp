@@ -65,7 +65,7 @@ class Planner {
       auto materials = materials_of(job(), machine());
       if (!materials) return materials.error();
       materials_ = std::move(*materials);
-      // Of one powder no layer mixes: the kept profile says what it said before `refuse` was the rule, so that its jobs go on.
+      // No layer of one powder mixes: the rule has no effect, and the kept profile names one value.
       if (printer_.machine && !materials_.several()) printer_.machine->machine.powder.vat_rule = VatRule::kMajority;
       beads_ = job().segment.any();
     }
