@@ -101,7 +101,7 @@ if(LAMINA_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
 endif()
 if(LAMINA_UNITE)
   set(united ${once_a_job})
-  list(FILTER united EXCLUDE REGEX "/(cli/commands/plan|job/extrude|job/profiles/printer)\\.cpp$")
+  list(FILTER united EXCLUDE REGEX "/(cli/commands/plan|job/profiles/printer)\\.cpp$")
   lamina_unite(lamina_once_a_job ${united})
 endif()
 

@@ -7,7 +7,7 @@
 #include <future>
 #include <set>
 
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/plan/fill.h"
