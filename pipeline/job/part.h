@@ -10,26 +10,13 @@
 #include <vector>
 
 #include "pipeline/job/fill.h"
+#include "stages/data/saturation.h"
 #include "stages/data/status.h"
 #include "stages/support/text/toml.h"
 
 namespace lamina::pipeline {
 
 struct Job;
-
-/// Per cent of the powder's voids: a number, or a formula of x, y and z in mm.
-struct Saturation {
-  double percent = 0;
-  std::string formula;  // empty: the number
-
-  Saturation() = default;
-  Saturation(double of_voids) : percent(of_voids) {}
-  static Saturation of(std::string text) {
-    Saturation saturation;
-    saturation.formula = std::move(text);
-    return saturation;
-  }
-};
 
 /// A different material between two heights, in mm above the bottom of a part. Where ranges overlap, the last one counts.
 struct MaterialRange {

@@ -1,5 +1,5 @@
-// stages/bead/pore.cpp: the gap along a period, from the middle of the thin stretch to both sides.
-#include "stages/bead/pore.h"
+// tests/bead/pore.cpp: the gap along a period, from the middle of the thin stretch to both sides.
+#include "tests/bead/pore.h"
 
 #include <algorithm>
 #include <cstddef>

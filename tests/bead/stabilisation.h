@@ -1,4 +1,4 @@
-// stages/bead/stabilisation.h: the lag of a hot end from where a bead is as wide again as before the speed rose.
+// tests/bead/stabilisation.h: the lag of a hot end from where a bead is as wide again as before the speed rose.
 //
 // A line laid evenly goes on at a higher speed; its width drops and comes back. The way until then is measured with a ruler,
 // and no width of the thin bead is needed: Di Nisio 2022, Table 11, column "stabilisation distance". "As wide again" is as near

@@ -1,5 +1,5 @@
-// stages/bead/stabilisation.cpp: the lag with which a bead is as wide again after the measured way.
-#include "stages/bead/stabilisation.h"
+// tests/bead/stabilisation.cpp: the lag with which a bead is as wide again after the measured way.
+#include "tests/bead/stabilisation.h"
 
 #include <algorithm>
 #include <cmath>

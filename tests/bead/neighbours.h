@@ -1,4 +1,4 @@
-// stages/bead/neighbours.h: beads side by side that leave each other no room; volume is conserved in the cross-section.
+// tests/bead/neighbours.h: beads side by side that leave each other no room; volume is conserved in the cross-section.
 //
 // Each bead alone has two round sides. Where two reach each other they share the space between their centres: what would lie
 // twice fills the cusps above and below the place where they touch. A stadium's cusps hold an overlap of (1 - pi/4) of the

@@ -1,5 +1,5 @@
-// stages/bead/neighbours.cpp: groups of beads that touch; the room between their centres is shared by all of a group.
-#include "stages/bead/neighbours.h"
+// tests/bead/neighbours.cpp: groups of beads that touch; the room between their centres is shared by all of a group.
+#include "tests/bead/neighbours.h"
 
 #include <algorithm>
 #include <cstddef>
