@@ -40,10 +40,10 @@ Error interrupted() { return {Fault::kInterrupted, "interrupted"}; }
 
 Status read_file(const std::string& path, const std::atomic<bool>& cancel, std::vector<std::byte>& block,
                  std::uint64_t& bytes) {
-  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) return system_error(Fault::kInput, path);
   while (!cancel) {
-    const ssize_t got = read(file.get(), block.data(), block.size());
+    const ssize_t got = ::read(file.get(), block.data(), block.size());
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return system_error(Fault::kInput, path);
     if (got == 0) return {};
