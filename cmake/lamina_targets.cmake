@@ -54,7 +54,7 @@ list(FILTER stage_sources EXCLUDE REGEX "/stages/(view/picture|calibration/scan)
 add_library(lamina_stages STATIC ${stage_sources})
 add_library(lamina::stages ALIAS lamina_stages)
 if(LAMINA_UNITE STREQUAL "all")
-  list(FILTER stage_sources EXCLUDE REGEX "/(load/stl_ascii|load/stl_binary|slice/gaps)\\.cpp$")  # names of their own
+  list(FILTER stage_sources EXCLUDE REGEX "/slice/gaps\\.cpp$")  # names of their own
   lamina_unite(lamina_stages ${stage_sources})
 endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>

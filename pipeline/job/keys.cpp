@@ -10,7 +10,7 @@
 #include "pipeline/job/profiles/printer.h"
 #include "stages/data/units.h"
 #include "stages/dose/field.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"

@@ -13,7 +13,7 @@
 
 #include "pipeline/manifest/manifest_head.h"
 #include "pipeline/manifest/manifest_line.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"

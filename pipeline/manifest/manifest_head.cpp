@@ -10,7 +10,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/program/dialect.h"
 #include "stages/support/text/readable.h"

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "stages/dose/saturate.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/program/care/care_check.h"
 #include "stages/program/head_grid.h"
 

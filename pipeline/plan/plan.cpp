@@ -18,7 +18,7 @@
 #include "pipeline/plan/reach.h"
 #include "stages/checks/records.h"
 #include "stages/formats/extrusion_format.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"

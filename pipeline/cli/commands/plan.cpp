@@ -16,7 +16,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/laid_look.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/json.h"
 

@@ -1,9 +1,9 @@
-// stages/load/detect.cpp: what kind of file is this, by its content or by its name alone.
+#include "stages/load/reader.h"
+
 #include <algorithm>
 #include <string_view>
 
 #include "stages/load/foreign/foreign.h"
-#include "stages/load/reader.h"
 #include "stages/load/text.h"
 
 namespace lamina::load {

@@ -1,14 +1,179 @@
-#include <fmt/format.h>
-#include <unistd.h>
+#include "stages/formats/tiff/tiff.h"
 
+#include <fmt/format.h>
+
+#include <unistd.h>
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
+#include "stages/data/units.h"
 #include "stages/formats/g4/decode.h"
+#include "stages/formats/g4/encode.h"
+#include "stages/formats/image_format.h"
 #include "stages/formats/images/image_formats.h"
+#include "stages/formats/tiff/ending.h"
+#include "stages/formats/tiff/memory_file.h"
+#include "stages/formats/tiff/tags.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
+
+namespace lamina::write::tiff {
+namespace {
+
+// libtiff's header of a classic TIFF. The first strip follows it.
+constexpr std::size_t kHeaderBytes = 8;
+
+class G4Encoder : public ImageEncoder {
+ public:
+  void tag(const LayerTags& tags) override { text_.take(tags); }
+  void use(Isa isa) override { encoder_ = g4::Encoder(isa); }
+
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    if (Status status = check_size(runs.columns, runs.rows()); !status) return status;
+    file.resize(file.capacity());
+    const std::size_t end = encoder_.encode(runs, file, kHeaderBytes);
+    if (end > kMostClassicBytes - kDirectoryBytes) return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB");
+    const Ending::Image image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kHeaderBytes > UINT16_MAX};
+    if (!text_.any() && ending_.put(image, end, file)) return {};
+    if (file.size() < end + kDirectoryBytes) file.resize(end + kDirectoryBytes);
+
+    MemoryFile memory{file};
+    std::string message;
+    TiffHandle tiff = open_for_writing(memory, message);
+    if (tiff == nullptr) return cannot_hold(runs.columns, runs.rows(), message);
+    set_tags(tiff.get(), {runs.columns, runs.rows(), dpi_x, dpi_y}, 1, COMPRESSION_CCITTFAX4, runs.rows());
+    text_.put(tiff.get());
+    const auto length = static_cast<tmsize_t>(end - kHeaderBytes);
+    const bool written = TIFFWriteRawStrip(tiff.get(), 0, file.data() + kHeaderBytes, length) == length;
+    Status status = finish(std::move(tiff), written, memory, {runs.columns, runs.rows(), dpi_x, dpi_y}, message);
+    if (status && !text_.any()) ending_.take(image, file, end);
+    return status;
+  }
+
+ private:
+  LayerText text_;
+  g4::Encoder encoder_;
+  Ending ending_;  // of the layer before
+};
+
+class StripEncoder : public ImageEncoder {
+ public:
+  void tag(const LayerTags& tags) override { text_.take(tags); }
+  explicit StripEncoder(std::uint16_t compression) : compression_(compression) {}
+
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    if (Status status = check_size(runs.columns, runs.rows()); !status) return status;
+    const std::size_t stride = row_bytes(runs.columns);
+    if (compression_ == COMPRESSION_NONE && stride * runs.rows() > kMostClassicBytes - kStripBytes) {
+      return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB; use --format tiff-g4");
+    }
+    const auto rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, runs.rows()));
+    if (compression_ == COMPRESSION_NONE) {  // its size is known: nothing has to grow, and no second copy exists meanwhile
+      const std::size_t strips = ceil_div<std::size_t>(runs.rows(), rows_per_strip);
+      file.clear();
+      file.reserve(kHeaderBytes + stride * runs.rows() + kDirectoryBytes + strips * 2 * sizeof(std::uint32_t));
+    }
+    file.resize(file.capacity());
+    MemoryFile memory{file};
+    std::string message;
+    TiffHandle tiff = open_for_writing(memory, message);
+    if (tiff == nullptr) return cannot_hold(runs.columns, runs.rows(), message);
+    set_tags(tiff.get(), {runs.columns, runs.rows(), dpi_x, dpi_y}, 1, compression_, rows_per_strip);
+    text_.put(tiff.get());
+
+    bool written = true;
+    bits_.resize(stride * rows_per_strip);
+    for (std::uint32_t first = 0, strip = 0; first < runs.rows() && written; first += rows_per_strip, ++strip) {
+      const std::uint32_t rows = std::min(rows_per_strip, runs.rows() - first);
+      for (std::uint32_t r = 0; r < rows; ++r) {
+        expand_row(runs.row(first + r), std::span(bits_).subspan(stride * r, stride));
+      }
+      const auto length = static_cast<tmsize_t>(stride * rows);
+      written = compression_ == COMPRESSION_NONE ? TIFFWriteRawStrip(tiff.get(), strip, bits_.data(), length) == length
+                                                 : TIFFWriteEncodedStrip(tiff.get(), strip, bits_.data(), length) == length;
+    }
+    return finish(std::move(tiff), written, memory, {runs.columns, runs.rows(), dpi_x, dpi_y}, message);
+  }
+
+ private:
+  LayerText text_;
+  std::uint16_t compression_;
+  Bytes bits_;  // of one strip
+};
+
+}  // namespace
+
+std::unique_ptr<ImageEncoder> make_g4_encoder() { return std::make_unique<G4Encoder>(); }
+std::unique_ptr<ImageEncoder> make_packbits_encoder() { return std::make_unique<StripEncoder>(COMPRESSION_PACKBITS); }
+std::unique_ptr<ImageEncoder> make_uncompressed_encoder() { return std::make_unique<StripEncoder>(COMPRESSION_NONE); }
+
+// TIFF of 4 or 8 bits a pixel, min-is-white: the darkest value is a full voxel. TIFF 6.0, sections 4 and 9.
+
+namespace {
+
+class GreyEncoder : public LevelEncoder {
+ public:
+  explicit GreyEncoder(unsigned bits) : bits_(bits), darkest_((1u << bits) - 1) {}
+  void tag(const LayerTags& tags) override { text_.take(tags); }
+
+  Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) override {
+    const Frame frame{image.columns, image.rows(), dpi_x, dpi_y};
+    if (Status status = check_size(frame.columns, frame.rows); !status) return status;
+    if (full == 0 || darkest_ % full != 0) {
+      return cannot_hold(frame.columns, frame.rows, fmt::format("{} levels are no whole steps of {} bits", full + 1, bits_));
+    }
+    const std::size_t stride = (std::size_t{image.columns} * bits_ + 7) / 8;
+    const auto rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, frame.rows));
+    file.resize(file.capacity());
+    MemoryFile memory{file};
+    std::string message;
+    TiffHandle tiff = open_for_writing(memory, message);
+    if (tiff == nullptr) return cannot_hold(frame.columns, frame.rows, message);
+    set_tags(tiff.get(), frame, static_cast<std::uint16_t>(bits_), COMPRESSION_PACKBITS, rows_per_strip);
+    text_.put(tiff.get());
+    bool written = true;
+    strip_.resize(stride * rows_per_strip);
+    for (std::uint32_t first = 0, strip = 0; first < frame.rows && written; first += rows_per_strip, ++strip) {
+      const std::uint32_t rows = std::min(rows_per_strip, frame.rows - first);
+      const std::size_t length = stride * rows;
+      std::memset(strip_.data(), 0, length);
+      for (std::uint32_t r = 0; r < rows; ++r) put_row(image, first + r, darkest_ / full, strip_.data() + stride * r);
+      written = TIFFWriteEncodedStrip(tiff.get(), strip, strip_.data(), static_cast<tmsize_t>(length)) ==
+                static_cast<tmsize_t>(length);
+    }
+    return finish(std::move(tiff), written, memory, frame, message);
+  }
+
+ private:
+  /// The runs of a row over zeros. Of 4 bits the left pixel is in the high ones.
+  void put_row(const LevelsView& image, std::uint32_t row, unsigned step, std::byte* to) const {
+    for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
+      const unsigned value = image.level[i] * step;
+      std::uint32_t begin = image.change[2 * i], end = image.change[2 * i + 1];
+      if (bits_ == 8) {
+        std::memset(to + begin, static_cast<int>(value), end - begin);
+        continue;
+      }
+      if (begin % 2 != 0) to[begin++ / 2] |= static_cast<std::byte>(value);
+      if (end > begin && end % 2 != 0) to[--end / 2] |= static_cast<std::byte>(value << 4);
+      if (end > begin) std::memset(to + begin / 2, static_cast<int>(value * 17), (end - begin) / 2);
+    }
+  }
+
+  LayerText text_;
+  unsigned bits_, darkest_;
+  Bytes strip_;
+};
+
+}  // namespace
+
+std::unique_ptr<LevelEncoder> make_4_bit_encoder() { return std::make_unique<GreyEncoder>(4); }
+std::unique_ptr<LevelEncoder> make_8_bit_encoder() { return std::make_unique<GreyEncoder>(8); }
+
+}  // namespace lamina::write::tiff
 
 namespace lamina::read {
 namespace {
