@@ -134,7 +134,6 @@ Outcome predict_job(const Arguments& arguments, Context& context, Predict predic
   if (const Status status = folder.status(); !status) return status;
   job->output = folder.file(moves ? "part.gcode" : "job");
   if (Status status = check_job(*job); !status) return status;
-  for (const std::string& note : job->notes) context.say("note: " + note);
   Result<Resolved> resolved = resolve(*job, *product);
   if (!resolved) return resolved.error();
   std::array<double, 2> corner_mm{};

@@ -10,7 +10,6 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/job/lists/job_command.h"
 #include "pipeline/job/lists/named_files.h"
-#include "pipeline/job/lists/old_forms.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/replaceable.h"
@@ -53,7 +52,6 @@ bool has_section(std::string_view section) {
 
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
-  if (Status status = read::replace_old_forms(*tree, file, job.notes); !status) return status;
   if (Status status = read::replace_paths(*tree, file, job.missing); !status) return status;
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
@@ -82,15 +80,6 @@ template <class Change>
 void change_profiles(MachineRequest& machine, const Change& change) {
   machine.profile = change(machine.profile);
   for (std::string& preset : machine.presets) preset = change(preset);
-}
-
-/// Whether a job's bytes are other ones than those of 77c7a2d, which wrote texts without the keys that are unsaid.
-bool bytes_are_new(const Job& job, Product product) {
-  const bool shrinks =
-      std::ranges::any_of(job.parts, [](const PartRequest& part) { return part.shrink != PartRequest().shrink; });
-  if (job.heights.mode == heights::Mode::kAngle && shrinks) return true;            // angles are those before the shrinkage
-  if (product != Product::kContours) return product == Product::kMoves;             // with a skirt
-  return job.slice.format.starts_with("cli") || tolerance_um_of(job, product) > 0;  // units; points left out last
 }
 
 /// The value of an assignment: text, or TOML in quotes, brackets or braces.
@@ -144,9 +133,6 @@ Status set_key(Job& job, std::string_view assignment) {
   root.kind = table.kind = TomlValue::Kind::kTable;
   table.add(names.back(), assigned_value(assignment.substr(equals + 1)));
   root.add(names[0], std::move(table));
-  const std::size_t notes_before = job.notes.size();
-  if (Status status = read::replace_old_forms(root, {}, job.notes); !status) return wrong(status.error().message);
-  for (std::size_t i = notes_before; i < job.notes.size(); ++i) job.notes[i] = "--set " + job.notes[i];
   job.named.emplace_back(assignment.substr(0, equals));
   const TomlValue& set = root.value.front();
   if (names[0] != "part") return read_assigned(set, names[0], option, job_keys(), job);
@@ -179,13 +165,11 @@ std::string job_text(const Job& job, const std::string& directory) {
 
 std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
-  const bool is_new = bytes_are_new(job, product);
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
   change_profiles(whole.machine, read::profile_name);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
-    if (key.unsaid == value && !is_new) return false;
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
   });
   for (PartRequest part : job.parts) {

@@ -17,7 +17,6 @@ namespace lamina::pipeline {
 
 /// Reads a job file into `job`: keys absent from the file keep their values; its parts replace the job's.
 /// Relative paths (of parts, profiles, presets and of the output) are relative to the file.
-/// Old forms are accepted with a line in job.notes.
 /// errors  kUsage, one line: file, line, column, key, reason. The job is then undefined.
 Status read_job(const std::string& path, Job& job);
 

@@ -13,10 +13,11 @@
 
 #include "pipeline/manifest/manifest_head.h"
 #include "pipeline/manifest/manifest_line.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina {
 
@@ -69,41 +70,14 @@ std::string difference_of_jobs(std::string_view now, std::string_view earlier) {
   return said.empty() ? "" : fmt::format("{} is set no more, or {}", said.begin()->first, kOtherBuild);
 }
 
-/// The head with profiles and presets by their files' names.
-ManifestHead by_file_names(ManifestHead head) {
-  std::string text, section;
-  for (const std::string_view line : split(head.job_toml, "\n")) {
-    if (line.starts_with('[')) section = line;
-    const bool names = section == "[machine]" && (line.starts_with("profile = ") || line.starts_with("presets = "));
-    bool quoted = false;
-    std::size_t begin = 0;  // of the string at hand
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      text += line[i];
-      if (line[i] == '\\' && i + 1 < line.size()) {
-        text += line[++i];
-      } else if (line[i] == '"') {
-        quoted = !quoted;
-        begin = text.size();
-      } else if (names && quoted && line[i] == '/') {
-        text.resize(begin);
-      }
-    }
-    text += '\n';
-  }
-  head.job_toml = std::move(text);
-  return head;
-}
-
 }  // namespace
 
-bool same_job(const ManifestHead& one, const ManifestHead& other) {
-  return one.id() == other.id() || by_file_names(one).id() == by_file_names(other).id();
-}
+bool same_job(const ManifestHead& one, const ManifestHead& other) { return one.id() == other.id(); }
 
 std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   if (same_job(now, earlier)) return {};
   if (now.version != earlier.version) return fmt::format("lamina is {}, was {}", now.version, earlier.version);
-  if (std::string what = difference_of_jobs(by_file_names(now).job_toml, by_file_names(earlier).job_toml); !what.empty()) {
+  if (std::string what = difference_of_jobs(now.job_toml, earlier.job_toml); !what.empty()) {
     return what.starts_with("part.") && now.parts.size() != earlier.parts.size() ? "the parts are others" : what;
   }
   for (std::size_t i = 0; i < std::min(now.parts.size(), earlier.parts.size()); ++i) {
@@ -286,5 +260,128 @@ Status ManifestWriter::finish(const FileDigest& file, const std::function<Status
 }
 
 void ManifestWriter::discard() { state_->file.discard(); }
+
+// --- Reads manifests, line by line: a hundred thousand layers cost their records and no document tree.
+
+namespace {
+
+constexpr std::size_t kLongestHead = 256u << 20, kLongestLine = 1u << 20, kLongestTail = 4096;  // bytes
+constexpr ReadRules kRules{.missing = "cannot be opened", .no_text = "is no manifest of lamina", .longest_line = kLongestHead};
+constexpr std::string_view kLayers = "\"layers\": [";
+
+/// All up to the first layer; without the last line if the file ends before.
+std::string read_head_text(FileReader& file) {
+  std::string head;
+  for (std::string_view line; file.next(line);) {
+    head += line;
+    if (line.ends_with(kLayers) || head.size() > kLongestHead) return head;
+    if (file.line_number() == 1 && line != "{") return head;
+    head += '\n';
+  }
+  return head;
+}
+
+/// Whether what is left of the file closes the manifest.
+bool read_rest(FileReader& file, const ManifestHead& head, FileDigest& digest) {
+  std::string rest;
+  for (std::string_view line; rest.size() <= kLongestTail && file.next(line);) {
+    rest += line;
+    if (file.ended_by_break()) rest += '\n';
+  }
+  return file.status().ok() && rest.size() <= kLongestTail && read_tail(head, rest, digest);
+}
+
+/// Empty, or what is wrong with the line.
+std::string read_line(std::string_view line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
+  LineReader io(line);
+  record.layer.index = index;
+  record.images.resize(head.named_images());
+  PathFacts paths;
+  describe_line(io, head, record, paths);
+  if (io.good() && !io.ended()) return "is not the line of a layer";
+  if (!io.good()) return fmt::format("layer {}: {}", index, io.what());
+  if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
+  for (const std::string& what : {what_is_impossible(record.layer), what_is_impossible(record.program)}) {
+    if (!what.empty()) return fmt::format("layer {}: {}", index, what);
+  }
+  if (head.product != Product::kImages) record.paths = std::make_shared<const PathFacts>(paths);
+  if (head.most_drops == 1) record.most_drops = record.drops > 0 ? 1 : 0;
+  for (const ImageRecord& image : record.images) {
+    record.bytes += image.bytes;
+    if (head.drops_of_materials()) continue;
+    record.set_pixels += head.materials.empty() && record.set_pixels > 0 ? 0 : image.set_pixels;  // drops fall on the same
+    if (head.materials.empty() && image.set_pixels > 0) ++record.most_drops;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Manifest> read_manifest(const std::string& path) {
+  auto file = FileReader::open(path, kRules);
+  return file ? read_manifest(*file) : Result<Manifest>(file.error());
+}
+
+Result<Manifest> read_manifest(FileReader& file) {
+  const bool partial = file.path().ends_with(".part");
+  const auto wrong = [&](const std::string& what) {
+    return Error{Fault::kVerification, fmt::format("{}:{}: {}", file.path(), file.line_number(), one_line(what))};
+  };
+  const std::string text = read_head_text(file);
+  if (!file.status()) return file.status().error();
+  if (!text.starts_with("{\n")) return wrong("is no manifest of lamina");
+  if (!text.ends_with(kLayers)) return wrong("the manifest ends before its first layer");
+  auto head = read_head(text);
+  if (!head) return wrong(head.error().message);
+
+  Manifest manifest;
+  manifest.head = std::move(*head);
+  const ManifestHead& range = manifest.head;
+  bool closed = false;
+  file.bound_lines(kLongestLine);
+  for (std::string_view line; !closed && file.next(line);) {
+    if (line == "]" || line == "],") {
+      closed = read_rest(file, range, manifest.file);
+      break;
+    }
+    if (line.ends_with(',')) line.remove_suffix(1);
+    const auto index = range.first_layer + static_cast<std::uint32_t>(manifest.layers.size());
+    LayerRecord record;
+    const std::string what = index >= range.last_layer ? "a layer beyond the range" : read_line(line, range, index, record);
+    // What a killed run left at the end of its .part is not worth more than its whole lines.
+    if (!what.empty() && partial) return manifest;
+    if (!what.empty()) return wrong(what);
+    manifest.layers.push_back(std::move(record));
+  }
+  if (partial) return manifest;
+  if (!file.status()) return file.status().error();
+  if (!closed || manifest.layers.size() != range.last_layer - range.first_layer) {
+    return wrong(
+        fmt::format("the manifest ends after {} of {} layers", manifest.layers.size(), range.last_layer - range.first_layer));
+  }
+  manifest.complete = true;
+  return manifest;
+}
+
+Result<ManifestHead> read_manifest_head(const std::string& path) {
+  auto file = FileReader::open(path, kRules);
+  if (!file) return file.error();
+  const std::string text = read_head_text(*file);
+  if (!file->status()) return file->status().error();
+  auto head = read_head(text);
+  return head ? head
+              : Result<ManifestHead>(Error{head.error().fault, fmt::format("{}: {}", path, one_line(head.error().message))});
+}
+
+bool has_manifest_head(const std::string& path) {
+  auto file = FileReader::open(path, kRules);
+  return file && read_head_text(*file).ends_with(kLayers);
+}
+
+std::optional<Product> product_of_manifest(const std::string& path) {
+  const auto head = read_manifest_head(path);
+  if (!head) return std::nullopt;
+  return head->product;
+}
 
 }  // namespace lamina

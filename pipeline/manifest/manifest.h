@@ -91,7 +91,7 @@ std::uint8_t grey_level_of(std::uint32_t most_drops);
 /// "bracket.stl and 2 more"; empty without parts.
 std::string title_of(const std::vector<PartSummary>& parts);
 
-/// Whether heads are of one job, whatever their ranges. Builds before wrote profiles and presets by their paths.
+/// Whether heads are of one job, regardless of their ranges.
 bool same_job(const ManifestHead& one, const ManifestHead& other);
 
 /// The first difference between heads of different jobs, "bed.dpi is [600, 600], was [1200, 1200]"; empty for one job.
@@ -118,7 +118,7 @@ struct LayerImageFile {
 std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record);
 
 /// Reads a manifest, or the complete lines of a .part.
-/// errors  kVerification with file and line; a specific message for earlier versions of lamina
+/// errors  kVerification with file and line
 Result<Manifest> read_manifest(const std::string& path);
 Result<Manifest> read_manifest(FileReader& file);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "pipeline/manifest/manifest.h"
 
@@ -21,5 +22,14 @@ Result<ManifestHead> read_head(const std::string& text);
 
 /// Reads the output of tail_text() without its first line. errors  false for any other text
 bool read_tail(const ManifestHead& head, const std::string& text, FileDigest& file);
+
+// --- what a manifest says is held against what lamina can have written.
+//
+// The id of a manifest is no signature: anybody can write one that holds together. Names of files are made of what stands
+// in it, so an extension "/../../x.tif" would lead out of the job's folder.
+
+/// Empty, or what no layer, and no print program of one, that lamina writes has.
+std::string what_is_impossible(const Layer& layer);
+std::string what_is_impossible(const ProgramRecord& program);
 
 }  // namespace lamina

@@ -1,24 +1,178 @@
 // pipeline/manifest/manifest_line.h: a layer's line in a manifest, described once for writer and reader.
 #pragma once
 
-#include <string_view>
+#include <fmt/compile.h>
+#include <fmt/format.h>
 
-#include "pipeline/manifest/line_io.h"
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
 #include "pipeline/manifest/manifest.h"
+#include "stages/data/layer.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina {
 
+/// Appends the pieces of a line.
+class LineWriter {
+ public:
+  explicit LineWriter(std::string& out) : out_(out) {}
+  template <class Number>
+  void number(std::string_view key, const Number& value) {
+    begin(key);
+    char text[32];
+    out_.append(text, fmt::format_to(text, FMT_COMPILE("{}"), value));
+  }
+  /// A text determined by the rest of the line.
+  void fixed(std::string_view key, std::string_view value) {
+    begin(key);
+    out_ += json_string(value);
+  }
+  void hash(std::string_view key, const Hash128& value) {
+    begin(key);
+    char text[40];
+    out_.append(text, fmt::format_to(text, FMT_COMPILE("\"{:016x}{:016x}\""), value.high, value.low));
+  }
+  void reason(std::string_view key, const LayerReason& value) { fixed(key, reason_name(value)); }
+  /// A list of objects, left out if it is empty. describe(item) writes the numbers of one.
+  template <class List, class Describe>
+  void list(std::string_view key, const List& items, Describe describe) {
+    if (items.empty()) return;
+    open(key, "[");
+    for (const auto& item : items) {
+      open("", "{");
+      describe(item);
+      close("}");
+    }
+    close("]");
+  }
+  /// Opens an object or a list under a key, or as a list element if the key is empty.
+  void open(std::string_view key, std::string_view bracket) {
+    if (!key.empty()) {
+      begin(key);
+    } else if (!first_) {
+      out_ += ", ";
+    }
+    out_ += bracket;
+    first_ = true;
+  }
+  void close(std::string_view bracket) {
+    out_ += bracket;
+    first_ = false;
+  }
+
+ private:
+  void begin(std::string_view key) {
+    if (!first_) out_ += ", ";
+    out_ += '"';
+    out_ += key;
+    out_ += "\": ";
+    first_ = false;
+  }
+  std::string& out_;
+  bool first_ = true;
+};
+
+/// Consumes the pieces of a line from the front; what() describes its error.
+class LineReader {
+ public:
+  explicit LineReader(std::string_view line) : rest_(line) {}
+  template <class Number>
+  void number(std::string_view key, Number& value) {
+    begin(key);
+    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    expect(error == std::errc());
+    if constexpr (std::is_floating_point_v<Number>) expect(std::isfinite(value));
+    if (good()) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+  }
+  void fixed(std::string_view key, std::string_view value) {
+    begin(key);
+    if (good() && !take(json_string(value))) what_ = fmt::format("its \"{}\" is not {}", key, value);
+  }
+  void hash(std::string_view key, Hash128& value) {
+    begin(key);
+    expect(take("\""));
+    if (good() && !read_hex(rest_.substr(0, 32), value)) what_ = "has a hash that is none";
+    rest_.remove_prefix(std::min<std::size_t>(32, rest_.size()));
+    expect(take("\""));
+  }
+  void reason(std::string_view key, LayerReason& value) {
+    begin(key);
+    for (const LayerReason one :
+         {LayerReason::kUniform, LayerReason::kSlope, LayerReason::kPeak, LayerReason::kCusp, LayerReason::kFlat}) {
+      if (!take(fmt::format("\"{}\"", reason_name(one)))) continue;
+      value = one;
+      return;
+    }
+    if (good()) what_ = "has a reason that is none";
+  }
+  template <class List, class Describe>
+  void list(std::string_view key, List& items, Describe describe) {
+    if (!follows(key)) return;
+    open(key, "[");
+    while (good() && !rest_.starts_with(']')) {
+      open("", "{");
+      describe(items.emplace_back());
+      close("}");
+    }
+    close("]");
+  }
+  void open(std::string_view key, std::string_view bracket) {
+    if (!key.empty()) {
+      begin(key);
+    } else if (!first_) {
+      expect(take(", "));
+    }
+    expect(take(bracket));
+    first_ = true;
+  }
+  void close(std::string_view bracket) {
+    expect(take(bracket));
+    first_ = false;
+  }
+  bool good() const { return what_.empty(); }
+  const std::string& what() const { return what_; }
+  bool ended() const { return rest_.empty(); }
+
+ private:
+  void begin(std::string_view key) {
+    if (!first_) expect(take(", "));
+    expect(take("\"") && take(key) && take("\": "));
+    first_ = false;
+  }
+  /// Whether a number under that key comes next in an object that has begun.
+  bool follows(std::string_view key) const {
+    return rest_.starts_with(", \"") && rest_.substr(3).starts_with(key) && rest_.substr(3 + key.size()).starts_with("\": ");
+  }
+  bool take(std::string_view piece) {
+    if (!rest_.starts_with(piece)) return false;
+    rest_.remove_prefix(piece.size());
+    return true;
+  }
+  void expect(bool holds) {
+    if (!holds && what_.empty()) what_ = "is not the line of a layer";
+  }
+  std::string_view rest_;
+  std::string what_;
+  bool first_ = true;
+};
+
 template <class Io, class Pores>
 void describe_pores(Io& io, Pores& pores) {
-  io.added("pores", pores.closed);
-  io.added("pores_open", pores.open);
-  io.added("pores_filled", pores.filled);
-  io.added("pores_at_edges", pores.edges);
-  io.added("pores_length_mm", pores.length_mm);
-  io.added("pores_width_mm", pores.width_mm);
-  io.added("pores_distance_mm", pores.distance_mm);
-  io.added("crossing", pores.crossing);
-  io.added("crossed", pores.crossed);
+  io.number("pores", pores.closed);
+  io.number("pores_open", pores.open);
+  io.number("pores_filled", pores.filled);
+  io.number("pores_at_edges", pores.edges);
+  io.number("pores_length_mm", pores.length_mm);
+  io.number("pores_width_mm", pores.width_mm);
+  io.number("pores_distance_mm", pores.distance_mm);
+  io.number("crossing", pores.crossing);
+  io.number("crossed", pores.crossed);
 }
 
 template <class Io, class Paths>
@@ -31,16 +185,16 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("laid_mm", t.bead_mm);
   io.number("travel_mm", t.travel_mm);
   io.number("volume_mm3", t.volume_mm3);
-  io.added("beside_mm3", t.beside_mm3);
+  io.number("beside_mm3", t.beside_mm3);
   io.number("filament_mm", t.filament_mm);
   io.number("seconds", t.seconds);
   io.number("low_x_nm", t.lo_x);
   io.number("low_y_nm", t.lo_y);
   io.number("high_x_nm", t.hi_x);
   io.number("high_y_nm", t.hi_y);
-  io.added("beside_moves", t.beside_moves);
-  io.added("beside_mm", t.beside_mm);
-  io.added("beside_filament_mm", t.beside_filament_mm);
+  io.number("beside_moves", t.beside_moves);
+  io.number("beside_mm", t.beside_mm);
+  io.number("beside_filament_mm", t.beside_filament_mm);
   auto& laid = paths.laid;
   io.number("segmented_lines", laid.segments.lines);
   io.number("pieces", laid.segments.pieces);
@@ -48,13 +202,12 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("thin", laid.segments.thin);
   io.number("solid_mm3", laid.porosity.solid_mm3);
   io.number("extruded_mm3", laid.porosity.extruded_mm3);
-  io.retired("ellipses_mm3");
   io.number("measured_mm3", laid.porosity.measured_mm3);
   describe_pores(io, laid.pores);
-  io.added("too_short", laid.shorts.count);
-  io.added("shortest_mm", laid.shorts.shortest_mm);
-  io.added("reached_mm_s", laid.shorts.reached_mm_s);
-  io.added("told_mm_s", laid.shorts.told_mm_s);
+  io.number("too_short", laid.shorts.count);
+  io.number("shortest_mm", laid.shorts.shortest_mm);
+  io.number("reached_mm_s", laid.shorts.reached_mm_s);
+  io.number("told_mm_s", laid.shorts.told_mm_s);
   io.list("ranges", paths.by_range, [&](auto& range) {
     io.number("area_mm2", range.area_mm2);
     describe_pores(io, range.pores);
@@ -96,7 +249,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
       io.number("bytes", image.bytes);
       io.number("set_pixels", image.set_pixels);
       if (head.grey_drops()) io.number("drops", image.drops);
-      if (!head.machine.empty()) io.added("unfed_pixels", image.unfed_pixels);
+      if (!head.machine.empty()) io.number("unfed_pixels", image.unfed_pixels);
       io.hash("xxh3_128", image.hash);
       io.close("}");
     }
@@ -111,8 +264,8 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("drops", record.program.drops);
   io.number("moved", record.program.moved);
   io.number("lost", record.program.lost);
-  io.added("microseconds", record.program.microseconds);
-  io.added("spat", record.program.spat);
+  io.number("microseconds", record.program.microseconds);
+  io.number("spat", record.program.spat);
   if (head.head_drops > 1) {
     io.number("added_sweeps", record.program.added_sweeps);
     io.number("added_microseconds", record.program.added_microseconds);

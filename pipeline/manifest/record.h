@@ -19,7 +19,7 @@ struct ProgramRecord {
   std::uint32_t sweeps = 0;  // that fire
   std::uint64_t drops = 0;
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
-  std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h); 0: of an earlier build
+  std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h)
   std::uint64_t spat = 0;             // drops fired off the bed
   /// Of heads that fire several drops: sweeps that are there for their frequency (data/program.h), and what they take.
   std::uint32_t added_sweeps = 0;

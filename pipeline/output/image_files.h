@@ -16,7 +16,7 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/support/io/leftovers.h"
 #include "stages/support/io/sync.h"
 

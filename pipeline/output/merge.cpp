@@ -182,16 +182,13 @@ Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, Merge
   sanity::LayerRecords records;
   std::vector<UnfedPowder> unfed;
   for (const JobMaterial& material : head.materials) unfed.push_back({material.name});
-  bool timed = true;  // layers that an earlier build left are not
   for (const Shard& shard : shards) {
     for (const LayerRecord& record : shard.manifest.layers) {
       records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
       for (std::size_t m = 0; m < unfed.size(); ++m) unfed[m].add(record.layer, record.image_of(m, unfed.size()).unfed_pixels);
       report.microseconds += record.program.microseconds;
-      timed = timed && (record.program.bytes == 0 || record.program.microseconds > 0);
     }
   }
-  if (!timed) report.microseconds = 0;
   for (const UnfedPowder& powder : unfed) sanity::warn_of_unfed(powder, report.warnings);
   const Status status = records.judge(head.parts, thins(job), allow_empty, report.warnings);
   return status && strict ? sanity::refuse_warnings(report.warnings) : status;

@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/job/profiles/extruder.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/plan/heights.h"

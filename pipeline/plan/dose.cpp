@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "stages/dose/saturate.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/program/care/care_check.h"
 #include "stages/program/head_grid.h"
 
@@ -21,9 +21,9 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
       mirror_(job.mirror) {
   const std::int64_t shell = nm_of(job.dose.shell_mm);
   if (job.dose.saturation_percent) {
-    wishes_.emplace().all = wish_of(*job.dose.saturation_percent, job.dose.core_saturation_percent);
+    wishes_.emplace().all = {*job.dose.saturation_percent, job.dose.core_saturation_percent};
     for (const SaturationRange& range : job.dose.saturation_ranges) {
-      wishes_->ranges.push_back({range.from_mm, range.to_mm, wish_of(range.percent, range.core_percent)});
+      wishes_->ranges.push_back({range.from_mm, range.to_mm, {range.percent, range.core_percent}});
     }
     wishes_->own = zones_.wishes();
   }
@@ -126,10 +126,10 @@ Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t
   for (std::uint32_t zone = 0; wishes_ && zone < zones_.count(); ++zone) {
     const dose::Wish& wish = wishes_->of(layer, zone);
     for (std::size_t inside = 0; inside < 2; ++inside) {
-      const dose::Percent& percent = inside == 0 ? wish.percent : wish.of_core();
-      if (percent.formula.empty()) {
+      const Saturation& wanted = inside == 0 ? wish.percent : wish.of_core();
+      if (wanted.formula.empty()) {
         constexpr std::uint32_t kAny = 1u << 20;
-        asks[zone][inside].drops = dose::drops_for(percent.value, binder_, grid_, layer.thickness, kAny);
+        asks[zone][inside].drops = dose::drops_for(wanted.percent, binder_, grid_, layer.thickness, kAny);
         continue;
       }
       dose::Field& field = work.fields[2 * zone + inside];
@@ -138,7 +138,7 @@ Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t
       const std::string_view key = own    ? core ? "part.core_saturation_percent" : "part.saturation_percent"
                                    : core ? "--core-saturation"
                                           : "--saturation";
-      Status status = field.start(percent.formula, key, sheet,
+      Status status = field.start(wanted.formula, key, sheet,
                                   own ? std::span<const dose::ZoneBox>(copies_[zone]) : std::span<const dose::ZoneBox>());
       if (!status) return status.error();
       asks[zone][inside].field = &field;

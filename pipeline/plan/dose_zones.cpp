@@ -7,20 +7,6 @@
 #include "stages/data/mesh.h"
 
 namespace lamina::pipeline {
-namespace {
-
-dose::Percent percent_of(const Saturation& saturation) {
-  return saturation.formula.empty() ? dose::Percent(saturation.percent) : dose::Percent::of(saturation.formula);
-}
-
-}  // namespace
-
-dose::Wish wish_of(const Saturation& saturation, const std::optional<Saturation>& core) {
-  dose::Wish wish{percent_of(saturation), {}};
-  if (core) wish.core_percent = percent_of(*core);
-  return wish;
-}
-
 DoseZones::DoseZones(const Job& job, const PixelGrid& grid) : bleeds_(job.dose.first_bleed_um ? job.dose.first_layers : 0) {
   const DoseRequest& dose = job.dose;
   const auto zone_of = [&](const PartRequest* part) {
@@ -37,7 +23,7 @@ DoseZones::DoseZones(const Job& job, const PixelGrid& grid) : bleeds_(job.dose.f
     zone.bleed.first =
         dose.first_bleed_um ? dose::bleed_of(grid, *dose.first_bleed_um, *dose.first_bleed_um) : zone.bleed.above;
     if (part != nullptr && part->saturation_percent)
-      zone.wish = wish_of(*part->saturation_percent, part->core_saturation_percent);
+      zone.wish = dose::Wish{*part->saturation_percent, part->core_saturation_percent};
     return zone;
   };
   zones_.push_back(zone_of(nullptr));

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "pipeline/job/job.h"
@@ -16,9 +15,6 @@
 
 namespace lamina::pipeline {
 
-/// A saturation of a job, and of its core.
-dose::Wish wish_of(const Saturation& saturation, const std::optional<Saturation>& core);
-
 /// Parts of one bleed and one saturation are a zone. Zone 0 is that of the job's own values.
 class DoseZones {
  public:
@@ -27,7 +23,6 @@ class DoseZones {
   std::uint32_t count() const { return static_cast<std::uint32_t>(zones_.size()); }
   bool several() const { return zones_.size() > 1; }
   std::uint32_t of_part(std::size_t part) const { return of_part_[part]; }
-  std::span<const std::uint32_t> of_parts() const { return of_part_; }
 
   /// The moves of their edges.
   const dose::Bleeds& bleeds() const { return bleeds_; }

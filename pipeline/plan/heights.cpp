@@ -1,7 +1,7 @@
 #include "pipeline/plan/heights.h"
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 
 namespace lamina::pipeline {
 

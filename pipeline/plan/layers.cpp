@@ -4,7 +4,7 @@
 #include <tuple>
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/plan/heights.h"
 #include "stages/heights/per_part.h"
 

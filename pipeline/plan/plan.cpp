@@ -7,7 +7,7 @@
 #include <future>
 #include <set>
 
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/plan/fill.h"
@@ -18,7 +18,7 @@
 #include "pipeline/plan/reach.h"
 #include "stages/checks/records.h"
 #include "stages/formats/extrusion_format.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
@@ -65,7 +65,7 @@ class Planner {
       auto materials = materials_of(job(), machine());
       if (!materials) return materials.error();
       materials_ = std::move(*materials);
-      // Of one powder no layer mixes: the kept profile says what it said before `refuse` was the rule, so that its jobs go on.
+      // No layer of one powder mixes: the rule has no effect, and the kept profile names one value.
       if (printer_.machine && !materials_.several()) printer_.machine->machine.powder.vat_rule = VatRule::kMajority;
       beads_ = job().segment.any();
     }

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/geometry/blocks/block_maker.h"
 
 namespace lamina::pipeline {

@@ -22,7 +22,7 @@ double narrowest_mm(const ImagePlan& images) {
 
 Inspector::Inspector(const Plan& plan) : plan_(plan) {
   if (!plan.job.inspect) return;
-  std::vector<inspect::Stand> stands;
+  std::vector<sanity::Solid> stands;
   for (std::size_t i = 0; i < plan.scene->instances.size(); ++i) {
     stands.push_back({box_of(*plan.scene, plan.scene->instances[i]), plan.scene->part_of_instance[i]});
   }

@@ -6,7 +6,7 @@
 
 #include "pipeline/run/image_maker.h"
 #include "stages/dose/edges/dilate.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
 

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "pipeline/flow/layers.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/output/toolpath_file.h"

@@ -39,11 +39,6 @@ struct Phase {
   double excess() const { return flow_mm3_s - area_mm2 * (speed_mm_s - acceleration_mm_s2 * tau_s); }
 };
 
-/// Flow after a feed of constant flow, or none (0: a travel without retraction), for a time.
-inline double flow_after_rest(double flow_mm3_s, double fed_mm3_s, double seconds, double tau_s) {
-  return tau_s <= 0 ? fed_mm3_s : fed_mm3_s + (flow_mm3_s - fed_mm3_s) * std::exp(-seconds / tau_s);
-}
-
 /// mm3 by which a line that is fed so much comes short (below 0: has too much) because it begins with another flow. Fed in
 /// addition before the line begins, it makes a start that is right at once: the same line then begins with the flow that it
 /// keeps.

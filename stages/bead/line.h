@@ -49,8 +49,6 @@ class BeadLine {
   double seconds() const { return seconds_; }
   double laid_mm3() const { return laid_; }
   double fed_mm3() const { return fed_; }
-  /// What the lag holds: fed - laid = held now - held at the beginning.
-  double held_mm3() const { return machine_.tau_s * flow_; }
 
  private:
   void lay(const Planned& planned, const TakePiece& take);

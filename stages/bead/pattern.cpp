@@ -44,16 +44,6 @@ class Gather {
 
 }  // namespace
 
-void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
-                double tolerance_mm) {
-  const auto period = period_of(machine, pattern);
-  const Joint joint = steady_joint(machine, height_mm, period);
-  BeadLine line(machine, height_mm, tolerance_mm);
-  line.begin(joint);
-  for (const Stretch& stretch : period) line.add(stretch, take);
-  line.end(joint.speed_mm_s, take);
-}
-
 PatternSums steady_profile(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread,
                            const TakeProfile& take) {
   const auto period = period_of(machine, pattern);

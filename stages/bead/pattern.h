@@ -40,10 +40,6 @@ struct ProfilePiece {
 };
 using TakeProfile = std::function<void(const ProfilePiece&)>;
 
-/// One period in its steady state, thick first, from the place 0.
-void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
-                double tolerance_mm = 0.005);
-
 /// The widths of one period, without gaps and in order.
 /// spread  the bead spreads along its line (spread.h); widths are then those of cells of 0.02 mm at most
 /// cost    some hundred exponentials without spread, some ten thousand numbers from a table with it

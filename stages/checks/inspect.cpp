@@ -79,15 +79,15 @@ struct Inspection::Powder {
   }
 };
 
-Inspection::Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm, std::uint64_t most_bytes)
+Inspection::Inspection(const PixelGrid& grid, std::vector<sanity::Solid> stands, std::int64_t least_nm, std::uint64_t most_bytes)
     : grid_(grid),
       stands_(std::move(stands)),
       stencils_(grid, least_nm),
       least_mm_(static_cast<double>(least_nm) / kNmPerMm),
       pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)),
       most_bytes_(most_bytes) {
-  std::ranges::stable_sort(stands_, {}, [](const Stand& stand) { return stand.box.lo.z; });
-  for (const Stand& stand : stands_) {
+  std::ranges::stable_sort(stands_, {}, [](const sanity::Solid& stand) { return stand.box.lo.z; });
+  for (const sanity::Solid& stand : stands_) {
     window_.push_back(window_of(stand.box));
     all_.add(window_.back());
   }
@@ -175,7 +175,7 @@ bool Inspection::stands_in(std::uint32_t stand, const Body& body) const {
 
 /// The copy with the narrowest box around a body, of those whose bottoms lie in [from, to); kNone without one.
 std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int64_t to) const {
-  const auto bottom = [](const Stand& stand) { return std::int64_t{stand.box.lo.z}; };
+  const auto bottom = [](const sanity::Solid& stand) { return std::int64_t{stand.box.lo.z}; };
   const auto first = std::ranges::lower_bound(stands_, from, {}, bottom),
              last = std::ranges::lower_bound(stands_, to, {}, bottom);
   std::uint32_t owner = Body::kNone;

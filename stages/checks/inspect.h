@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "stages/checks/bodies.h"
+#include "stages/checks/tally.h"
 #include "stages/checks/thin.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -28,12 +29,6 @@
 #include "stages/data/status.h"
 
 namespace lamina::inspect {
-
-/// A mesh where it stands.
-struct Stand {
-  Box box;                 // nm, on the bed
-  std::uint32_t part = 0;  // of the job
-};
 
 /// Where something is: the middle of its box.
 struct Spot {
@@ -103,7 +98,8 @@ class Inspection {
   /// stands      the boxes of all copies; a piece at the bottom of one is not an island
   /// least_nm    what is narrower is thin; 0: nothing is
   /// most_bytes  that it may take, with the look at one layer
-  Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm, std::uint64_t most_bytes = UINT64_MAX);
+  Inspection(const PixelGrid& grid, std::vector<sanity::Solid> stands, std::int64_t least_nm,
+             std::uint64_t most_bytes = UINT64_MAX);
 
   // --- from any thread
   /// About what look() adds to what a layer holds.
@@ -149,7 +145,7 @@ class Inspection {
   void note_edges(const Layer& layer, const RunsView& image);
 
   const PixelGrid& grid_;
-  std::vector<Stand> stands_;  // by bottom
+  std::vector<sanity::Solid> stands_;  // by bottom
   std::vector<PixelBox> window_;
   PixelBox all_;  // of all stands, a pixel wider
   Stencils stencils_;

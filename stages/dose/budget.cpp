@@ -123,10 +123,10 @@ FieldSurvey* Budget::survey_of(const std::string& formula, std::size_t place, st
 void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
   const Wish& wish = wishes_->of(layer, zone);
   const std::size_t place = wishes_->place_of(layer, zone);
-  const Percent& percent = core ? wish.of_core() : wish.percent;
-  FieldRange range{percent.value, percent.value, true};
-  if (!percent.formula.empty()) {
-    FieldSurvey* survey = survey_of(percent.formula, place, zone);
+  const Saturation& wanted = core ? wish.of_core() : wish.percent;
+  FieldRange range{wanted.percent, wanted.percent, true};
+  if (!wanted.formula.empty()) {
+    FieldSurvey* survey = survey_of(wanted.formula, place, zone);
     if (survey != nullptr) range = survey->in(layer);
   }
   no_number_ |= made_ && !range.each;
@@ -143,7 +143,7 @@ void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
   };
   const LayerDose least = of(range.least);
   if (made_ && least.gets < least_percent_ * (1 - 1e-6)) thin_.add(layer, least.asked, least.gets, 0, least.gets < thin_.gets);
-  look_at(layer, zone, of(range.most), core, percent.formula.empty() ? cut_ : peaks_);
+  look_at(layer, zone, of(range.most), core, wanted.formula.empty() ? cut_ : peaks_);
 }
 
 void Budget::warn_of_none(std::vector<Warning>& warnings) const {

@@ -39,8 +39,8 @@ LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder
                   std::uint32_t zone) {
   const Wish& wish = wishes.of(layer, zone);
   LayerDose dose;
-  dose.asked = wish.percent.value;
-  dose.asked_core = wish.of_core().value;
+  dose.asked = wish.percent.percent;
+  dose.asked_core = wish.of_core().percent;
   constexpr std::uint32_t kAny = 1u << 20;
   const Drops24 shell = drops_for(dose.asked, binder, grid, layer.thickness, kAny);
   const Drops24 core = drops_for(dose.asked_core, binder, grid, layer.thickness, kAny);

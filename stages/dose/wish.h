@@ -4,34 +4,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "stages/data/layer.h"
+#include "stages/data/saturation.h"
 #include "stages/dose/saturation.h"
 
 namespace lamina::dose {
 
-/// Per cent of the voids: a number, or a formula of the place (field.h).
-struct Percent {
-  double value = 0;
-  std::string formula;  // of x, y and z in mm; empty: the value
-
-  Percent() = default;
-  Percent(double of_voids) : value(of_voids) {}
-  static Percent of(std::string text) {
-    Percent percent;
-    percent.formula = std::move(text);
-    return percent;
-  }
-  bool operator==(const Percent&) const = default;
-};
-
 /// The core is as the shell if none is stated.
 struct Wish {
-  Percent percent;
-  std::optional<Percent> core_percent;
-  const Percent& of_core() const { return core_percent ? *core_percent : percent; }
+  Saturation percent;
+  std::optional<Saturation> core_percent;
+  const Saturation& of_core() const { return core_percent ? *core_percent : percent; }
   bool has_formula() const { return !percent.formula.empty() || !of_core().formula.empty(); }
   bool operator==(const Wish&) const = default;
 };

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "stages/formats/cli/cli.h"
+#include "stages/formats/svg/svg.h"
+
 namespace lamina::write {
 namespace {
 

@@ -53,13 +53,6 @@ class SliceEncoder {
   virtual void tail(const SliceHead& head, Buffer<char>& out) const = 0;
 };
 
-std::unique_ptr<SliceEncoder> make_svg_encoder();
-/// Polygons as Slic3r's --export-svg writes them; no filling.
-std::unique_ptr<SliceEncoder> make_svg_polygon_encoder();
-std::unique_ptr<SliceEncoder> make_cli_encoder(bool binary, const SliceFormatOptions& options);
-/// CLI with commands of 16 bits.
-std::unique_ptr<SliceEncoder> make_cli_16_encoder(const SliceFormatOptions& options);
-
 /// One row of the registry.
 struct SliceFormat {
   std::string_view id, extension;

@@ -174,12 +174,6 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
   return made;
 }
 
-Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
-  auto made = outlines_of(contours, context, parameters);
-  if (!made) return made.error();
-  return std::move(made->region);
-}
-
 Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
                              const FillParameters& parameters) {
   // Clipper takes an offset's or a line's points as edges, joins, scan beams and result at once.

@@ -45,9 +45,6 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
 /// The same, with the outlines made beforehand.
 Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
-/// The region of outlines_of().
-Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
-
 /// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region
 /// counted, curves counted by their places and what the region is like at some of these, waves by what of them lies within
 /// reach of the region.

@@ -24,7 +24,7 @@ std::optional<std::string_view> add_words(std::string_view text, std::map<char, 
 
 void GcodeReader::fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
 
-bool GcodeReader::take(GcodeLine& line, bool all_words) {
+bool GcodeReader::next(GcodeLine& line) {
   while (!left_.empty() && printing_.ok()) {
     const std::size_t end = left_.find('\n');
     if (end == std::string_view::npos) {
@@ -48,7 +48,6 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
     line.rest = space == std::string_view::npos ? std::string_view() : now_.substr(space + 1);
     line.word.clear();
     if (line.command[0] != 'G' && line.command[0] != 'M' && line.command[0] != 'T') return true;
-    if (!all_words && line.command == "M117") return true;
     if (const auto wrong = add_words(line.rest, line.word)) {
       fault(fmt::format("'{}' is no word", *wrong));
       return false;

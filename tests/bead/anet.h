@@ -11,7 +11,7 @@
 #include "stages/bead/line.h"
 #include "stages/bead/section.h"
 #include "stages/bead/spread.h"
-#include "stages/bead/stabilisation.h"
+#include "tests/bead/stabilisation.h"
 #include "tests/segment/table.h"
 
 namespace lamina::bead::test {

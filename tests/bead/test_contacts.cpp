@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "stages/bead/contacts.h"
-#include "stages/bead/neighbours.h"
 #include "stages/bead/section.h"
+#include "tests/bead/neighbours.h"
 
 namespace lamina::bead {
 namespace {

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "stages/bead/neighbours.h"
 #include "stages/bead/section.h"
+#include "tests/bead/neighbours.h"
 
 namespace lamina::bead {
 namespace {

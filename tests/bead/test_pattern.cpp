@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "stages/bead/pattern.h"
-#include "stages/bead/pore.h"
 #include "tests/bead/anet.h"
+#include "tests/bead/pore.h"
 
 namespace lamina::bead {
 namespace {
@@ -75,16 +75,6 @@ TEST(Pore, BeadsThatNeverTouchLeaveASlotAndBeadsTooNearNone) {
   const BeadPore none = pore_beside(machine, kHeight, pattern, 0.35, 0.4, 0.02, false);
   EXPECT_LT(none.width, 0);
   EXPECT_EQ(none.open_length, 0);
-}
-
-TEST(Pattern, OnePeriodOfPiecesHoldsWhatIsFed) {
-  double volume = 0, end = 0;
-  lay_steady({0.1, 0.05, kProfile}, kHeight, {1.5, 2, 100, 15, 30}, [&](const BeadPiece& p) {
-    volume += p.volume_mm3;
-    end = p.end_mm;
-  });
-  EXPECT_NEAR(volume, 0.35, 1e-12);
-  EXPECT_NEAR(end, 3.5, 1e-12);
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <array>
 
-#include "stages/bead/pore.h"
 #include "tests/bead/anet.h"
+#include "tests/bead/pore.h"
 
 namespace lamina::bead {
 namespace {

@@ -309,7 +309,7 @@ TEST(Budget, ForeseesFormulasInTheBoxesOfParts) {
   const ZoneBox box{0, {2'000'000, 2'000'000, 0}, {6'000'000, 3'000'000, 400'000}, {2'000'000, 2'000'000, 0}};
   std::vector<Warning> warnings;
   const auto budget_of = [&](const std::string& formula, double least) {
-    Budget budget(kForty, kBed, Wishes{{Percent::of(formula), {}}, {}}, 8, least, {true, true, 1},
+    Budget budget(kForty, kBed, Wishes{{Saturation::of(formula), {}}, {}}, 8, least, {true, true, 1},
                   Stretches({&box, 1}, 1, 0, 100'000));
     budget.survey({box}, 6);
     for (std::uint32_t i = 0; i < 6; ++i) budget.foresee(tenth_of(i));

@@ -11,7 +11,6 @@
 #include "stages/data/levels.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/image.h"
-#include "stages/formats/level_format.h"
 #include "tests/formats/images.h"
 
 namespace lamina::write {

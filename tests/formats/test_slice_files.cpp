@@ -16,7 +16,9 @@
 #include <regex>
 #include <sstream>
 
+#include "stages/formats/cli/cli.h"
 #include "stages/formats/slice_format.h"
+#include "stages/formats/svg/svg.h"
 #include "stages/formats/threemf/slice3mf.h"
 #include "stages/support/text/decimal.h"
 

@@ -8,7 +8,9 @@
 #include <regex>
 #include <sstream>
 
+#include "stages/formats/cli/cli.h"
 #include "stages/formats/slice_format.h"
+#include "stages/formats/svg/svg.h"
 
 namespace lamina::test {
 namespace {

@@ -11,7 +11,6 @@
 #include "stages/formats/g4/decode.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/stack_info.h"
-#include "stages/formats/level_format.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
 #include "tests/fuzz/laws.h"

@@ -24,7 +24,6 @@ bool read_job(std::string_view text) {
   Job job;
   const Status read = pipeline::read_job_text(text, "/jobs/job.toml", job);
   if (!read) return check_error(read.error()), false;
-  for (const std::string& note : job.notes) check_line(note);
   check_round_trip(job);
   if (const Status checked = pipeline::check_job(job); !checked) check_error(checked.error());
   return true;

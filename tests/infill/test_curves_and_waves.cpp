@@ -166,7 +166,7 @@ TEST(CurvesAndWaves, ClosedCurvesAreNumberedFromTheSurfaceInwardsAndThoseOfOneDe
       const FillContext context = context_of(outline.contours, layer);
       const Toolpaths paths = filled(outline.contours, context, parameters);
       const auto places =
-          infill::place_inwards(*infill::fill_region(outline.contours, context, parameters), context, parameters);
+          infill::place_inwards(infill::outlines_of(outline.contours, context, parameters)->region, context, parameters);
       ASSERT_TRUE(places.ok());
       std::int32_t before = INT32_MIN;
       for (std::uint32_t p = 0; p < paths.size(); ++p) {

@@ -42,10 +42,11 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
           if (gap == 300'000) parameters.stagger = {170'000};
           if (gap == -100'000 && pattern != Pattern::kQuatrefoil) parameters.group = 3;
           const FillContext context = context_of(outline.contours);
-          const auto region = infill::fill_region(outline.contours, context, parameters);
-          ASSERT_TRUE(region.ok());
+          const auto outlines = infill::outlines_of(outline.contours, context, parameters);
+          ASSERT_TRUE(outlines.ok());
+          const Contours& region = outlines->region;
           const Toolpaths paths = filled(outline.contours, context, parameters);
-          const auto bound = infill::bound_fill(outline.contours, *region, context, parameters);
+          const auto bound = infill::bound_fill(outline.contours, region, context, parameters);
           ASSERT_TRUE(bound.ok());
           ASSERT_LE(paths.point.size(), bound->points) << outline.name << ", pattern " << static_cast<int>(pattern);
           ASSERT_EQ(paths.kind.size(), paths.point.size());
@@ -54,7 +55,7 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
           for (std::uint32_t p = 0; p < paths.size(); ++p) {
             ASSERT_GE(paths.view()[p].size(), 2u);
             const bool wall = paths.kind[paths.offset[p]] == PathKind::kOuter;
-            const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(*region);
+            const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(region);
             // Looking is slow: some hundred stretches of each filling, others each time.
             const auto step = static_cast<std::uint32_t>(1 + paths.point.size() * within.point.size() / 10'000);
             for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(stretches % step); i + 1 < paths.offset[p + 1];

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "stages/data/levels.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "tests/formats/images.h"
 
 namespace lamina::write {

@@ -169,7 +169,7 @@ TEST(Porosity, HolesBlindHolesAndCavitiesAreToldApart) {
   EXPECT_DOUBLE_EQ(p.percolating(0), 0);
   EXPECT_EQ(p.cavities, 1u);
   EXPECT_EQ(p.parts, 3u);
-  EXPECT_DOUBLE_EQ(p.cavities_mm3(), 8e-9);
+  EXPECT_DOUBLE_EQ(static_cast<double>(p.empty - p.open) * p.voxel_mm3, 8e-9);
   EXPECT_EQ(porosity(solid, nullptr, kFacesX).open, 0u);
   EXPECT_EQ(porosity(solid, nullptr, kFacesX | 16).open, 60u);  // the lower z face: not the blind hole
 }

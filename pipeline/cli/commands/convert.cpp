@@ -11,7 +11,6 @@
 #include "stages/dose/shares.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/layer_images.h"
-#include "stages/formats/level_format.h"
 #include "stages/raster/mirror.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"

@@ -7,7 +7,7 @@
 #include "pipeline/cli/needs.h"
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/job/file.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/heights.h"
 #include "stages/formats/rp3/rp3.h"

@@ -16,7 +16,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/laid_look.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/formats/level_format.h"
+#include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/json.h"
 
@@ -68,7 +68,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   return spec;
 }
 
-/// What a job file leaves to the printer, one line for each: files of earlier versions meant other defaults.
+/// What a job file leaves to the printer, one line for each.
 std::vector<std::string> notes_on_defaults(const std::string& path, const Job& job) {
   const std::string file = path == "-" ? "the job" : path;
   std::vector<std::string> notes;
@@ -93,8 +93,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  for (std::string& note : notes_on_needs(row.product, arguments, *job)) job->notes.push_back(std::move(note));
-  for (const std::string& note : job->notes) {
+  for (const std::string& note : notes_on_needs(row.product, arguments, *job)) {
     if (!job->quiet) context.say("note: " + note);
   }
   Result<Resolved> resolved = resolve(*job, row.product);

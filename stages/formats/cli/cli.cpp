@@ -1,10 +1,11 @@
 // stages/formats/cli/cli.cpp: Common Layer Interface, text and binary; see README.md for every field.
+#include "stages/formats/cli/cli.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
 
-#include "stages/formats/slice_format.h"
 #include "stages/support/text/decimal.h"
 
 namespace lamina::write {

@@ -51,7 +51,7 @@ class GcodeFile {
   /// out of the bed's plane, splines), lays more than most_beads in a layer, or has more than most_layers; with the line
   /// cost    O(bytes + chords)
   static Result<GcodeFile> open(const std::string& path, const GcodeOptions& options = {});
-  /// The same of an open file, or of a text in memory, whose layers cannot be asked for then.
+  /// The same of an open file.
   static Result<GcodeFile> read(FileReader& reader, const GcodeOptions& options = {});
   std::uint32_t count() const { return static_cast<std::uint32_t>(layers_.size()); }
   const Box& box() const { return box_; }  // of all beads, with about their widths
@@ -59,7 +59,6 @@ class GcodeFile {
   const std::vector<std::string>& types() const { return types_; }
   bool tells_widths() const { return tells_widths_; }
   double filament_mm() const { return filament_mm_; }  // diameter
-  bool tells_filament() const { return tells_filament_; }
   /// The printer's name, as lamina's files tell it; "" of others.
   const std::string& machine() const { return machine_; }
   /// What all beads take, mm3; without what start code lays, and priming on the spot.

@@ -36,7 +36,7 @@ Result<Image> image(const std::string& path, std::uint8_t full = 0);
 /// readable
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page = 0);
 
-/// Decodes levels of voxels as the formats of stages/formats/level_format.h have them (TIFF of 4 or 8 bits, PNG of 8), row
+/// Decodes levels of voxels as the formats of stages/formats/image_format.h have them (TIFF of 4 or 8 bits, PNG of 8), row
 /// by row. full    level of a full voxel: 1, 3 or 15 image   its runs are the pixels of any level above 0 levels  the levels
 /// errors  kVerification with the file's name: of image(); a value that is none of the levels
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels);
@@ -53,7 +53,7 @@ struct LevelsRequest {
 };
 
 /// The levels of an image of others, of 1, 4, 8 or 16 bits: level = floor(darkness x full + 1/2), in integers, so that a value
-/// between two levels takes the nearest. Those of stages/formats/level_format.h come back as they are.
+/// between two levels takes the nearest. Those of stages/formats/image_format.h come back as they are.
 /// returns  the image's resolution; its runs are empty. errors  kInput: of dark_pixels()
 Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels);
 

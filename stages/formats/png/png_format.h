@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "stages/formats/image_format.h"
-#include "stages/formats/level_format.h"
 
 namespace lamina::write::png {
 

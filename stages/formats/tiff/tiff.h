@@ -5,7 +5,6 @@
 #include <memory>
 
 #include "stages/formats/image_format.h"
-#include "stages/formats/level_format.h"
 
 namespace lamina::write::tiff {
 

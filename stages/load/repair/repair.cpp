@@ -1,4 +1,3 @@
-// stages/load/repair/repair.cpp: the steps, over one indexed mesh.
 #include "stages/load/repair/repair.h"
 
 #include <algorithm>
@@ -12,6 +11,9 @@
 #include "stages/load/repair/weld.h"
 
 namespace lamina::load {
+
+// The steps, over one indexed mesh.
+
 namespace {
 
 using Facet = Indexed::Facet;
@@ -196,6 +198,25 @@ RepairReport repair(Mesh& mesh, const WeldRange& range, bool caps) {
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   if (work.unmatched > 0 && caps) cap(work, report);
   return report;
+}
+
+// Which way round a mesh is, and how much of it repair added.
+
+bool turn_over_if_inside_out(Mesh& mesh) {
+  if (!mesh.closed || mesh.volume_mm3 >= 0) return false;
+  for (Triangle& t : mesh.triangles) std::swap(t.b, t.c);
+  const Census found = census(mesh.triangles, mesh.bounds.middle().z);
+  mesh.fingerprint = found.fingerprint;
+  mesh.volume_mm3 = found.volume_mm3;
+  return true;
+}
+
+double capped_share(const Mesh& mesh) {
+  const std::size_t count = mesh.triangles.size(), own = std::min<std::size_t>(mesh.repaired_from, count);
+  if (own == count) return 0;
+  double area = 0, caps = 0;
+  for (std::size_t i = 0; i < count; ++i) (i < own ? area : caps) += doubled_area_length(mesh.triangles[i]);
+  return caps > 0 ? caps / (area + caps) : 0;
 }
 
 }  // namespace lamina::load

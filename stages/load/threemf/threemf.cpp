@@ -1,7 +1,8 @@
 // stages/load/threemf/threemf.cpp: a package is opened, its models are parsed, and what its build names becomes meshes.
+#include "stages/load/threemf/threemf.h"
+
 #include <fmt/core.h>
 
-#include "stages/load/reader.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/expansion.h"

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "stages/replay/bytes.h"
-#include "stages/replay/care/records.h"
+#include "stages/replay/care_records.h"
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {

@@ -125,17 +125,6 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
   return FileReader(std::move(state));
 }
 
-FileReader FileReader::of_text(std::string text, const std::string& path, const ReadRules& rules) {
-  auto state = std::make_unique<State>();
-  state->path = path;
-  state->rules = rules;
-  state->size = state->taken = state->end = text.size();
-  state->buffer = std::move(text);
-  state->at_end = true;
-  if (state->size > rules.most_bytes) state->status = state->error(too_long(rules.most_bytes));
-  return FileReader(std::move(state));
-}
-
 const std::string& FileReader::path() const { return state_->path; }
 std::uint64_t FileReader::size() const { return state_->size; }
 int FileReader::descriptor() const { return state_->file; }

@@ -36,8 +36,6 @@ class FileReader {
  public:
   /// errors  rules.fault: "path: reason" for what is missing, unreadable, no regular file, or longer than the rules allow
   static Result<FileReader> open(const std::string& path, const ReadRules& rules);
-  /// Text in place of a file; `path` is for messages.
-  static FileReader of_text(std::string text, const std::string& path, const ReadRules& rules);
   FileReader(FileReader&&) noexcept;
   FileReader& operator=(FileReader&&) noexcept;
   ~FileReader();

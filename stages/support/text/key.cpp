@@ -5,7 +5,20 @@
 
 namespace lamina {
 
+namespace {
+
+/// Keys that have another name now.
+constexpr std::string_view kRenamed[][3] = {{"fill", "by_height", "range"},
+                                            {"segment", "by_height", "range"},
+                                            {"part", "material_by_height", "material_range"},
+                                            {"extrude", "set", "machine"}};
+
+}  // namespace
+
 std::string no_such_key(std::string_view section, std::string_view name, std::span<const std::string_view> names) {
+  for (const auto& [of, old, now] : kRenamed) {
+    if (of == section && old == name) return fmt::format("is now {}.{}; see docs/job.md", section, now);
+  }
   const std::string near = suggest(name, names);
   return near.empty() ? fmt::format("no such key; [{}] has {}", section, fmt::join(names, ", "))
                       : fmt::format("no such key{}", near);

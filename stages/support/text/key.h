@@ -28,7 +28,7 @@ struct KeyName {
   std::string_view meaning = {};                // for the help, one line
   unsigned decides = 0;                         // products whose bytes depend on it (job/product.h)
   std::string_view switch_text = {};            // value of a flag without text, as in --no-repair: "false"
-  std::optional<std::string_view> unsaid = {};  // value that kept texts leave out, of a key that came after them
+  std::optional<std::string_view> unsaid = {};  // default that kept texts leave out
 };
 
 /// The form of a value in TOML; kToml: its text is TOML already.
@@ -59,7 +59,7 @@ struct Key : KeyName {
     key.words = all;
     return key;
   }
-  /// At this value all bytes are those of a lamina without the key, so that its jobs go on: their texts lack it.
+  /// The default of optional equipment: kept texts leave the key out at this value.
   constexpr Key unsaid_at(std::string_view same) const {
     Key key = *this;
     key.unsaid = same;

@@ -294,6 +294,19 @@ TEST(Manifest, ChangedBytesOfItsHeadAreNoticed) {
   EXPECT_LT(range, keys_end);
 }
 
+TEST(Manifest, OfAnotherVersionIsRefused) {
+  const Directory directory;
+  write_manifest(directory / "manifest.json", some_head(0, 3));
+  std::string other = test::read_text(directory / "manifest.json");
+  const std::string version = "\"manifest\": " + std::to_string(kManifestVersion);
+  ASSERT_NE(other.find(version), std::string::npos);
+  other.replace(other.find(version), version.size(), "\"manifest\": 1");
+  test::write_text(directory / "manifest.json", other);
+  const auto manifest = read_manifest(directory / "manifest.json");
+  ASSERT_FALSE(manifest.ok());
+  EXPECT_NE(manifest.error().message.find("of another version of lamina"), std::string::npos) << manifest.error().message;
+}
+
 TEST(Manifest, KeptRecordsComeFirstAndNoLayerIsSkipped) {
   const Directory directory;
   write_manifest(directory / "whole.json", some_head());
@@ -337,34 +350,6 @@ TEST(Manifest, SecondRunInTheSameDirectoryIsRefusedWhileTheFirstWrites) {
     ASSERT_TRUE(first->flush().ok());
   }
   EXPECT_TRUE(ManifestWriter::open(directory / "manifest.json", some_head(), {}).ok());
-}
-
-// Builds before wrote profiles by the path that a call or a file had for them.
-TEST(Manifest, IsOfTheSameJobWhereverItsProfilesLie) {
-  const auto with = [](const std::string& machine, const std::string& rest = "") {
-    ManifestHead head = some_head();
-    head.job_toml = "[bed]\ndpi = [600, 600]\n\n[machine]\n" + machine + rest + "\n\n[[part]]\npath = \"a/b\"\n";
-    return head;
-  };
-  const auto now = with("profile = \"mine.toml\"\npresets = [\"steel\", \"dear.toml\"]");
-  for (const char* before : {"profile = \"mine.toml\"\npresets = [\"steel\", \"dear.toml\"]",
-                             "profile = \"../shop/mine.toml\"\npresets = [\"steel\", \"./dear.toml\"]",
-                             "profile = \"/a \\\"b/ c\\\\/mine.toml\"\npresets = [\"x/y/steel\", \"z/dear.toml\"]"}) {
-    EXPECT_TRUE(same_job(now, with(before))) << before;
-    EXPECT_EQ(difference(now, with(before)), "") << before;
-  }
-  for (const char* other : {"profile = \"shop/yours.toml\"\npresets = [\"steel\", \"dear.toml\"]",
-                            "profile = \"mine.toml\"\npresets = [\"dear.toml\"]", "profile = \"mine.toml\""}) {
-    EXPECT_FALSE(same_job(now, with(other))) << other;
-    EXPECT_NE(difference(now, with(other)).find("machine."), std::string::npos) << difference(now, with(other));
-  }
-  ManifestHead changed = with("profile = \"../shop/mine.toml\"\npresets = [\"steel\", \"dear.toml\"]");
-  changed.machine_profile = hash_bytes({});
-  changed.machine = "mine";
-  EXPECT_FALSE(same_job(now, changed));
-  ManifestHead part = now;
-  part.job_toml.replace(part.job_toml.find("a/b"), 3, "c/b");
-  EXPECT_FALSE(same_job(now, part));
 }
 
 TEST(Hash, KnownValuesAndFiles) {

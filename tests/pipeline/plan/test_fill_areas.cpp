@@ -9,6 +9,7 @@
 
 #include "pipeline/job/file.h"
 #include "stages/formats/slice_format.h"
+#include "stages/formats/svg/svg.h"
 #include "stages/geometry/clipping.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"

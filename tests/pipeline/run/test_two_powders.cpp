@@ -246,12 +246,7 @@ TEST_F(TwoPowders, PixelsInTheOtherPowderAreInManifestAndVerify) {
   ASSERT_EQ(report->unfed.size(), 2u);
   EXPECT_EQ(report->unfed[1].pixels, unfed);
   EXPECT_EQ(report->unfed[1].layers, layers);
-  // A manifest of an older build has no such key; one that tells another number is at fault.
   const std::string path = made.output + "/manifest.json", whole = text(path);
-  std::ofstream(path) << std::regex_replace(whole, std::regex(", \"unfed_pixels\": [0-9]+"), "");
-  report = verify(made.output, {});
-  ASSERT_TRUE(report.ok()) << report.error().message;
-  EXPECT_TRUE(report->ok());
   std::ofstream(path) << std::regex_replace(whole, std::regex("(\"unfed_pixels\": [1-9][0-9]*)"), "$017");
   report = verify(made.output, {});
   ASSERT_TRUE(report.ok());
