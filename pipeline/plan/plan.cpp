@@ -21,7 +21,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
-#include "stages/heights/build_steps.h"
+#include "stages/heights/table.h"
 #include "stages/raster/beams.h"
 #include "stages/support/clocks.h"
 #include "stages/support/text/number_text.h"

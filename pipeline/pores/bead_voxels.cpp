@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "stages/bead/along.h"
+#include "stages/bead/contacts.h"
 #include "stages/pores/period.h"
 #include "stages/raster/beads.h"
 

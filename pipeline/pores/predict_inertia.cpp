@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "stages/stokes/canonical.h"
-#include "stages/stokes/sweep.h"
+#include "stages/stokes/inertia.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -12,7 +12,7 @@
 #include "pipeline/plan/layer_cut.h"
 #include "stages/bead/even_starts.h"
 #include "stages/infill/skirt.h"
-#include "stages/segment/laid/crossing.h"
+#include "stages/segment/laid/pores.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {

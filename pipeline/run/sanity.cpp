@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/plan/heights.h"
-#include "stages/checks/crossed.h"
+#include "stages/checks/judge.h"
 #include "stages/load/info/planned.h"
 #include "stages/slice/bodies.h"
 #include "stages/slice/surplus.h"

@@ -12,7 +12,6 @@
 #include "pipeline/plan/plan.h"
 #include "stages/checks/judge.h"
 #include "stages/checks/tally.h"
-#include "stages/checks/united.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
@@ -23,7 +22,7 @@ std::vector<sanity::Solid> solids_from_above(const Scene& scene);
 /// How images on a grid see the solids of a job, or contours if it is null. Names of parts are left to the caller.
 sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid);
 
-/// What the solids of a group hold together (stages/checks/united.h). Scene, tally and cancel must outlive it.
+/// What the solids of a group hold together (stages/checks/judge.h). Scene, tally and cancel must outlive it.
 std::function<Result<double>(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally,
                                                        const std::atomic<bool>* cancel = nullptr,
                                                        sanity::United::Again again = {});

@@ -5,10 +5,10 @@
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/run/sanity.h"
-#include "stages/checks/crossed.h"
+#include "stages/checks/judge.h"
 #include "stages/checks/paths.h"
 #include "stages/checks/records.h"
-#include "stages/heights/build_steps.h"
+#include "stages/heights/table.h"
 #include "stages/program/head_grid.h"
 
 namespace lamina::pipeline {

@@ -1,9 +1,11 @@
 #include "stages/bead/predicted_tables.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
-#include "stages/bead/pattern.h"
 #include "stages/bead/section.h"
+#include "stages/bead/spread.h"
 
 namespace lamina::bead {
 namespace {
@@ -65,6 +67,90 @@ Calibration predicted_tables(const BeadMachine& machine, double width_mm, double
     tables.repeated.push_back({extrusion, 200, thick_speed, laid.thick.middle, laid.thin.middle, even});
   }
   return tables;
+}
+
+// One period of a pattern in its steady state, and its widths.
+
+namespace {
+
+constexpr double kReach = 1.5;  // mm: half of the widest bead that spreads
+
+std::array<Stretch, 2> period_of(const BeadMachine& machine, const Pattern& pattern) {
+  const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
+  return {{{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
+}
+
+/// Gathers the widths between two places.
+class Gather {
+ public:
+  Gather(double begin, double end) : begin_(begin), end_(end), middle_((begin + end) / 2) {}
+
+  void add(const ProfilePiece& p) {
+    const double from = std::max(p.begin_mm, begin_), to = std::min(p.end_mm, end_);
+    if (from >= to) return;
+    const double first = p.width_at(from), last = p.width_at(to);
+    sum_ += (to - from) * (first + last) / 2;
+    widths_.least = std::min({widths_.least, first, last});
+    widths_.largest = std::max({widths_.largest, first, last});
+    if (from <= middle_ && middle_ <= to) widths_.middle = p.width_at(middle_);
+  }
+  StretchWidths widths() const {
+    StretchWidths result = widths_;
+    result.mean = sum_ / (end_ - begin_);
+    return result;
+  }
+
+ private:
+  double begin_, end_, middle_, sum_ = 0;
+  StretchWidths widths_{0, 0, HUGE_VAL, 0};
+};
+
+}  // namespace
+
+PatternSums steady_profile(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread,
+                           const TakeProfile& take) {
+  const auto period = period_of(machine, pattern);
+  const Joint joint = steady_joint(machine, height_mm, period);
+  const double length = pattern.thick_mm + pattern.thin_mm;
+  const int before = spread ? static_cast<int>(std::ceil(2 * kReach / length)) : 0;
+  const double begin = before * length;
+  const auto see = [&](double a, double b, double width_a, double width_b) {
+    const double from = std::max(a, begin), to = std::min(b, begin + length);
+    if (from >= to) return;
+    const auto at = [&](double place) { return width_a + (width_b - width_a) * (place - a) / (b - a); };
+    take({from - begin, to - begin, at(from), at(to)});
+  };
+  BeadSpread pen(height_mm, std::min(0.02, std::min(pattern.thick_mm, pattern.thin_mm) / 20), kReach);
+  double place = -HUGE_VAL, width = 0;
+  const TakeCell cell = [&](const SpreadCell& c) {
+    const double middle = (c.begin_mm + c.end_mm) / 2;
+    if (std::isfinite(place)) see(place, middle, width, c.width_mm);
+    place = middle;
+    width = c.width_mm;
+  };
+  const TakePiece piece = [&](const BeadPiece& p) {
+    if (spread) return pen.add(p, cell);
+    see(p.begin_mm, p.end_mm, p.begin_width_mm, p.end_width_mm);
+  };
+  BeadLine line(machine, height_mm, 0.001);
+  line.begin(joint);
+  for (int i = 0; i <= 2 * before; ++i) {
+    for (const Stretch& stretch : period) line.add(stretch, piece);
+  }
+  line.end(joint.speed_mm_s, piece);
+  if (spread) pen.end(cell);
+  const int periods = 2 * before + 1;
+  const Planned thin{period[1], std::min(period[0].speed_mm_s, period[1].speed_mm_s), joint.speed_mm_s};
+  return {line.fed_mm3() / periods, line.seconds() / periods, joint.flow_mm3_s, thin.peak(machine.acceleration_mm_s2)};
+}
+
+PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread) {
+  Gather thick(0, pattern.thick_mm), thin(pattern.thick_mm, pattern.thick_mm + pattern.thin_mm);
+  const PatternSums sums = steady_profile(machine, height_mm, pattern, spread, [&](const ProfilePiece& p) {
+    thick.add(p);
+    thin.add(p);
+  });
+  return {thick.widths(), thin.widths(), sums};
 }
 
 }  // namespace lamina::bead

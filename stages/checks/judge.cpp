@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <utility>
 
 #include "stages/support/text/number_text.h"
 
@@ -256,6 +258,62 @@ std::string why_nothing(const Tally& tally, const Sampling& sampling) {
   }
   if (sampling.offset_mm < 0) return fmt::format("--offset {} leaves none of the parts", number_text(sampling.offset_mm));
   return "the shells of the parts enclose nothing or cancel each other: look at `lamina info`";
+}
+
+std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                         std::span<const Nm> planes) {
+  std::vector<std::uint8_t> crossed(planes.size(), 0);
+  std::set<std::pair<std::uint32_t, Nm>> seen;
+  for (const Instance& instance : instances) {
+    if (!seen.emplace(instance.mesh, instance.offset.z).second) continue;
+    for (const Triangle& t : meshes[instance.mesh].triangles) {
+      const std::int64_t lowest = std::int64_t{std::min({t.a.z, t.b.z, t.c.z})} + instance.offset.z,
+                         highest = std::int64_t{std::max({t.a.z, t.b.z, t.c.z})} + instance.offset.z;
+      auto plane = std::ranges::lower_bound(planes, lowest);
+      for (; plane != planes.end() && *plane < highest; ++plane) crossed[static_cast<std::size_t>(plane - planes.begin())] = 1;
+    }
+  }
+  return crossed;
+}
+
+United::United(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
+               Again again)
+    : meshes_(meshes), volume_(std::move(volume)), again_(std::move(again)) {
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    if (members_.size() <= solids[i].group) members_.resize(std::size_t{solids[i].group} + 1);
+    members_[solids[i].group].push_back(instances[i]);
+  }
+}
+
+United::Key United::key_of(std::span<const Instance> members) {
+  Key key;
+  for (const Instance& one : members) key.push_back({one.mesh, one.offset.x, one.offset.y, one.offset.z});
+  std::ranges::sort(key);
+  for (auto at = key.rbegin(); at != key.rend(); ++at)
+    for (std::size_t axis = 1; axis < 4; ++axis) (*at)[axis] -= key.front()[axis];
+  return key;
+}
+
+Result<double> United::compute(std::span<const Instance> members) {
+  if (!again_) return volume_(meshes_, members);
+  if (!reread_) reread_.emplace(again_());
+  if (!*reread_) return reread_->error();
+  const std::vector<Mesh>& now = **reread_;
+  const auto changed = [&](const Instance& one) {
+    return one.mesh >= now.size() || now[one.mesh].fingerprint != meshes_[one.mesh].fingerprint;
+  };
+  if (now.size() != meshes_.size() || std::ranges::any_of(members, changed)) {
+    return Error{Fault::kInput, "a part has changed since it was planned"};
+  }
+  return volume_(now, members);
+}
+
+Result<double> United::mm3(std::uint32_t group) {
+  if (group >= members_.size()) return 0.0;
+  const std::vector<Instance>& members = members_[group];
+  Key key = key_of(members);
+  const auto found = known_.find(key);
+  return found != known_.end() ? found->second : known_.emplace(std::move(key), compute(members)).first->second;
 }
 
 }  // namespace lamina::sanity

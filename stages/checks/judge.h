@@ -11,6 +11,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,7 +38,7 @@ struct Sampling {
   bool one_sided = false;             // steps lie inside or outside of the parts, on purpose
   std::span<const std::string> part;  // names of files
   /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0: the volumes of the meshes
-  /// count. Asked only of groups that are doubted by those; where it fails, no volume is doubted (united.h).
+  /// count. Asked only of groups that are doubted by those; where it fails, no volume is doubted.
   std::function<Result<double>(std::uint32_t group)> united_mm3 = {};
 };
 
@@ -56,5 +58,44 @@ void judge_footing(std::span<const Solid> solids, const Sampling& sampling, std:
 
 /// Why nothing at all is planned, and what to do; "" if the solids do not tell.
 std::string why_nothing(const Tally& tally, const Sampling& sampling);
+
+// --- planes that meet a facet; layers at them are not rightly empty.
+
+/// For each of some rising planes, whether a facet crosses it. cost  O(T log P) for each instance of another mesh or height
+std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                         std::span<const Nm> planes);
+
+// --- what the solids of a group hold together, computed once for groups that are copies of each other.
+
+/// Not thread-safe.
+class United {
+ public:
+  /// What instances hold together, mm3; 0 if that is not known.
+  using Volume = std::function<Result<double>(std::span<const Mesh>, std::span<const Instance>)>;
+  /// Reads the meshes again.
+  using Again = std::function<Result<std::vector<Mesh>>()>;
+
+  /// meshes  of the job; only their fingerprints are looked at if `again` is given. Must outlive this object
+  /// solids  one for each instance; both must outlive this object
+  /// again   where the triangles of the meshes are gone: asked once, when the first volume is
+  United(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
+         Again again = {});
+
+  /// errors  of `again` and `volume`; kInput: a mesh of the group has changed since
+  /// cost    `volume` once for all groups that hold the same meshes in the same places relative to each other
+  Result<double> mm3(std::uint32_t group);
+
+ private:
+  using Key = std::vector<std::array<std::int64_t, 4>>;  // mesh, and x, y, z from the first
+  static Key key_of(std::span<const Instance> members);
+  Result<double> compute(std::span<const Instance> members);
+
+  std::span<const Mesh> meshes_;
+  Volume volume_;
+  Again again_;
+  std::vector<std::vector<Instance>> members_;  // by group
+  std::optional<Result<std::vector<Mesh>>> reread_;
+  std::map<Key, Result<double>> known_;
+};
 
 }  // namespace lamina::sanity

@@ -19,7 +19,9 @@
 #include <memory>
 #include <span>
 
-#include "stages/coverage/scratch.h"
+#include "stages/coverage/band/maker.h"
+#include "stages/coverage/slab_facet.h"
+#include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -28,6 +30,19 @@
 #include "stages/data/status.h"
 
 namespace lamina::cover {
+
+// --- memory of one layer in flight.
+
+/// Any layer may follow any other in it.
+struct LayerScratch {
+  Buffer<SlabFacet> facets;             // that reach into the layer
+  Buffer<std::uint32_t> begins, order;  // facets by the band of the last row they reach: where a band's begin; indices
+  BandMaker maker;
+
+  std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + maker.bytes(); }
+};
+
+// ---
 
 /// What a layer told besides its levels.
 struct LayerReport {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/coverage/volume.h"
+#include "stages/coverage/slab_facet.h"
 
 namespace lamina::cover {
 namespace {

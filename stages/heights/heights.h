@@ -14,10 +14,10 @@
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 #include "stages/heights/flats.h"
+#include "stages/heights/ladder.h"
 #include "stages/heights/settings.h"
 #include "stages/heights/surface.h"
 #include "stages/heights/table.h"
-#include "stages/heights/thickness_set.h"
 
 namespace lamina::heights {
 

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "stages/data/buffer.h"
 #include "stages/data/layer.h"
+#include "stages/data/machine.h"
+#include "stages/data/status.h"
 
 namespace lamina::heights {
 
@@ -56,5 +59,12 @@ class LayerTable {
   std::uint32_t count_ = 0;
   Buffer<Entry> entries_;
 };
+
+// --- whether the build vat of a powder printer can make a table of layers.
+
+/// Empty, or a warning if some layers end between two steps of the vat.
+/// errors  kUsage: a layer thinner than a step
+/// cost    O(layers)
+Result<std::string> check_build_steps(const Machine& machine, const LayerTable& table);
 
 }  // namespace lamina::heights

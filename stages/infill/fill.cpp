@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/merge.h"
-#include "stages/infill/expression.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/raster.h"
+#include "stages/infill/spacing.h"
 #include "stages/infill/waves.h"
 
 namespace lamina::infill {

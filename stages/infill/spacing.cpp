@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
-
-#include "stages/infill/expression.h"
 
 namespace lamina::infill {
 namespace {
@@ -177,6 +176,24 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
     place += *distance + extent.line_height;
   }
   return places;
+}
+
+Result<Expression> Expression::parse(const std::string& text) {
+  static constexpr std::string_view kNames[] = {"z", "h", "n", "a", "i", "s", "u"};
+  auto formula = Formula::parse(text, kNames);
+  if (!formula) return formula.error();
+  return Expression(std::move(*formula));
+}
+
+Result<double> Expression::operator()(const Variables& of) {
+  const std::array values{of.z, of.h, of.n, of.a, of.i, of.s, of.u};
+  const Result<double> value = formula_(values);
+  if (value && !std::isfinite(*value)) {
+    return Error{Fault::kUsage, fmt::format("'{}': is {} where z = {:g}, n = {:g}, i = {:g}, s = {:g}; it has to be a "
+                                            "finite number of mm",
+                                            formula_.text(), *value, of.z, of.n, of.i, of.s)};
+  }
+  return value;
 }
 
 }  // namespace lamina::infill

@@ -1,7 +1,6 @@
 #include "stages/pores/porosity.h"
 
 #include "stages/pores/rows.h"
-#include "stages/pores/voids.h"
 
 namespace lamina::pores {
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "stages/pores/rows.h"
-#include "stages/pores/voids.h"
 
 namespace lamina::pores {
 namespace {

@@ -9,7 +9,6 @@
 #include "stages/geometry/isa.h"
 #include "stages/raster/beams.h"
 #include "stages/raster/clusters.h"
-#include "stages/raster/crossed_planes.h"
 #include "stages/raster/cut_clusters.h"
 #include "stages/raster/layer_bound.h"
 

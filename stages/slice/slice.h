@@ -25,7 +25,6 @@
 #include "stages/slice/chain.h"
 #include "stages/slice/cut.h"
 #include "stages/slice/gaps.h"
-#include "stages/slice/plane_index.h"
 
 namespace lamina::slice {
 

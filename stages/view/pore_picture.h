@@ -34,4 +34,12 @@ struct PorePicture {
 /// side of its section. cost  parallel to nothing; some 2e6 pixels, each looked up in a row of runs
 Plot draw_pores(const PorePicture& picture);
 
+// --- colours for numbers, in which equal steps look equal.
+
+/// "rrggbb" of a share 0 .. 1: from dark blue over violet and orange to light yellow, ever lighter, so that it reads in grey
+/// too. Lightness, hue and chroma go evenly in the colour space OKLab.
+///
+/// source  B. Ottosson, "A perceptual color space for image processing" (2020)
+std::string scale_colour(double share);
+
 }  // namespace lamina::view

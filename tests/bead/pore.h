@@ -5,7 +5,7 @@
 // Against Di Nisio 2022, Table 16, see tests/bead/test_tables.cpp.
 #pragma once
 
-#include "stages/bead/pattern.h"
+#include "stages/bead/predicted_tables.h"
 
 namespace lamina::bead {
 

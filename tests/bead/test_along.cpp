@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/bead/along.h"
+#include "stages/bead/contacts.h"
 #include "stages/bead/section.h"
 
 namespace lamina::bead {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "stages/bead/laid.h"
-#include "stages/bead/pattern.h"
+#include "stages/bead/predicted_tables.h"
 #include "stages/bead/section.h"
 
 namespace lamina::bead {

@@ -1,7 +1,7 @@
 // A pattern in its steady state: the widths told are those of a long line.
 #include <gtest/gtest.h>
 
-#include "stages/bead/pattern.h"
+#include "stages/bead/predicted_tables.h"
 #include "tests/bead/anet.h"
 #include "tests/bead/pore.h"
 

@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "stages/bead/line.h"
 #include "stages/bead/section.h"
-#include "stages/bead/speeds.h"
 
 namespace lamina::bead {
 namespace {

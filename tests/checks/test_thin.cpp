@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "stages/checks/stencils.h"
 #include "stages/checks/thin.h"
 #include "tests/checks/volume.h"
 

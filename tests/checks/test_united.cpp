@@ -1,5 +1,4 @@
 // What solids hold together is computed once for all that are alike, and not at all where their part is no more what it was.
-#include "stages/checks/united.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "stages/coverage/coverage.h"
-#include "stages/coverage/scratch.h"
 #include "stages/data/layer.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"

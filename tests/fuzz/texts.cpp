@@ -2,8 +2,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stages/heights/thickness_set.h"
-#include "stages/infill/expression.h"
+#include "stages/heights/ladder.h"
+#include "stages/infill/spacing.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

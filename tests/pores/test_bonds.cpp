@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "stages/pores/bonds.h"
-#include "stages/pores/closing.h"
 #include "stages/pores/porosity.h"
 #include "tests/pores/boxes.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stages/pores/closing.h"
+#include "stages/pores/bonds.h"
 #include "stages/pores/porosity.h"
 #include "tests/pores/boxes.h"
 

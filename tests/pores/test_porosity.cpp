@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "stages/pores/porosity.h"
-#include "stages/pores/voids.h"
+#include "stages/pores/rows.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina::pores {

@@ -5,7 +5,6 @@
 #include <numbers>
 #include <vector>
 
-#include "stages/pores/least_box.h"
 #include "stages/pores/sizes.h"
 #include "tests/pores/boxes.h"
 

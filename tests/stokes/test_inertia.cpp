@@ -7,10 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "stages/stokes/convection.h"
 #include "stages/stokes/flow.h"
 #include "stages/stokes/inertia.h"
-#include "stages/stokes/sweep.h"
+#include "stages/stokes/operator.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina {

@@ -6,7 +6,6 @@
 #include <cstdlib>
 
 #include "stages/pores/porosity.h"
-#include "stages/view/colour_scale.h"
 #include "stages/view/pore_picture.h"
 #include "tests/pores/boxes.h"
 

@@ -6,7 +6,6 @@
 #include "stages/calibration/scan/dashes.h"
 #include "stages/calibration/scan/marks.h"
 #include "stages/calibration/scan/robust.h"
-#include "stages/calibration/scan/shape.h"
 
 namespace lamina::scan {
 namespace {

@@ -1,7 +1,7 @@
 // stages/coverage/band/body.h: the kernels of kernels.h, on the lanes of an instruction set. Included once for each, in its
 // namespace, behind Eight, Mask and what is done with them; LAMINA_LANES has the target.
 
-/// A triangle that what lies behind it sees along x (volume.h), in each of eight rows; x from the facet's lowest corner.
+/// A triangle that what lies behind it sees along x (slab_facet.h), in each of eight rows; x from the facet's lowest corner.
 struct Tent {
   Eight x0, x1, x2, area, mean, rise, fall;
 };

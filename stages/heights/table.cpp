@@ -1,4 +1,4 @@
-#include "stages/heights/build_steps.h"
+#include "stages/heights/table.h"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,6 @@
-#include "stages/pores/voids.h"
+#include "stages/pores/rows.h"
 
 #include <array>
-
-#include "stages/pores/rows.h"
 
 namespace lamina::pores {
 namespace {
