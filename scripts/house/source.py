@@ -98,7 +98,8 @@ class Source:
 
     def types(self):
         """(line, name, what it names) of every struct, class, union and enum outside of functions, and of aliases at namespace scope.
-        For an alias the last entry is the type that it names, else None. Specialisations of templates declare no name."""
+        For an alias the last entry is the type that it names, else None. Specialisations of templates, and
+        definitions of what a class declares (A::B), declare no name."""
         scopes, start = [], 0
         for found in re.finditer(r"[{};]", self.bare):
             head, mark = self.bare[start:found.start()], found.group()
@@ -111,7 +112,7 @@ class Source:
                 if re.search(r"\bnamespace\b", head):
                     scopes.append("namespace")
                 elif declared and "(" not in re.sub(r"alignas\s*\([^)]*\)", "", head):
-                    if "function" not in scopes:
+                    if "function" not in scopes and "::" not in declared.group(1):
                         yield self.line(start + declared.start(1)), declared.group(1), None
                     scopes.append("type")
                 else:
@@ -122,7 +123,7 @@ class Source:
 
 
 DECLARED = re.compile(r"\b(?:struct|class|union|enum(?:\s+(?:class|struct))?)\s+(?:alignas\s*\([^)]*\)\s*|\[\[[^\]]*\]\]\s*)*"
-                      r"([A-Za-z_]\w*)(?:\s+final)?\s*(?::[^;{}]*)?$", re.S)
+                      r"((?:\w+::)*[A-Za-z_]\w*)(?:\s+final)?\s*(?::(?!:)[^;{}]*)?$", re.S)
 ALIAS = re.compile(r"\s*(?:template\s*<.*>\s*)?using\s+(\w+)\s*=\s*(.*)$", re.S)
 
 

@@ -15,7 +15,7 @@ NAMES = set(PROSE) | set("""least most place places stretch stretches stretched 
 # Whole names that tell a tale instead of the thing.
 TALES = {"LayerWorkshop", "layer_workshop", "keep_what_is_done", "something_to_keep", "at_work", "AtWork"}
 # Names of the standard library and of others.
-OTHERS = re.compile(r"^(?:in_place(?:_t|_type|_index)?|u?int_least\d+_t|memory_order_\w+)$")
+OTHERS = re.compile(r"^(?:in_place(?:_t|_type|_index)?|u?int_least\d+_t|ZIP_SOURCE_TELL)$")
 
 PROSE_PATTERN = re.compile(r"(?<![\w-])(?:" + "|".join(PROSE) + "|" + PHRASES + r")(?![\w])", re.I)
 PARTS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -59,9 +59,10 @@ class Words:
                 if words:
                     self.pages.append((f"{page.path}:{number}", words, line.strip()))
         for source in sources:
-            stem = os.path.splitext(os.path.basename(source.path))[0]
-            if counted(stem):
-                self.uses[stem]["file name " + source.path] += 1
+            folder, name = os.path.split(source.path)
+            for part in [os.path.splitext(name)[0], *folder.split("/")]:
+                if counted(part):
+                    self.uses[part]["file name " + source.path] += 1
 
     def _count(self, path, name, label=None):
         if name not in self._known:
