@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <tuple>
 
@@ -15,7 +14,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "pipeline/run/job_cost.h"
+#include "pipeline/report/job_cost.h"
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
 #include "stages/replay/feeding.h"
@@ -183,12 +182,7 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
   report.use = {};
-  report.use.facts = std::make_shared<nlohmann::ordered_json>();
-  cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
-  for (const cost::PowderDrops& powder : cost->powders()) {
-    report.use.results.emplace_back("", powder.told(cost->drop_pl()));
-    (*report.use.facts)["materials"].push_back(powder.json(cost->drop_pl()));
-  }
+  cost->report(report.use);
 }
 
 /// As the program feeds, or its host.

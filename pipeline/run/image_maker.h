@@ -8,6 +8,7 @@
 #include "pipeline/output/image_files.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/report/image_observers.h"
 #include "pipeline/run/maker.h"
 #include "pipeline/run/sanity.h"
 #include "stages/checks/vanished.h"
@@ -36,14 +37,6 @@ struct ImageWork {
 
   /// Capacity of its buffers.
   std::uint64_t bytes() const;
-};
-
-/// Observations about a layer, for the summary.
-struct ImageNotes {
-  raster::LayerReport report;
-  inspect::VanishedPieces vanished;                 // by the bleed
-  std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
-  std::vector<std::uint64_t> part_pixels;           // of each part before its dose, or shares of voxels; empty: nobody asks
 };
 
 /// The steps of a layer's images; const, usable from any thread with separate work objects.
@@ -108,9 +101,6 @@ class LayerImager {
 
   const Plan& plan_;
 };
-
-/// The head of the summary for a plan of images.
-void tell_images(const Plan& plan, Summary& summary);
 
 std::unique_ptr<Maker> make_image_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
 

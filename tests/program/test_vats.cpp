@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/report/machine_text.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"

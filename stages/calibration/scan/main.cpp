@@ -64,7 +64,7 @@ Result<std::string> run(const std::string& what) {
   const auto text = read_file("-", {.fault = Fault::kUsage, .most_bytes = 1u << 30, .streams = true});
   if (!text) return text.error();
   if (!json_nests_within(*text)) return Error{Fault::kUsage, "the request nests too deep"};
-  return what == "chart" ? read_chart_of(Json::parse(*text)) : compare_with(Json::parse(*text));
+  return what == "chart" ? read_chart_of(parse_json(*text)) : compare_with(parse_json(*text));
 }
 
 int end(const Result<std::string>& result) {
