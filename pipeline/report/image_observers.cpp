@@ -10,6 +10,7 @@
 #include "pipeline/machine/materials.h"
 #include "pipeline/report/dose_text.h"
 #include "pipeline/report/job_cost.h"
+#include "pipeline/report/layer_text.h"
 #include "pipeline/report/machine_text.h"
 #include "pipeline/report/powder_drops.h"
 #include "pipeline/report/replay_text.h"
@@ -232,7 +233,7 @@ class PrintObserver : public ImageObserver {
   void report(Summary& summary) const override {
     const double seconds = timed_ ? static_cast<double>(microseconds_) * 1e-6 : 0;
     if (seconds > 0) summary.results.emplace_back("printing", replay::time_text(seconds, machine_.name));
-    if (!refills_.empty()) summary.results.emplace_back("vats", program::refills_text(refills_));
+    if (!refills_.empty()) summary.results.emplace_back("vats", refills_text(refills_));
     if (timed_) {
       cost_.report(summary);
       summary.facts["print_seconds"] = seconds;

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
@@ -34,8 +33,5 @@ struct FullLayer {
 /// What follows from a profile, one fact a line, for people.
 /// full  absent: its time is not told
 std::string explain(const Machine& machine, const HeadGrid& grid, const std::optional<FullLayer>& full);
-
-/// "pauses before layers 812, 1630 and 4 more for vats to be filled"; empty without refills.
-std::string refills_text(const std::vector<std::uint32_t>& refills);
 
 }  // namespace lamina::program

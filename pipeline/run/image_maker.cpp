@@ -5,6 +5,7 @@
 
 #include "pipeline/report/image_observers.h"
 #include "pipeline/run/inspector.h"
+#include "pipeline/run/layer_imager.h"
 #include "pipeline/run/part_counter.h"
 #include "pipeline/run/powders.h"
 

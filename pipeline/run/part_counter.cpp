@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/report/job_cost.h"
+#include "pipeline/run/layer_imager.h"
 #include "pipeline/run/sanity.h"
 #include "stages/slice/bodies.h"
 
