@@ -2,6 +2,7 @@
 // a printer and beside meshes.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
