@@ -180,7 +180,6 @@ class Printing {
   double base_mm() const { return layer_.index == 0 ? profile().powder.base_mm() : 0; }
   std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
   void strokes(double build_mm, double fed_mm);
-  const std::vector<std::string>& own_lines() const;
   bool capped() const;
   void waits_capped(std::string_view what);
   void check_pauses();

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::chart {
 namespace {

@@ -7,7 +7,7 @@
 #include "stages/calibration/scan/view.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::scan {
 

@@ -11,7 +11,7 @@
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/status.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::scan {
 
