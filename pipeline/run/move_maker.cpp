@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/output/toolpath_file.h"
+#include "pipeline/report/laid_summary.h"
 #include "pipeline/run/path_layer.h"
 #include "stages/checks/paths.h"
 #include "stages/formats/gcode/write_gcode.h"
-#include "stages/segment/laid/told.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -88,7 +88,7 @@ class MoveMaker : public Maker {
     const std::vector<RangePores>& by_range = record.paths->by_range;
     const auto& areas = plan_.sections->areas();
     const SegmentRange& in = plan_.segments->at(record.layer.plane() - (areas.empty() ? 0 : areas.front().box.lo.z));
-    const auto add_to = [&](segment::LaidRange& range, const PoreCounts& pores, double area_mm2) {
+    const auto add_to = [&](LaidRange& range, const PoreCounts& pores, double area_mm2) {
       range.pores.add(pores);
       range.area_mm2 += area_mm2;
     };
@@ -174,15 +174,15 @@ class MoveMaker : public Maker {
 
   PathFacts sums_;
   decltype(std::declval<SegmentPlan>().segmented()) segmented_;
-  std::vector<segment::LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
-  bool by_range_ = false;                   // records hold the pores of each range
+  std::vector<LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
+  bool by_range_ = false;          // records hold the pores of each range
   std::uint64_t first_layer_points_ = 0, bytes_written_ = 0;
   sanity::PathsTold told_;
 };
 
 void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {
   told_.tell(plan_.sections->fills(), sums_.totals.part_moves(), so_far.layers_planned, warnings);
-  std::string slow = segment::speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
+  std::string slow = speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
   if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
 }
 
@@ -204,7 +204,7 @@ void MoveMaker::tell(Summary& summary) const {
   result("skirt", totals.beside_moves == 0 ? std::string(none)
                                            : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts",
                                                          totals.beside_mm, totals.beside_mm3, totals.beside_filament_mm));
-  segment::tell_laid(sums_.laid, ranges_, machine, first_layer_points_, summary.results, *summary.facts);
+  tell_laid(sums_.laid, ranges_, machine, first_layer_points_, summary.results, *summary.facts);
   result("filament", fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
   result("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
 
@@ -231,8 +231,8 @@ void tell_moves(const Plan& plan, Summary& summary) {
   summary.machine = plan.moves->profile.machine.name;
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
-  segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out,
-                     plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, *summary.facts);
+  tell_bead(plan.moves->profile.machine, plan.moves->left_out,
+            plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, *summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
   summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",
                                                                        number_text(tolerance_um))

@@ -13,6 +13,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/output/toolpath_file.h"
+#include "pipeline/report/heights_study.h"
 #include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/move_maker.h"

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <numeric>
-#include <string>
 #include <string_view>
 #include <vector>
 
+#include "stages/data/status.h"
 #include "stages/data/units.h"
 
 namespace lamina::heights {
@@ -30,7 +30,7 @@ struct ThicknessSet {
 
 /// Reads a set "0.178,0.254" or a range "0.05..0.3:0.01" of thicknesses in mm; a range without a step has steps of
 /// 0.001 mm, and holds what lies on the steps from its lower end. Sets may be in any order.
-/// returns "" or what is wrong and what would be right; the set is then as it was
-std::string read_thicknesses(std::string_view text, ThicknessSet& set);
+/// errors  kUsage: what is wrong and what would be right, without the name of the option
+Result<ThicknessSet> read_thicknesses(std::string_view text);
 
 }  // namespace lamina::heights

@@ -5,6 +5,8 @@
 // between facets, behind corners and before "endfacet"; signed numbers; normals that are no numbers (they are not used). Not
 // tolerated, because it would lose facets in silence: words out of place within a facet, facets that do not have three corners,
 // numbers with a decimal comma.
+#include "stages/load/stl_ascii.h"
+
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
@@ -12,7 +14,7 @@
 #include <cstring>
 #include <vector>
 
-#include "stages/load/reader.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 
 namespace lamina::load {

@@ -1,9 +1,9 @@
 // stages/calibration/scan/marks.h: the four marks of a chart in a photograph.
 #pragma once
 
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/scan/photo.h"
 #include "stages/calibration/scan/view.h"
+#include "stages/data/chart.h"
 #include "stages/data/status.h"
 
 namespace lamina::scan {

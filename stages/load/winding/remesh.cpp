@@ -1,4 +1,6 @@
 // stages/load/winding/remesh.cpp: the winding number on a grid, near facets and where it changes, and the surface in it.
+#include "stages/load/winding/remesh.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/job/file.h"
-#include "pipeline/pores/gradient.h"
+#include "pipeline/pores/design.h"
 #include "stages/support/text/json.h"
 #include "tests/commands/program.h"
 
