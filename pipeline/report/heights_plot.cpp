@@ -11,7 +11,8 @@
 namespace lamina::pipeline {
 namespace {
 
-using heights::LayerReason;
+using heights::Evaluation;
+using heights::FlatHit;
 using heights::Study;
 
 constexpr int kWidth = 1200, kHeight = 900, kTop = 96, kBottom = 70, kLeft = 80, kGap = 90, kRight = 150;

@@ -68,7 +68,8 @@ std::string_view reason(const Study& study, std::size_t layer) {
 }
 
 double angle(const Study& study, std::size_t layer) {
-  return angle_of(study.plan.looked_at.empty() ? study.evaluation.layers[layer].flattest : study.plan.looked_at[layer]);
+  return heights::angle_of(study.plan.looked_at.empty() ? study.evaluation.layers[layer].flattest
+                                                        : study.plan.looked_at[layer]);
 }
 
 std::string study_page(const StudiedParts& parts, const Study& study) {

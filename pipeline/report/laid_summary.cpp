@@ -11,11 +11,6 @@
 namespace lamina::pipeline {
 namespace {
 
-using segment::PlannedPorosity;
-using segment::PoreCounts;
-using segment::SegmentCounts;
-using segment::ShortStretches;
-
 using Json = nlohmann::ordered_json;
 
 /// The share of a speed that stretches come up to without a warning.
@@ -69,7 +64,7 @@ std::string short_text(const ShortStretches& shorts, const Extruder& machine) {
 
 }  // namespace
 
-void tell_laid(const segment::LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
+void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
                std::uint64_t points_first_layer, Lines& lines, nlohmann::ordered_json& facts) {
   const SegmentCounts& segments = sums.segments;
   const PlannedPorosity& porosity = sums.porosity;

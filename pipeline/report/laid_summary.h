@@ -16,7 +16,7 @@ namespace lamina::pipeline {
 /// The layers of a range of heights with segmented lines.
 struct LaidRange {
   std::string heights;  // "3 to 5.7 mm", above the bottoms of parts, "" for all
-  segment::PoreCounts pores;
+  PoreCounts pores;
   double area_mm2 = 0;  // within the contours, over all layers
 };
 
@@ -25,7 +25,7 @@ using Lines = std::vector<std::pair<std::string, std::string>>;
 
 /// Adds stretches, porosity, pores and speeds that are not reached to a summary, and the same numbers to its object.
 /// sums    of the job. points_first_layer  of segmented lines in its first layer
-void tell_laid(const segment::LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
+void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
                std::uint64_t points_first_layer, Lines& lines, nlohmann::ordered_json& facts);
 
 /// What 100 % of extrusion is, and how many layers are left out at the top, before anything is laid; as above.
@@ -34,6 +34,6 @@ void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view
                nlohmann::ordered_json& facts);
 
 /// "612 stretches are too short for 400 mm/s2: ..." if most of the speed is missed; else "".
-std::string speed_warning(const segment::ShortStretches& shorts, const Extruder& machine);
+std::string speed_warning(const ShortStretches& shorts, const Extruder& machine);
 
 }  // namespace lamina::pipeline

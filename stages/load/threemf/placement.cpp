@@ -149,8 +149,8 @@ Status Placement::add(std::span<const Leaf> leaves) {
 /// A mesh of the solid and of what is inside out within it, which is the same for copies of the whole.
 Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std::span<const std::uint32_t> voids) {
   const Transform transform = after(options_.transform, leaf.transform);
-  const std::string label = label(model_, model_.objects[leaf.object]);
-  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], label, transform, options_);
+  const std::string name = label(model_, model_.objects[leaf.object]);
+  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], name, transform, options_);
   if (!mesh) return mesh.error();
   Facets& facets = mesh->facets;
   for (const std::uint32_t index : voids) {
@@ -176,7 +176,7 @@ Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std
   if (share_equal(turned, facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());
   turned.variants.push_back({to_.objects.size(), {}, {}, {}});
-  to_.objects.push_back({label, std::move(facets), {{0, 0, 0}}});
+  to_.objects.push_back({name, std::move(facets), {{0, 0, 0}}});
   return {};
 }
 
@@ -187,14 +187,14 @@ Status Placement::add_solid(const Leaf& leaf) {
   for (double& axis : translation) axis *= 1e6;
   Turned& turned = turns_[{leaf.object, transform.linear, false}];
   if (share_known(turned, translation)) return {};
-  const std::string label = label(model_, object);
-  Result<SnappedMesh> mesh = snap_mesh(source_, object, label, transform, options_);
+  const std::string name = label(model_, object);
+  Result<SnappedMesh> mesh = snap_mesh(source_, object, name, transform, options_);
   if (!mesh) return mesh.error();
   const std::uint64_t hash = relative_hash(mesh->facets.triangles);
   if (share_equal(turned, mesh->facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());
   turned.variants.push_back({to_.objects.size(), translation, mesh->margin, reach_of(object, transform.linear)});
-  to_.objects.push_back({label, std::move(mesh->facets), {{0, 0, 0}}});
+  to_.objects.push_back({name, std::move(mesh->facets), {{0, 0, 0}}});
   return {};
 }
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "stages/load/reader.h"
 #include "stages/load/threemf/expansion.h"
 #include "stages/load/threemf/model.h"
+#include "stages/load/threemf/threemf.h"
 
 namespace lamina::load {
 
