@@ -26,13 +26,15 @@ Result<std::string> answer(const Json& json, const cv::Mat& picture) {
 Result<std::string> read_chart_of(const Json& request) {
   constexpr int kLeast = 200;
   const auto path = request.at("photo").get<std::string>();
-  const auto chart = read_chart(request.at("chart").dump(), "the chart");
+  const auto chart = read_chart(json_text(request.at("chart")), "the chart");
   if (!chart) return chart.error();
   const auto photo = read_photo(path, kLeast);
   if (!photo) return photo.error();
   const auto reading = read_chart_photo(*photo, *chart);
   if (!reading) return at_photo(path, reading.error());
-  return answer(reading_json(*reading), request.value("picture", false) ? picture_of(*photo, *chart, *reading) : cv::Mat());
+  return answer(reading_json(*reading), request.contains("picture") && request.at("picture").get<bool>()
+                                            ? picture_of(*photo, *chart, *reading)
+                                            : cv::Mat());
 }
 
 /// {"photo": path, "photo_um", "scan_along_x", "pixel_nm": [x, y], "columns", "row_offset", "change"}
@@ -64,7 +66,7 @@ Result<std::string> run(const std::string& what) {
   const auto text = read_file("-", {.fault = Fault::kUsage, .most_bytes = 1u << 30, .streams = true});
   if (!text) return text.error();
   if (!json_nests_within(*text)) return Error{Fault::kUsage, "the request nests too deep"};
-  return what == "chart" ? read_chart_of(Json::parse(*text)) : compare_with(Json::parse(*text));
+  return what == "chart" ? read_chart_of(parse_json(*text)) : compare_with(parse_json(*text));
 }
 
 int end(const Result<std::string>& result) {

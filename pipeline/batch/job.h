@@ -12,7 +12,7 @@
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 

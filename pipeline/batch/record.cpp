@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/text_shape.h"
 
 namespace lamina::pipeline {
@@ -17,27 +17,27 @@ std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id)
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::map<std::string, BatchRecord::Earlier>& earlier) try {
   if (!json_nests_within(line)) return;
-  const Json json = Json::parse(line);
+  const Json json = parse_json(line);
   const bool ended = json.contains("ended");
-  const std::string id = json.at(ended ? "ended" : "begun"), place = json.at("output");
+  const std::string id = json.at(ended ? "ended" : "begun").text(), place = json.at("output").text();
   BatchRecord::Earlier entry;
   if (!read_hex(id, entry.begun)) return;
   if (ended) {
-    const std::string outcome = json.at("outcome");
+    const std::string& outcome = json.at("outcome").text();
     const bool done = outcome == outcome_name(BatchOutcome::kDone) || outcome == outcome_name(BatchOutcome::kKept);
     BatchResult& result = entry.result;
     entry.ended = read_hex(json.at("hash").get<std::string>(), result.output.hash) && done;
     result.outcome = BatchOutcome::kDone;
-    result.seconds = json.at("seconds");
+    json.at("seconds").get_to(result.seconds);
     if (!json.at("files").is_number_unsigned() || !json.at("bytes").is_number_unsigned()) return;
-    result.output.files = json.at("files");
-    result.output.bytes = json.at("bytes");
+    json.at("files").get_to(result.output.files);
+    json.at("bytes").get_to(result.output.bytes);
     result.value = json.at("result");
   }
   BatchRecord::Earlier& known = earlier[place.empty() ? id : place];
   entry.foreign = ended ? known.foreign && !entry.ended : json.contains("foreign");
   known = std::move(entry);
-} catch (const Json::exception&) {
+} catch (const JsonError&) {
   return;
 }
 

@@ -11,7 +11,7 @@
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/journal.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 

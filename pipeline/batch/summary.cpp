@@ -27,7 +27,8 @@ std::size_t warnings_of(const BatchResult& result) {
 
 std::string first_warning(const BatchResult& result) {
   const Json& first = result.value["warnings"].front();
-  return first.is_object() ? first.value("text", "") : first.get<std::string>();
+  const Json* text = first.is_object() ? first.find("text") : &first;
+  return text == nullptr ? "" : text->text();
 }
 
 std::string warnings_text(std::size_t count) { return fmt::format("{} warning{}", count, count == 1 ? "" : "s"); }

@@ -14,7 +14,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/leftovers.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

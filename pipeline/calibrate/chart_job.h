@@ -5,7 +5,7 @@
 #include <string>
 
 #include "pipeline/machine/powder_printer.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "stages/calibration/chart/rows.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -144,7 +144,7 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
   for (std::string& line : joint_lines(json.at("joints"))) lines.push_back(std::move(line));
   if (auto untold_offsets = untold_line(nozzles); !untold_offsets.empty()) lines.push_back(std::move(untold_offsets));
-  if (const auto gain = json.find("dot_gain_um"); gain != json.end()) {
+  if (const Json* gain = json.find("dot_gain_um")) {
     const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
     const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;
     const std::array<double, 2> um{std::round(along_x ? along : across), std::round(along_x ? across : along)};
@@ -166,7 +166,7 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
 
 Result<std::vector<std::string>> take_over(std::string_view reading, const Chart& chart, Machine& machine) {
   try {
-    return take(Json::parse(reading), chart, machine);
+    return take(parse_json(reading), chart, machine);
   } catch (const std::exception& error) {
     return Error{Fault::kInternal, std::string("lamina-scan told what is no reading: ") + error.what()};
   }

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -74,7 +74,7 @@ std::string as_text(const segment::DropsFit& fit) {
          lines_of(*fit.gas, fit.expanded.points.size());
 }
 
-nlohmann::ordered_json as_json(const segment::DropsFit& fit) {
+Json as_json(const segment::DropsFit& fit) {
   Json json = {{"configuration", fit.group.name}, {"points", fit.group.points.size()}};
   if (fit.plain) add_form(*fit.plain, json);
   if (!fit.gas) return json;

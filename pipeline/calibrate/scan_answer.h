@@ -3,7 +3,7 @@
 
 #include "stages/calibration/scan/compare.h"
 #include "stages/calibration/scan/reading.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::scan {
 

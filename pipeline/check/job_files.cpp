@@ -8,8 +8,8 @@
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
+#include "pipeline/report/machine_text.h"
 #include "stages/data/levels.h"
-#include "stages/program/explain.h"
 #include "stages/program/head_grid.h"
 #include "stages/raster/materials.h"
 #include "stages/support/io/file_reader.h"
@@ -73,12 +73,12 @@ raster::DropPlanes planes_of(const ManifestHead& head) {
   return {std::max(1u, head.most_drops), head.levels > 0 && head.drops_of_materials()};
 }
 
-std::string add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
-                        raster::DropPlanes& picture) {
+Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
+                   raster::DropPlanes& picture) {
   if (!head.grey_drops()) return picture.add(std::move(image), static_cast<std::uint32_t>(number % head.drop_images()));
-  std::string what;
-  for (std::uint32_t drop = 0; drop < drops.size() && what.empty(); ++drop) what = picture.add(std::move(drops[drop]), drop);
-  return what;
+  Status status;
+  for (std::uint32_t drop = 0; drop < drops.size() && status; ++drop) status = picture.add(std::move(drops[drop]), drop);
+  return status;
 }
 
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
@@ -92,8 +92,9 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
       return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", files[i].name)};
     }
-    const std::string what = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
-    if (!what.empty()) return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, what)};
+    const Status added = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
+    if (!added)
+      return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, added.error().message)};
   }
   return std::move(picture.planes);
 }

@@ -34,10 +34,10 @@ using LayerPicture = std::vector<Runs>;
 Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels);
 
 /// What the images of a layer are put together by, and adds the one of this number.
-/// returns  empty, or what the pixels that it sets contradict, as DropPlanes::add()
+/// errors  of DropPlanes::add()
 raster::DropPlanes planes_of(const ManifestHead& head);
-std::string add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
-                        raster::DropPlanes& picture);
+Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
+                   raster::DropPlanes& picture);
 
 /// A layer on the manifest's grid; at least one image.
 /// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel; drops without the first

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <tuple>
 
@@ -15,7 +14,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "pipeline/run/job_cost.h"
+#include "pipeline/report/job_cost.h"
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
 #include "stages/replay/feeding.h"
@@ -43,6 +42,12 @@ struct Finding {
   std::optional<replay::Count> count;  // of its replayed program
 };
 
+/// "both vats feed"
+std::string vats_text(std::uint32_t vats) {
+  constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
+  return kTexts[vats & 3];
+}
+
 /// Empty, or what is wrong with the vats that feed a layer.
 /// feeds  the vats that do, a bit each
 std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& record, std::uint32_t feeds) {
@@ -57,8 +62,9 @@ std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& re
   }
   const std::uint32_t wanted =
       replay::vats_wanted(inspection.machine->profile(), record.pixels_of_materials(head.materials.size()), vats);
-  if (feeds != wanted) return fmt::format("{} where {} has to", replay::vats_text(feeds), replay::vats_text(wanted));
-  return replay::fault_of_unfed(set, vat_of_image, unfed, feeds);
+  if (feeds != wanted) return fmt::format("{} where {} has to", vats_text(feeds), vats_text(wanted));
+  const Status status = replay::check_unfed(set, vat_of_image, unfed, feeds);
+  return status ? std::string() : status.error().message;
 }
 
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
@@ -85,8 +91,8 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                              .microseconds = says.microseconds,
                              .added_microseconds = says.added_microseconds,
                              .spat = says.spat};
-    if (std::string fault = fault_of_count(inspection.machine->profile(), told, *replay); same && !fault.empty())
-      return fmt::format("{}: {}", name, fault);
+    if (const Status counted = check_count(inspection.machine->profile(), told, *replay); same && !counted)
+      return fmt::format("{}: {}", name, counted.error().message);
     if (same) {
       std::string fault = fault_of_feeding(inspection, record, replay->vats);
       if (!fault.empty()) return fmt::format("{}: layer {}: {}", name, record.layer.index, fault);
@@ -112,8 +118,8 @@ std::string fault_of_image(const Inspection& inspection, const Layer& layer, std
     return fmt::format("{}: {}", name, what);
   if (file.record.drops > 0 && own != file.record.drops)
     return fmt::format("{}: has {} drops, the manifest says {}", name, own, file.record.drops);
-  const std::string what = add_picture(inspection.head, number, std::move(image->runs), std::move(drops), picture);
-  return what.empty() ? what : fmt::format("{}: sets pixels that {}", name, what);
+  const Status added = add_picture(inspection.head, number, std::move(image->runs), std::move(drops), picture);
+  return added ? std::string() : fmt::format("{}: sets pixels that {}", name, added.error().message);
 }
 
 /// Empty, or what the manifest says of a layer's drops that its images do not.
@@ -183,12 +189,7 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
   report.use = {};
-  report.use.facts = std::make_shared<nlohmann::ordered_json>();
-  cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
-  for (const cost::PowderDrops& powder : cost->powders()) {
-    report.use.results.emplace_back("", powder.told(cost->drop_pl()));
-    (*report.use.facts)["materials"].push_back(powder.json(cost->drop_pl()));
-  }
+  cost->report(report.use);
 }
 
 /// As the program feeds, or its host.
@@ -232,9 +233,10 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);
         if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
       }
-      if (std::string fault = vats ? vats->take(record.layer.index, fed_of(inspection, record, found[i].count)) : "";
-          !fault.empty())
-        report.add(std::move(fault));
+      if (vats) {
+        const Status taken = vats->take(record.layer.index, fed_of(inspection, record, found[i].count));
+        if (!taken) report.add(taken.error().message);
+      }
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));
     }

@@ -10,8 +10,8 @@
 
 #include "stages/support/io/file.h"
 #include "stages/support/io/leftovers.h"
-#include "stages/support/text/json.h"
 #include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/terminal.h"
 
 namespace lamina::pipeline {

@@ -17,7 +17,7 @@ class Console : public Context {
   void say_text(std::string_view text) override;
   int complain(const Error& error) override;
   Status print(std::string_view text) override;
-  Status give(const nlohmann::ordered_json& value) override;
+  Status give(const Json& value) override;
   void progress(const ProgressEvent& event) override;
   const std::atomic<bool>& cancel() override;
 

@@ -14,7 +14,7 @@
 #include "pipeline/output/temporary_folder.h"
 #include "pipeline/run/run_resolved.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

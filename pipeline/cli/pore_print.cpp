@@ -11,7 +11,7 @@
 #include "pipeline/pores/pore_drawing.h"
 #include "pipeline/pores/pore_page.h"
 #include "pipeline/pores/predict_inertia.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -6,7 +6,7 @@
 #include "pipeline/pores/pore_drawing.h"
 #include "pipeline/pores/pore_page.h"
 #include "pipeline/pores/scan_compare.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

@@ -8,7 +8,7 @@
 #include "pipeline/cli/plot_file.h"
 #include "stages/formats/voxels/image.h"
 #include "stages/formats/voxels/surface_stl.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/version.h"
 
@@ -99,7 +99,7 @@ std::string as_text(const std::vector<WindowFile>& files) {
   return text;
 }
 
-nlohmann::ordered_json as_json(const std::vector<WindowFile>& files) {
+Json as_json(const std::vector<WindowFile>& files) {
   Json json = Json::array();
   for (const WindowFile& file : files) {
     json.push_back({{"path", file.path}, {"content", file.content}, {"bytes", file.bytes}});

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "stages/data/plot.h"
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -35,7 +35,7 @@ Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& ar
 
 /// A line each, which ends with LF.
 std::string as_text(const std::vector<WindowFile>& files);
-nlohmann::ordered_json as_json(const std::vector<WindowFile>& files);
+Json as_json(const std::vector<WindowFile>& files);
 
 /// What there is to say of a window without a flow through it.
 PoreReport pores_alone(const VoxelView& window);

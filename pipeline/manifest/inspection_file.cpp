@@ -4,18 +4,16 @@
 
 #include <array>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/replaceable.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::uint64_t kMostBytes = 4 << 20;
 constexpr std::array<std::string_view, 1> kMarks = {"\"kind\":\"inspection\""};
@@ -26,9 +24,15 @@ std::optional<Json> read_of(const std::string& directory, const ManifestHead* he
   if (!write::is_file(path)) return std::nullopt;
   const auto text = read_file(path, {.most_bytes = kMostBytes});
   if (!text || !json_nests_within(*text)) return std::nullopt;
-  Json json = Json::parse(*text, nullptr, false);
+  Json json;
+  try {
+    json = parse_json(*text);
+  } catch (const JsonError&) {
+    return std::nullopt;
+  }
   const auto is = [&](const char* key, std::string_view value) {
-    return json.contains(key) && json[key].is_string() && json[key].get_ref<const std::string&>() == value;
+    const Json* member = json.find(key);
+    return member != nullptr && member->is_string() && member->text() == value;
   };
   if (!json.is_object() || !is("kind", "inspection")) return std::nullopt;
   if (head != nullptr && !is("job", hex(head->id()))) return std::nullopt;
@@ -52,7 +56,7 @@ Status write_inspection(const std::string& directory, const ManifestHead& head, 
   if (Status status = check_inspection_file(directory); !status) return status;
   Json json{{"lamina", head.version}, {"kind", "inspection"}, {"job", hex(head.id())}};
   json.update(facts);
-  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string text = json_line(json);
   return write::write_file(inspection_path(directory), std::string_view(text));
 }
 

@@ -4,12 +4,12 @@
 //   {"lamina": version, "kind": "inspection", "job": id of the manifest, "inspection": {...}, "warnings": [...]}
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
 #include "pipeline/manifest/manifest.h"
 #include "stages/data/status.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina {
 
@@ -20,12 +20,12 @@ std::string inspection_path(const std::string& directory);
 Status check_inspection_file(const std::string& directory);
 
 /// facts  an object whose keys follow those of the job. errors  kUsage, kOutput
-Status write_inspection(const std::string& directory, const ManifestHead& head, const nlohmann::ordered_json& facts);
+Status write_inspection(const std::string& directory, const ManifestHead& head, const Json& facts);
 
 /// Removes a file that is lamina's own and of another job. errors  kOutput
 Status keep_inspection_of(const std::string& directory, const ManifestHead& head);
 
 /// What was found in this job; none without a file of it, or with one that says something else.
-std::optional<nlohmann::ordered_json> read_inspection(const std::string& directory, const ManifestHead& head);
+std::optional<Json> read_inspection(const std::string& directory, const ManifestHead& head);
 
 }  // namespace lamina

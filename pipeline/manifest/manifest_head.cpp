@@ -5,15 +5,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/manifest/possible.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::pair<Product, std::string_view> kKinds[] = {
     {Product::kImages, "images"}, {Product::kContours, "contours"}, {Product::kMoves, "toolpaths"}};
@@ -22,10 +20,10 @@ std::string_view kind_name(Product product) {
   return std::ranges::find(kKinds, product, &std::pair<Product, std::string_view>::first)->second;
 }
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string text_of(const Json& json) { return json_text(json); }
 
 Json point_json(const Point3& p) { return {p.x, p.y, p.z}; }
-Point3 point_from(const Json& json) { return {json.at(0), json.at(1), json.at(2)}; }
+Point3 point_from(const Json& json) { return {json.at(0).get<Nm>(), json.at(1).get<Nm>(), json.at(2).get<Nm>()}; }
 
 Json part_json(const PartSummary& part) {
   Json notes = Json::array();
@@ -40,12 +38,12 @@ Json part_json(const PartSummary& part) {
 
 PartSummary part_from(const Json& json) {
   PartSummary part;
-  part.path = json.at("path");
-  part.copies = json.at("copies");
-  part.triangles = json.at("triangles");
+  json.at("path").get_to(part.path);
+  json.at("copies").get_to(part.copies);
+  json.at("triangles").get_to(part.triangles);
   part.fingerprint = std::stoull(json.at("fingerprint").get<std::string>(), nullptr, 16);
   part.bounds = {point_from(json.at("bounds_nm").at(0)), point_from(json.at("bounds_nm").at(1))};
-  for (const Json& note : json.at("notes")) part.notes.push_back({note.at("repair"), note.at("text")});
+  for (const Json& note : json.at("notes")) part.notes.push_back({note.at("repair").get<bool>(), note.at("text").text()});
   return part;
 }
 
@@ -92,22 +90,23 @@ void add_images(const ManifestHead& head, Json& json) {
 }
 
 void read_images(const Json& json, ManifestHead& head) {
-  head.grid.x = axis_from(json.at("dpi").at(0), json.at("bed_nm").at(0));
-  head.grid.y = axis_from(json.at("dpi").at(1), json.at("bed_nm").at(1));
-  head.fill_rule = json.at("fill_rule");
-  head.mirror = json.at("mirror");
+  head.grid.x = axis_from(json.at("dpi").at(0), json.at("bed_nm").at(0).get<std::int64_t>());
+  head.grid.y = axis_from(json.at("dpi").at(1), json.at("bed_nm").at(1).get<std::int64_t>());
+  json.at("fill_rule").get_to(head.fill_rule);
+  json.at("mirror").get_to(head.mirror);
   if (json.contains("materials")) {
-    for (const Json& entry : json.at("materials")) head.materials.push_back({entry.at("name"), entry.at("vat")});
+    for (const Json& entry : json.at("materials"))
+      head.materials.push_back({entry.at("name").text(), entry.at("vat").get<decltype(JobMaterial::vat)>()});
   }
-  if (json.contains("most_drops")) head.most_drops = json.at("most_drops");
-  if (json.contains("levels")) head.levels = json.at("levels");
+  if (json.contains("most_drops")) json.at("most_drops").get_to(head.most_drops);
+  if (json.contains("levels")) json.at("levels").get_to(head.levels);
   if (head.machine.empty()) return;
-  head.dialect = json.at("dialect");
-  head.program_extension = json.at("program_extension");
+  json.at("dialect").get_to(head.dialect);
+  json.at("program_extension").get_to(head.program_extension);
   head.program_start = hash_from(json.at("program_start_xxh3_128"));
   head.program_end = hash_from(json.at("program_end_xxh3_128"));
-  if (json.contains("head_drops")) head.head_drops = json.at("head_drops");
-  if (json.contains("sweep_drops")) head.sweep_drops = json.at("sweep_drops");
+  if (json.contains("head_drops")) json.at("head_drops").get_to(head.head_drops);
+  if (json.contains("sweep_drops")) json.at("sweep_drops").get_to(head.sweep_drops);
 }
 
 Json lasting_json(const ManifestHead& head) {
@@ -133,41 +132,42 @@ Json lasting_json(const ManifestHead& head) {
 /// Throws where something is missing or of another type.
 ManifestHead head_from(const Json& json) {
   ManifestHead head;
-  const std::string kind = json.at("kind");
+  const std::string& kind = json.at("kind").text();
   const auto found = std::ranges::find(kKinds, kind, &std::pair<Product, std::string_view>::second);
   if (found == std::end(kKinds)) throw std::invalid_argument(fmt::format("kind '{}' is none", kind));
   head.product = found->first;
-  head.version = json.at("lamina");
-  head.job_toml = json.at("job");
-  head.format = json.at("format");
-  head.extension = json.at("extension");
-  head.file = json.at("file");
-  head.layer_count = json.at("layer_count");
-  head.first_layer = json.at("range").at(0);
-  head.last_layer = json.at("range").at(1);
+  json.at("lamina").get_to(head.version);
+  json.at("job").get_to(head.job_toml);
+  json.at("format").get_to(head.format);
+  json.at("extension").get_to(head.extension);
+  json.at("file").get_to(head.file);
+  json.at("layer_count").get_to(head.layer_count);
+  json.at("range").at(0).get_to(head.first_layer);
+  json.at("range").at(1).get_to(head.last_layer);
   for (const Json& part : json.at("parts")) head.parts.push_back(part_from(part));
   if (json.contains("machine")) {
-    head.machine = json.at("machine");
+    json.at("machine").get_to(head.machine);
     head.machine_profile = hash_from(json.at("machine_xxh3_128"));
   }
   if (head.product == Product::kImages) read_images(json, head);
   return head;
 }
 
-/// fraction  whether a number is none of the whole ones, of which heads and tails consist, or too large to be one
+/// Null if it is not JSON. fraction  whether a number is not whole, as all of heads and tails are, or too large to be one
 Json parsed(const std::string& text, bool& fraction) {
-  fraction = false;
-  const auto look = [&](int, Json::parse_event_t, const Json& value) {
-    fraction = fraction || value.is_number_float();
-    return true;
-  };
-  return Json::parse(text, look, false);
+  try {
+    Json json = parse_json(text);
+    fraction = json.has_fraction();
+    return json;
+  } catch (const JsonError&) {
+    return {};
+  }
 }
 
 /// An object of a key a line, without its end.
 std::string lines_of(const Json& json) {
   std::string text = "{\n";
-  for (const auto& [key, value] : json.items()) text += fmt::format("{}: {},\n", text_of(key), text_of(value));
+  for (const auto& [key, value] : json.members()) text += fmt::format("{}: {},\n", text_of(key), text_of(value));
   return text;
 }
 
@@ -194,7 +194,7 @@ Result<ManifestHead> read_head(const std::string& text) {
   bool fraction = false;
   const Json json = parsed(text + "]}", fraction);
   if (!json.is_object()) return wrong("is no manifest of lamina");
-  if (!json.contains("manifest") || json["manifest"] != kManifestVersion) {
+  if (!json.contains("manifest") || json.at("manifest") != kManifestVersion) {
     if (!json.contains("lamina")) return wrong("is no manifest of lamina");
     return wrong(
         fmt::format("is of another version of lamina, whose manifests differ from those of this one; read it with that "
@@ -221,7 +221,7 @@ bool read_tail(const ManifestHead& head, const std::string& text, FileDigest& fi
     const Json json = parsed("{" + text.substr(0, text.find('\n')) + "}", fraction);
     if (!json.is_object() || fraction || !json.contains("whole_file")) return false;
     try {
-      file.bytes = json.at("whole_file").at("bytes");
+      json.at("whole_file").at("bytes").get_to(file.bytes);
       file.hash = hash_from(json.at("whole_file").at("xxh3_128"));
     } catch (const std::exception&) {
       return false;

@@ -90,9 +90,8 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
 }
 
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
-  if (std::string idle = write::idle_care(machine); !idle.empty()) warnings.push_back({"care", std::move(idle)});
-  if (std::string joints = program::idle_joints(machine, grid); !joints.empty())
-    warnings.push_back({"joints", std::move(joints)});
+  write::warn_of_idle_care(machine, warnings);
+  program::warn_of_fixed_joints(machine, grid, warnings);
 }
 
 Status DosePlan::check_images(std::string_view format) const {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "stages/segment/permeability.h"  // the unit
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -114,7 +114,7 @@ std::string as_text(const DesignedJob& found) {
                             found.runs == 1 ? "" : "s", 100 * found.miss);
 }
 
-nlohmann::ordered_json as_json(const DesignedJob& found, const std::string& output) {
+Json as_json(const DesignedJob& found, const std::string& output) {
   Json json{{"command", "design"}, {"met", found.met}, {"miss", found.miss}, {"job", output}};
   tell_plan(found, json);
   json["runs"] = found.runs;
@@ -139,7 +139,7 @@ std::string as_text(const GradientJob& found) {
                      found.runs, found.steps.size(), 100 * found.miss);
 }
 
-nlohmann::ordered_json as_json(const GradientJob& found, const std::string& output) {
+Json as_json(const GradientJob& found, const std::string& output) {
   Json json = {{"command", "design"}, {"met", found.met}, {"miss", found.miss}, {"job", output}, {"steps", Json::array()}};
   for (const GradientStep& one : found.steps) json["steps"].push_back(step_json(one));
   json["porosity"] = found.porosity;

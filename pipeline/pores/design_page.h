@@ -1,10 +1,10 @@
 // pipeline/pores/design_page.h: designed jobs, as text and as JSON.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "pipeline/pores/design.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -14,11 +14,11 @@ std::string told_by(const ForwardRun& forward);
 /// Lines that end with LF.
 std::string as_text(const DesignedJob& found);
 /// output  the job file; "" if none was written
-nlohmann::ordered_json as_json(const DesignedJob& found, const std::string& output);
+Json as_json(const DesignedJob& found, const std::string& output);
 
 /// The same, step by step from the bottom up.
 std::string as_text(const GradientJob& found);
-nlohmann::ordered_json as_json(const GradientJob& found, const std::string& output);
+Json as_json(const GradientJob& found, const std::string& output);
 
 /// What the nearest is, of what was wished, as options: "--porosity 26.14".
 std::string nearest_text(const segment::PoreWish& wish, const DesignedJob& found);

@@ -13,7 +13,7 @@
 #include "pipeline/run/run.h"
 #include "stages/formats/stl/block.h"
 #include "stages/support/io/file.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -51,7 +51,7 @@ Result<Json> lay_block(Job job, double height_mm, const TemporaryFolder& folder)
   const auto summary = run(
       job, Product::kMoves, [](const ProgressEvent&) {}, never);
   if (!summary) return summary.error();
-  return summary->facts && summary->facts->contains("pores") ? summary->facts->at("pores") : Json::array();
+  return summary->facts.contains("pores") ? summary->facts.at("pores") : Json::array();
 }
 
 /// Voxels of a region, looked at in each place.

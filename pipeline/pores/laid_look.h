@@ -3,16 +3,16 @@
 
 #include <array>
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "pipeline/pores/predict_flow.h"
 #include "pipeline/pores/window_choice.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/plot.h"
 #include "stages/pores/bonds.h"
 #include "stages/pores/sizes.h"
 #include "stages/pores/tortuosity.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -42,7 +42,7 @@ Result<LaidLook> look_at_laid(const read::GcodeFile& file, const Pile& pile, con
 /// What lamina permeability tells of a window beside the flow: lines that end with LF.
 std::string as_text(const LaidLook& look);
 /// Adds the same to an object.
-void add_to(const LaidLook& look, nlohmann::ordered_json& json);
+void add_to(const LaidLook& look, Json& json);
 
 /// Whether a file is one of toolpaths, by how its name ends: .gcode, .gco, .g, .nc.
 bool names_toolpaths(const std::string& path);
@@ -62,7 +62,7 @@ struct LaidPrint {
 /// cost           reads the file, and some twenty of its layers once more; about a second at 8 million voxels
 Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3, Plot* sections = nullptr);
 std::string as_text(const LaidPrint& print);
-nlohmann::ordered_json as_json(const LaidPrint& print);
+Json as_json(const LaidPrint& print);
 
 /// The same for a page, with sections of the window as SVG; "" of other files, of those above 16 MB, and where nothing can be
 /// said.

@@ -11,7 +11,7 @@
 #include "stages/data/ticks.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/segment/predict.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -94,7 +94,7 @@ std::string as_text(const LaidLook& look) {
   return text + sections_text(look.sections);
 }
 
-void add_to(const LaidLook& look, nlohmann::ordered_json& json) {
+void add_to(const LaidLook& look, Json& json) {
   json["connected"] = {{"bonded", look.connected.bonded_share()},
                        {"unbonded", look.connected.unbonded_share()},
                        {"bond_gap_mm", segment::kBondGap}};
@@ -127,7 +127,7 @@ std::string as_text(const LaidPrint& print) {
          as_text(print.choice, print.pores) + as_text(print.look);
 }
 
-nlohmann::ordered_json as_json(const LaidPrint& print) {
+Json as_json(const LaidPrint& print) {
   Json json = as_json(print.choice, print.pores);
   json.erase("command");
   json.erase("flow");
@@ -184,8 +184,7 @@ void add_pores(const std::string& path, Summary& summary) {
     summary.results.emplace_back("widths", histogram_line(histogram(sizes, false)));
     summary.results.emplace_back("lengths", histogram_line(histogram(sizes, true)));
   }
-  if (summary.facts == nullptr) summary.facts = std::make_shared<Json>(Json::object());
-  (*summary.facts)["laid"] = as_json(*print);
+  summary.facts["laid"] = as_json(*print);
 }
 
 }  // namespace lamina::pipeline

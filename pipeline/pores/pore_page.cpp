@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "stages/segment/permeability.h"  // the unit
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -38,7 +38,7 @@ std::string as_text(const WindowChoice& choice, const PoreReport& report) {
   return text;
 }
 
-nlohmann::ordered_json as_json(const WindowChoice& choice, const PoreReport& report) {
+Json as_json(const WindowChoice& choice, const PoreReport& report) {
   const Box& box = choice.window.box;
   Json json = {
       {"command", "permeability"},
@@ -77,7 +77,7 @@ std::string as_text(const Forchheimer& inertia) {
                                 : "");
 }
 
-nlohmann::ordered_json as_json(const Forchheimer& inertia) {
+Json as_json(const Forchheimer& inertia) {
   Json json = {{"along", "z"},
                {"k2_m", inertia.fit.k2_m},
                {"k2_error_m", inertia.fit.k2_error_m},

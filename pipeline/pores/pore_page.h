@@ -1,12 +1,12 @@
 // pipeline/pores/pore_page.h: what there is to say of the pores of a window, for people and for programs.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "pipeline/pores/predict_flow.h"
 #include "pipeline/pores/predict_inertia.h"
 #include "pipeline/pores/window_choice.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -14,10 +14,10 @@ namespace lamina::pipeline {
 std::string as_text(const WindowChoice& choice, const PoreReport& report);
 
 /// The same, k1 as a tensor: a row for each axis of the force that was asked for.
-nlohmann::ordered_json as_json(const WindowChoice& choice, const PoreReport& report);
+Json as_json(const WindowChoice& choice, const PoreReport& report);
 
 /// k2 along z, and what it was fitted on.
 std::string as_text(const Forchheimer& inertia);
-nlohmann::ordered_json as_json(const Forchheimer& inertia);
+Json as_json(const Forchheimer& inertia);
 
 }  // namespace lamina::pipeline

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "stages/pores/surface.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -104,7 +104,7 @@ std::string as_text(const ScanComparison& c) {
       c.surface_per_mm, share(c.match.differing()), share(c.match.only_small), share(c.match.only_large));
 }
 
-nlohmann::ordered_json as_json(const ScanComparison& c) {
+Json as_json(const ScanComparison& c) {
   const Box& box = c.window.box;
   return {{"command", "permeability"},
           {"window_mm", {mm(box.width()), mm(box.depth()), mm(box.height())}},

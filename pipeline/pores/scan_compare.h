@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "pipeline/pores/bead_voxels.h"
@@ -11,6 +10,7 @@
 #include "stages/data/status.h"
 #include "stages/formats/gcode/read_gcode.h"
 #include "stages/pores/registration.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -44,6 +44,6 @@ Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile
 
 /// Lines that end with LF.
 std::string as_text(const ScanComparison& comparison);
-nlohmann::ordered_json as_json(const ScanComparison& comparison);
+Json as_json(const ScanComparison& comparison);
 
 }  // namespace lamina::pipeline

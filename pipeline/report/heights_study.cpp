@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -133,7 +133,6 @@ std::string study_csv(const StudiedParts& parts, const std::vector<Study>& studi
 }
 
 std::string study_json(const StudiedParts& parts, const std::vector<Study>& studies) {
-  using Json = nlohmann::ordered_json;
   Json all = {{"height_mm", mm(parts.height)}, {"parts", Json::array()}, {"cusp_limit_mm", parts.cusp_limit_mm}};
   for (const std::string& path : parts.paths) all["parts"].push_back(path);
   for (const Study& study : studies) {
@@ -173,7 +172,7 @@ std::string study_json(const StudiedParts& parts, const std::vector<Study>& stud
     }
     all["tables"].push_back(std::move(table));
   }
-  return all.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_line(all);
 }
 
 std::string comparison_page(const std::vector<Study>& studies) {

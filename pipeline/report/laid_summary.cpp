@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// The share of a speed that stretches come up to without a warning.
 constexpr double kNearTold = 0.75;
@@ -65,7 +63,7 @@ std::string short_text(const ShortStretches& shorts, const Extruder& machine) {
 }  // namespace
 
 void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
-               std::uint64_t points_first_layer, Lines& lines, nlohmann::ordered_json& facts) {
+               std::uint64_t points_first_layer, Lines& lines, Json& facts) {
   const SegmentCounts& segments = sums.segments;
   const PlannedPorosity& porosity = sums.porosity;
   const ShortStretches& shorts = sums.shorts;
@@ -97,8 +95,7 @@ void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const
                         {"told_mm_s", shorts.told_mm_s}};
 }
 
-void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines,
-               nlohmann::ordered_json& facts) {
+void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines, Json& facts) {
   constexpr std::array<std::string_view, 3> kShapes{"stadium", "rectangle", "ellipse"};
   const auto& material = machine.material;
   const std::string_view shape = kShapes[static_cast<std::size_t>(material.shape())];

@@ -1,7 +1,6 @@
 // pipeline/report/laid_summary.h: what toolpaths of segmented lines deposit, as lines of a summary and as JSON.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -10,6 +9,7 @@
 #include "stages/data/extruder.h"
 #include "stages/data/toolpaths.h"
 #include "stages/segment/predict.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -26,12 +26,11 @@ using Lines = std::vector<std::pair<std::string, std::string>>;
 /// Adds stretches, porosity, pores and speeds that are not reached to a summary, and the same numbers to its object.
 /// sums    of the job. points_first_layer  of segmented lines in its first layer
 void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
-               std::uint64_t points_first_layer, Lines& lines, nlohmann::ordered_json& facts);
+               std::uint64_t points_first_layer, Lines& lines, Json& facts);
 
 /// What 100 % of extrusion is, and how many layers are left out at the top, before anything is laid; as above.
 /// cut_at  "middle" or "top", the place of a layer that decides whether it is empty
-void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines,
-               nlohmann::ordered_json& facts);
+void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines, Json& facts);
 
 /// "612 stretches are too short for 400 mm/s2: ..." if most of the speed is missed; else "".
 std::string speed_warning(const ShortStretches& shorts, const Extruder& machine);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "stages/load/reader.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -232,10 +232,10 @@ const char* name_of(Known known) {
   return known == Known::kExactly ? "exact" : known == Known::kAbout ? "integrated" : "summed";
 }
 
-nlohmann::ordered_json as_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
+Json as_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
-nlohmann::ordered_json as_json(const Diagnosis& found) {
-  nlohmann::ordered_json mesh;
+Json as_json(const Diagnosis& found) {
+  Json mesh;
   mesh["triangles"] = found.triangles;
   mesh["vertices"] = found.vertices;
   mesh["edges"] = found.edges;
@@ -246,7 +246,7 @@ nlohmann::ordered_json as_json(const Diagnosis& found) {
   mesh["volume_mm3"] = found.volume_mm3;
   for (const Kind& kind : kKinds) {
     const auto& finding = found.*kind.finding;
-    nlohmann::ordered_json places = nlohmann::ordered_json::array();
+    Json places = Json::array();
     for (const auto& place : finding.first) places.push_back({{"triangle", place.triangle + 1}, {"at_mm", as_json(place.at)}});
     mesh[kind.key] = {{"count", finding.count}, {"first", places}};
   }
@@ -287,7 +287,7 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
   const Result<Description> description = describe(path, options, surplus);
   if (!description) return description.error();
   const Description& d = *description;
-  nlohmann::ordered_json json;
+  Json json;
   json["path"] = path;
   json["format"] = d.format;
   json["items"] = d.part.instances.size();
@@ -301,12 +301,12 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
   json["planned_volume_mm3"] = d.planned.all.mm3;
   json["planned_volume_is"] = name_of(d.planned.all.known);
   json["capped_share"] = d.planned_on_caps();
-  json["notes"] = nlohmann::ordered_json::array();
-  json["repairs"] = nlohmann::ordered_json::array();
+  json["notes"] = Json::array();
+  json["repairs"] = Json::array();
   for (const Note& note : d.notes) json[note.repair ? "repairs" : "notes"].push_back(note.text);
-  json["meshes"] = nlohmann::ordered_json::array();
+  json["meshes"] = Json::array();
   for (std::size_t i = 0; i < d.diagnosis.size(); ++i) {
-    nlohmann::ordered_json mesh = as_json(d.diagnosis[i]);
+    Json mesh = as_json(d.diagnosis[i]);
     mesh["name"] = short_name(d, i);
     mesh["copies"] = d.copies[i];
     mesh["planned_volume_mm3"] = d.planned.of_mesh[i].mm3;
@@ -314,7 +314,7 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
     json["meshes"].push_back(std::move(mesh));
   }
   // Names in a file may be bytes that are not UTF-8.
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return json_line(json);
 }
 
 }  // namespace lamina::pipeline

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "pipeline/manifest/inspection_file.h"
+#include "pipeline/report/inspection_json.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -40,7 +40,7 @@ Inspector::Inspector(const Plan& plan) : plan_(plan) {
   inspection_.emplace(plan.images->grid, std::move(stands), nm_of(least_mm_), plan.job.memory_bytes / 2);
 }
 
-void Inspector::warn(std::vector<Warning>& warnings) {
+void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   if (!on()) return;
   if (kept_) {
     warnings.push_back({"not-inspected",
@@ -54,8 +54,8 @@ void Inspector::warn(std::vector<Warning>& warnings) {
   warnings.insert(warnings.end(), told_.begin(), told_.end());
 }
 
-void Inspector::tell(Summary& summary) const {
-  if (on() && !kept_) (*summary.facts)["inspection"] = json_of(inspection_->findings(), least_mm_);
+void Inspector::report(Summary& summary) const {
+  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), least_mm_);
 }
 
 Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }

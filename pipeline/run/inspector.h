@@ -7,12 +7,12 @@
 
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/image_observers.h"
 #include "stages/checks/inspect.h"
 
 namespace lamina::pipeline {
 
-class Inspector {
+class Inspector : public ImageObserver {
  public:
   /// Idle unless the job asks for it. The plan must outlive this object.
   explicit Inspector(const Plan& plan);
@@ -24,15 +24,16 @@ class Inspector {
   void record(const Layer& layer, const inspect::LayerLook& look) { inspection_->add(layer, look); }
   /// Beside the looks at layers.
   std::uint64_t bytes() const { return on() ? inspection_->bytes() : 0; }
-  /// A layer of an earlier run, whose image is not at hand: bodies cannot be followed.
-  void keep() {
+
+  // --- observer
+  /// The image of a layer of an earlier run is not available: bodies cannot be followed.
+  void layer(const LayerRecord&, const ImageNotes* made) override {
+    if (made != nullptr) return;
     kept_ = true;
     if (on()) inspection_->leave();
   }
-
-  /// After the last layer.
-  void warn(std::vector<Warning>& warnings);
-  void tell(Summary& summary) const;
+  void warn(const Summary& summary, std::vector<Warning>& warnings) override;
+  void report(Summary& summary) const override;
 
   // --- DIR/inspection.json, for reports: of whole jobs that were looked at from the first layer to the last
   /// Before the first layer. errors  kUsage: a file of somebody else has that name

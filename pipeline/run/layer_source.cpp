@@ -8,7 +8,7 @@
 
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layers.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file.h"
 

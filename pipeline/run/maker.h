@@ -11,7 +11,7 @@
 
 #include "pipeline/flow/layers.h"
 #include "pipeline/manifest/record.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

@@ -9,9 +9,6 @@
 
 namespace lamina::pipeline {
 
-/// Adds what is known before the first move: the printer, its bead and the tolerance.
-void tell_moves(const Plan& plan, Summary& summary);
-
 std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

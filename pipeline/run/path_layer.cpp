@@ -10,6 +10,7 @@
 
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
+#include "pipeline/report/move_observers.h"
 #include "stages/bead/even_starts.h"
 #include "stages/infill/skirt.h"
 #include "stages/segment/laid/crossing.h"
@@ -62,7 +63,7 @@ AreaCut cut_of(const Plan& plan, std::uint32_t area_number, const Layer& layer) 
 class PoresByRange {
  public:
   explicit PoresByRange(const Plan& plan) {
-    if (tells_ranges(plan)) segmented_ = plan.segments->segmented();
+    if (has_ranges_by_layer(plan)) segmented_ = plan.segments->segmented();
     ranges.resize(segmented_.size());
   }
   /// What `count` adds to `all` is added to the range too. returns  what it returns
@@ -112,14 +113,6 @@ Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work
 }
 
 }  // namespace
-
-bool tells_ranges(const Plan& plan) {
-  if (plan.segments->ranges.empty() || !plan.segments->any()) return false;
-  // A layer that goes on above a part is in that part's topmost range, whatever range others are in.
-  if (covers_top(plan.job) || plan.job.heights.containment == Containment::kOutside) return true;
-  const auto& areas = plan.sections->areas();
-  return std::ranges::any_of(areas, [&](const Sections::Area& area) { return area.box.lo.z != areas.front().box.lo.z; });
-}
 
 PathFacts facts_of(const Sections::Work& work) {
   PathFacts facts;

@@ -7,16 +7,12 @@
 
 #include "pipeline/manifest/record.h"
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/formats/extrusion_format.h"
 
 namespace lamina::pipeline {
-
-/// Whether layers can hold several segmented ranges of heights: parts stand at different heights, or layers go on above the
-/// top of one.
-bool tells_ranges(const Plan& plan);
 
 /// Statistics of a layer's contours and stored paths, without area and the length of the paths.
 PathFacts facts_of(const Sections::Work& work);

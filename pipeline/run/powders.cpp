@@ -8,6 +8,7 @@
 #include <atomic>
 
 #include "pipeline/plan/heights.h"
+#include "pipeline/report/layer_text.h"
 #include "stages/checks/mixed.h"
 #include "stages/program/vats.h"
 
@@ -87,7 +88,7 @@ Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
       if (feeds) continue;
       if (feeds.error().fault != Fault::kUsage) return feeds.error();
       return Error{Fault::kUsage, fmt::format("{} mix powders, by the heights of their parts; layer {} (z {:.3f} mm) has {}",
-                                              sanity::ranges_text(ranges), i, mm(layer.plane()), feeds.error().message)};
+                                              ranges_text(ranges), i, mm(layer.plane()), feeds.error().message)};
     }
   }
   return {};

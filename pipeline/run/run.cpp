@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "pipeline/flow/layers.h"
@@ -14,12 +13,14 @@
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/report/heights_study.h"
+#include "pipeline/report/image_observers.h"
+#include "pipeline/report/move_observers.h"
+#include "pipeline/report/timing.h"
 #include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
 #include "pipeline/run/sanity.h"
-#include "pipeline/run/timing.h"
 #include "stages/checks/records.h"
 
 namespace lamina::pipeline {
@@ -59,13 +60,12 @@ Summary summary_of(const Plan& plan) {
   summary.memory_budget_bytes = plan.job.memory_bytes;
   summary.parts = plan.scene->parts;
   summary.warnings = plan.warnings;
-  summary.facts = std::make_shared<nlohmann::ordered_json>(nlohmann::ordered_json::object());
   if (plan.layer_count > 0) {
     const Layer highest = plan.layer(plan.layer_count - 1);
     summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
   }
-  if (plan.product == Product::kImages) tell_images(plan, summary);
-  if (plan.product == Product::kMoves) tell_moves(plan, summary);
+  if (plan.product == Product::kImages) report_image_plan(plan, summary);
+  if (plan.product == Product::kMoves) report_move_plan(plan, summary);
   return summary;
 }
 

@@ -107,7 +107,7 @@ std::string Sanity::why_nothing() const {
   }
   if (kept_) return "look at `lamina info`";
   if (plan_.scene->instances.empty()) return "no pixel of the images is dark enough: give part.threshold, or part.invert";
-  if (std::string why = sanity::why_nothing(*tally_, sampling_); !why.empty()) return why;
+  if (const Status status = sanity::check_anything(*tally_, sampling_); !status) return status.error().message;
   if (job.dose.saturation_percent) return "--saturation leaves no drop: give a higher one";
   if (job.dose.core < 1) return "--core leaves no drop: give a greater share, or --shell";
   return "no bead fits into the parts: they are narrower than walls and filling ask for";

@@ -10,7 +10,7 @@
 #include <span>
 
 #include "pipeline/job/file.h"
-#include "pipeline/run/job_cost.h"
+#include "pipeline/report/job_cost.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_doubts.h"
 #include "pipeline/show/report_head.h"
@@ -170,7 +170,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
     for (std::size_t i = 0; i < manifest.layers.size(); ++i)
       cost.add(manifest.layers[i], manifest.layers[i].program.drops + manifest.layers[i].program.spat,
                std::llround(1e6 * seen->seconds[i]));
-    seen->quote = cost.account().rows();
+    seen->quote = cost.rows();
     seen->sweeps = sweeps_of_job(folder.string(), manifest);
   }
   if (views.empty()) {

@@ -8,7 +8,7 @@
 
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 
 namespace lamina::pipeline {
 

@@ -1,15 +1,13 @@
 #include "pipeline/show/report_head.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "stages/support/text/base64.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::write::report {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json part_json(const PartSummary& part) {
   const auto point = [](const Point3& p) { return Json{mm(p.x), mm(p.y), mm(p.z)}; };
@@ -103,7 +101,7 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
     json["reasons"].push_back(reason_name(static_cast<LayerReason>(reason)));
   for (const auto& [place, code] : held.layers()) json["embedded"].push_back(place);
   json["layers"] = layers_json(manifest, seen);
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace lamina::write::report

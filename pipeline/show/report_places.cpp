@@ -1,16 +1,14 @@
 #include "pipeline/show/report_places.h"
 
 #include <array>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "pipeline/manifest/inspection_file.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::write::report {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct Shown {
   const PixelGrid& grid;
@@ -28,13 +26,15 @@ struct Shown {
   SeenPlace place(const std::string& code, const std::string& unit, const Json& json) const {
     SeenPlace place;
     place.code = code;
-    place.x_mm = json.at("x_mm"), place.y_mm = json.at("y_mm"), place.z_mm = json.at("z_mm");
+    json.at("x_mm").get_to(place.x_mm);
+    json.at("y_mm").get_to(place.y_mm);
+    json.at("z_mm").get_to(place.z_mm);
     place.layer = place.last_layer = layer(json.at("layer"));
     std::array<double, 4> box{place.x_mm, place.y_mm, place.x_mm, place.y_mm};
     if (json.contains("last_layer")) place.last_layer = layer(json.at("last_layer"));
-    if (json.contains("box_mm")) box = json.at("box_mm");
+    for (std::size_t i = 0; json.contains("box_mm") && i < box.size(); ++i) json.at("box_mm").at(i).get_to(box[i]);
     if (!unit.empty()) {
-      place.amount = json.at(unit);
+      json.at(unit).get_to(place.amount);
       place.unit = unit;
     }
     const auto side = [](const PixelAxis& axis) { return static_cast<double>(axis.count) / axis.pixels_per_nm() / kNmPerMm; };
@@ -49,7 +49,7 @@ struct Shown {
 
 void add(const Json& json, const Shown& shown, LayersSeen& seen) {
   for (const Json& warning : json.at("warnings")) {
-    Warning& told = seen.warnings.emplace_back(Warning{warning.at("code"), warning.at("text")});
+    Warning& told = seen.warnings.emplace_back(Warning{warning.at("code").text(), warning.at("text").text()});
     if (warning.contains("layer")) told.layer = shown.layer(warning.at("layer"));
   }
   const Json& found = json.at("inspection");

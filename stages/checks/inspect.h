@@ -13,7 +13,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -165,8 +164,6 @@ class Inspection {
   Findings findings_;
 };
 
-/// What was found, for programs.
-nlohmann::ordered_json json_of(const Findings& findings, double least_mm);
 /// One warning for each kind. part  names of files
 void tell(const Findings& findings, std::span<const std::string> part, double least_mm, std::vector<Warning>& warnings);
 

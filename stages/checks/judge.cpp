@@ -243,19 +243,22 @@ void judge_footing(std::span<const Solid> solids, const Sampling& sampling, std:
   }
 }
 
-std::string why_nothing(const Tally& tally, const Sampling& sampling) {
+Status check_anything(const Tally& tally, const Sampling& sampling) {
+  const auto because = [](std::string why) { return Error{Fault::kInput, std::move(why)}; };
   const auto solids = tally.solids();
   for (std::uint32_t s = 0; s < solids.size(); ++s) {
     if (tally.seen(s)) {
       const bool bleeds = tally.looked_at_bleed() && tally.left_mm3(solids[s].group) == 0;
-      return bleeds ? bleed_text(sampling, "the bleed") + " takes away all of the parts: --bleed counts in um" : std::string();
+      if (!bleeds) return {};
+      return because(bleed_text(sampling, "the bleed") + " takes away all of the parts: --bleed counts in um");
     }
   }
   for (const Solid& solid : solids) {
-    if (std::string why = too_coarse(solid.box, sampling); !why.empty()) return why;
+    if (std::string why = too_coarse(solid.box, sampling); !why.empty()) return because(std::move(why));
   }
-  if (sampling.offset_mm < 0) return fmt::format("--offset {} leaves none of the parts", number_text(sampling.offset_mm));
-  return "the shells of the parts enclose nothing or cancel each other: look at `lamina info`";
+  if (sampling.offset_mm < 0)
+    return because(fmt::format("--offset {} leaves none of the parts", number_text(sampling.offset_mm)));
+  return because("the shells of the parts enclose nothing or cancel each other: look at `lamina info`");
 }
 
 }  // namespace lamina::sanity

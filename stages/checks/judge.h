@@ -54,7 +54,7 @@ void judge_tolerance(std::span<const Solid> solids, const Sampling& sampling, st
 /// Parts that neither stand on the bed nor on the box of another solid; for printers that lay beads.
 void judge_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
 
-/// Why nothing at all is planned, and what to do; "" if the solids do not tell.
-std::string why_nothing(const Tally& tally, const Sampling& sampling);
+/// errors  kInput: why nothing at all is planned, and what to do; none if the solids do not explain it
+Status check_anything(const Tally& tally, const Sampling& sampling);
 
 }  // namespace lamina::sanity

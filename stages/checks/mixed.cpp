@@ -36,18 +36,4 @@ std::vector<LayerRange> mixed_layers(std::vector<PowderStretch> stretches, std::
   return ranges;
 }
 
-std::string ranges_text(std::span<const LayerRange> ranges) {
-  constexpr std::size_t kMost = 6;
-  const std::size_t shown = std::min(kMost, ranges.size());
-  const bool one = ranges.size() == 1 && ranges[0][0] == ranges[0][1];
-  std::string text = one ? "layer " : "layers ";
-  for (std::size_t i = 0; i < shown; ++i) {
-    if (i > 0) text += i + 1 == ranges.size() ? " and " : ", ";
-    const auto [first, last] = ranges[i];
-    text += first == last ? fmt::format("{}", first) : fmt::format("{} to {}", first, last);
-  }
-  if (shown < ranges.size()) text += fmt::format(" and {} more ranges", ranges.size() - shown);
-  return text;
-}
-
 }  // namespace lamina::sanity

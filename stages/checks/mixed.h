@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "stages/data/layer.h"
@@ -25,8 +24,5 @@ using LayerRange = std::array<std::uint32_t, 2>;
 /// planes  of the layers, increasing
 /// cost    sorts the stretches, then one step a layer and a stretch; independent of meshes
 std::vector<LayerRange> mixed_layers(std::vector<PowderStretch> stretches, std::uint32_t materials, std::span<const Nm> planes);
-
-/// "layers 0 to 41, 60 and 72 to 80", at most six ranges, and how many more.
-std::string ranges_text(std::span<const LayerRange> ranges);
 
 }  // namespace lamina::sanity

@@ -216,20 +216,4 @@ double BinderCount::reached_percent(const Budget& budget) const {
   return voids_pl_ > 0 ? 100 * static_cast<double>(drops_) * stays / voids_pl_ : 0;
 }
 
-std::string told(const Budget& budget, const BinderCount& count) {
-  if (!budget.has_wish()) {
-    const auto [least, most] = budget.gets();
-    const std::string share = least == most ? fmt::format("{:.1f}", most) : fmt::format("{:.1f} to {:.1f}", least, most);
-    const double core = budget.jetting().core;
-    const std::string thinned = core < 1 ? fmt::format(", of the core's {} %,", number_text(100 * core)) : "";
-    const std::string pl = number_text(budget.binder().drop_pl);
-    if (const std::uint32_t full = budget.jetting().full_drops; full > 1)
-      return fmt::format("{} drops of {} pl a full voxel fill {} % of the voids", full, pl, share);
-    return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", pl, thinned, share);
-  }
-  return fmt::format("{:.2f} % of the voids reached, {:.2f} % asked; {} drops, {:.3f} ml of binder, up to {} a pixel",
-                     count.reached_percent(budget), count.asked_percent(budget), readable_count(count.drops()),
-                     count.binder_ml(budget), count.most_drops() > 0 ? count.most_drops() : budget.most_drops());
-}
-
 }  // namespace lamina::dose

@@ -122,7 +122,4 @@ class BinderCount {
   double voids_pl_ = 0;
 };
 
-/// The summary's line.
-std::string told(const Budget& budget, const BinderCount& count);
-
 }  // namespace lamina::dose

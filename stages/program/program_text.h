@@ -11,7 +11,7 @@
 
 #include "stages/data/units.h"
 #include "stages/program/dialect.h"
-#include "stages/support/text/number_text.h"
+#include "stages/support/text/gcode_number.h"
 
 namespace lamina::write {
 
@@ -24,39 +24,15 @@ void put(ProgramBytes& out, fmt::format_string<Values...> format, Values&&... va
   std::memcpy(out.data() + at, text.data(), text.size());
 }
 
-/// mm with four digits (a tenth of a micrometre), never -0.
-inline std::string mm_text(double millimetres) {
-  const double rounded =
-      static_cast<double>(static_cast<std::int64_t>(millimetres * 1e4 + (millimetres < 0 ? -0.5 : 0.5))) / 1e4;
-  return fmt::format("{:.4f}", rounded == 0 ? 0.0 : rounded);
-}
-
-/// A number with up to so many digits behind the point, and no exponent, which G-code does not know.
-inline std::string plain_text(double value, int digits) {
-  std::string text = fmt::format("{:.{}f}", value, digits);
-  if (digits == 0) return text;
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
-/// The least that is written of a roller's turns a minute, and of seconds to dry: a thousandth.
-inline constexpr int kPlainDigits = 3;
-
-/// mm a minute, as F words have it: whole ones but below 1, never 0.
-inline std::string feed_text(double mm_s) {
-  return mm_s * 60 < 1 ? fmt::format("{:.2f}", mm_s * 60) : fmt::format("{:.0f}", mm_s * 60);
-}
-
 /// Positions of the carriage for sweeps, in mm.
 class Carriage {
  public:
   Carriage(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid) {}
 
-  const std::string& scan_axis() const {
+  std::string_view scan_axis() const {
     return grid_.scan_axis == ScanAxis::kX ? machine_.motion.x_axis : machine_.motion.y_axis;
   }
-  const std::string& line_axis() const {
+  std::string_view line_axis() const {
     return grid_.scan_axis == ScanAxis::kX ? machine_.motion.y_axis : machine_.motion.x_axis;
   }
   double along(double step) const {

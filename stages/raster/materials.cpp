@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <string>
 #include <utility>
 
 #include "stages/geometry/combine.h"
@@ -85,21 +86,22 @@ void unite(const Runs& image, Runs& plane) {
 
 }  // namespace
 
-std::string DropPlanes::add(Runs&& image, std::uint32_t drop) {
+Status DropPlanes::add(Runs&& image, std::uint32_t drop) {
+  const auto wrong = [](std::string what) { return Error{Fault::kVerification, std::move(what)}; };
   if (planes.empty()) {
     Runs none;
     none.columns = image.columns;
     none.row_offset.assign(image.row_offset.size(), 0);
     planes.resize(most_, none);
   }
-  if (drop >= most_) return fmt::format("get more than {} drops", most_);
-  if (drop > 0 && !lies_within(image, before_)) return "get no drop before";
+  if (drop >= most_) return wrong(fmt::format("get more than {} drops", most_));
+  if (drop > 0 && !lies_within(image, before_)) return wrong("get no drop before");
   if (most_ > 1) before_ = image;
   if (!shared_) {
     if (planes[drop].change.empty()) {
       planes[drop] = std::move(image);
     } else if (drop == 0 && meets(planes[0], image)) {
-      return "another material's image sets as well";
+      return wrong("another material's image sets as well");
     } else {
       unite(image, planes[drop]);
     }
@@ -113,7 +115,7 @@ std::string DropPlanes::add(Runs&& image, std::uint32_t drop) {
     unite(image, plane);
     image = std::move(upon);
   }
-  return image.change.empty() ? std::string() : fmt::format("get more than {} drops", most_);
+  return image.change.empty() ? Status() : wrong(fmt::format("get more than {} drops", most_));
 }
 
 }  // namespace lamina::raster

@@ -3,10 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "stages/data/runs.h"
+#include "stages/data/status.h"
 
 namespace lamina::raster {
 
@@ -36,8 +36,8 @@ class DropPlanes {
   DropPlanes(std::uint32_t most, bool shared) : most_(most), shared_(shared) {}
 
   /// Images come material by material, those of a material drop by drop, all of one size. drop  of its material, from 0
-  /// returns  empty, or what its pixels contradict: "get no drop before"; `planes` are then of no use
-  std::string add(Runs&& image, std::uint32_t drop);
+  /// errors  kVerification: its pixels contradict the others, "get no drop before"; `planes` are then of no use
+  Status add(Runs&& image, std::uint32_t drop);
 
   /// The pixels that get at least one drop of any material, two, ...: `most` of them, once an image was added.
   std::vector<Runs> planes;

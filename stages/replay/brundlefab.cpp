@@ -46,7 +46,7 @@ class Firmware {
   void line(std::string_view text, std::size_t number) {
     number_ = number;
     Block block;
-    if (const std::string wrong = brundle::read_block(text, unit_mm_, block); !wrong.empty()) return fault(wrong);
+    if (const Status read = brundle::read_block(text, unit_mm_, block); !read) return fault(read.error().message);
     if (ended_) return fault("goes on behind its end");
     switch (block.code) {
       case 'M': return message(block);

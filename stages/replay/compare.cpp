@@ -16,7 +16,7 @@ std::int64_t Printing::line_of(std::uint32_t column, std::uint32_t row) const {
 }
 
 // Where the nozzle is that has to see to a pixel.
-std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
+void Printing::note_place(std::uint32_t column, std::uint32_t row, std::string& text) const {
   const auto& mount = profile().mounting;
   const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
   const std::int64_t from_left = has(Side::kRight) ? machine_.columns_ - 1 - column : column;
@@ -26,11 +26,12 @@ std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
       if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
-      return fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number,
-                         place * machine_.ticks_ + nozzle.step_offset);
+      text =
+          fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number, place * machine_.ticks_ + nozzle.step_offset);
+      return;
     }
   }
-  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, place);
+  text = fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, place);
 }
 
 // Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
@@ -84,11 +85,12 @@ void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::ui
             !extra ? moved + lost > 0 && may_be_lost(column, row)
                    : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
                                      : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
-        if (differ.first_of_all.empty()) differ.first_of_all = place_of(column, row);
+        if (differ.first_of_all.empty()) note_place(column, row, differ.first_of_all);
         if (differ.first.empty() && !explained) {
-          differ.first = fmt::format("{}: column {}, row {} is {}{}", place_of(column, row), column, row,
-                                     extra ? "fired and not set in the image" : "set in the image and not fired",
-                                     planes_ == 1 ? "" : fmt::format(", drop {}", plane + 1));
+          note_place(column, row, differ.first);
+          differ.first += fmt::format(": column {}, row {} is {}{}", column, row,
+                                      extra ? "fired and not set in the image" : "set in the image and not fired",
+                                      planes_ == 1 ? "" : fmt::format(", drop {}", plane + 1));
         }
       }
     }

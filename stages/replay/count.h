@@ -3,7 +3,8 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
+
+#include "stages/data/status.h"
 
 namespace lamina {
 struct Machine;
@@ -34,9 +35,9 @@ struct Count {
   void add(const Count& other);
 };
 
-/// Empty, or the first number in which a program differs from what is told of it: drops, sweeps, added sweeps and times; a time
-/// of 0 is untold.
-std::string fault_of_count(const Machine& machine, const Count& told, const Count& found);
+/// Compares a program's numbers with what is recorded of it; a time of 0 is not recorded.
+/// errors  kVerification: the first that differs: drops, sweeps, added sweeps, times
+Status check_count(const Machine& machine, const Count& told, const Count& found);
 
 /// Binder and powder used by a program.
 struct Material {

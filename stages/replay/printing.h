@@ -180,7 +180,6 @@ class Printing {
   double base_mm() const { return layer_.index == 0 ? profile().powder.base_mm() : 0; }
   std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
   void strokes(double build_mm, double fed_mm);
-  const std::vector<std::string>& own_lines() const;
   bool capped() const;
   void waits_capped(std::string_view what);
   void check_pauses();
@@ -189,7 +188,7 @@ class Printing {
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
-  std::string place_of(std::uint32_t column, std::uint32_t row) const;
+  void note_place(std::uint32_t column, std::uint32_t row, std::string& text) const;
 
   const VirtualMachine& machine_;
   const VirtualMachine::Watch* watch_;

@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "pipeline/report/inspection_json.h"
 #include "stages/checks/inspect.h"
 #include "tests/checks/volume.h"
 
@@ -103,8 +103,8 @@ TEST_F(BoundedInspection, StopsWhereItDoesWhateverScratchLayersHave) {
   const Findings all = inspect(UINT64_MAX);
   const std::uint64_t most = *std::ranges::max_element(held_);
   for (const std::uint64_t may : {most / 16, most / 4, most / 2, most}) {
-    const std::string one = json_of(inspect(may), 0.3).dump();
-    for (const std::size_t slots : {2, 3, 5, 12}) EXPECT_EQ(json_of(inspect(may, kLayers, slots), 0.3).dump(), one) << may;
+    const std::string one = json_text(json_of(inspect(may), 0.3));
+    for (const std::size_t slots : {2, 3, 5, 12}) EXPECT_EQ(json_text(json_of(inspect(may, kLayers, slots), 0.3)), one) << may;
   }
 }
 

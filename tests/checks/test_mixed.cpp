@@ -4,6 +4,7 @@
 #include <random>
 #include <set>
 
+#include "pipeline/report/layer_text.h"
 #include "stages/checks/mixed.h"
 
 namespace lamina::sanity {
@@ -53,7 +54,7 @@ TEST(MixedLayers, AsCountedLayerByLayer) {
 }
 
 TEST(MixedLayers, AreNamedShortly) {
-  const auto text = [](std::vector<LayerRange> ranges) { return ranges_text(ranges); };
+  const auto text = [](std::vector<LayerRange> ranges) { return pipeline::ranges_text(ranges); };
   EXPECT_EQ(text({{4, 4}}), "layer 4");
   EXPECT_EQ(text({{0, 41}}), "layers 0 to 41");
   EXPECT_EQ(text({{0, 41}, {60, 60}, {72, 80}}), "layers 0 to 41, 60 and 72 to 80");

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/report/cost_report.h"
 #include "stages/cost/cost.h"
-#include "stages/cost/quote_table.h"
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "tests/commands/program.h"

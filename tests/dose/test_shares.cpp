@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "pipeline/report/dose_text.h"
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
@@ -238,7 +239,7 @@ TEST(Shares, AreToldInOneLine) {
   ShareCount count;
   count.add(150, 2, 0);
   count.add(50, 1, 1);
-  EXPECT_EQ(count.told(16, "grey"),
+  EXPECT_EQ(pipeline::voxels_text(count, 16, "grey"),
             "16 levels come to 200 full voxels, as grey; 3 (1.500 %) half full or more are not as their centre, 1 away from "
             "any boundary");
 }

@@ -3,9 +3,9 @@
 
 #include <numeric>
 
+#include "pipeline/report/machine_text.h"
 #include "stages/program/compile.h"
 #include "stages/program/dialect.h"
-#include "stages/program/explain.h"
 #include "tests/program/machines.h"
 
 namespace lamina::program {

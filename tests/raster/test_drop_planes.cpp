@@ -37,7 +37,7 @@ Runs plane_of_counts(const Counts& counts, std::uint32_t least) {
 std::string added_images(const std::vector<Counts>& materials, std::uint32_t images, DropPlanes& planes) {
   for (const Counts& counts : materials) {
     for (std::uint32_t k = 0; k < images; ++k) {
-      if (const std::string what = planes.add(plane_of_counts(counts, k + 1), k); !what.empty()) return what;
+      if (const Status added = planes.add(plane_of_counts(counts, k + 1), k); !added) return added.error().message;
     }
   }
   return {};

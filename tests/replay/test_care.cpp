@@ -451,23 +451,25 @@ TEST(Care, VatsAreEmptiedAndFilledByWhatProgramsFeed) {
   replay::VatLevels levels(machine);
   replay::Count count;
   count.fed_mm = {0.5, 7};
-  for (std::uint32_t layer = 0; layer < 4; ++layer) EXPECT_EQ(levels.take(layer, count), "");
-  EXPECT_EQ(levels.take(4, count), "layer 4: takes 0.5 mm of the first vat, where 0 of 2 are left");
-  EXPECT_EQ(levels.take(5, count), "") << "once";
+  for (std::uint32_t layer = 0; layer < 4; ++layer) EXPECT_TRUE(levels.take(layer, count).ok());
+  EXPECT_EQ(levels.take(4, count).error().message, "layer 4: takes 0.5 mm of the first vat, where 0 of 2 are left");
+  EXPECT_TRUE(levels.take(5, count).ok()) << "once";
   // A layer that nobody could carry out, or that is of a shard elsewhere, may have filled them.
   for (const bool missing : {false, true}) {
     replay::VatLevels unsure(machine);
     for (std::uint32_t layer = 0; layer < 10; ++layer) {
       count.refills = layer == 5 ? 1 : 0;
       if (layer == 2 && missing) continue;
-      const std::string fault = unsure.take(layer, layer == 2 ? std::nullopt : std::optional(count));
-      EXPECT_EQ(fault, layer == 9 ? "layer 9: takes 0.5 mm of the first vat, where 0 of 2 are left" : "") << layer;
+      const Status taken = unsure.take(layer, layer == 2 ? std::nullopt : std::optional(count));
+      EXPECT_EQ(taken ? "" : taken.error().message,
+                layer == 9 ? "layer 9: takes 0.5 mm of the first vat, where 0 of 2 are left" : "")
+          << layer;
     }
   }
   replay::VatLevels filled(machine);
   for (std::uint32_t layer = 0; layer < 12; ++layer) {
     count.refills = layer == 4 || layer == 8 ? 1 : 0;
-    EXPECT_EQ(filled.take(layer, count), "") << layer;
+    EXPECT_TRUE(filled.take(layer, count).ok()) << layer;
   }
 }
 

@@ -55,7 +55,7 @@ class Hp45Stream {
   std::vector<Shown> shown;
 
   void say(const std::string& command, const std::string& rest) {
-    if (controller_.execute(command, rest).empty()) text += command + " " + rest + "\n";
+    if (controller_.execute(command, rest).ok()) text += command + " " + rest + "\n";
   }
   void go(std::int64_t counts) {
     text += fmt::format("G1 X{:.6f} F15000\nG4 P0\n", static_cast<double>(counts) * 25.4 / 600);
@@ -98,11 +98,11 @@ TEST(Hp45, LongWaysOfAnIdleControllerChangeNothing) {
       controller.move(static_cast<double>(counts) * Hp45Stream::kCountUm, watch);
       controller.move(0, watch);
     }
-    EXPECT_EQ(controller.execute("SER", "JY"), "");
-    EXPECT_EQ(controller.execute("SEP", "A"), "");
+    EXPECT_TRUE(controller.execute("SER", "JY").ok());
+    EXPECT_TRUE(controller.execute("SEP", "A").ok());
     for (const char* line : {"B9A ", "D6A ", "F3A "}) {
       const char nozzles = line[0] == 'D' ? 'B' : 'A';
-      EXPECT_EQ(controller.execute("SBR", line + std::string(50, nozzles)), "");
+      EXPECT_TRUE(controller.execute("SBR", line + std::string(50, nozzles)).ok());
     }
     controller.move(60'000, watch);
     return seen;

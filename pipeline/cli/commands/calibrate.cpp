@@ -6,7 +6,7 @@
 #include "pipeline/cli/commands/calibrate_powder.h"
 #include "pipeline/cli/console.h"
 #include "stages/support/io/file.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -12,7 +12,7 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/replaceable.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -72,7 +72,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
   if (laid->machine != machine->name)
     return at_option("--chart", fmt::format("{} is of {}, not of {}", chart, one_line(laid->machine), machine->name));
   const auto seen = scanned(
-      "chart", {{"photo", arguments.text("--scan")}, {"chart", Json::parse(*text)}, {"picture", arguments.has("--overlay")}},
+      "chart", {{"photo", arguments.text("--scan")}, {"chart", parse_json(*text)}, {"picture", arguments.has("--overlay")}},
       arguments.text("--overlay"));
   if (!seen) return seen.error();
   const auto lines = take_over(*seen, *laid, *machine);
@@ -85,7 +85,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
     context.say("profile   " + request.directory);
   }
   if (!arguments.has("--json")) return {};
-  return context.give({{"command", "calibrate"}, {"profile", request.directory}, {"reading", Json::parse(*seen)}});
+  return context.give({{"command", "calibrate"}, {"profile", request.directory}, {"reading", parse_json(*seen)}});
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include "pipeline/manifest/images_on_record.h"
 #include "stages/data/units.h"
 #include "stages/formats/images/image.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -47,7 +47,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
                              {"change", layer->runs.change}},
                             "");
   if (!told) return told.error();
-  Json json = Json::parse(*told);
+  Json json = parse_json(*told);
   const auto number = [](const Json& value) { return value.get<double>(); };
   const char* axis = machine->mounting.scan_axis == ScanAxis::kX ? "from the back" : "from the left";
   Answer answer(arguments, context);

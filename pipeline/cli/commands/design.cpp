@@ -10,7 +10,7 @@
 #include "pipeline/pores/design_page.h"
 #include "stages/segment/permeability.h"  // the unit
 #include "stages/support/io/file.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

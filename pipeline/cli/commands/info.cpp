@@ -12,7 +12,7 @@
 #include "stages/formats/images/layer_images.h"
 #include "stages/formats/images/stack_info.h"
 #include "stages/slice/surplus.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -135,7 +135,7 @@ Outcome run_info(const Arguments& arguments, Context& context) {
       code = std::max(code, context.complain(page.error()));
       continue;
     }
-    const Status status = arguments.has("--json") ? context.give(Json::parse(*page)) : context.print(*page);
+    const Status status = arguments.has("--json") ? context.give(parse_json(*page)) : context.print(*page);
     if (!status) return status.error();
   }
   return code;

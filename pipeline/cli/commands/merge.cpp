@@ -3,8 +3,8 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
-#include "pipeline/run/summary.h"
-#include "stages/support/text/json.h"
+#include "pipeline/report/summary.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

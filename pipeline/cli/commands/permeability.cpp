@@ -12,7 +12,7 @@
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
 #include "pipeline/pores/laid_look.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -18,7 +18,7 @@
 #include "pipeline/run/run_resolved.h"
 #include "stages/formats/level_format.h"
 #include "stages/support/io/file.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -135,7 +135,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     context.say_text(summary->text());
   }
   if (job->json) {
-    if (Status status = context.give(Json::parse(summary->json())); !status) return status.error();
+    if (Status status = context.give(parse_json(summary->json())); !status) return status.error();
   }
   Outcome outcome;
   outcome.layers_planned = summary->layers_planned;

@@ -5,10 +5,10 @@
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/report/replay_text.h"
 #include "stages/checks/records.h"
-#include "stages/replay/time/totals.h"
-#include "stages/support/text/json.h"
 #include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -47,7 +47,7 @@ Json report_json(const VerifyReport& report) {
   Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
                {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
   if (!report.machine.empty()) json["replay"] = replay::totals_json(totals_of(report));
-  if (report.use.facts) json["use"] = *report.use.facts;
+  if (const Json* use = report.use.facts.find("use")) json["use"] = *use;
   for (const UnfedPowder& powder : report.unfed) {
     json["unfed"].push_back({{"material", powder.name}, {"pixels", powder.pixels}, {"layers", powder.layers}});
   }

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/text_shape.h"
 
@@ -64,7 +64,7 @@ Chart chart_of(const Json& json) {
   for (const double mm : {chart.between_mm, chart.gap_mm, chart.mark_mm}) {
     if (!(mm > 0 && mm <= kMaxLengthMm)) throw std::out_of_range("its lengths are not positive, or too large");
   }
-  chart.layer_mm = json.value("layer_mm", 0.0);
+  if (json.contains("layer_mm")) json.at("layer_mm").get_to(chart.layer_mm);
   if (!(chart.layer_mm >= 0 && chart.layer_mm <= kMaxLengthMm)) throw std::out_of_range("its layer has no thickness");
   for (const Json& mark : json.at("marks")) chart.marks.push_back(box_of(mark, chart));
   if (chart.marks.size() != 4) throw std::out_of_range("it has not four marks");
@@ -82,7 +82,8 @@ Chart chart_of(const Json& json) {
   }
   for (const Json& joint : json.at("joints")) chart.joints.push_back(box_of(joint, chart));
   if (chart.joints.size() >= std::max(chart.swaths, 1u)) throw std::out_of_range("it has more joints than swaths");
-  for (const Json& one : json.value("verniers", Json::array())) chart.verniers.push_back(vernier_of(one, chart));
+  if (!json.contains("verniers")) return chart;
+  for (const Json& one : json.at("verniers")) chart.verniers.push_back(vernier_of(one, chart));
   return chart;
 }
 
@@ -126,7 +127,7 @@ Result<Chart> read_chart(std::string_view text, const std::string& where) {
   };
   if (!json_nests_within(text)) return refused("it nests too deep");
   try {
-    return chart_of(Json::parse(text));
+    return chart_of(parse_json(text));
   } catch (const std::exception& error) {
     return refused(error.what());
   }

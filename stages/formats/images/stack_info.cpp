@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/images/numbered.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -181,27 +181,27 @@ std::string as_text(const StackInfo& info) {
   return text;
 }
 
-nlohmann::ordered_json as_json(const StackInfo& info) {
-  nlohmann::ordered_json json = {{"path", info.path},
-                                 {"kind", "images"},
-                                 {"files", info.files},
-                                 {"images", info.images},
-                                 {"format", info.kind.format},
-                                 {"bits", info.kind.bits},
-                                 {"photometric", info.kind.light},
-                                 {"compression", info.kind.coding},
-                                 {"columns", info.columns},
-                                 {"rows", info.rows},
-                                 {"dpi", nullptr},
-                                 {"set_pixels", info.set},
-                                 {"least_set_pixels", info.least_set},
-                                 {"most_set_pixels", info.most_set},
-                                 {"empty_images", info.empty},
-                                 {"grey_pixels", info.grey},
-                                 {"filled_pixels", info.filled},
-                                 {"unreadable_images", info.unreadable},
-                                 {"differing_images", info.differing},
-                                 {"wrong", info.wrong}};
+Json as_json(const StackInfo& info) {
+  Json json = {{"path", info.path},
+               {"kind", "images"},
+               {"files", info.files},
+               {"images", info.images},
+               {"format", info.kind.format},
+               {"bits", info.kind.bits},
+               {"photometric", info.kind.light},
+               {"compression", info.kind.coding},
+               {"columns", info.columns},
+               {"rows", info.rows},
+               {"dpi", nullptr},
+               {"set_pixels", info.set},
+               {"least_set_pixels", info.least_set},
+               {"most_set_pixels", info.most_set},
+               {"empty_images", info.empty},
+               {"grey_pixels", info.grey},
+               {"filled_pixels", info.filled},
+               {"unreadable_images", info.unreadable},
+               {"differing_images", info.differing},
+               {"wrong", info.wrong}};
   if (info.dpi_x > 0 && info.dpi_y > 0) json["dpi"] = {info.dpi_x, info.dpi_y};
   if (info.folder) json["numbers"] = {{"first", info.first_number}, {"last", info.last_number}, {"missing", info.missing}};
   return json;

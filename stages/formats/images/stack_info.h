@@ -3,11 +3,11 @@
 
 #include <array>
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "stages/data/status.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::read {
 
@@ -48,6 +48,6 @@ struct StackInfo {
 Result<StackInfo> look_at_stack(const std::string& path, int threshold);
 
 std::string as_text(const StackInfo& info);
-nlohmann::ordered_json as_json(const StackInfo& info);
+Json as_json(const StackInfo& info);
 
 }  // namespace lamina::read

@@ -219,7 +219,7 @@ Status check_care(const Dialect& dialect, const Machine& machine, const HeadGrid
   return Checker(dialect, machine, grid).check();
 }
 
-std::string idle_care(const Machine& machine) {
+void warn_of_idle_care(const Machine& machine, std::vector<Warning>& warnings) {
   const auto& care = machine.care;
   const auto& powder = machine.powder;
   const bool pauses = powder.dry_s > 0 || powder.refill == VatRefill::kPause;
@@ -239,7 +239,7 @@ std::string idle_care(const Machine& machine) {
   add(dries_s > 0 && powder.dry_s > dries_s, care.cap_mm.has_value(),
       fmt::format("nozzles wait uncapped for {:g} s while a layer dries, and care.{} is {:g}: give care.cap_mm", powder.dry_s,
                   care.spit_seconds > 0 ? "spit_seconds" : "wipe_seconds", dries_s));
-  return idle.empty() ? idle : fmt::format("{}: {}", machine.name, idle);
+  if (!idle.empty()) warnings.push_back({"care", fmt::format("{}: {}", machine.name, idle)});
 }
 
 }  // namespace lamina::write

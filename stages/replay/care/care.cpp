@@ -118,15 +118,10 @@ void Printing::dwells(double seconds) {
   takes(seconds);
 }
 
-// The block that may come now.
-const std::vector<std::string>& Printing::own_lines() const {
-  const auto& profile = machine_.machine_;
-  if (at_wiper_) return profile.care.wipe_lines;
-  return dwelt_s_ > 0 ? profile.powder.dry_off_lines : profile.powder.dry_on_lines;
-}
-
 bool Printing::takes_own(std::string_view line) {
-  const auto& lines = own_lines();
+  const auto& powder = profile().powder;
+  // The block that may come now.
+  const auto& lines = at_wiper_ ? profile().care.wipe_lines : dwelt_s_ > 0 ? powder.dry_off_lines : powder.dry_on_lines;
   if (own_ < lines.size() && lines[own_] == line) {
     if (under_way_) fault(fmt::format("'{}' comes while the head may still move; G4 P0 waits for it", line));
     if (!at_wiper_) waits_capped(fmt::format("'{}' of the pause to dry comes", line));

@@ -9,9 +9,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <string>
 #include <string_view>
 #include <vector>
+
+#include "stages/data/status.h"
 
 namespace lamina::replay::hp45 {
 
@@ -28,8 +29,8 @@ class Controller {
 
   /// Carries out a line, as SerialCommand::Update and SerialExecute do, with the head at rest.
   /// command  letters before the first blank; rest: what follows it
-  /// returns  empty, or why the controller drops the line, does something else or is beyond its limits
-  std::string execute(std::string_view command, std::string_view rest);
+  /// errors  kVerification: the controller drops the line, does something else or is beyond its limits
+  Status execute(std::string_view command, std::string_view rest);
 
   /// What one row of nozzles fires on a way; the rows' positions are true ones along the scan.
   struct Firing {
@@ -62,8 +63,8 @@ class Controller {
 
  private:
   double count_um() const { return 25'400.0 / counts_per_inch_; }
-  std::string set(std::string_view command, std::int32_t value);
-  std::string add(std::int32_t position, std::string_view raw);
+  Status set(std::string_view command, std::int32_t value);
+  Status add(std::int32_t position, std::string_view raw);
   void set_encoder(std::int32_t position_um);
   void tell(std::string_view command);
   void update_position();

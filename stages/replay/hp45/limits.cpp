@@ -30,13 +30,15 @@ std::optional<std::uint32_t> primed(std::string_view number) {
   return bursts;
 }
 
-std::string encoder_fault(double counts, double encoder_dpi, double step_um) {
+Status check_encoder(double counts, double encoder_dpi, double step_um) {
   if (counts == encoder_dpi) return {};
   if (encoder_dpi <= 0) {  // 600, or what pixels need
     if (counts <= 600 + 2 * 25'400 / step_um) return {};
-    return fmt::format("SER has {:g} counts an inch, far more than pixels of {:.1f} um need", counts, step_um);
+    return Error{Fault::kVerification,
+                 fmt::format("SER has {:g} counts an inch, far more than pixels of {:.1f} um need", counts, step_um)};
   }
-  return fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder_dpi);
+  return Error{Fault::kVerification,
+               fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder_dpi)};
 }
 
 // Along the scan: the bed with ramps and room, where the head waits, and the spreader's ends if the gantry has it.
@@ -66,14 +68,15 @@ bool reaches(const Printing& printing, double counts_per_inch, double mm) {
   return mm >= low - room && mm <= high + room;
 }
 
-std::string speed_fault(double mm_s, double counts_per_inch) {
+Status check_speed(double mm_s, double counts_per_inch) {
   const double counts = mm_s / 25.4 * counts_per_inch;
   if (std::abs(mm_s - std::round(mm_s)) > 1e-3) {
-    return fmt::format("sweeps at {:g} mm/s, which the controller cuts to whole mm/s", mm_s);
+    return Error{Fault::kVerification, fmt::format("sweeps at {:g} mm/s, which the controller cuts to whole mm/s", mm_s)};
   }
   if (counts >= kLeastCountsPerSecond) return {};
-  return fmt::format("sweeps at {:g} mm/s, {:.0f} counts a second: below {:.0f} the controller takes the head to rest", mm_s,
-                     counts, kLeastCountsPerSecond);
+  return Error{Fault::kVerification,
+               fmt::format("sweeps at {:g} mm/s, {:.0f} counts a second: below {:.0f} the controller takes the head to rest",
+                           mm_s, counts, kLeastCountsPerSecond)};
 }
 
 }  // namespace lamina::replay::hp45

@@ -52,8 +52,8 @@ class Hp45Reader {
   void move(const GcodeLine& line);
   void spread(const GcodeLine& line);
   bool ready();
-  std::string encoder_fault() const {
-    return hp45::encoder_fault(controller_.counts_per_inch(), printing_.profile().motion.encoder_dpi, step_um_);
+  Status check_encoder() const {
+    return hp45::check_encoder(controller_.counts_per_inch(), printing_.profile().motion.encoder_dpi, step_um_);
   }
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
@@ -122,8 +122,7 @@ void Hp45Reader::command(const GcodeLine& line) {
   if (line.command == "BRES" && ++rewinds_ > kMostRewinds) return reader_.fault("rewinds the buffer again and again");
   primes_ = line.command == "PRM";
   if (primes_) return prime(line.rest);
-  const std::string wrong = controller_.execute(line.command, line.rest);
-  if (!wrong.empty()) return reader_.fault(wrong);
+  if (const Status done = controller_.execute(line.command, line.rest); !done) return reader_.fault(done.error().message);
   if (line.command == "SBR") {
     const double at_um = controller_.true_um(controller_.last_position_um());
     if (++lines_ == 1) {
@@ -133,7 +132,7 @@ void Hp45Reader::command(const GcodeLine& line) {
     if (lines_ == 2) ahead_ = at_um > begin_um_ ? 1 : -1;
     take_burst();
   } else if (line.command == "SER") {
-    if (const std::string fault = encoder_fault(); !fault.empty()) reader_.fault(fault);
+    if (const Status encoder = check_encoder(); !encoder) reader_.fault(encoder.error().message);
   } else if (line.command == "BRL") {
     if (controller_.unread() > 0) {
       return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
@@ -159,14 +158,14 @@ void Hp45Reader::prime(std::string_view number) {
 
 // Whether lines can be fired as the profile has it: where the head stands, how fine the encoder, how many bursts.
 bool Hp45Reader::ready() {
-  const std::string encoder = encoder_fault();
+  const Status encoder = check_encoder();
   const double density = 100 * 25'400 / (kBurstsPerInch * step_um_);
   if (const std::string_view unset = controller_.unset(); !unset.empty()) {
     reader_.fault(fmt::format("lines come before {}: the controller keeps what another print has set or left", unset));
   } else if (!controller_.zeroed()) {
     reader_.fault("lines come before SEP tells where the head stands");
-  } else if (!encoder.empty()) {
-    reader_.fault(encoder);
+  } else if (!encoder) {
+    reader_.fault(encoder.error().message);
   } else if (controller_.density() != std::max<std::int64_t>(1, std::llround(density))) {
     reader_.fault(fmt::format("SDN has {} %, where {:.0f} give a burst a pixel", controller_.density(), density));
   } else {
@@ -229,8 +228,8 @@ void Hp45Reader::move(const GcodeLine& line) {
     printing_.begin_sweep(sweep_++, !upwards);
     if (axes_.at(scan_.across) != beside) return reader_.fault("moves across while it fires");
     printing_.go_across(axes_.at(scan_.across));
-    const std::string slow = hp45::speed_fault(axes_.speed_mm_s(), controller_.counts_per_inch());
-    if (!slow.empty()) return reader_.fault(slow);
+    const Status speed = hp45::check_speed(axes_.speed_mm_s(), controller_.counts_per_inch());
+    if (!speed) return reader_.fault(speed.error().message);
   }
   for (auto& shots : shots_) shots.clear();
   hurried_ = 0;

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/console.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
 #include "tests/commands/program.h"

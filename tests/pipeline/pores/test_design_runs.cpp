@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/job/file.h"
 #include "pipeline/pores/design.h"
-#include "stages/support/text/json.h"
 #include "tests/commands/program.h"
 
 namespace lamina {
@@ -78,12 +78,12 @@ TEST(DesignedJob, TheCommandWritesAJobThatExtrudeTakes) {
   const auto made = test::run_lamina(
       {"design", "--pore", "0.12x0.9", "--machine", "anet-a8", "--voxel", "30", "--json", "-o", "a.toml"}, folder.path());
   ASSERT_EQ(made.code, 0) << made.err;
-  const Json told = Json::parse(made.out);
+  const nlohmann::ordered_json told = nlohmann::ordered_json::parse(made.out);
   EXPECT_EQ(told["met"], true);
   EXPECT_NEAR(told["pore_mm"][0].get<double>(), 0.12, 0.002);
   const auto laid = test::run_lamina({"extrude", "part.stl", "--job", "a.toml", "--json", "-o", "a.gcode"}, folder.path());
   ASSERT_EQ(laid.code, 0) << laid.err;
-  const Json summary = Json::parse(laid.out);
+  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(laid.out);
   EXPECT_TRUE(summary["warnings"].empty()) << summary["warnings"].dump();
   EXPECT_NEAR(summary["pores"][0]["width_mm"].get<double>(), 0.12, 0.002);
   EXPECT_NEAR(summary["pores"][0]["length_mm"].get<double>(), 0.9, 0.02);

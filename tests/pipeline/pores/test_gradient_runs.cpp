@@ -1,9 +1,10 @@
 // tests/pipeline/pores/test_gradient_runs.cpp: a wish with two ends becomes a job of regions, each checked in the one file.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "pipeline/job/file.h"
 #include "pipeline/pores/design.h"
-#include "stages/support/text/json.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -77,14 +78,14 @@ TEST(DesignedGradient, TheCommandWritesRegionsThatExtrudeLays) {
                                         "--json --quiet -o a.toml"),
                                folder.path());
   ASSERT_EQ(made.code, 0) << made.err;
-  const Json told = Json::parse(made.out);
+  const nlohmann::ordered_json told = nlohmann::ordered_json::parse(made.out);
   EXPECT_EQ(told["met"], true);
   ASSERT_EQ(told["steps"].size(), 2u);
   EXPECT_EQ(told["steps"][0]["to_mm"], 0.9);
   EXPECT_EQ(told["steps"][1]["to_mm"], 2.1) << "the layer that reaches the height";
   const auto laid = run_lamina(words_of("extrude part.stl --job a.toml --json -o a.gcode"), folder.path());
   ASSERT_EQ(laid.code, 0) << laid.err;
-  const Json summary = Json::parse(laid.out);
+  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(laid.out);
   EXPECT_TRUE(summary["warnings"].empty()) << summary["warnings"].dump();
   EXPECT_EQ(laid.err.find("none closes"), std::string::npos) << "nothing is said of heights that no layer has\n" << laid.err;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -104,7 +105,7 @@ TEST(DesignedGradient, AStepOutOfReachIsNamedWithTheNearest) {
   EXPECT_NE(refused.err.find("not reachable: 1 of 2 regions; from 0.9 to 1.8 mm nearest to --pore 0.4x0.9 is --pore 0."),
             std::string::npos)
       << refused.err;
-  const Json told = Json::parse(refused.out);
+  const nlohmann::ordered_json told = nlohmann::ordered_json::parse(refused.out);
   EXPECT_EQ(told["steps"][0]["met"], true);
   EXPECT_EQ(told["steps"][1]["met"], false);
   EXPECT_TRUE(files_below(folder.path()).empty());

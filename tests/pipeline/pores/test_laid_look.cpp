@@ -5,10 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "pipeline/pores/laid_look.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "tests/commands/program.h"
 #include "tests/segment/table.h"
 
@@ -42,7 +43,7 @@ TEST(LaidLook, GroupsOfTouchingBeadsByHand) {
   ASSERT_TRUE(print.ok()) << print.error().message;
   EXPECT_EQ(print->layers, 6u);
   EXPECT_NEAR(print->fed_mm3, 6 * 33 * 16 * kBead, 0.01);
-  const Json json = as_json(*print);
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(json_text(as_json(*print)));
   EXPECT_NEAR(json["fed_g"], 6 * 33 * 16 * kBead * 1.25e-3, 1e-4);
   EXPECT_NEAR(json["window_mm"][0], kGroup, 0.011);
   // Void is what beads leave of the layer; each of two contacts in a group hides two cusps above and two below.
@@ -65,7 +66,7 @@ TEST(LaidLook, GroupsOfTouchingBeadsByHand) {
 }
 
 /// Of a box of 12 mm as that document plans it.
-Json plan_of(const Directory& directory, const std::string& configuration) {
+nlohmann::ordered_json plan_of(const Directory& directory, const std::string& configuration) {
   const fs::path job = fs::path(LAMINA_TEST_DIR) / "../docs/examples/dinisio2022" / (configuration + ".toml");
   test::write_box(directory / "part.stl", {0, 0, 0}, {12, 12, 2.1f});
   const auto done = test::run_lamina(
@@ -73,7 +74,7 @@ Json plan_of(const Directory& directory, const std::string& configuration) {
   EXPECT_EQ(done.code, 0) << done.err;
   const auto print = look_at_print(directory / "part.gcode", 0);
   EXPECT_TRUE(print.ok());
-  return print.ok() ? as_json(*print) : Json();
+  return print.ok() ? nlohmann::ordered_json::parse(json_text(as_json(*print))) : nlohmann::ordered_json();
 }
 
 TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
@@ -85,7 +86,7 @@ TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
     const std::string& name = row.at("configuration");
     const double between = name == "F1.5E100C2" ? 4.7 : name == "F1.5E100C3" ? 7.1 : 0;
     if (between == 0 && name != "F1.5E100C1") continue;
-    const Json json = plan_of(directory, name);
+    const nlohmann::ordered_json json = plan_of(directory, name);
     const double bonded = 100 * json["connected"]["bonded"].get<double>();
     const double unbonded = 100 * json["connected"]["unbonded"].get<double>();
     const double helium = test::number(row, "effective_porosity_percent");
@@ -93,27 +94,27 @@ TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
     EXPECT_LT(bonded, helium) << name;
     EXPECT_LT(helium, unbonded + 2) << name;
     // Pores of thin stretches of 1.5 mm: all alike, closed at both ends.
-    const Json& pores = json["pores"];
+    const nlohmann::ordered_json& pores = json["pores"];
     EXPECT_GT(pores["count"].get<int>(), 50) << name;
     EXPECT_LT(pores["width_mm"]["mean"].get<double>(), 0.2) << name;
     EXPECT_NEAR(pores["length_mm"]["mean"], 1.2, 0.35) << name;
     std::uint64_t counted = 0;
-    for (const Json& count : pores["length_mm"]["counts"]) counted += count.get<std::uint64_t>();
+    for (const nlohmann::ordered_json& count : pores["length_mm"]["counts"]) counted += count.get<std::uint64_t>();
     EXPECT_EQ(counted, pores["count"].get<std::uint64_t>());
     // The summary of the job tells the same, and so does the page about it.
     if (name == "F1.5E100C2") {
       const fs::path job = fs::path(LAMINA_TEST_DIR) / "../docs/examples/dinisio2022" / (name + ".toml");
       const auto again = test::run_lamina(
           {"extrude", "part.stl", "--job", job.string(), "--overwrite", "-o", "part.gcode", "--json"}, directory.path());
-      EXPECT_EQ(Json::parse(again.out)["laid"]["connected"].dump(), json["connected"].dump());
+      EXPECT_EQ(nlohmann::ordered_json::parse(again.out)["laid"]["connected"].dump(), json["connected"].dump());
       EXPECT_NE(again.err.find(fmt::format("connected {:.2f} % if", bonded)), std::string::npos) << again.err;
       EXPECT_EQ(test::run_lamina({"report", "part.gcode", "-o", "page.html"}, directory.path()).code, 0);
       const std::string page = test::read_text(directory / "page.html");
       EXPECT_NE(page.find("\"laid\":\"fed "), std::string::npos);
       EXPECT_NE(page.find("\"laid_svg\":\"PHN2Zy"), std::string::npos) << "<svg in base 64";
       const auto info = test::run_lamina({"info", "part.gcode", "--density", "1.1", "--json"}, directory.path());
-      EXPECT_EQ(Json::parse(info.out)["pores"].dump(), json["pores"].dump());
-      EXPECT_NEAR(Json::parse(info.out)["fed_g"].get<double>(), json["fed_mm3"].get<double>() * 1.1e-3, 1e-9);
+      EXPECT_EQ(nlohmann::ordered_json::parse(info.out)["pores"].dump(), json["pores"].dump());
+      EXPECT_NEAR(nlohmann::ordered_json::parse(info.out)["fed_g"].get<double>(), json["fed_mm3"].get<double>() * 1.1e-3, 1e-9);
     }
     // The file tells its filament's density by what it used, to 0.01 cm3.
     EXPECT_NEAR(json.value("density_g_cm3", 0.0), 1.24, 0.04);
@@ -133,7 +134,7 @@ TEST(LaidLook, APrintWithoutPoresIsNotJudgedByASpotOfIt) {
   file.close();
   const auto print = look_at_print(directory / "full.gcode", 0);
   ASSERT_TRUE(print.ok());
-  const Json json = as_json(*print);
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(json_text(as_json(*print)));
   EXPECT_NEAR(json["window_mm"][0], 2, 0.011);
   EXPECT_NEAR(json["porosity"], 1 - kBead / (kWidth * kHeight), 0.01);
   EXPECT_LT(json["connected"]["bonded"].get<double>(), 0.01);

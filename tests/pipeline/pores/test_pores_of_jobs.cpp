@@ -3,8 +3,8 @@
 #include <stdlib.h>
 
 #include <array>
+#include <nlohmann/json.hpp>
 
-#include "stages/support/text/json.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -27,8 +27,8 @@ void write_two_jobs(const Directory& folder) {
 Outcome told(const std::string& line, const Directory& folder) { return run_lamina(words_of(line), folder.path()); }
 
 /// What is told of a job but for the job itself.
-Json without_job(const std::string& text) {
-  Json json = Json::parse(text);
+nlohmann::ordered_json without_job(const std::string& text) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(text);
   json.erase("job");
   return json;
 }
@@ -40,9 +40,9 @@ TEST(PoresOfJobs, AJobOfFilamentHasThePoresOfItsToolpaths) {
   const auto file = told("permeability part.gcode --voxel 30 --json", folder);
   const auto job = told("permeability filament.toml --voxel 30 --json", folder);
   ASSERT_EQ(job.code, 0) << job.err;
-  EXPECT_EQ(without_job(job.out), Json::parse(file.out));
+  EXPECT_EQ(without_job(job.out), nlohmann::ordered_json::parse(file.out));
   EXPECT_EQ(job.err, file.err);
-  const Json said = Json::parse(job.out)["job"];
+  const nlohmann::ordered_json said = nlohmann::ordered_json::parse(job.out)["job"];
   EXPECT_EQ(said["path"], "filament.toml");
   EXPECT_EQ(said["command"], "extrude");
   EXPECT_EQ(said["machine"], "Anet A8");
@@ -60,8 +60,8 @@ TEST(PoresOfJobs, AJobOfPowderHasThePoresOfItsBitmaps) {
   const auto files = told("permeability job --window 1,1,0.4 --periodic z --json", folder);
   const auto job = told("permeability powder.toml --window 1,1,0.4 --periodic z --json", folder);
   ASSERT_EQ(job.code, 0) << job.err;
-  EXPECT_EQ(without_job(job.out), Json::parse(files.out));
-  EXPECT_EQ(Json::parse(job.out)["job"]["command"], "jet");
+  EXPECT_EQ(without_job(job.out), nlohmann::ordered_json::parse(files.out));
+  EXPECT_EQ(nlohmann::ordered_json::parse(job.out)["job"]["command"], "jet");
 }
 
 TEST(PoresOfJobs, OptionsAndPartsGoBeforeWhatTheJobSays) {
@@ -72,8 +72,8 @@ TEST(PoresOfJobs, OptionsAndPartsGoBeforeWhatTheJobSays) {
   const auto file = told("permeability other.gcode --no-flow --json", folder);
   const auto job = told("permeability filament.toml other.stl --no-flow --json" + set, folder);
   ASSERT_EQ(job.code, 0) << job.err;
-  EXPECT_EQ(without_job(job.out), Json::parse(file.out));
-  EXPECT_EQ(Json::parse(job.out)["window_mm"][1], 3.5) << "a period of 1.5 and 2 mm";
+  EXPECT_EQ(without_job(job.out), nlohmann::ordered_json::parse(file.out));
+  EXPECT_EQ(nlohmann::ordered_json::parse(job.out)["window_mm"][1], 3.5) << "a period of 1.5 and 2 mm";
 }
 
 TEST(PoresOfJobs, TheWindowLiesInTheMiddleOfTheFirstOfSeveralParts) {

@@ -6,7 +6,7 @@
 #include "pipeline/pores/pore_page.h"
 #include "pipeline/pores/predict_inertia.h"
 #include "stages/stokes/flow.h"
-#include "stages/support/text/json.h"
+#include "stages/support/text/json_value.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina {

@@ -6,7 +6,6 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -53,10 +52,10 @@ class HeadCare : public ::testing::Test {
     return run(
         job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   }
-  static nlohmann::ordered_json facts(const Job& job) {
+  static Json facts(const Job& job) {
     const auto summary = made(job);
     EXPECT_TRUE(summary.ok()) << (summary.ok() ? "" : summary.error().message);
-    return summary.ok() ? *summary->facts : nlohmann::ordered_json();
+    return summary.ok() ? summary->facts : Json();
   }
   static VerifyReport verified(const Job& job) {
     auto report = verify(job.output, {});
@@ -121,12 +120,12 @@ TEST_F(HeadCare, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledInPauses)
 
   Job pauses =
       prism(3, profile("pauses", "vat_depth_mm = [1.5, 0]\nrefill = \"pause\"\n[care]\ncap_mm = [-40, 5]\n"), "pauses");
-  EXPECT_EQ(facts(pauses)["refills"], nlohmann::ordered_json({12, 24}));
+  EXPECT_EQ(facts(pauses)["refills"], Json({12, 24}));
   EXPECT_EQ(verified(pauses).replay.refills, 2u);
   EXPECT_NE(test::read_text(fs::path(pauses.output) / "program/000012.gcode").find("\nM815\n"), std::string::npos);
   const std::string whole = test::read_text(fs::path(pauses.output) / "program/000024.gcode");
   pauses.output = directory_ / "shards";
-  const nlohmann::ordered_json own[] = {nlohmann::ordered_json::array(), {12}, {24}};
+  const Json own[] = {Json::array(), Json::array({12}), Json::array({24})};
   for (std::uint32_t i = 0; i < 3; ++i) {
     pauses.shard = {{i, 3}};
     EXPECT_EQ(facts(pauses)["refills"], own[i]) << "those of its own layers";
@@ -206,7 +205,7 @@ TEST_F(HeadCare, TheSecondVatIsEmptiedByTheLayersThatItFeeds) {
   EXPECT_NE(first.error().message.find("layer 9 (z 0.900 mm): the first vat"), std::string::npos) << first.error().message;
   EXPECT_NE(second.error().message.find("layer 29 (z 2.900 mm): the second vat"), std::string::npos) << second.error().message;
   Job pauses = two("both", "vat_depth_mm = [1.25, 1.25]\nrefill = \"pause\"\n");
-  EXPECT_EQ(facts(pauses)["refills"], nlohmann::ordered_json({20}));
+  EXPECT_EQ(facts(pauses)["refills"], Json::array({20}));
   EXPECT_EQ(verified(pauses).replay.refills, 1u);
 }
 

@@ -4,7 +4,7 @@
 #include <iostream>
 
 #include "pipeline/job/file.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
 

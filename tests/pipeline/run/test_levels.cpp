@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/manifest/manifest.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
 #include "tests/commands/job_folder.h"

@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -183,7 +182,7 @@ TEST(PartDoses, RoundedDropsAreThoseOfOneDose) {
     if (zones) job.parts[1].hole_bleed_um = {1, 1};  // moves nothing
     const auto summary = run_part_doses(job);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
-    drops.push_back((*summary->facts)["saturation"]["drops"]);
+    drops.push_back(summary->facts["saturation"]["drops"].get<std::uint64_t>());
   }
   EXPECT_EQ(drops[0], drops[1]);
 }
@@ -200,7 +199,7 @@ TEST(PartDoses, SharesOfVoxelsStayWhereNoEdgeMoves) {
     job.dose.bleed_um = {um, um};
     const auto summary = run_part_doses(job);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
-    full.push_back((*summary->facts)["voxels"]["full_voxels"]);
+    full.push_back(summary->facts["voxels"]["full_voxels"].get<std::uint64_t>());
   }
   EXPECT_EQ(full[0], full[1]);
   EXPECT_LT(full[2], full[1]);
@@ -219,7 +218,7 @@ TEST(PartDoses, SharesOfVoxelsAreSharedOutAmongPartsAndVerified) {
     const auto summary = run_part_doses(job);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
     expect_replayed(job);
-    const auto& use = (*summary->facts)["use"];
+    const auto& use = summary->facts["use"];
     std::uint64_t drops = 0;
     for (const auto& part : use["parts"]) drops += part["drops"].get<std::uint64_t>();
     EXPECT_EQ(drops, use["drops"].get<std::uint64_t>());

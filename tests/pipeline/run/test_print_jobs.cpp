@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/check/verify.h"
 #include "pipeline/machine/profiles.h"
@@ -22,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A number of a summary that only images have.
-std::uint64_t fact(const Summary& summary, const char* key) { return (*summary.facts)[key]; }
+std::uint64_t fact(const Summary& summary, const char* key) { return summary.facts[key].get<std::uint64_t>(); }
 
 class PrintJobs : public ::testing::Test {
  protected:

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -38,12 +37,12 @@ class FormulaJobs : public test::JobFolder {
     return run(
         job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   }
-  nlohmann::ordered_json facts_of(const Job& job) const {
+  Json facts_of(const Job& job) const {
     const auto summary = run_job(job);
     EXPECT_TRUE(summary.ok()) << (summary.ok() ? "" : summary.error().message);
     const auto report = verify(job.output, {});
     EXPECT_TRUE(report.ok() && report->ok()) << (report.ok() && !report->faults.empty() ? report->faults[0] : "");
-    return summary.ok() ? *summary->facts : nlohmann::ordered_json();
+    return summary.ok() ? summary->facts : Json();
   }
   Runs image(const Job& job, const std::string& name) const {
     auto read = read::image(job.output + "/layers/" + name);

@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "pipeline/cli/console.h"
-#include "pipeline/run/timing.h"
+#include "pipeline/report/timing.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
 #include "tests/commands/program.h"
@@ -177,9 +177,9 @@ TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
   const test::Directory folder;
   timing.not_measured = write::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
   EXPECT_NE(timing.not_measured.find("missing.stl: "), std::string::npos);
-  const nlohmann::ordered_json limit = timing_json(timing)["limit"];
-  EXPECT_EQ(limit.size(), 1u) << limit;
-  EXPECT_EQ(limit.value("not_measured", ""), timing.not_measured);
+  const Json limit = timing_json(timing)["limit"];
+  EXPECT_EQ(limit.size(), 1u) << json_text(limit);
+  EXPECT_EQ(limit["not_measured"], timing.not_measured);
   bool told = false;
   for (const auto& [label, line] : timing_lines(timing)) {
     told |= line.find("not measured: ") != std::string::npos;

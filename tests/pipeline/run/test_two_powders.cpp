@@ -10,7 +10,6 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "pipeline/check/verify.h"
@@ -31,8 +30,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The set pixels of a summary, all of them or of one material.
-std::uint64_t set_pixels_of(const Summary& summary) { return (*summary.facts)["set_pixels"]; }
-std::uint64_t set_pixels_of(const Summary& summary, std::size_t i) { return (*summary.facts)["materials"][i]["set_pixels"]; }
+std::uint64_t set_pixels_of(const Summary& summary) { return summary.facts["set_pixels"].get<std::uint64_t>(); }
+std::uint64_t set_pixels_of(const Summary& summary, std::size_t i) {
+  return summary.facts["materials"][i]["set_pixels"].get<std::uint64_t>();
+}
 
 class TwoPowders : public ::testing::Test {
  protected:
@@ -127,7 +128,7 @@ TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsSt
     ASSERT_TRUE(one.ok() && alone.ok());
     ASSERT_EQ(summary->layers_total, one->layers_total);
     EXPECT_EQ(set_pixels_of(*summary), set_pixels_of(*one));
-    ASSERT_EQ((*summary->facts)["materials"].size(), 2u);
+    ASSERT_EQ(summary->facts["materials"].size(), 2u);
     EXPECT_EQ(set_pixels_of(*summary, 0) + set_pixels_of(*summary, 1), set_pixels_of(*summary));
     EXPECT_GT(set_pixels_of(*summary, 1), 0u);
     for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
@@ -239,8 +240,8 @@ TEST_F(TwoPowders, PixelsInTheOtherPowderAreInManifestAndVerify) {
     layers += mixed;
   }
   EXPECT_GT(unfed, 0u);
-  EXPECT_EQ((*summary->facts)["materials"][1]["unfed_pixels"], unfed);
-  EXPECT_EQ((*summary->facts)["materials"][1]["unfed_layers"], layers);
+  EXPECT_EQ(summary->facts["materials"][1]["unfed_pixels"], unfed);
+  EXPECT_EQ(summary->facts["materials"][1]["unfed_layers"], layers);
   auto report = verify(made.output, {});
   ASSERT_TRUE(report.ok() && report->ok());
   ASSERT_EQ(report->unfed.size(), 2u);

@@ -26,7 +26,7 @@ struct Made {
 class Listener final : public Console {
  public:
   Status print(std::string_view text) override { return said += text, Status(); }
-  Status give(const nlohmann::ordered_json& value) override { return said += value.dump(), Status(); }
+  Status give(const Json& value) override { return said += json_text(value), Status(); }
   std::string said;
 };
 

@@ -1,4 +1,4 @@
-#include "stages/program/explain.h"
+#include "pipeline/report/machine_text.h"
 
 #include <fmt/format.h>
 

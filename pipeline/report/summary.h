@@ -1,9 +1,8 @@
-// pipeline/run/summary.h: the summary of a job, as text and as JSON, in one form for all products.
+// pipeline/report/summary.h: the summary of a job, as text and as JSON, in one form for all products.
 #pragma once
 
 #include <cstdint>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -39,7 +39,7 @@ struct Summary {
   // --- specific to the product
   using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
   Lines head, results, end;                                        // before the layers, after them, after memory
-  std::shared_ptr<nlohmann::ordered_json> facts;                   // an object, or null
+  Json facts = Json::object();                                     // names and values of the product
   std::vector<std::vector<std::string>> quote;                     // rows of a table of costs; empty for none
 
   /// Aligned lines with units, then one line per warning.
@@ -50,8 +50,8 @@ struct Summary {
 
 /// Each part on a line, its notes below it; as in a summary.
 Summary::Lines part_lines(const std::vector<PartSummary>& parts);
-nlohmann::ordered_json part_json(const PartSummary& part);
-nlohmann::ordered_json warnings_json(const std::vector<Warning>& warnings);
+Json part_json(const PartSummary& part);
+Json warnings_json(const std::vector<Warning>& warnings);
 /// Lines with their names aligned.
 std::string text_of(const Summary::Lines& lines);
 

@@ -1,4 +1,4 @@
-// stages/program/explain.h: what follows from a profile, for people.
+// pipeline/report/machine_text.h: what follows from the profile of a powder printer, as text.
 #pragma once
 
 #include <cstdint>

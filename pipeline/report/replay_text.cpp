@@ -1,9 +1,8 @@
-#include "stages/replay/time/totals.h"
+#include "pipeline/report/replay_text.h"
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::replay {
@@ -50,7 +49,7 @@ std::vector<std::string> totals_text(const Totals& totals) {
   return lines;
 }
 
-nlohmann::ordered_json totals_json(const Totals& totals) {
+Json totals_json(const Totals& totals) {
   const Count& count = totals.count;
   return {{"machine", totals.machine},
           {"layers", totals.layers},

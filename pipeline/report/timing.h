@@ -1,8 +1,7 @@
-// pipeline/run/timing.h: where the time of a run went, beside what no program could go below. `--timing`
+// pipeline/report/timing.h: where the time of a run went, beside what no program could go below. `--timing`
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -10,6 +9,7 @@
 
 #include "stages/formats/null/floor.h"
 #include "stages/support/clocks.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -39,6 +39,6 @@ double serial_share(const Elapsed& took, std::uint32_t threads);
 
 using Lines = std::vector<std::pair<std::string, std::string>>;
 Lines timing_lines(const Timing& timing);
-nlohmann::ordered_json timing_json(const Timing& timing);
+Json timing_json(const Timing& timing);
 
 }  // namespace lamina::pipeline

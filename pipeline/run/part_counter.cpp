@@ -1,29 +1,17 @@
-#include "pipeline/run/job_cost.h"
+#include "pipeline/run/part_counter.h"
 
 #include <algorithm>
 
-#include "pipeline/run/image_maker.h"
+#include "pipeline/report/job_cost.h"
+#include "pipeline/run/layer_imager.h"
 #include "pipeline/run/sanity.h"
 #include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {
 
-JobCost::JobCost(const Machine& machine, const Manifest& manifest)
-    : account_(machine, manifest.head.grid, manifest.head.parts,
-               std::ranges::any_of(manifest.layers, [](const LayerRecord& record) { return !record.part_pixels.empty(); }),
-               title_of(manifest.head.parts)),
-      drop_pl_(machine.head.drop_pl) {
-  for (const JobMaterial& material : manifest.head.materials) {
-    if (manifest.head.most_drops > 0) powders_.push_back({material.name});
-  }
-}
-
-// The plan outlives this object.
-JobCost::JobCost(const Plan& plan)
-    : account_(plan.images->machine->machine, plan.images->grid, plan.scene->parts,
-               plan.job.quote || cost::has_prices(plan.images->machine->machine.cost), title_of(plan.scene->parts)) {
-  if (account_.parts() < 2) return;
-  plan_ = &plan;
+PartCounter::PartCounter(const Plan& plan) : plan_(plan) {
+  const std::size_t parts = reported_parts(plan);
+  if (parts < 2) return;
   saturates_ = plan.images->dose.saturates();
   several_ = plan.images->dose.most_drops() > 1;
   full_ = plan.images->dose.full();
@@ -42,18 +30,17 @@ JobCost::JobCost(const Plan& plan)
   const Mirror mirror = plan.job.mirror;
   // What images set is nobody's window: beside them windows are of the meshes alone, before anything is mirrored.
   const bool mirrored = mirror != Mirror::kNone && plan.scene->images.empty();
-  windows_.emplace(bodies, account_.parts(), plan.images->grid, mirrored && mirror != Mirror::kY,
-                   mirrored && mirror != Mirror::kX);
+  windows_.emplace(bodies, parts, plan.images->grid, mirrored && mirror != Mirror::kY, mirrored && mirror != Mirror::kX);
 }
 
-void JobCost::weigh(const Layer& layer, const ImageWork& work, ImageNotes& notes) const {
+void PartCounter::weigh(const Layer& layer, const ImageWork& work, ImageNotes& notes) const {
   if (!windows_) return;
   notes.part_pixels = full_ > 0 ? windows_->sum(layer, work.drops.shares) : windows_->count(layer, work.runs);
 }
 
-void JobCost::count(const ImageWork& work, const ImageNotes& notes, LayerRecord& record) const {
+void PartCounter::count(const ImageWork& work, const ImageNotes& notes, LayerRecord& record) const {
   if (!windows_) return;
-  if (!plan_->scene->images.empty()) return share_out(work, notes.part_pixels, record);
+  if (!plan_.scene->images.empty()) return share_out(work, notes.part_pixels, record);
   const dose::DropWork& drops = work.drops;
   if (full_ > 0) {
     const Levels& voxels = saturates_ ? drops.zones : drops.shares;
@@ -66,13 +53,13 @@ void JobCost::count(const ImageWork& work, const ImageNotes& notes, LayerRecord&
   }
 }
 
-void JobCost::share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const {
+void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const {
   const auto shared = [](std::uint64_t all, const std::vector<std::uint64_t>& by) {
     const auto whole = cost::shares(static_cast<std::int64_t>(all), by);
     return std::vector<std::uint64_t>(whole.begin(), whole.end());
   };
   record.part_pixels = shared(record.filled_pixels(), weights);
-  const DoseZones& zones = plan_->images->dose.zones();
+  const DoseZones& zones = plan_.images->dose.zones();
   if (!saturates_ || !zones.several()) return;  // drops are as pixels
   record.part_drops.assign(weights.size(), 0);
   std::vector<std::uint64_t> drops(zones.count(), 0);  // those of shared voxels count for all of theirs
@@ -93,14 +80,6 @@ void JobCost::share_out(const ImageWork& work, const std::vector<std::uint64_t>&
     const std::vector<std::uint64_t> own = shared(drops[zone], within);
     for (std::size_t part = 0; part < own.size(); ++part) record.part_drops[part] += own[part];
   }
-}
-
-void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds) {
-  if (record.layer.index == 0) account_.tally().add_base();
-  account_.tally().add(record.layer.thickness, microseconds, drops, record.filled_pixels(), record.part_pixels,
-                       record.part_drops);
-  for (std::size_t m = 0; m < powders_.size(); ++m)
-    powders_[m].add(record.image_of(m, powders_.size()).set_pixels, record.drops_of(m, powders_.size()));
 }
 
 }  // namespace lamina::pipeline

@@ -1,13 +1,9 @@
-// What an inspection found, for programs.
-#include <nlohmann/json.hpp>
-#include <string>
+#include "pipeline/report/inspection_json.h"
 
-#include "stages/checks/inspect.h"
+#include <string>
 
 namespace lamina::inspect {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json json_of(const Spot& spot) {
   return {{"x_mm", spot.x_mm}, {"y_mm", spot.y_mm}, {"z_mm", spot.z_mm}, {"layer", spot.layer}};

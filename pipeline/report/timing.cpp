@@ -1,10 +1,10 @@
-#include "pipeline/run/timing.h"
+#include "pipeline/report/timing.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -46,8 +46,7 @@ Lines timing_lines(const Timing& timing) {
   return lines;
 }
 
-nlohmann::ordered_json timing_json(const Timing& timing) {
-  using Json = nlohmann::ordered_json;
+Json timing_json(const Timing& timing) {
   Json phases = Json::object(), steps = Json::object();
   for (const auto& [name, span] : timing.phases) {
     phases[std::string(name)] = {

@@ -1,19 +1,14 @@
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
-#include "pipeline/run/timing.h"
+#include "pipeline/report/timing.h"
 #include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 double rate(double amount, double seconds) { return seconds > 0 ? amount / seconds : 0; }
 
@@ -73,7 +68,7 @@ Summary::Lines part_lines(const std::vector<PartSummary>& parts) {
   return lines;
 }
 
-nlohmann::ordered_json part_json(const PartSummary& part) {
+Json part_json(const PartSummary& part) {
   Json notes = Json::array();
   for (const Note& note : part.notes) notes.push_back({{"repair", note.repair}, {"text", note.text}});
   return {{"path", part.path},
@@ -83,7 +78,7 @@ nlohmann::ordered_json part_json(const PartSummary& part) {
           {"notes", notes}};
 }
 
-nlohmann::ordered_json warnings_json(const std::vector<Warning>& warnings) {
+Json warnings_json(const std::vector<Warning>& warnings) {
   Json all = Json::array();
   for (const Warning& warning : warnings) {
     Json& json = all.emplace_back(Json{{"code", warning.code}, {"text", warning.text}});
@@ -155,8 +150,8 @@ std::string Summary::json() const {
            {"parts", part_list},
            {"warnings", warnings_json(warnings)}};
   if (timing) all["timing"] = timing_json(*timing);
-  if (facts) all.update(*facts);
-  return text_of(all) + "\n";
+  all.update(facts);
+  return json_line(all);
 }
 
 }  // namespace lamina::pipeline

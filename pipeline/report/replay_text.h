@@ -1,12 +1,12 @@
-// stages/replay/time/totals.h: what the replay of a job found, for people and for programs.
+// pipeline/report/replay_text.h: what the replay of a job found, for people and for programs.
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "stages/replay/count.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::replay {
 
@@ -22,7 +22,7 @@ struct Totals {
 /// Lines of text, each with its name.
 std::vector<std::string> totals_text(const Totals& totals);
 /// Lengths in mm, time in seconds.
-nlohmann::ordered_json totals_json(const Totals& totals);
+Json totals_json(const Totals& totals);
 
 /// "1 h 38 min (5930.2 s) on nuferbj"
 std::string time_text(double seconds, const std::string& machine);
