@@ -86,11 +86,11 @@ set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/text/version.cp
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/sheet|show/swath)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|scan_main|calibrate/scan_answer|show/sheet|show/swath)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
                "pipeline/machine/*.cpp" "pipeline/pores/*.cpp" "pipeline/show/*.cpp")
-list(FILTER once_a_job EXCLUDE REGEX "/show/(sheet|swath)\\.cpp$")
+list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet|show/swath)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
 target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nlohmann_json)
@@ -154,13 +154,12 @@ mark_as_advanced(OPENCV_INCLUDE_DIR OPENCV_CORE_LIBRARY OPENCV_IMGPROC_LIBRARY)
 if(OPENCV_INCLUDE_DIR AND OPENCV_CORE_LIBRARY AND OPENCV_IMGPROC_LIBRARY)
   set(LAMINA_SCAN ON)
   lamina_sources(scan_sources "stages/calibration/scan/*.cpp")
-  list(FILTER scan_sources EXCLUDE REGEX "/scan/main\\.cpp$")
-  add_library(lamina_scan STATIC ${scan_sources})
+  add_library(lamina_scan STATIC ${scan_sources} pipeline/calibrate/scan_answer.cpp)
   target_include_directories(lamina_scan SYSTEM PUBLIC ${OPENCV_INCLUDE_DIR})
   target_link_libraries(lamina_scan PUBLIC lamina::stages ${OPENCV_IMGPROC_LIBRARY} ${OPENCV_CORE_LIBRARY} nlohmann_json::nlohmann_json
                         PRIVATE PkgConfig::OPENIMAGEIO)
   target_compile_options(lamina_scan PRIVATE -Wno-array-bounds -Wno-stringop-overflow)
-  add_executable(lamina-scan stages/calibration/scan/main.cpp)
+  add_executable(lamina-scan pipeline/scan_main.cpp)
   target_link_libraries(lamina-scan PRIVATE lamina_scan)
   if(LAMINA_UNITE STREQUAL "all")
     set_target_properties(lamina_scan PROPERTIES UNITY_BUILD OFF)  # helpers of one name in several files

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "pipeline/calibrate/pieces_text.h"
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
 #include "stages/formats/stl/block.h"
@@ -149,9 +150,9 @@ Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, c
     if (Status status = write_piece(piece, request, extension, written); !status) return status.error();
     names.push_back(piece.name);
   }
-  const std::string steps = segment::steps_text(pieces, request.pieces, extension);
+  const std::string steps = steps_text(pieces, request.pieces, extension);
   if (Status status = written.write((directory / "STEPS.md").string(), steps); !status) return status.error();
-  if (Status status = widths->append(segment::widths_text(request.pieces)); !status) return status.error();
+  if (Status status = widths->append(widths_text(request.pieces)); !status) return status.error();
   if (const auto whole = widths->finish(); !whole) return whole.error();
   written.keep();
   return names;

@@ -10,9 +10,11 @@
 #include "pipeline/run/run.h"
 #include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
+#include "stages/formats/chart/chart.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/leftovers.h"
+#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -45,6 +47,12 @@ Status write_images(const HeadGrid& grid, std::uint32_t count, const std::functi
     if (Status status = files.add(fmt::format("images/{:06}.tif", i), bytes); !status) return status;
   }
   return {};
+}
+
+/// drops.json: the layers that a call with --drops wrote.
+std::string drops_text(const chart::DropLayers& wanted) {
+  return json_line(
+      {{"kind", "lamina drops 1"}, {"drops", wanted.drops}, {"drops_a_layer", wanted.a_layer}, {"layers", wanted.layers}});
 }
 
 }  // namespace
@@ -89,7 +97,7 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
   auto summary = run(
       job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   if (!summary) return summary.error();
-  const std::string json = request.drops > 0 ? chart::drops_text(*drops) : chart_text(*laid);
+  const std::string json = request.drops > 0 ? drops_text(*drops) : chart_text(*laid);
   if (status = text->append(json); !status) return status.error();
   if (const auto whole = text->finish(); !whole) return whole.error();
   files.paths.clear();

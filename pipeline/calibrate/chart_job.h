@@ -6,7 +6,6 @@
 
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/report/summary.h"
-#include "stages/calibration/chart/chart.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

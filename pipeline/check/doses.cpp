@@ -31,7 +31,7 @@ void DoseCheck::check_heights(const Manifest& manifest, Faults& faults) const {
   const auto options = job_ ? heights_options(*job_) : Error{};
   heights::OnRecord layers(options ? std::optional(*options) : std::nullopt);
   for (const LayerRecord& record : manifest.layers) {
-    if (std::string what = layers.fault(record.layer); !what.empty()) faults.add(std::move(what));
+    if (const Status status = layers.check(record.layer); !status) faults.add(status.error().message);
   }
 }
 

@@ -67,10 +67,10 @@ constexpr Word<Containment> kContainments[] = {
     {"across", Containment::kAcross}, {"inside", Containment::kInside}, {"outside", Containment::kOutside}};
 
 std::string read_thickness_text(std::string_view text, std::string& thickness_mm) {
-  heights::ThicknessSet set;
-  auto wrong = heights::read_thicknesses(text, set);
-  if (wrong.empty()) thickness_mm = text;
-  return wrong;
+  const auto set = heights::read_thicknesses(text);
+  if (!set) return set.error().message;
+  thickness_mm = text;
+  return {};
 }
 std::string same_text(const std::string& text) { return text; }
 

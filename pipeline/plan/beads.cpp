@@ -40,7 +40,7 @@ Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::v
   if (!segments) return segments.error();
   const auto warn = [&](const SegmentRange& range) {
     if (!range.settings.on) return;
-    for (std::string& warning : segment::warnings(range.plan, exact)) warnings.push_back({"pores", std::move(warning)});
+    for (Warning& warning : segment::warnings(range.plan, exact)) warnings.push_back(std::move(warning));
   };
   std::ranges::for_each(segments->ranges, warn);
   warn(segments->base);

@@ -109,8 +109,9 @@ void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profil
     warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
   }
   for (const auto& [heights, range] : segments.segmented()) {
-    for (const std::string& warning : segment::warnings(range->plan, profile.calibration)) {
-      warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
+    for (Warning& warning : segment::warnings(range->plan, profile.calibration)) {
+      if (!heights.empty()) warning.text.insert(0, heights + ": ");
+      warnings.push_back(std::move(warning));
     }
   }
   if (!segments.any()) return;

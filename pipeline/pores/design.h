@@ -1,4 +1,5 @@
-// pipeline/pores/design.h: the job of segmented lines whose pores are as wished.
+// pipeline/pores/design.h: the job of segmented lines whose pores are as requested, the same everywhere or changing with
+// height.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "pipeline/pores/forward_run.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
-#include "stages/segment/design/designed.h"
+#include "stages/segment/design/gradient.h"
 
 namespace lamina::pipeline {
 
@@ -25,7 +26,18 @@ struct DesignRequest {
   segment::LineBounds lines;
 };
 
-using segment::DesignedJob;
+struct DesignedJob {
+  segment::Design design;  // as the corrected model says
+  ForwardRun forward;      // of this design
+  double miss = 0;         // of the wish that the forward run meets worst: relative
+  bool met = false;        // within the tolerance
+  std::uint32_t runs = 0;
+  std::vector<segment::RatioAt> known;  // what forward runs said, of earlier searches too
+  double model_ratio = 1;               // k1 of the forward run / of the slots alone
+  std::vector<std::string> outside;     // what of the choice lies beyond what was measured, one line each
+  std::string widths;                   // where the widths of beads come from
+  std::string toml;                     // of the job file
+};
 
 /// The printer, if pores are designed for it. errors  kUsage, of --machine
 Result<ExtruderProfile> designable_extruder(const std::string& machine);
@@ -37,5 +49,35 @@ Result<ExtruderProfile> designable_extruder(const std::string& machine);
 /// errors   kUsage: no such machine, or no calibration of segmented lines; of run_forward(); kInterrupted
 /// cost     of up to most_runs forward runs
 Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& tell);
+
+struct GradientStep {
+  segment::WishStep step;
+  DesignedJob found;  // its forward run, miss and met are of the one file of all regions
+};
+
+struct GradientJob {
+  std::vector<GradientStep> steps;  // from the bottom up
+  double miss = 0;                  // of the step that misses its wish by most
+  bool met = false;                 // all of them
+  std::uint32_t lines = 0;          // continuous ones in all regions; 0: not the same ones
+  std::uint32_t runs = 0;           // forward runs, of the one file one for each region
+  double porosity = 0;              // mean over the height
+  double permeability_m2 = 0;       // along z, regions in series; what is lost where they meet is left out
+  std::string toml;                 // of the job file: ranges of heights
+};
+
+/// Designs each step as design_job() does, with what the runs of the steps below told of the slots, writes one job with a range
+/// of heights for each, plans a block as high as all of them with it, and looks at one period in the middle of each region of
+/// that one file.
+/// request  its wish counts for nothing
+/// steps    of segment::steps_of(), in whole layers of the machine's calibration
+/// returns  the nearest of steps that cannot be met
+/// errors   those of design_job() and run_forward()
+/// cost     of design_job() for each step, and of a forward run for each
+Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::WishStep>& steps,
+                                    const std::function<bool(double)>& tell);
+
+/// "3 to 5.7 mm", as a summary names the pores of a range.
+std::string heights_text(double from_mm, double to_mm);
 
 }  // namespace lamina::pipeline

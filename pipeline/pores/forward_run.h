@@ -8,7 +8,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/pores/predict_flow.h"
 #include "stages/data/status.h"
-#include "stages/segment/design/designed.h"
+#include "stages/segment/predict.h"
 
 namespace lamina::pipeline {
 
@@ -18,7 +18,13 @@ struct ForwardGrid {
   std::uint32_t places = 2;  // of the voxels across the lines, whose results are averaged: walls fall between voxels otherwise
 };
 
-using segment::ForwardRun;
+/// Of one period of the plan.
+struct ForwardRun {
+  double porosity = 0, porosity_through = 0;              // all void, and what leads through along z
+  double permeability_m2 = 0, permeability_error_m2 = 0;  // Darcy's k1 along z; the error is that of the voxels
+  bool resolved = true;                                   // false: voxels are too coarse for the pores
+  double pore_length_mm = 0, pore_width_mm = 0;           // means of the pores that the written toolpaths leave; 0 without any
+};
 
 /// Layers of a job that are looked at.
 struct ForwardRegion {

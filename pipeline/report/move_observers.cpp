@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "pipeline/plan/heights.h"
+#include "pipeline/report/laid_summary.h"
 #include "stages/checks/paths.h"
 #include "stages/formats/gcode/write_gcode.h"
-#include "stages/segment/laid/told.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

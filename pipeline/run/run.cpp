@@ -12,6 +12,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/output/toolpath_file.h"
+#include "pipeline/report/heights_study.h"
 #include "pipeline/report/image_observers.h"
 #include "pipeline/report/move_observers.h"
 #include "pipeline/report/timing.h"

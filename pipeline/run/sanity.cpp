@@ -6,7 +6,7 @@
 
 #include "pipeline/plan/heights.h"
 #include "stages/checks/judge.h"
-#include "stages/load/info/planned.h"
+#include "stages/load/planned.h"
 #include "stages/slice/bodies.h"
 #include "stages/slice/surplus.h"
 #include "stages/support/text/readable.h"

@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "stages/heights/greedy.h"
 #include "stages/heights/ladder.h"
 #include "stages/heights/optimal.h"
-#include "stages/support/text/number_text.h"
 
 namespace lamina::heights {
 
@@ -26,9 +27,9 @@ Result<Options> options_of(const Settings& settings, double layer_mm) {
   options.least_flat_mm2 = settings.least_flat_mm2;
   options.time = {settings.time_model[0], settings.time_model[1]};
   if (!settings.thickness_mm.empty()) {
-    if (const std::string wrong = read_thicknesses(settings.thickness_mm, options.set); !wrong.empty()) {
-      return Error{Fault::kUsage, "heights.thickness_mm: " + wrong};
-    }
+    Result<ThicknessSet> set = read_thicknesses(settings.thickness_mm);
+    if (!set) return Error{Fault::kUsage, "heights.thickness_mm: " + set.error().message};
+    options.set = std::move(*set);
   } else if (settings.mode == Mode::kUniform) {
     options.set.values = {static_cast<Nm>(nm_of(layer_mm))};
   } else {
@@ -38,22 +39,6 @@ Result<Options> options_of(const Settings& settings, double layer_mm) {
   }
   if (Status status = check_options(options); !status) return status.error();
   return options;
-}
-
-std::string text_of(const Settings& settings, double layer_mm) {
-  std::string text = fmt::format("of {} mm", settings.thickness_mm.empty() ? number_text(layer_mm) : settings.thickness_mm);
-  if (settings.mode == Mode::kUniform) return text;
-  text += fmt::format(", {}", mode_name(settings.mode));
-  if (settings.mode == Mode::kAngle) return text + fmt::format(", from {} degrees", number_text(settings.adapt_angle_deg));
-  return text + fmt::format(", steps up to {} mm", number_text(settings.cusp_mm));
-}
-
-std::string small_peaks_text(const Plan& plan, double least_flat_mm2) {
-  if (plan.small_peaks == 0) return {};
-  return fmt::format(
-      "{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
-      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(least_flat_mm2),
-      plan.small_peaks == 1 ? "is" : "are", plan.small_peaks == 1 ? "" : "s");
 }
 
 Status check_options(const Options& options) {

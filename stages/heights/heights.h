@@ -66,15 +66,9 @@ struct Plan {
   std::int64_t largest_miss = 0;  // optimal: nm, the smallest that any table can have
 };
 
-/// What a person has to know of the peaks that were passed over, as "2 horizontal faces ..."; empty if there are none.
-std::string small_peaks_text(const Plan& plan, double least_flat_mm2);
-
 /// Settings as the stage takes them. layer_mm is the thickness where settings name none.
 /// errors  kUsage, one line that begins with the key: no thicknesses to choose from; of read_thicknesses and check_options
 Result<Options> options_of(const Settings& settings, double layer_mm);
-
-/// The same for messages: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
-std::string text_of(const Settings& settings, double layer_mm);
 
 /// Whether options make sense together. errors  kUsage, one line that begins with the key
 Status check_options(const Options& options);

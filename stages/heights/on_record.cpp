@@ -7,30 +7,34 @@
 
 namespace lamina::heights {
 
-std::string OnRecord::fault(const Layer& layer) {
+Status OnRecord::check(const Layer& layer) {
   const bool uniform = options_ && options_->mode == Mode::kUniform;
   if (layer.index == 0) begins_ = 0;
   if (uniform) begins_ = std::int64_t{layer.index} * options_->set.least();
   const auto begins = std::exchange(begins_, std::int64_t{layer.bottom} + layer.thickness);
-  const std::string thick = options_ ? fault_of_thickness(layer) : std::string();
+  const Status thick = options_ ? check_thickness(layer) : Status();
   if (begins && layer.bottom != *begins) {
-    return fmt::format("layer {}: begins {} nm above the bed, the manifest says {}", layer.index, *begins, layer.bottom);
+    return Error{Fault::kVerification,
+                 fmt::format("layer {}: begins {} nm above the bed, the manifest says {}", layer.index, *begins, layer.bottom)};
   }
-  return thick.empty() ? thick : fmt::format("layer {}: {}", layer.index, thick);
+  return thick;
 }
 
-std::string OnRecord::fault_of_thickness(const Layer& layer) {
+Status OnRecord::check_thickness(const Layer& layer) {
   const ThicknessSet& set = options_->set;
+  const auto wrong = [&](const std::string& what) {
+    return Error{Fault::kVerification, fmt::format("layer {}: {}", layer.index, what)};
+  };
   if (options_->mode == Mode::kStepwise) {
     if (divides_slab(layer)) return {};
-    return fmt::format("divides no slab of {} nm evenly, from {} to {} nm", set.most(), layer.bottom,
-                       std::int64_t{layer.bottom} + layer.thickness);
+    return wrong(fmt::format("divides no slab of {} nm evenly, from {} to {} nm", set.most(), layer.bottom,
+                             std::int64_t{layer.bottom} + layer.thickness));
   }
   if (std::ranges::binary_search(set.values, layer.thickness)) return {};
   if (options_->mode == Mode::kUniform) {
-    return fmt::format("is {} nm thick as all of the job, the manifest says {}", set.least(), layer.thickness);
+    return wrong(fmt::format("is {} nm thick as all of the job, the manifest says {}", set.least(), layer.thickness));
   }
-  return fmt::format("is {} nm thick, by the manifest, which is none of the job's thicknesses", layer.thickness);
+  return wrong(fmt::format("is {} nm thick, by the manifest, which is none of the job's thicknesses", layer.thickness));
 }
 
 bool OnRecord::divides_slab(const Layer& layer) {

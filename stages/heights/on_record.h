@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "stages/heights/heights.h"
@@ -18,11 +17,11 @@ class OnRecord {
   /// options  none: they are not known
   explicit OnRecord(std::optional<Options> options) : options_(std::move(options)) {}
 
-  /// "", or what is wrong with the next layer: "layer 3: begins 300000 nm above the bed, the manifest says 300001".
-  std::string fault(const Layer& layer);
+  /// Takes the next layer. errors  kVerification: "layer 3: begins 300000 nm above the bed, the manifest says 300001"
+  Status check(const Layer& layer);
 
  private:
-  std::string fault_of_thickness(const Layer& layer);
+  Status check_thickness(const Layer& layer);
   bool divides_slab(const Layer& layer);
 
   std::optional<Options> options_;

@@ -13,6 +13,7 @@
 #include <array>
 #include <vector>
 
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 
 namespace lamina::load {

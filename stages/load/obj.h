@@ -1,4 +1,4 @@
-// stages/load/obj.h: facets of Wavefront OBJ; internal to load.
+// stages/load/obj.h: Wavefront OBJ; internal to load.
 #pragma once
 
 #include "stages/load/reader.h"

@@ -1,4 +1,4 @@
-// stages/load/reader.h: what each format's reader gives back; internal to load.
+// stages/load/reader.h: what the readers of formats return; internal to load.
 #pragma once
 
 #include <functional>
@@ -34,12 +34,6 @@ struct Facets {
   std::vector<Note> notes;
   std::optional<Doubt> doubt;
 };
-
-enum class Format { kBinaryStl, kAsciiStl, kObj, k3mf, kGzip };
-
-/// Tells the format from the content, and from the name where the content is text that could be anything.
-/// errors  kInput: empty, or nothing that is known
-Result<Format> detect(const Source& source);
 
 /// Is shown the triangles of a file in pieces, each in the order of the file, by any thread. first  the number of the first
 using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Triangle>)>;

@@ -17,6 +17,16 @@ constexpr ReadRules kRules{.fault = Fault::kInput,
                            .directory = "is a directory; name a part file (STL, OBJ or 3MF)",
                            .device = "is not a regular file; write the part to a file first"};
 
+constexpr std::size_t kStep = std::size_t{1} << 20;
+
+/// The size that the last four bytes of the file claim, as a hint; 0 if it is not plausible.
+std::size_t claimed_size(const Source& compressed) {
+  std::array<unsigned char, 4> tail{};
+  if (compressed.size() < 18 || !compressed.read(compressed.size() - 4, reinterpret_cast<char*>(tail.data()), 4)) return 0;
+  const std::uint64_t claim = tail[0] | tail[1] << 8 | tail[2] << 16 | std::uint64_t{tail[3]} << 24;
+  return claim > compressed.size() * 20 ? 0 : static_cast<std::size_t>(claim);
+}
+
 }  // namespace
 
 Result<Source> Source::open(const std::string& path) {
@@ -45,27 +55,10 @@ bool Source::read(std::uint64_t offset, char* to, std::size_t count) const {
   return true;
 }
 
-std::string Source::head(std::size_t count) const {
-  std::string bytes(static_cast<std::size_t>(std::min<std::uint64_t>(count, size_)), '\0');
-  if (!read(0, bytes.data(), bytes.size())) bytes.clear();
-  return bytes;
+std::string_view Source::head(std::span<char> space) const {
+  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(space.size(), size_));
+  return read(0, space.data(), count) ? std::string_view(space.data(), count) : std::string_view();
 }
-
-// Gzip files (RFC 1952) inflated into memory, with a bound on what they may become.
-
-namespace {
-
-constexpr std::size_t kStep = std::size_t{1} << 20;
-
-/// The size that the last four bytes of the file claim, as a hint; 0 if it is not plausible.
-std::size_t claimed_size(const Source& compressed) {
-  std::array<unsigned char, 4> tail{};
-  if (compressed.size() < 18 || !compressed.read(compressed.size() - 4, reinterpret_cast<char*>(tail.data()), 4)) return 0;
-  const std::uint64_t claim = tail[0] | tail[1] << 8 | tail[2] << 16 | std::uint64_t{tail[3]} << 24;
-  return claim > compressed.size() * 20 ? 0 : static_cast<std::size_t>(claim);
-}
-
-}  // namespace
 
 Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
   z_stream stream{};
@@ -112,7 +105,7 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
   }
   if (within_member) return compressed.error("gzip data ends early: the file was cut short; copy it again");
   output.resize(written);
-  return Source::of_memory(compressed.path(), std::move(output));
+  return Source::of_memory(std::string(compressed.path()), std::move(output));
 }
 
 }  // namespace lamina::load

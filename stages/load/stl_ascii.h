@@ -1,4 +1,4 @@
-// stages/load/stl_ascii.h: facets of ASCII STL; internal to load.
+// stages/load/stl_ascii.h: text STL; internal to load.
 #pragma once
 
 #include "stages/load/reader.h"

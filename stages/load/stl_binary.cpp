@@ -1,3 +1,5 @@
+// stages/load/stl_binary.cpp: read in blocks and snapped straight into the mesh; a sound file becomes blocks in one pass, each
+// read, snapped, judged and stored in a core's cache, and the list of triangles never exists.
 #include "stages/load/stl_binary.h"
 
 #include <fmt/core.h>
@@ -18,6 +20,27 @@
 #include "stages/load/repair/census.h"
 
 namespace lamina::load {
+
+struct Scratch {
+  /// What a thread needs for a block, and what it found in all of its blocks.
+  struct Worker {
+    std::array<char, kBlockSize * kFacetBytes> bytes;
+    std::array<Triangle, kBlockSize> facets;
+    const LoadKernels& kernels;
+    BlockMaker maker;
+    CensusSums sums;
+    FacetBox box;
+
+    explicit Worker(Isa isa) : kernels(load_kernels_for(isa)), maker(isa) {}
+  };
+
+  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers;
+
+  explicit Scratch(Isa isa) : workers([isa] { return std::make_unique<Worker>(isa); }) {}
+};
+
+std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch>(isa_at_most(isa)); }
+
 namespace {
 
 bool snap_transformed(const char* facets, std::size_t count, const Snapper& snapper, Triangle* out, Box& box) {
@@ -42,43 +65,7 @@ Box snapped_box(const CoordinateBox& from, const Snapper& snapper) {
   return box;
 }
 
-}  // namespace
-
-void FacetBox::add(const FacetBox& other) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    plain.lo[k] = std::min(plain.lo[k], other.plain.lo[k]);
-    plain.hi[k] = std::max(plain.hi[k], other.plain.hi[k]);
-  }
-  transformed.add(other.transformed);
-}
-
-Box FacetBox::nm(const Snapper& snapper) const { return is_plain(snapper) ? snapped_box(plain, snapper) : transformed; }
-
-Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
-  std::array<float, 9> corner;
-  std::memcpy(corner.data(), facet + 12, 36);
-  Triangle triangle{};
-  const std::array<Point3*, 3> points =
-      snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b} : std::array{&triangle.a, &triangle.b, &triangle.c};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Snapped snapped = snapper.snap(static_cast<double>(corner[3 * i]), static_cast<double>(corner[3 * i + 1]),
-                                         static_cast<double>(corner[3 * i + 2]), *points[i]);
-    if (snapped != Snapped::kYes) return snapped;
-  }
-  out = triangle;
-  return Snapped::kYes;
-}
-
-bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box) {
-  return is_plain(snapper) ? load_kernels_for(isa_at_most(isa)).snap(facets, count, out, box.plain)
-                           : snap_transformed(facets, count, snapper, out, box.transformed);
-}
-
-// Binary STL, read in blocks and snapped straight into the mesh.
-
-namespace {
-
-constexpr std::size_t kBlockFacets = 5120;  // facets, 250 KiB: a block and its triangles stay in a core's cache
+constexpr std::size_t kFacetsOfBlock = 5120;  // facets, 250 KiB: a block and its triangles stay in a core's cache
 
 std::uint32_t little_endian(const char* bytes) {
   const auto* b = reinterpret_cast<const unsigned char*>(bytes);
@@ -91,9 +78,9 @@ Status read_carefully(const Source& source, const Snapper& snapper, const LoadOp
                       Facets& facets) {
   facets.bounds = {};
   std::uint64_t dropped = 0, first_dropped = 0, kept = 0;
-  Buffer<char> block(kBlockFacets * kFacetBytes);
-  for (std::uint64_t first = 0; first < count; first += kBlockFacets) {
-    const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kBlockFacets, count - first));
+  Buffer<char> block(kFacetsOfBlock * kFacetBytes);
+  for (std::uint64_t first = 0; first < count; first += kFacetsOfBlock) {
+    const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kFacetsOfBlock, count - first));
     if (!source.read(kHeaderBytes + first * kFacetBytes, block.data(), in_block * kFacetBytes))
       return source.changed_while_read();
     for (std::size_t i = 0; i < in_block; ++i) {
@@ -135,15 +122,15 @@ Status read_facets(const Source& source, const Snapper& snapper, const LoadOptio
   prefer_large_pages(facets.triangles);
   Triangle* const out = facets.triangles.data();
 
-  tbb::enumerable_thread_specific<Buffer<char>> scratch([] { return Buffer<char>(kBlockFacets * kFacetBytes); });
+  tbb::enumerable_thread_specific<Buffer<char>> scratch([] { return Buffer<char>(kFacetsOfBlock * kFacetBytes); });
   std::atomic<bool> unreadable{false}, bad{false};
   const FacetBox box = tbb::parallel_reduce(
-      tbb::blocked_range<std::uint64_t>(0, (count + kBlockFacets - 1) / kBlockFacets), FacetBox{},
+      tbb::blocked_range<std::uint64_t>(0, (count + kFacetsOfBlock - 1) / kFacetsOfBlock), FacetBox{},
       [&](const tbb::blocked_range<std::uint64_t>& blocks, FacetBox so_far) {
         char* const block = scratch.local().data();
         for (std::uint64_t b = blocks.begin(); b != blocks.end() && !unreadable && !bad; ++b) {
-          const std::uint64_t first = b * kBlockFacets;
-          const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kBlockFacets, count - first));
+          const std::uint64_t first = b * kFacetsOfBlock;
+          const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kFacetsOfBlock, count - first));
           if (!source.read(kHeaderBytes + first * kFacetBytes, block, in_block * kFacetBytes)) {
             unreadable = true;
           } else if (!snap_facets(block, in_block, snapper, options.isa, out + first, so_far)) {
@@ -162,8 +149,8 @@ Status read_facets(const Source& source, const Snapper& snapper, const LoadOptio
   return {};
 }
 
-}  // namespace
-
+/// How many facets a file holds, with what there is to say about it in `facets`.
+/// errors  kInput: the header and the length of the file contradict each other, or there are more than the limit
 Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& options, Facets& facets) {
   std::array<char, 4> bytes;
   if (source.size() < kHeaderBytes || !source.read(80, bytes.data(), 4))
@@ -189,48 +176,6 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     return source.error(fmt::format("{} facets are more than the limit of {}", count, options.triangle_limit));
   return count;
 }
-
-Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options) {
-  Facets facets;
-  const Result<std::uint64_t> count = count_facets(source, options, facets);
-  if (!count) return count.error();
-  Status read = read_facets(source, snapper, options, *count, facets);
-  if (!read && facets.doubt && facets.doubt->claimed > 0) {
-    // What follows the claimed facets is none.
-    facets.notes.push_back({false, facets.doubt->rest_left_out});
-    read = read_facets(source, snapper, options, facets.doubt->claimed, facets);
-    facets.doubt.reset();
-  } else if (!read && facets.doubt) {
-    return source.error(facets.doubt->error);
-  }
-  if (!read) return read.error();
-  return facets;
-}
-
-// A sound binary STL becomes blocks in one pass, each read, snapped, judged and stored in a core's
-// Cache. The list of triangles never exists.
-
-struct Scratch {
-  /// What a thread needs for a block, and what it found in all of its blocks.
-  struct Worker {
-    std::array<char, kBlockSize * kFacetBytes> bytes;
-    std::array<Triangle, kBlockSize> facets;
-    const LoadKernels& kernels;
-    BlockMaker maker;
-    CensusSums sums;
-    FacetBox box;
-
-    explicit Worker(Isa isa) : kernels(load_kernels_for(isa)), maker(isa) {}
-  };
-
-  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers;
-
-  explicit Scratch(Isa isa) : workers([isa] { return std::make_unique<Worker>(isa); }) {}
-};
-
-std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch>(isa_at_most(isa)); }
-
-namespace {
 
 /// Reads one block. false  it cannot be read or snapped
 bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, const SeeTriangles& see,
@@ -268,6 +213,53 @@ double sixfold_volume(const Buffer<Prisms>& pieces, Nm plane) {
 }
 
 }  // namespace
+
+void FacetBox::add(const FacetBox& other) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    plain.lo[k] = std::min(plain.lo[k], other.plain.lo[k]);
+    plain.hi[k] = std::max(plain.hi[k], other.plain.hi[k]);
+  }
+  transformed.add(other.transformed);
+}
+
+Box FacetBox::nm(const Snapper& snapper) const { return is_plain(snapper) ? snapped_box(plain, snapper) : transformed; }
+
+Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
+  std::array<float, 9> corner;
+  std::memcpy(corner.data(), facet + 12, 36);
+  Triangle triangle{};
+  const std::array<Point3*, 3> points =
+      snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b} : std::array{&triangle.a, &triangle.b, &triangle.c};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Snapped snapped = snapper.snap(static_cast<double>(corner[3 * i]), static_cast<double>(corner[3 * i + 1]),
+                                         static_cast<double>(corner[3 * i + 2]), *points[i]);
+    if (snapped != Snapped::kYes) return snapped;
+  }
+  out = triangle;
+  return Snapped::kYes;
+}
+
+bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box) {
+  return is_plain(snapper) ? load_kernels_for(isa_at_most(isa)).snap(facets, count, out, box.plain)
+                           : snap_transformed(facets, count, snapper, out, box.transformed);
+}
+
+Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options) {
+  Facets facets;
+  const Result<std::uint64_t> count = count_facets(source, options, facets);
+  if (!count) return count.error();
+  Status read = read_facets(source, snapper, options, *count, facets);
+  if (!read && facets.doubt && facets.doubt->claimed > 0) {
+    // What follows the claimed facets is none.
+    facets.notes.push_back({false, facets.doubt->rest_left_out});
+    read = read_facets(source, snapper, options, facets.doubt->claimed, facets);
+    facets.doubt.reset();
+  } else if (!read && facets.doubt) {
+    return source.error(facets.doubt->error);
+  }
+  if (!read) return read.error();
+  return facets;
+}
 
 std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
                                    const SeeTriangles& see, std::vector<Note>& notes) {

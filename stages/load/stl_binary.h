@@ -1,4 +1,4 @@
-// stages/load/stl_binary.h: facets of binary STL become triangles in nm, in lists or in blocks; internal to load.
+// stages/load/stl_binary.h: binary STL as triangles in nm or as blocks; internal to load.
 #pragma once
 
 #include <array>
@@ -40,10 +40,6 @@ Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out);
 /// Snaps facets that follow each other, and grows the box by them. isa  the widest instruction set to use
 /// false  one of them cannot be snapped
 bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box);
-
-/// How many facets a file holds, with what there is to say about it in `facets`.
-/// errors  kInput: the header and the length of the file contradict each other, or there are more than the limit
-Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& options, Facets& facets);
 
 /// Facets of 50 bytes behind a header of 84: normal (12), three corners of three floats (36), attributes (2).
 /// cost    one pass, parallel; 256 KiB a thread besides the triangles

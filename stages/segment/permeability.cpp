@@ -6,14 +6,6 @@
 
 namespace lamina::segment {
 
-std::string odd_about(const Fluid& fluid) {
-  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
-  return fmt::format(
-      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
-      "k2 for air is {:.4g} times smaller",
-      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
-}
-
 Result<std::vector<FlowPoint>> expanded(std::span<const FlowPoint> points, double length_m, const GasPressures& pressures) {
   std::vector<FlowPoint> gas(points.begin(), points.end());
   for (FlowPoint& point : gas) {

@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "stages/data/status.h"
@@ -26,9 +25,6 @@ struct Fluid {
   double viscosity_pa_s = 1.81e-5;  // air at 20 degC
   double density_kg_m3 = 1.204;
 };
-
-/// A warning about implausible properties of a fluid, one line; "" if none.
-std::string odd_about(const Fluid& fluid);
 
 struct Permeability {
   double k1_m2 = 0, k2_m = 0;

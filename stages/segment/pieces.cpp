@@ -119,22 +119,4 @@ std::vector<TestPiece> test_pieces(const PieceRequest& request) {
   return pieces;
 }
 
-std::string steps_text(const std::vector<TestPiece>& pieces, const PieceRequest& request, std::string_view extension) {
-  std::string text = fmt::format(
-      "# Calibrating segmented lines\n\n1. Parameters: beads of {} mm, layers of {} mm, the speeds and temperatures of the machine's profile; keep them for all "
-      "pieces.\n",
-      number_text(request.width_mm), number_text(request.height_mm));
-  char step = '1';
-  for (const TestPiece& piece : pieces) {
-    if (piece.name[0] == '6' && step < '5') {
-      text +=
-          "5. Spacing: fill in widths.csv, then `lamina calibrate --measured widths.csv --machine MACHINE -o machine.toml`; plan the pieces of steps 6 and 7 "
-          "again with `lamina extrude --job FILE --machine machine.toml`.\n";
-    }
-    text += fmt::format("{}. `{}{}`: {}\n", piece.name[0], piece.name, extension, piece.task);
-    step = piece.name[0];
-  }
-  return text;
-}
-
 }  // namespace lamina::segment

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stages/segment/pore_geometry.h"
 
@@ -59,62 +60,62 @@ Status check(const Segmentation& s, double bead_width_mm) {
   return {};
 }
 
-std::vector<std::string> warnings(const Segmentation& s, const Calibration& calibration) {
-  std::vector<std::string> lines;
+std::vector<Warning> warnings(const Segmentation& s, const Calibration& calibration) {
+  std::vector<Warning> found;
+  const auto warn = [&](std::string text) { found.push_back({"pores", std::move(text)}); };
   if (!s.sweep.empty())
-    return {fmt::format("segment: thin stretches differ from line to line ({} kinds): a test piece to be measured",
-                        s.sweep.size())};
+    return {{"pores", fmt::format("segment: thin stretches differ from line to line ({} kinds): a test piece to be measured",
+                                  s.sweep.size())}};
   if (s.thin_speed > 100 && !calibration.by_speed.empty()) {
     const Reading stable = stable_distance(calibration, s.thin_speed);
     if (s.thin_mm > stable.value) {
-      lines.push_back(fmt::format(
+      warn(fmt::format(
           "segment.thin_mm: {} mm is longer than the {:.2f} mm after which a bead at {} % of the speed is as wide as before: "
           "pores close towards their ends; make it at most {:.2f} mm",
           s.thin_mm, stable.value, s.thin_speed, stable.value));
     }
     if (!stable.inside) {
-      lines.push_back(
+      warn(
           fmt::format("segment.thin_speed_percent: {} % is outside of what was measured (100 to {} %); the nearest "
                       "value is taken",
                       s.thin_speed, calibration.by_speed.back().percent));
     }
   }
   if (s.thin_speed <= 100 && s.thin_extrusion >= 100) {
-    lines.push_back("segment.thin_speed_percent: not above 100 % and no less extrusion: thin stretches will not be thin");
+    warn("segment.thin_speed_percent: not above 100 % and no less extrusion: thin stretches will not be thin");
   }
   if (s.thick_extrusion != s.thin_extrusion) {
-    lines.push_back(
+    warn(
         "segment.thin_extrusion_percent: differs from the thick one; extrusion follows with a delay of about 1 mm "
         "and more, so keep it the same along the line and change the speed");
   }
   if (!calibration.repeated.empty()) {
     const RepeatedReading reading = repeated_at(calibration, s.thick_extrusion);
     if (!reading.inside) {
-      lines.push_back(fmt::format(
+      warn(fmt::format(
           "segment.thick_extrusion_percent: {} % is outside of what was measured ({} to {} %); the nearest "
           "value is taken",
           s.thick_extrusion, calibration.repeated.front().extrusion_percent, calibration.repeated.back().extrusion_percent));
     } else if (std::abs(reading.thick_speed_percent - s.thick_speed) > 0.5) {
-      lines.push_back(
-          fmt::format("segment.thick_speed_percent: {} %; at {} % extrusion widths stay the same along the part at {:.4g} %",
-                      s.thick_speed, s.thick_extrusion, reading.thick_speed_percent));
+      warn(fmt::format("segment.thick_speed_percent: {} %; at {} % extrusion widths stay the same along the part at {:.4g} %",
+                       s.thick_speed, s.thick_extrusion, reading.thick_speed_percent));
     }
   }
   const PoreSize pore = planned_pore(s);
   const double gap = pore.gap_mm;
   if (gap > kBondGap) {
-    lines.push_back(
+    warn(
         fmt::format("segment.spacing_sc_mm: thick stretches and continuous lines will be {:.3f} mm apart and not bond; "
                     "give {:.3f} mm",
                     gap, s.spacing_sc_mm - gap));
   }
   if (pore.length_mm <= 0) {
-    lines.push_back(
+    warn(
         fmt::format("segment.thin_mm: {} mm is not longer than a thick bead is wide ({:.2f} mm): its round ends meet and "
                     "close the pore; give more",
                     s.thin_mm, s.thick_width_mm));
   }
-  return lines;
+  return found;
 }
 
 Pores predict_pores(const Segmentation& s) {

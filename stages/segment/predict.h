@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "stages/data/status.h"
@@ -39,8 +38,9 @@ struct Segmentation {
 /// Whether it can be laid. errors  kUsage, one line that begins with the key's name (as in [segment])
 Status check(const Segmentation& segmentation, double bead_width_mm);
 
-/// What a user should know: a pore that closes, speeds outside of what was measured, beads that do not touch.
-std::vector<std::string> warnings(const Segmentation& segmentation, const Calibration& calibration);
+/// What a user should know, of the code "pores": a pore that closes, speeds outside of what was measured, beads that do not
+/// touch.
+std::vector<Warning> warnings(const Segmentation& segmentation, const Calibration& calibration);
 
 /// A pore between a thin stretch and the continuous line next to it (pore_geometry.h).
 struct Pores {

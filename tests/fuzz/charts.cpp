@@ -1,5 +1,5 @@
 // Charts of powder printers, as lamina calibrate writes them.
-#include "stages/calibration/chart/chart.h"
+#include "stages/formats/chart/chart.h"
 
 #include <algorithm>
 
@@ -76,7 +76,7 @@ std::vector<std::string> chart_seeds() {
   return seeds;
 }
 
-const Registered kChart({"chart", read_one, chart_seeds, "stages/calibration/chart/chart stages/support/text", "", "chart.dict",
+const Registered kChart({"chart", read_one, chart_seeds, "stages/formats/chart/chart stages/support/text", "", "chart.dict",
                          4096});
 
 }  // namespace

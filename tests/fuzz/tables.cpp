@@ -1,6 +1,7 @@
 // Tables that people write: tops of layers, measured widths, flows and pressure drops.
 #include <cmath>
 
+#include "pipeline/calibrate/pieces_text.h"
 #include "stages/heights/study/study.h"
 #include "stages/segment/flows.h"
 #include "stages/segment/measured.h"
@@ -81,7 +82,7 @@ std::vector<std::string> height_seeds() { return {"# tops\n0\n0.1\n0.25 # thick\
 std::vector<std::string> width_seeds() {
   segment::PieceRequest request;
   return {
-      segment::widths_text(request),
+      pipeline::widths_text(request),
       "test;percent;thick_speed_percent;region;wall_mm;thick_mm;thin_mm;continuous_mm;stable_mm\nflow;;;;0.41;;;;\n"
       "speed;150;;;;0.6;0.35;;2\nspeed;200;;;;0.6;0.3;;1.5\nextrusion;80;;;;0.5;0.3;;\n"
       "repeated;100;100;initial;;0.55;0.3;0.4;\nrepeated;100;100;central;;0.56;0.31;0.4;\nrepeated;100;100;final;;0.55;0.3;0.4;\n"};

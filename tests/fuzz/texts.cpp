@@ -48,10 +48,9 @@ void read_numbers(std::string_view text) {
 
 bool read_texts(std::string_view text) {
   read_numbers(text);
-  heights::ThicknessSet set;
-  if (heights::read_thicknesses(text, set).empty()) {
-    law(set.size() > 0 && set.least() > 0, "no thickness");
-    law(std::ranges::adjacent_find(set.values, std::greater_equal{}) == set.values.end(), "thicknesses do not rise");
+  if (const auto set = heights::read_thicknesses(text)) {
+    law(set->size() > 0 && set->least() > 0, "no thickness");
+    law(std::ranges::adjacent_find(set->values, std::greater_equal{}) == set->values.end(), "thicknesses do not rise");
   }
   if (const auto words = split_words(text)) {
     std::string line;

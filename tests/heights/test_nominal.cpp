@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/report/heights_study.h"
 #include "tests/heights/surfaces.h"
 
 namespace lamina::heights {
@@ -202,12 +203,12 @@ TEST(SmallPeaks, AreNoPeaksUnlessEveryFacetIs) {
   const Result<Plan> plain = plan_heights(index, options);
   EXPECT_EQ(test::thicknesses(plain->table), std::vector<double>(4, 0.254));
   EXPECT_EQ(plain->small_peaks, 1u);
-  EXPECT_NE(small_peaks_text(*plain, 1).find("--peaks facets"), std::string::npos);
+  EXPECT_NE(pipeline::small_peaks_text(*plain, 1).find("--peaks facets"), std::string::npos);
   options.peaks = Peaks::kFacets;
   const Result<Plan> document = plan_heights(index, options);
   EXPECT_EQ(test::thicknesses(document->table), (std::vector<double>{0.254, 0.178, 0.254, 0.254}));
   EXPECT_EQ(document->small_peaks, 0u);
-  EXPECT_EQ(small_peaks_text(*document, 1), "");
+  EXPECT_EQ(pipeline::small_peaks_text(*document, 1), "");
 }
 
 }  // namespace

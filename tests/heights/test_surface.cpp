@@ -179,9 +179,8 @@ TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
 
 TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
   const auto read = [](std::string_view text) {
-    ThicknessSet set;
-    const std::string wrong = read_thicknesses(text, set);
-    return wrong.empty() ? set.values : std::vector<Nm>{};
+    const auto set = read_thicknesses(text);
+    return set ? set->values : std::vector<Nm>{};
   };
   EXPECT_EQ(read("0.254,0.178"), (std::vector<Nm>{178'000, 254'000}));
   EXPECT_EQ(read("0.05..0.2:0.05"), (std::vector<Nm>{50'000, 100'000, 150'000, 200'000}));

@@ -1,5 +1,5 @@
 // tests/load/test_info.cpp: the report of `lamina info`.
-#include "stages/load/info/info.h"
+#include "pipeline/report/part_info.h"
 
 #include <algorithm>
 #include <array>
@@ -15,13 +15,13 @@ namespace lamina::test {
 namespace {
 
 std::string text_of(const std::string& path, const load::LoadOptions& options = {}) {
-  const Result<std::string> text = load::describe_part_text(path, options, slice::surplus_areas);
+  const Result<std::string> text = pipeline::describe_part_text(path, options, slice::surplus_areas);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? *text : "";
 }
 
 nlohmann::json json_of(const std::string& path) {
-  const Result<std::string> text = load::describe_part_json(path, {}, slice::surplus_areas);
+  const Result<std::string> text = pipeline::describe_part_json(path, {}, slice::surplus_areas);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? nlohmann::json::parse(*text) : nlohmann::json();
 }
@@ -99,7 +99,7 @@ TEST(Info, ObjectsThatOverlapArePlannedOnce) {
   EXPECT_NEAR(json["planned_volume_mm3"].get<double>(), 12000 - 750, 0.01);
   EXPECT_NEAR(json["meshes"][0]["planned_volume_mm3"].get<double>(), 6000, 1e-6);
   EXPECT_CONTAINS(text_of(path), "planned volume       about 11250 mm3\n");
-  const Result<std::string> unsliced = load::describe_part_text(path, {});
+  const Result<std::string> unsliced = pipeline::describe_part_text(path, {});
   ASSERT_TRUE(unsliced.ok());
   EXPECT_CONTAINS(*unsliced, "planned volume       12000 mm3 (what overlaps counts as often as it does)\n");
 }
@@ -187,10 +187,10 @@ TEST(Info, JsonHasTheSameNumbers) {
 }
 
 TEST(Info, AFileThatCannotBePlannedIsAnError) {
-  const Result<std::string> text = load::describe_part_text(corpus("broken/plane_flat.stl"), {});
+  const Result<std::string> text = pipeline::describe_part_text(corpus("broken/plane_flat.stl"), {});
   ASSERT_FALSE(text.ok());
   EXPECT_EQ(text.error().fault, Fault::kInput);
-  EXPECT_FALSE(load::describe_part_json(corpus("broken/empty_file.stl"), {}).ok());
+  EXPECT_FALSE(pipeline::describe_part_json(corpus("broken/empty_file.stl"), {}).ok());
 }
 
 TEST(Info, EveryPartOfTheCorpusIsDescribed) {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "stages/load/threemf/archive.h"
+#include "stages/support/text/part_name.h"
 #include "tests/load/archives.h"
 #include "tests/load/files.h"
 
@@ -118,7 +119,7 @@ TEST(Read3mfExtensions, OnePackageHasOneModel) {
   EXPECT_CONTAINS(refusal(write_file("two.3mf", zip(entries))), "more than one 3D model");
   entries[1].second = "<Relationships/>";
   EXPECT_CONTAINS(refusal(write_file("none.3mf", zip(entries))), "is a zip file, but no 3MF: it names no 3D model");
-  EXPECT_EQ(load::part_name("../A%2fb\\./c.Model", "/3d/x/"), "/3d/a/b/c.model");
+  EXPECT_EQ(part_name("../A%2fb\\./c.Model", "/3d/x/"), "/3d/a/b/c.model");
 }
 
 TEST(Read3mfExtensions, WhatDoesNotFitTogetherIsRefusedWithItsLine) {

@@ -111,11 +111,11 @@ TEST(Prediction, AThinStretchLongerThanTheStabilisationDistanceIsWarnedOf) {
   EXPECT_TRUE(warnings(s, anet).empty());
   s.thin_mm = 4.5;
   ASSERT_EQ(warnings(s, anet).size(), 1);
-  EXPECT_NE(warnings(s, anet)[0].find("at most 4.45 mm"), std::string::npos) << warnings(s, anet)[0];
+  EXPECT_NE(warnings(s, anet)[0].text.find("at most 4.45 mm"), std::string::npos) << warnings(s, anet)[0].text;
   s.thin_mm = 1.5;
   s.thick_speed = 100;
   ASSERT_EQ(warnings(s, anet).size(), 1);
-  EXPECT_NE(warnings(s, anet)[0].find("75 %"), std::string::npos) << warnings(s, anet)[0];
+  EXPECT_NE(warnings(s, anet)[0].text.find("75 %"), std::string::npos) << warnings(s, anet)[0].text;
 }
 
 TEST(Prediction, WrongParametersAreNamedInOneLine) {

@@ -28,7 +28,7 @@ PoreWish porous(double porosity, double darcy) {
 /// The pores of a found design, and that the machine can lay it without a warning.
 void expect_sound(const Design& design) {
   EXPECT_TRUE(check(design.plan, 0.4).ok());
-  for (const std::string& line : warnings(design.plan, anet_a8_calibration())) ADD_FAILURE() << line;
+  for (const Warning& warning : warnings(design.plan, anet_a8_calibration())) ADD_FAILURE() << warning.text;
   EXPECT_GE(design.plan.thick_extrusion, 75);
   EXPECT_LE(design.plan.thick_extrusion, 125);
   EXPECT_GE(design.pores.width_mm, 0.0299);

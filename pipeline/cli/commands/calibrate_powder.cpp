@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include "pipeline/calibrate/chart_job.h"
+#include "pipeline/calibrate/chart_reading.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/calibration/chart/draw.h"
-#include "stages/calibration/chart/measured.h"
+#include "stages/formats/chart/chart.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/replaceable.h"
@@ -74,7 +75,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
       "chart", {{"photo", arguments.text("--scan")}, {"chart", parse_json(*text)}, {"picture", arguments.has("--overlay")}},
       arguments.text("--overlay"));
   if (!seen) return seen.error();
-  const auto lines = chart::take_over(*seen, *laid, *machine);
+  const auto lines = take_over(*seen, *laid, *machine);
   if (!lines) return lines.error();
   const auto profile = measured_profile(*machine);
   if (!profile) return profile.error();

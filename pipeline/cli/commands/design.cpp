@@ -7,8 +7,7 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/pores/gradient.h"
-#include "stages/segment/design/design_page.h"
+#include "pipeline/pores/design_page.h"
 #include "stages/segment/permeability.h"  // the unit
 #include "stages/support/io/file.h"
 #include "stages/support/text/json_value.h"
@@ -188,7 +187,7 @@ Outcome run_design(const Arguments& arguments, Context& context) {
     keep_on_signals();
     const auto found = design_gradient(*request, *steps, go_on);
     if (!found) return found.error();
-    return give_found(*found, segment::missed_text(*found), arguments, context);
+    return give_found(*found, missed_text(*found), arguments, context);
   }
   for (const char* flag : {"--height", "--steps", "--tops"})
     if (arguments.has(flag)) return at_option(flag, "is of a gradient, and none is wished for, as in --porosity 20:26");
@@ -196,10 +195,10 @@ Outcome run_design(const Arguments& arguments, Context& context) {
   keep_on_signals();
   const auto found = design_job(*request, go_on);
   if (!found) return found.error();
-  return give_found(*found,
-                    fmt::format("nearest is {}, which misses the wish by {:.0f} %",
-                                segment::nearest_text(request->wish, *found), 100 * found->miss),
-                    arguments, context);
+  return give_found(
+      *found,
+      fmt::format("nearest is {}, which misses the wish by {:.0f} %", nearest_text(request->wish, *found), 100 * found->miss),
+      arguments, context);
 }
 
 }  // namespace

@@ -10,9 +10,9 @@
 #include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/heights.h"
+#include "pipeline/report/heights_plot.h"
+#include "pipeline/report/heights_study.h"
 #include "stages/formats/rp3/rp3.h"
-#include "stages/heights/study/study_plot.h"
-#include "stages/heights/study/study_text.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/value.h"
 
@@ -93,7 +93,7 @@ Status check_one_table(const Job& job, const Arguments& arguments) {
 
 std::string rp3_text(const Job& job, const heights::Study& study) {
   std::vector<write::rp3::Layer> layers;
-  for (std::size_t i = 0; i < study.layers(); ++i) layers.push_back({mm(study.thickness(i)), heights::angle(study, i)});
+  for (std::size_t i = 0; i < study.layers(); ++i) layers.push_back({mm(study.thickness(i)), angle(study, i)});
   write::rp3::Settings settings;
   settings.shrink = job.parts.front().shrink;
   settings.rotation_deg = job.parts.front().rotate_deg;
@@ -101,7 +101,7 @@ std::string rp3_text(const Job& job, const heights::Study& study) {
 }
 
 std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies) {
-  heights::StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
+  StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
   for (const PartSummary& part : scene.parts) parts.paths.push_back(part.path);
   switch (form) {
     case Form::kJson: return study_json(parts, studies);

@@ -8,9 +8,9 @@
 #include "pipeline/manifest/images_on_record.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/pores/laid_look.h"
+#include "pipeline/report/part_info.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/formats/images/stack_info.h"
-#include "stages/load/info/info.h"
 #include "stages/slice/surplus.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
@@ -129,8 +129,8 @@ Outcome run_info(const Arguments& arguments, Context& context) {
       continue;
     }
     const load::LoadOptions options = load_options(*job, part);
-    const Result<std::string> page = (arguments.has("--json") ? load::describe_part_json : load::describe_part_text)(
-        part.path, options, slice::surplus_areas);
+    const Result<std::string> page =
+        (arguments.has("--json") ? describe_part_json : describe_part_text)(part.path, options, slice::surplus_areas);
     if (!page) {
       code = std::max(code, context.complain(page.error()));
       continue;

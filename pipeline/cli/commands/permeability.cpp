@@ -18,6 +18,15 @@
 namespace lamina::pipeline {
 namespace {
 
+/// A warning about implausible properties of a fluid, one line; "" if none.
+std::string odd_about(const segment::Fluid& fluid) {
+  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
+  return fmt::format(
+      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
+      "k2 for air is {:.4g} times smaller",
+      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
+}
+
 CommandSpec permeability_spec() {
   CommandSpec spec;
   spec.summary =
@@ -150,7 +159,7 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
           fmt::format("note: {} is of {}, the first of {} configurations", plot, fits->front().group.name, fits->size()));
     }
   }
-  if (std::string warning = segment::odd_about(settings->fluid); !warning.empty()) warnings.push_back(std::move(warning));
+  if (std::string warning = odd_about(settings->fluid); !warning.empty()) warnings.push_back(std::move(warning));
   for (const std::string& warning : warnings) {
     context.say_text(fmt::format("warning   {}\n", one_line(warning)));
     json["warnings"].push_back(warning);

@@ -7,8 +7,6 @@
 #include <numbers>
 #include <vector>
 
-#include "stages/support/text/json_value.h"
-
 namespace lamina::chart {
 namespace {
 
@@ -131,11 +129,6 @@ Runs draw_drops(const DropLayers& wanted, const HeadGrid& grid, std::uint32_t la
     left -= taken;
   }
   return image_of(runs, grid.image.columns(), grid.image.rows());
-}
-
-std::string drops_text(const DropLayers& wanted) {
-  return json_line(
-      {{"kind", "lamina drops 1"}, {"drops", wanted.drops}, {"drops_a_layer", wanted.a_layer}, {"layers", wanted.layers}});
 }
 
 }  // namespace lamina::chart

@@ -2,9 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
-#include "stages/calibration/chart/chart.h"
+#include "stages/data/chart.h"
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
@@ -29,9 +28,6 @@ Result<DropLayers> lay_out_drops(const Machine& machine, const HeadGrid& grid, s
 
 /// Layer `layer` of them: full from its first row on, its last row as far as the drops go.
 Runs draw_drops(const DropLayers& wanted, const HeadGrid& grid, std::uint32_t layer);
-
-/// What a call that asked for them wrote, as JSON.
-std::string drops_text(const DropLayers& wanted);
 
 /// Volume of a drop in pl from the mass of many. mass in mg, density in g/ml
 constexpr double drop_pl_of(double mass_mg, double density, double drops) { return mass_mg / density / drops * 1e6; }

@@ -6,7 +6,7 @@
 // are of nozzles so far apart that blurred ones do not touch.
 #pragma once
 
-#include "stages/calibration/chart/chart.h"
+#include "stages/data/chart.h"
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/status.h"

@@ -434,17 +434,4 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
   return comparison;
 }
 
-Json comparison_json(const Comparison& comparison) {
-  Json json = {
-      {"likeness", comparison.likeness}, {"missing", Json::array()}, {"bodies", Json::array()}, {"extra", Json::array()}};
-  for (const MissingBand& band : comparison.bands)
-    json["missing"].push_back({{"from_mm", band.from_mm}, {"to_mm", band.to_mm}, {"missing_mm", band.missing_mm}});
-  for (const BodySeen& body : comparison.bodies)
-    json["bodies"].push_back(
-        {{"x_mm", body.x_mm}, {"y_mm", body.y_mm}, {"expected_mm2", body.expected_mm2}, {"seen_mm2", body.seen_mm2}});
-  for (const ExtraInk& ink : comparison.extra)
-    json["extra"].push_back({{"x_mm", ink.x_mm}, {"y_mm", ink.y_mm}, {"mm2", ink.mm2}});
-  return json;
-}
-
 }  // namespace lamina::scan

@@ -7,7 +7,6 @@
 #include "stages/calibration/scan/view.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/support/text/json_value.h"
 
 namespace lamina::scan {
 
@@ -47,7 +46,5 @@ struct Comparison {
 /// errors  kInput: the layer is empty, or the photograph does not show it, or is mirrored
 /// cost    a second for a million pixels
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer);
-
-Json comparison_json(const Comparison& comparison);
 
 }  // namespace lamina::scan

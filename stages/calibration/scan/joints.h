@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/scan/inks.h"
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/photo.h"
 #include "stages/calibration/scan/sheet_fit.h"
+#include "stages/data/chart.h"
 
 namespace lamina::scan {
 

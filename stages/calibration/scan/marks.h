@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/scan/photo.h"
 #include "stages/calibration/scan/view.h"
+#include "stages/data/chart.h"
 #include "stages/data/status.h"
 
 namespace lamina::scan {

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/scan/dashes.h"
 #include "stages/calibration/scan/sheet_fit.h"
+#include "stages/data/chart.h"
 
 namespace lamina::scan {
 

@@ -68,50 +68,6 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   return reading;
 }
 
-Json reading_json(const ChartReading& reading) {
-  const auto rounded = [](double um) { return std::round(100 * um) / 100; };
-  const auto offsets = [&](const std::vector<std::optional<Offset>>& list) {
-    Json json = Json::array();
-    for (const auto& one : list) {
-      Json& entry = json.emplace_back();
-      if (!one) continue;
-      const auto add = [&](const char* name, const char* seen, const char* error, const char* within, const Measure& measure) {
-        entry[name] = measure.told ? Json(rounded(measure.um)) : Json();
-        entry[seen] = measure.error_um > 0 ? Json(rounded(measure.um)) : Json();  // null: all dashes are marred
-        entry[error] = rounded(measure.error_um);
-        entry[within] = rounded(measure.within_um);
-      };
-      add("along_um", "along_seen_um", "along_error_um", "along_within_um", one->along);
-      add("across_um", "across_seen_um", "across_error_um", "across_within_um", one->across);
-    }
-    return json;
-  };
-  const HeadReading& head = reading.head;
-  Json json = {{"pixels_a_mm", reading.pixels_a_mm},
-               {"scatter_um", reading.scatter_um},
-               {"blocked", head.blocked},
-               {"weak", head.weak},
-               {"untold", head.untold},
-               {"swaths", offsets(head.swath)},
-               {"nozzles", offsets(head.nozzle)}};
-  // Where no bar across the scan is whole, what is known is the gain along it.
-  const InkReading& inks = reading.inks;
-  if (inks.bars_along > 0)
-    json["dot_gain_um"] = {{"along", inks.gain_along_um},
-                           {"across", inks.bars_across > 0 ? inks.gain_across_um : inks.gain_along_um}};
-  json["joints"] = Json::array();
-  for (const JointReading& joint : reading.joints) {
-    json["joints"].push_back({{"swath", joint.swath},
-                              {"along_um", joint.along_um ? Json(rounded(*joint.along_um)) : Json()},
-                              {"across_um", joint.across_um ? Json(rounded(*joint.across_um)) : Json()},
-                              {"agrees", joint.agrees}});
-  }
-  json["wedges"] = Json::array();
-  for (const auto& [percent, seen] : inks.wedges)
-    json["wedges"].push_back({{"pixels_percent", percent}, {"seen_percent", seen}});
-  return json;
-}
-
 cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& reading) {
   cv::Mat picture;
   cv::cvtColor(photo.grey, picture, cv::COLOR_GRAY2BGR);

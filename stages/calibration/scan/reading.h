@@ -4,14 +4,13 @@
 #include <optional>
 #include <vector>
 
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/scan/dashes.h"
 #include "stages/calibration/scan/inks.h"
 #include "stages/calibration/scan/joints.h"
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/sheet_fit.h"
+#include "stages/data/chart.h"
 #include "stages/data/status.h"
-#include "stages/support/text/json_value.h"
 
 namespace lamina::scan {
 
@@ -29,8 +28,6 @@ struct ChartReading {
 /// errors  kInput: the chart is not found, or fewer than a tenth of its dashes
 /// cost    some seconds for a thousand nozzles
 Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart);
-
-Json reading_json(const ChartReading& reading);
 
 /// The photograph with a sign on every dash: green seen, red not seen, orange hidden; the marks in blue.
 cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& reading);

@@ -115,8 +115,7 @@ bool is_dxf(std::string_view head) {
   return section != head.npos && head.substr(0, section).find_first_not_of(" 0\r\n") == head.npos;
 }
 
-}  // namespace
-
+/// The end of a sentence that begins with the file's name: the format and what to do about it; "" if it is of no known one.
 std::string foreign_format(std::string_view head) {
   if (begins(head, "\xff\xfe") || begins(head, "\xfe\xff"))
     return "is text in UTF-16, two bytes a character; save it as UTF-8 or ASCII";
@@ -139,6 +138,13 @@ std::string foreign_format(std::string_view head) {
     return "is JSON, perhaps in place of a download that failed; download or export the part again";
   }
   return {};
+}
+
+}  // namespace
+
+Status refuse_foreign(const Source& source, std::string_view head) {
+  const std::string format = foreign_format(head);
+  return format.empty() ? Status() : source.error(format);
 }
 
 bool is_machine_program(std::string_view head) {

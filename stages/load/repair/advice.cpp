@@ -30,18 +30,19 @@ bool makes_a_solid(const Buffer<Triangle>& triangles, const Box& bounds, std::in
   mesh.triangles = triangles;
   mesh.bounds = bounds;
   const RepairReport report = repair(mesh, distance);
-  return why_hollow(mesh, report).empty() && capped_share(mesh) < 0.1;
+  return check_solid(mesh, report) && capped_share(mesh) < 0.1;
 }
 
 }  // namespace
 
-std::string why_hollow(const Mesh& mesh, const RepairReport& report) {
-  if (mesh.triangles.empty()) return "its facets lie loose and enclose nothing";
+Status check_solid(const Mesh& mesh, const RepairReport& report) {
+  const auto hollow = [](std::string why) { return Error{Fault::kInput, std::move(why)}; };
+  if (mesh.triangles.empty()) return hollow("its facets lie loose and enclose nothing");
   const Enclosed held = enclosed(mesh);
-  if (held.nothing()) return "its facets enclose nothing";
+  if (held.nothing()) return hollow("its facets enclose nothing");
   const double before = std::fabs(report.volume_before_mm3);
   if (held.volume_mm3 >= before / 2) return {};
-  return fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before);
+  return hollow(fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before));
 }
 
 double weld_doubt(const Mesh& mesh, const RepairReport& report) {

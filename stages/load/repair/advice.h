@@ -2,15 +2,15 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "stages/data/mesh.h"
+#include "stages/data/status.h"
 #include "stages/load/repair/repair.h"
 
 namespace lamina::load {
 
-/// Why a repaired mesh is no solid; "" if it is one.
-std::string why_hollow(const Mesh& mesh, const RepairReport& report);
+/// Whether a repaired mesh is a solid. errors  kInput, without a file: why it is none
+Status check_solid(const Mesh& mesh, const RepairReport& report);
 
 /// By how much of itself the volume of a welded mesh may be off: 0.02 is 2 %. Corners that lie apart by chance lie as far from
 /// where they belong as from each other; twice their standard deviation.

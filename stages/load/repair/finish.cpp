@@ -11,7 +11,7 @@
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/repair.h"
-#include "stages/load/winding/winding.h"
+#include "stages/load/winding/remesh.h"
 
 namespace lamina::load {
 namespace {
@@ -111,7 +111,8 @@ Status close_by_winding(const Source& source, const std::string& prefix, const L
     const std::size_t facets = mesh.triangles.size();
     const Remeshed remeshed = remesh(mesh);
     found = census(mesh.triangles, mesh.bounds.middle().z);
-    if (!found.balanced) return Error{Fault::kInternal, source.path() + ": remeshing left the mesh open; please report it"};
+    if (!found.balanced)
+      return Error{Fault::kInternal, std::string(source.path()) + ": remeshing left the mesh open; please report it"};
     notes.push_back(
         {true, fmt::format("{}approximate: {} facets became {} where the winding number is a half, found in cells of "
                            "{:.4g} mm; what is thinner may be lost",
@@ -130,10 +131,11 @@ Status close(const Source& source, const std::string& prefix, const LoadOptions&
   const WeldRange range = weld_range(options, bounds);
   const RepairReport report = repair(mesh, range);
   found = census(mesh.triangles, mesh.bounds.middle().z);
-  if (!found.balanced) return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
-  if (std::string why = why_hollow(mesh, report); !why.empty()) {
+  if (!found.balanced)
+    return Error{Fault::kInternal, std::string(source.path()) + ": repair left the mesh open; please report it"};
+  if (const Status solid = check_solid(mesh, report); !solid) {
     const std::int64_t distance = weld_that_closes(original, bounds, range.most_nm);
-    return source.error(prefix + why +
+    return source.error(prefix + solid.error().message +
                         (distance > 0 ? fmt::format("; --weld {} closes it", distance / 1000)
                                       : "; export it as a solid, or try --repair winding"));
   }

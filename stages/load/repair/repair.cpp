@@ -1,3 +1,4 @@
+// stages/load/repair/repair.cpp: the steps, over one indexed mesh.
 #include "stages/load/repair/repair.h"
 
 #include <algorithm>
@@ -11,9 +12,6 @@
 #include "stages/load/repair/weld.h"
 
 namespace lamina::load {
-
-// The steps, over one indexed mesh.
-
 namespace {
 
 using Facet = Indexed::Facet;
@@ -199,8 +197,6 @@ RepairReport repair(Mesh& mesh, const WeldRange& range, bool caps) {
   if (work.unmatched > 0 && caps) cap(work, report);
   return report;
 }
-
-// Which way round a mesh is, and how much of it repair added.
 
 bool turn_over_if_inside_out(Mesh& mesh) {
   if (!mesh.closed || mesh.volume_mm3 >= 0) return false;

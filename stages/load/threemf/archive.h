@@ -16,12 +16,6 @@ struct zip;
 
 namespace lamina::load {
 
-/// The name of a part of a package as it is compared: a leading slash, lower case, "%20" decoded, "." and ".." resolved.
-///
-/// folder  where a name without a leading slash is looked for, such as "/3d/"
-/// source  ISO/IEC 29500-2 (Open Packaging Conventions), 6.2 and 6.3
-std::string part_name(std::string_view name, std::string_view folder = "/");
-
 class Archive {
  public:
   /// What entries say of their sizes is checked, against options.expanded_limit and as expansion_is_absurd().

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stages/load/matrix.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/cavities.h"
 #include "stages/load/threemf/extensions.h"
@@ -75,8 +76,8 @@ bool is_box(const ModelObject& object) {
 /// What is said of an object that lamina cannot plan as the mesh that it holds.
 Status check_content(const Source& source, const ModelPackage& package, const ModelObject& object) {
   const auto refused = [&](std::string_view space, std::string_view what) {
-    return source.error(fmt::format("{} {} the extension {}, which lamina does not read; {}", package.label(object), what,
-                                    extension_name(space), extension_remedy(space)));
+    return source.error(fmt::format("{} {} the extension {}, which lamina does not read; {}", label(package, object), what,
+                                    extension_label(space), extension_remedy(space)));
   };
   const bool has_mesh = !object.triangles.empty();
   if (object.beams > 0 && (package.needs_beams || !has_mesh))
@@ -134,7 +135,7 @@ struct Expansion {
     return source.error(
         fmt::format("{} {} a negative volume that takes material away, which lamina does not; export it as STL "
                     "from the program that wrote it, which cuts it out",
-                    package.label(object), is));
+                    label(package, object), is));
   }
 
   void tell(const ModelObject& object, std::vector<Note>& notes) const {
@@ -143,12 +144,12 @@ struct Expansion {
     if (count > 0)
       notes.push_back(
           {false, fmt::format("{}: {} of its volumes, such as {}, are modifiers or support blockers and are not planned",
-                              package.label(object), count, quoted(std::string_view(object.volumes.front().name)))});
+                              label(package, object), count, quoted(std::string_view(object.volumes.front().name)))});
     if (object.beams > 0)
       notes.push_back(
           {false, fmt::format("{}: {} beams of a lattice, which the file does not require, are not planned; its mesh is",
-                              package.label(object), object.beams)});
-    if (object.sliced) notes.push_back({false, fmt::format("{}: its mesh is planned, not its slices", package.label(object))});
+                              label(package, object), object.beams)});
+    if (object.sliced) notes.push_back({false, fmt::format("{}: its mesh is planned, not its slices", label(package, object))});
   }
 };
 
@@ -187,7 +188,7 @@ Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage&
     const ModelObject& object = package.objects[item.object];
     if (object.type == ModelObject::Type::kOther && object.components.empty())
       return source.error(fmt::format("the build names {}, which is of type \"other\", as 3MF forbids; export it again",
-                                      package.label(object)));
+                                      label(package, object)));
     if (const Status added = expansion.add(item, item.transform, notes); !added) return added.error();
     ++expansion.item;
   }

@@ -1,16 +1,8 @@
 #include "stages/load/threemf/model.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 
 namespace lamina::load {
-
-std::string ModelPackage::label(const ModelObject& object) const {
-  std::string text = fmt::format("object {}", object.id);
-  if (!object.name.empty()) text += fmt::format(" \"{}\"", object.name);
-  return object.file == 0 ? text : fmt::format("{} in {}", text, files[object.file].name.substr(1));
-}
 
 std::uint32_t ModelPackage::file_of(const std::string& name) {
   const auto [found, is_new] = file_of_name.emplace(name, static_cast<std::uint32_t>(files.size()));

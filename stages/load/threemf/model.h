@@ -82,8 +82,6 @@ struct ModelPackage {
   bool needs_beams = false;             // the package requires the extension to be understood
   bool has_forward_references = false;  // a component stands before the object that it names
 
-  /// "object 3 "cap"", or with its file where that is not the first one.
-  std::string label(const ModelObject& object) const;
   /// Adds to the departures from a rule.
   void depart(std::string_view rule, std::string_view what);
   /// The index of a file, which is added if it is new.

@@ -5,9 +5,11 @@
 #include <charconv>
 #include <cstring>
 
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/extensions.h"
+#include "stages/support/text/part_name.h"
 
 namespace lamina::load {
 namespace {
@@ -75,7 +77,8 @@ void ModelParser::end() {
   }
   if (place == Place::kMetadataGroup) metadata_.pop_back();
   if (place == Place::kResources) {
-    if (auto [what, line] = properties_.check_references(); !what.empty()) reader_->refuse(std::move(what), line);
+    std::uint64_t line = 0;
+    if (const Status status = properties_.check_references(line); !status) reader_->refuse(status.error().message, line);
   }
 }
 
@@ -157,7 +160,7 @@ ModelParser::Place ModelParser::not_known(std::string_view name, XmlAttributes a
 ModelParser::Place ModelParser::property(std::string_view name, XmlAttributes attributes) {
   const bool is_resource = places_.back() == Place::kResources;
   const std::uint64_t id = is_resource ? resource(name, attributes) : Properties::kNoId;
-  if (std::string what = properties_.add(name, attributes, id, reader_->line()); !what.empty()) refuse(std::move(what));
+  if (const Status status = properties_.add(name, attributes, id, reader_->line()); !status) refuse(status.error().message);
   return is_resource ? Place::kProperties : Place::kPassedOver;
 }
 
@@ -241,7 +244,7 @@ void ModelParser::require(std::string_view prefixes) {
     const std::string_view space = required.space;
     package_.needs_beams = package_.needs_beams || extension_of(space) == Extension::kBeams;
     if (extension_of(space) == Extension::kUnknown)
-      return refuse(fmt::format("requires the extension {}, which lamina does not read; {}", extension_name(space),
+      return refuse(fmt::format("requires the extension {}, which lamina does not read; {}", extension_label(space),
                                 extension_remedy(space)));
   }
 }

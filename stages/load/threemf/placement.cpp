@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "stages/load/matrix.h"
+#include "stages/load/messages.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/threemf/snap_mesh.h"
@@ -125,7 +126,7 @@ bool Placement::share_equal(const Turned& turned, const Facets& facets, std::uin
 }
 
 void Placement::tell_once(std::uint32_t object, const char* what) {
-  if (told_.emplace(object, what).second) to_.notes.push_back({false, model_.label(model_.objects[object]) + what});
+  if (told_.emplace(object, what).second) to_.notes.push_back({false, label(model_, model_.objects[object]) + what});
 }
 
 Status Placement::add(std::span<const Leaf> leaves) {
@@ -148,15 +149,15 @@ Status Placement::add(std::span<const Leaf> leaves) {
 /// A mesh of the solid and of what is inside out within it, which is the same for copies of the whole.
 Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std::span<const std::uint32_t> voids) {
   const Transform transform = after(options_.transform, leaf.transform);
-  const std::string label = model_.label(model_.objects[leaf.object]);
-  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], label, transform, options_);
+  const std::string name = label(model_, model_.objects[leaf.object]);
+  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], name, transform, options_);
   if (!mesh) return mesh.error();
   Facets& facets = mesh->facets;
   for (const std::uint32_t index : voids) {
     const Leaf& inner = leaves[index];
     const ModelObject& object = model_.objects[inner.object];
     Result<SnappedMesh> hollow =
-        snap_mesh(source_, object, model_.label(object), after(options_.transform, inner.transform), options_);
+        snap_mesh(source_, object, label(model_, object), after(options_.transform, inner.transform), options_);
     if (!hollow) return hollow.error();
     // What the container lacks is capped afterwards, around the void; a void that is open itself is no void for sure.
     if (!is_inside_out(hollow->facets)) {
@@ -175,7 +176,7 @@ Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std
   if (share_equal(turned, facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());
   turned.variants.push_back({to_.objects.size(), {}, {}, {}});
-  to_.objects.push_back({label, std::move(facets), {{0, 0, 0}}});
+  to_.objects.push_back({name, std::move(facets), {{0, 0, 0}}});
   return {};
 }
 
@@ -186,14 +187,14 @@ Status Placement::add_solid(const Leaf& leaf) {
   for (double& axis : translation) axis *= 1e6;
   Turned& turned = turns_[{leaf.object, transform.linear, false}];
   if (share_known(turned, translation)) return {};
-  const std::string label = model_.label(object);
-  Result<SnappedMesh> mesh = snap_mesh(source_, object, label, transform, options_);
+  const std::string name = label(model_, object);
+  Result<SnappedMesh> mesh = snap_mesh(source_, object, name, transform, options_);
   if (!mesh) return mesh.error();
   const std::uint64_t hash = relative_hash(mesh->facets.triangles);
   if (share_equal(turned, mesh->facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());
   turned.variants.push_back({to_.objects.size(), translation, mesh->margin, reach_of(object, transform.linear)});
-  to_.objects.push_back({label, std::move(mesh->facets), {{0, 0, 0}}});
+  to_.objects.push_back({name, std::move(mesh->facets), {{0, 0, 0}}});
   return {};
 }
 

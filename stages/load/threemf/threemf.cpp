@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/expansion.h"
@@ -36,11 +37,11 @@ void tell_of_model(const ModelPackage& model, std::vector<Note>& notes) {
   for (const std::string& space : model.extensions) {
     notes.push_back(
         {false, fmt::format("holds elements of the extension {}, which lamina does not read and the file does not require",
-                            extension_name(space))});
+                            extension_label(space))});
   }
   for (const std::string& space : model.foreign) {
     notes.push_back({false, fmt::format("holds attributes of {}, which lamina does not read and the file does not require",
-                                        extension_name(space))});
+                                        extension_label(space))});
   }
   for (const Departure& one : model.departures) {
     const std::string more = one.count > 1 ? fmt::format(" and {} more", one.count - 1) : "";

@@ -1,4 +1,4 @@
-// stages/load/threemf/threemf.h: meshes of a 3MF package; internal to load.
+// stages/load/threemf/threemf.h: the objects of a 3MF file; internal to load.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ struct Package {
   std::vector<Note> notes;
 };
 
-/// 3MF: core specification, production extension, components; see threemf/. Numbers are read in double precision, the unit is
+/// 3MF: core specification, production extension, components. Numbers are read in double precision, the unit is
 /// the file's own.
 ///
 /// errors  kInput: no whole package, or no model that may be planned as what it holds; what it is, and what to do

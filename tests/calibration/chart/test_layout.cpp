@@ -11,13 +11,13 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/calibrate/chart_reading.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
-#include "stages/calibration/chart/measured.h"
 #include "stages/data/runs.h"
+#include "stages/formats/chart/chart.h"
 #include "stages/program/compile.h"
 
 namespace lamina::test {
@@ -201,10 +201,10 @@ TEST(ChartMeasured, WedgesAreTakenForSaturations) {
   const auto machine = machine_of_chart("nuferbj");
   auto laid = chart::lay_out(machine.machine, machine.grid);
   ASSERT_TRUE(laid);
-  EXPECT_EQ(chart::saturation_of(100, *laid, machine.machine), 0);  // of no thickness
+  EXPECT_EQ(pipeline::saturation_of(100, *laid, machine.machine), 0);  // of no thickness
   laid->layer_mm = 0.1;
-  EXPECT_NEAR(chart::saturation_of(100, *laid, machine.machine), 13.30, 0.01);
-  EXPECT_NEAR(chart::saturation_of(25, *laid, machine.machine), 3.325, 0.003);
+  EXPECT_NEAR(pipeline::saturation_of(100, *laid, machine.machine), 13.30, 0.01);
+  EXPECT_NEAR(pipeline::saturation_of(25, *laid, machine.machine), 3.325, 0.003);
 }
 
 /// A reading with two rows: odd nozzles land 10 um too far, so that their row stands less far behind by as much. One is seen
@@ -226,7 +226,7 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
       R"({"along_um":null,"along_seen_um":-8,"along_error_um":3,"across_um":1,"across_seen_um":1,"across_error_um":0.5},null],)"
       R"("joints":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
       R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"seen_percent":61}]})";
-  const auto lines = chart::take_over(reading, chart, machine);
+  const auto lines = pipeline::take_over(reading, chart, machine);
   ASSERT_TRUE(lines) << lines.error().message;
   EXPECT_EQ(machine.head.blocked, (std::vector<std::uint32_t>{2}));
   EXPECT_EQ(machine.head.row_offset_um, (std::vector<double>{0, 2529.5}));
@@ -237,7 +237,7 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
         "50 % of the pixels, 6.2 % saturation: 61 %"})
     EXPECT_EQ(std::ranges::count_if(*lines, [&](const std::string& line) { return line.find(words) != std::string::npos; }), 1)
         << words;
-  EXPECT_FALSE(chart::take_over("{}", chart, machine));
+  EXPECT_FALSE(pipeline::take_over("{}", chart, machine));
 }
 
 }  // namespace

@@ -11,12 +11,12 @@
 #include <random>
 #include <vector>
 
-#include "stages/calibration/chart/chart.h"
 #include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/calibration/chart/rows.h"
 #include "stages/calibration/scan/photo.h"
 #include "stages/calibration/scan/reading.h"
+#include "stages/data/chart.h"
 #include "stages/data/machine.h"
 #include "stages/program/head_grid.h"
 #include "tests/calibration/scan/synthetic.h"

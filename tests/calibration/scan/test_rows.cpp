@@ -8,9 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/calibrate/chart_reading.h"
+#include "pipeline/calibrate/scan_answer.h"
 #include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
-#include "stages/calibration/chart/measured.h"
 #include "stages/calibration/scan/photo.h"
 #include "stages/calibration/scan/reading.h"
 #include "stages/program/head_grid.h"
@@ -56,7 +57,7 @@ RowsRead read_rows(const std::vector<double>& shift_um, const Camera& camera) {
   EXPECT_TRUE(reading) << reading.error().message;
   if (!reading) return read;
   for (const auto& nozzle : reading->head.nozzle) read.told += nozzle && nozzle->along.told;
-  const auto lines = chart::take_over(json_line(scan::reading_json(*reading)), *laid, machine);
+  const auto lines = pipeline::take_over(json_line(scan::reading_json(*reading)), *laid, machine);
   EXPECT_TRUE(lines) << lines.error().message;
   for (const std::string& line : *lines) read.lines += line + "\n";
   read.row_offset_um = machine.head.row_offset_um;

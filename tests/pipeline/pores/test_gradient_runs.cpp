@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/job/file.h"
-#include "pipeline/pores/gradient.h"
+#include "pipeline/pores/design.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

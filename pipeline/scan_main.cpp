@@ -1,12 +1,12 @@
-// stages/calibration/scan/main.cpp: the program lamina-scan, a filter that lamina runs: a request as JSON on standard input; on
+// pipeline/scan_main.cpp: the program lamina-scan, a filter that lamina runs: a request as JSON on standard input; on
 // standard output what was seen as one line of JSON, and behind it, if asked for, a picture as PNG. Errors are one line there.
 #include <cstdio>
 #include <iostream>
 #include <string>
 
-#include "stages/calibration/scan/compare.h"
-#include "stages/calibration/scan/reading.h"
+#include "pipeline/calibrate/scan_answer.h"
 #include "stages/data/shortage.h"
+#include "stages/formats/chart/chart.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/text_shape.h"
 

@@ -1,12 +1,12 @@
-// stages/segment/design/design_page.h: what there is to say of a designed job, for people and for programs.
+// pipeline/pores/design_page.h: designed jobs, as text and as JSON.
 #pragma once
 
 #include <string>
 
-#include "stages/segment/design/designed.h"
+#include "pipeline/pores/design.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::segment {
+namespace lamina::pipeline {
 
 /// What a forward run says: "porosity 24.13 %, k1 101.9 +- 3.3 D along z, pores 0.071 x 1.61 mm"
 std::string told_by(const ForwardRun& forward);
@@ -21,9 +21,9 @@ std::string as_text(const GradientJob& found);
 Json as_json(const GradientJob& found, const std::string& output);
 
 /// What the nearest is, of what was wished, as options: "--porosity 26.14".
-std::string nearest_text(const PoreWish& wish, const DesignedJob& found);
+std::string nearest_text(const segment::PoreWish& wish, const DesignedJob& found);
 
 /// Which steps miss their wish, and what is nearest to the first of them; one line.
 std::string missed_text(const GradientJob& found);
 
-}  // namespace lamina::segment
+}  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-#include "stages/segment/laid/told.h"
+#include "pipeline/report/laid_summary.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::segment {
+namespace lamina::pipeline {
 namespace {
 
 /// The share of a speed that stretches come up to without a warning.
@@ -115,4 +115,4 @@ std::string speed_warning(const ShortStretches& shorts, const Extruder& machine)
   return shorts.reached_mm_s < kNearTold * shorts.told_mm_s ? short_text(shorts, machine) : std::string();
 }
 
-}  // namespace lamina::segment
+}  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// stages/load/info/planned.h: the volume of what is solid in a part, where its shells or objects overlap too.
+// stages/load/planned.h: the volume of what is solid in a part, where its shells or objects overlap too.
 #pragma once
 
 #include <functional>

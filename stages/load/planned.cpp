@@ -1,4 +1,4 @@
-#include "stages/load/info/planned.h"
+#include "stages/load/planned.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stages/heights/study/study_text.h"
+#include "pipeline/report/heights_study.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,14 @@
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::heights {
+namespace lamina::pipeline {
 namespace {
+
+using heights::Evaluation;
+using heights::FlatHit;
+using heights::LayerFacts;
+using heights::Mode;
+using heights::Study;
 
 std::string part_name(const StudiedParts& parts, std::uint32_t part) {
   return part < parts.paths.size() ? std::filesystem::path(parts.paths[part]).filename().string() : "-";
@@ -41,12 +47,29 @@ std::string flats_line(const Study& study) {
 
 }  // namespace
 
+std::string text_of(const heights::Settings& settings, double layer_mm) {
+  std::string text = fmt::format("of {} mm", settings.thickness_mm.empty() ? number_text(layer_mm) : settings.thickness_mm);
+  if (settings.mode == Mode::kUniform) return text;
+  text += fmt::format(", {}", mode_name(settings.mode));
+  if (settings.mode == Mode::kAngle) return text + fmt::format(", from {} degrees", number_text(settings.adapt_angle_deg));
+  return text + fmt::format(", steps up to {} mm", number_text(settings.cusp_mm));
+}
+
+std::string small_peaks_text(const heights::Plan& plan, double least_flat_mm2) {
+  if (plan.small_peaks == 0) return {};
+  return fmt::format(
+      "{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
+      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(least_flat_mm2),
+      plan.small_peaks == 1 ? "is" : "are", plan.small_peaks == 1 ? "" : "s");
+}
+
 std::string_view reason(const Study& study, std::size_t layer) {
   return study.reasons.empty() ? "given" : reason_name(study.reasons[layer]);
 }
 
 double angle(const Study& study, std::size_t layer) {
-  return angle_of(study.plan.looked_at.empty() ? study.evaluation.layers[layer].flattest : study.plan.looked_at[layer]);
+  return heights::angle_of(study.plan.looked_at.empty() ? study.evaluation.layers[layer].flattest
+                                                        : study.plan.looked_at[layer]);
 }
 
 std::string study_page(const StudiedParts& parts, const Study& study) {
@@ -171,7 +194,7 @@ std::string comparison_page(const std::vector<Study>& studies) {
     text += '\n';
   }
   if (saves) {
-    const TimeModel& time = first.options.time.on() ? first.options.time : kPlainTime;
+    const heights::TimeModel& time = first.options.time.on() ? first.options.time : heights::kPlainTime;
     text += fmt::format("time: {:g} s a layer and {:g} s a mm2 of its section{}; saved: beside {}\n", time.seconds_per_layer,
                         time.seconds_per_mm2,
                         first.options.time.on() ? "" : ", as beads of 0.4 mm at 40 mm/s fill it; --time-model S,S for others",
@@ -180,4 +203,4 @@ std::string comparison_page(const std::vector<Study>& studies) {
   return text;
 }
 
-}  // namespace lamina::heights
+}  // namespace lamina::pipeline

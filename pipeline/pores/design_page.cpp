@@ -1,25 +1,24 @@
-#include "stages/segment/design/design_page.h"
+#include "pipeline/pores/design_page.h"
 
 #include <fmt/format.h>
 
-#include "stages/segment/design/job_text.h"
 #include "stages/segment/permeability.h"  // the unit
 #include "stages/support/text/json_value.h"
 
-namespace lamina::segment {
+namespace lamina::pipeline {
 namespace {
 
 constexpr std::string_view kSure =
     "sure      +- is of the voxels; prints of this kind by an Anet A8 have lain within a factor of 1.5 of measured k1,\n"
     "          2.5 points of measured porosity (bench/pores.md)\n";
 
-std::string lines_text(const Settings& keys) {
+std::string lines_text(const segment::Settings& keys) {
   return fmt::format("thick {:g} mm, thin {:g} mm, {} continuous line{} between segmented ones, S-C {:g}, C-C {:g} mm",
                      keys.thick_mm, keys.thin_mm, keys.continuous, keys.continuous == 1 ? "" : "s", *keys.spacing_sc_mm,
                      *keys.spacing_cc_mm);
 }
 
-Json segment_json(const Settings& keys) {
+Json segment_json(const segment::Settings& keys) {
   return {{"thick_mm", keys.thick_mm},
           {"thin_mm", keys.thin_mm},
           {"continuous_lines", keys.continuous},
@@ -31,19 +30,19 @@ Json segment_json(const Settings& keys) {
 }
 
 /// What is wished for, as options.
-std::string wish_text(const PoreWish& wish) {
+std::string wish_text(const segment::PoreWish& wish) {
   std::string text;
   const auto add = [&](const std::string& part) { text += (text.empty() ? "" : " ") + part; };
   if (wish.porosity) add(fmt::format("--porosity {:.4g}", 100 * *wish.porosity));
-  if (wish.permeability_m2) add(fmt::format("--permeability {:.4g}", *wish.permeability_m2 / kDarcy));
+  if (wish.permeability_m2) add(fmt::format("--permeability {:.4g}", *wish.permeability_m2 / segment::kDarcy));
   if (wish.pore_width_mm) add(fmt::format("--pore {:.3g}x{:.3g}", *wish.pore_width_mm, *wish.pore_length_mm));
   return text;
 }
 
-Json wish_json(const PoreWish& wish) {
+Json wish_json(const segment::PoreWish& wish) {
   Json json = Json::object();
   if (wish.porosity) json["porosity"] = *wish.porosity;
-  if (wish.permeability_m2) json["k1_darcy"] = *wish.permeability_m2 / kDarcy;
+  if (wish.permeability_m2) json["k1_darcy"] = *wish.permeability_m2 / segment::kDarcy;
   if (wish.pore_width_mm) json["pore_mm"] = {*wish.pore_width_mm, *wish.pore_length_mm};
   return json;
 }
@@ -54,8 +53,8 @@ void tell_plan(const DesignedJob& found, Json& json) {
   json["segment"] = segment_json(found.design.settings);
   json["porosity"] = forward.porosity;
   json["porosity_through"] = forward.porosity_through;
-  json["k1_darcy"] = forward.permeability_m2 / kDarcy;
-  json["k1_error_darcy"] = forward.permeability_error_m2 / kDarcy;
+  json["k1_darcy"] = forward.permeability_m2 / segment::kDarcy;
+  json["k1_error_darcy"] = forward.permeability_error_m2 / segment::kDarcy;
   json["k1_m2"] = forward.permeability_m2;
   json["resolved"] = forward.resolved;
   json["throat_mm"] = found.design.slots.throat_mm;
@@ -74,7 +73,7 @@ Json step_json(const GradientStep& one) {
 }
 
 std::string step_text(const GradientStep& one) {
-  const Settings& keys = one.found.design.settings;
+  const segment::Settings& keys = one.found.design.settings;
   const ForwardRun& forward = one.found.forward;
   std::string text = fmt::format("{}: wished {}\n", heights_text(one.step.from_mm, one.step.to_mm), wish_text(one.step.wish));
   text += one.found.met ? fmt::format("  is        {}; within {:.1f} %\n", told_by(forward), 100 * one.found.miss)
@@ -91,19 +90,20 @@ std::string step_text(const GradientStep& one) {
 
 std::string told_by(const ForwardRun& forward) {
   return fmt::format("porosity {:.2f} %, k1 {:.4g} +- {:.2g} D along z, pores {:.3f} x {:.2f} mm", 100 * forward.porosity,
-                     forward.permeability_m2 / kDarcy, forward.permeability_error_m2 / kDarcy, forward.pore_width_mm,
-                     forward.pore_length_mm);
+                     forward.permeability_m2 / segment::kDarcy, forward.permeability_error_m2 / segment::kDarcy,
+                     forward.pore_width_mm, forward.pore_length_mm);
 }
 
 std::string as_text(const DesignedJob& found) {
-  const Settings& keys = found.design.settings;
+  const segment::Settings& keys = found.design.settings;
   const ForwardRun& forward = found.forward;
   std::string text = fmt::format("lines     {}\nlaid at   {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
                                  lines_text(keys), keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
   text += fmt::format("porosity  {:.2f} %, {:.2f} % leads through along z\n", 100 * forward.porosity,
                       100 * forward.porosity_through);
-  text += fmt::format("along z   k1 {:.4g} +- {:.2g} D ({:.4e} m2), throat {:.3f} mm\n", forward.permeability_m2 / kDarcy,
-                      forward.permeability_error_m2 / kDarcy, forward.permeability_m2, found.design.slots.throat_mm);
+  text +=
+      fmt::format("along z   k1 {:.4g} +- {:.2g} D ({:.4e} m2), throat {:.3f} mm\n", forward.permeability_m2 / segment::kDarcy,
+                  forward.permeability_error_m2 / segment::kDarcy, forward.permeability_m2, found.design.slots.throat_mm);
   text += fmt::format("pores     {:.3f} x {:.2f} mm\n", forward.pore_width_mm, forward.pore_length_mm);
   text += kSure;
   if (!found.widths.empty()) text += fmt::format("widths    {}\n", found.widths);
@@ -130,7 +130,7 @@ std::string as_text(const GradientJob& found) {
   text += fmt::format(
       "whole     porosity {:.2f} %, k1 of the regions in series {:.4g} D along z; where two meet, pores lie upon\n"
       "          each other only in part, which takes more\n",
-      100 * found.porosity, found.permeability_m2 / kDarcy);
+      100 * found.porosity, found.permeability_m2 / segment::kDarcy);
   text += kSure;
   if (const std::string& widths = found.steps.front().found.widths; !widths.empty())
     text += fmt::format("widths    {}\n", widths);
@@ -143,21 +143,21 @@ Json as_json(const GradientJob& found, const std::string& output) {
   Json json = {{"command", "design"}, {"met", found.met}, {"miss", found.miss}, {"job", output}, {"steps", Json::array()}};
   for (const GradientStep& one : found.steps) json["steps"].push_back(step_json(one));
   json["porosity"] = found.porosity;
-  json["k1_in_series_darcy"] = found.permeability_m2 / kDarcy;
+  json["k1_in_series_darcy"] = found.permeability_m2 / segment::kDarcy;
   json["continuous_lines"] = found.lines;
   json["runs"] = found.runs;
   json["widths"] = found.steps.front().found.widths;
   return json;
 }
 
-std::string nearest_text(const PoreWish& wish, const DesignedJob& found) {
+std::string nearest_text(const segment::PoreWish& wish, const DesignedJob& found) {
   const ForwardRun& forward = found.forward;
   std::string text;
   const auto add = [&](bool wished, const std::string& part) {
     if (wished) text += (text.empty() ? "" : ", ") + part;
   };
   add(wish.porosity.has_value(), fmt::format("--porosity {:.2f}", 100 * forward.porosity));
-  add(wish.permeability_m2.has_value(), fmt::format("--permeability {:.4g}", forward.permeability_m2 / kDarcy));
+  add(wish.permeability_m2.has_value(), fmt::format("--permeability {:.4g}", forward.permeability_m2 / segment::kDarcy));
   add(wish.pore_width_mm.has_value(), fmt::format("--pore {:.3f}x{:.2f}", forward.pore_width_mm, forward.pore_length_mm));
   return text;
 }
@@ -176,4 +176,4 @@ std::string missed_text(const GradientJob& found) {
                      nearest_text(first->step.wish, first->found), 100 * first->found.miss);
 }
 
-}  // namespace lamina::segment
+}  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// stages/heights/study/study_plot.h: thickness against height, beside the parts' outline.
+// pipeline/report/heights_plot.h: thickness against height, next to the parts' outline.
 #pragma once
 
 #include <span>
@@ -8,12 +8,12 @@
 #include "stages/data/plot.h"
 #include "stages/heights/study/study.h"
 
-namespace lamina::heights {
+namespace lamina::pipeline {
 
 /// title  of the parts
 /// errors  none
 /// cost  O(triangles * rows they span + layers)
 Plot draw_study(const std::string& title, std::span<const Mesh> meshes, std::span<const Instance> instances,
-                const Study& study);
+                const heights::Study& study);
 
-}  // namespace lamina::heights
+}  // namespace lamina::pipeline

@@ -1,5 +1,4 @@
-// stages/load/info/info.cpp: a part is loaded as it is, diagnosed, and loaded again as a job would.
-#include "stages/load/info/info.h"
+#include "pipeline/report/part_info.h"
 
 #include <fmt/core.h>
 
@@ -15,8 +14,14 @@
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::load {
+namespace lamina::pipeline {
 namespace {
+
+using load::Diagnosis;
+using load::Known;
+using load::LoadOptions;
+using load::PlannedVolumes;
+using load::SurplusAreas;
 
 constexpr std::size_t kPlaces = 3;
 constexpr std::size_t kMeshesShown = 24;
@@ -58,7 +63,7 @@ bool may_change(const Description& description) {
 
 /// The volumes of a part as planned.
 Status plan(const Part& part, std::span<const Diagnosis> diagnosis, const SurplusAreas& surplus, Description& description) {
-  Result<PlannedVolumes> volumes = planned_volumes(part.meshes, part.instances, diagnosis, surplus);
+  Result<PlannedVolumes> volumes = load::planned_volumes(part.meshes, part.instances, diagnosis, surplus);
   if (!volumes) return volumes.error();
   description.planned = std::move(*volumes);
   for (const Mesh& mesh : part.meshes) description.capped_share.push_back(mesh.capped_share);
@@ -74,19 +79,20 @@ bool is_sound(const Diagnosis& found) {
 /// Loads a part as it is in the file and diagnoses it. A sound mesh that comes as blocks is diagnosed as such: where shells lie
 /// apart, its list is never made. `sound` is true then: repair would change nothing.
 Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& options, Description& description, bool& sound) {
-  DegenerateFacets degenerate(kPlaces);
+  load::DegenerateFacets degenerate(kPlaces);
   LoadOptions as_is = options;
   as_is.repair = false;
   as_is.blocks = true;
-  Result<Part> part = load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.look(first, facets); });
+  Result<Part> part =
+      load::load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.look(first, facets); });
   if (!part) return part;
   as_is.blocks = false;
   sound = false;
   if (part->meshes.size() == 1 && part->meshes.front().blocks) {
-    Diagnosis found = diagnose_blocks(std::exchange(part->meshes.front().blocks, nullptr));
+    Diagnosis found = load::diagnose_blocks(std::exchange(part->meshes.front().blocks, nullptr));
     found.degenerate_facets = degenerate.finding();
     sound = is_sound(found);
-    if (!sound || !found.shells_apart) part = load(path, as_is);
+    if (!sound || !found.shells_apart) part = load::load(path, as_is);
     if (!part) return part;
     if (sound) description.diagnosis.push_back(std::move(found));
   }
@@ -95,14 +101,14 @@ Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& optio
   if (sound) return part;
   const bool alone = part->instances.size() == 1;  // the lists of others may be sliced together
   for (Mesh& mesh : part->meshes) {
-    description.diagnosis.push_back(alone ? diagnose_alone(mesh, kPlaces) : diagnose(mesh, kPlaces));
+    description.diagnosis.push_back(alone ? load::diagnose_alone(mesh, kPlaces) : load::diagnose(mesh, kPlaces));
     description.balanced = description.balanced && description.diagnosis.back().balanced;
   }
   return part;
 }
 
 Result<Description> describe(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus) {
-  const Result<std::string> format = format_of(path, options);
+  const Result<std::string> format = load::format_of(path, options);
   if (!format) return format.error();
   Description description;
   description.format = *format;
@@ -117,14 +123,14 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
     return description;
   }
   for (Mesh& mesh : description.part.meshes) Buffer<Triangle>().swap(mesh.triangles);
-  Result<Part> planned = load(path, options);
+  Result<Part> planned = load::load(path, options);
   if (!planned) return planned.error();
   if (planned->meshes.size() != description.copies.size())
     return Error{Fault::kInput, path + ": changed while it was read; run it again"};
   description.notes = std::move(planned->notes);
   std::vector<Diagnosis> diagnosis;
   const bool alone = planned->instances.size() == 1;
-  for (Mesh& mesh : planned->meshes) diagnosis.push_back(alone ? diagnose_alone(mesh, 0) : diagnose(mesh, 0));
+  for (Mesh& mesh : planned->meshes) diagnosis.push_back(alone ? load::diagnose_alone(mesh, 0) : load::diagnose(mesh, 0));
   if (const Status done = plan(*planned, diagnosis, surplus, description); !done) return done.error();
   return description;
 }
@@ -311,4 +317,4 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
   return json_line(json);
 }
 
-}  // namespace lamina::load
+}  // namespace lamina::pipeline

@@ -1,13 +1,10 @@
-// stages/calibration/chart/chart.h: what a calibration chart of a powder printer has where. The chart is laid out by
+// stages/data/chart.h: the elements of a calibration chart of a powder printer and their positions. The chart is laid out by
 // stages/calibration/chart and read back from a photograph by stages/calibration/scan.
 #pragma once
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
-
-#include "stages/data/status.h"
 
 namespace lamina {
 
@@ -67,9 +64,5 @@ struct Chart {
 
 /// The radius of the hole of the ring, as a share of its own.
 inline constexpr double kRingHole = 0.5;
-
-/// The chart as JSON, and back. errors  kInput: what is no chart, or has boxes outside of the image; begins with `where`
-std::string chart_text(const Chart& chart);
-Result<Chart> read_chart(std::string_view text, const std::string& where);
 
 }  // namespace lamina

@@ -1,4 +1,4 @@
-#include "stages/calibration/chart/measured.h"
+#include "pipeline/calibrate/chart_reading.h"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,10 @@
 #include "stages/calibration/chart/rows.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::chart {
+namespace lamina::pipeline {
 namespace {
+
+using chart::Located;
 
 std::string list_of(const std::vector<std::uint32_t>& nozzles) {
   return nozzles.empty() ? "none" : fmt::format("{}", fmt::join(nozzles, ", "));
@@ -34,7 +36,7 @@ std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char
 std::string correct_rows(const std::vector<std::optional<Located>>& along, const Chart& chart, Machine& machine) {
   std::vector<double>& rows = machine.head.row_offset_um;
   if (rows.size() < 2) return "";
-  const auto seen = rows_of(along, static_cast<std::uint32_t>(rows.size()));
+  const auto seen = chart::rows_of(along, static_cast<std::uint32_t>(rows.size()));
   const double pixel_um = 1e-3 * (chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm);
   std::string line;
   std::size_t untold = 0;
@@ -177,4 +179,4 @@ double saturation_of(double pixels_percent, const Chart& chart, const Machine& m
   return voids_um3 > 0 ? pixels_percent * drop_um3 / voids_um3 : 0;
 }
 
-}  // namespace lamina::chart
+}  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// stages/segment/laid/told.h: what was laid, for people and as JSON.
+// pipeline/report/laid_summary.h: what toolpaths of segmented lines deposit, as lines of a summary and as JSON.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 #include "stages/segment/predict.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::segment {
+namespace lamina::pipeline {
 
 /// The layers of a range of heights with segmented lines.
 struct LaidRange {
@@ -35,4 +35,4 @@ void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view
 /// "612 stretches are too short for 400 mm/s2: ..." if most of the speed is missed; else "".
 std::string speed_warning(const ShortStretches& shorts, const Extruder& machine);
 
-}  // namespace lamina::segment
+}  // namespace lamina::pipeline

@@ -1,15 +1,15 @@
-// stages/calibration/chart/measured.h: what lamina-scan read off a chart, in the words of a profile.
+// pipeline/calibrate/chart_reading.h: the readings of lamina-scan from a chart, as keys of a machine profile.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "stages/calibration/chart/chart.h"
+#include "stages/data/chart.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
 
-namespace lamina::chart {
+namespace lamina::pipeline {
 
 /// Takes over what was read: head.blocked, head.row_offset_um and head.dot_gain_um. Nozzles that the chart does not have, for
 /// the controller cannot fire them, stay blocked. Rows are told apart where the head has several. Offsets that cannot be told
@@ -24,4 +24,4 @@ Result<std::vector<std::string>> take_over(std::string_view reading, const Chart
 /// Per cent of the voids that drops on so many per cent of the pixels fill; 0 if the layer's thickness is not known.
 double saturation_of(double pixels_percent, const Chart& chart, const Machine& machine);
 
-}  // namespace lamina::chart
+}  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-#include "stages/calibration/chart/chart.h"
+#include "stages/formats/chart/chart.h"
 
 #include <fmt/format.h>
 
@@ -12,8 +12,8 @@ namespace lamina {
 namespace {
 
 constexpr const char* kKind = "lamina chart 1";
-constexpr std::uint32_t kMostSide = 1u << 20;
-constexpr double kMostMm = 1000, kMostImageMm = 10'000;
+constexpr std::uint32_t kMaxSide = 1u << 20;
+constexpr double kMaxLengthMm = 1000, kMaxImageMm = 10'000;
 
 Json box_json(const ChartBox& box) { return Json::array({box.left, box.top, box.right, box.bottom}); }
 
@@ -41,13 +41,13 @@ Chart chart_of(const Json& json) {
   chart.machine = json.at("machine").get<std::string>();
   chart.columns = json.at("columns").get<std::uint32_t>();
   chart.rows = json.at("rows").get<std::uint32_t>();
-  if (chart.columns > kMostSide || chart.rows > kMostSide) throw std::out_of_range("its image is too large");
+  if (chart.columns > kMaxSide || chart.rows > kMaxSide) throw std::out_of_range("its image is too large");
   chart.pixel_x_nm = json.at("pixel_nm").at(0).get<double>();
   chart.pixel_y_nm = json.at("pixel_nm").at(1).get<double>();
-  if (!(chart.pixel_x_nm >= 1000 && chart.pixel_x_nm <= kMostMm * 1e6) ||
-      !(chart.pixel_y_nm >= 1000 && chart.pixel_y_nm <= kMostMm * 1e6))
+  if (!(chart.pixel_x_nm >= 1000 && chart.pixel_x_nm <= kMaxLengthMm * 1e6) ||
+      !(chart.pixel_y_nm >= 1000 && chart.pixel_y_nm <= kMaxLengthMm * 1e6))
     throw std::out_of_range("its pixels have no size");
-  if (chart.columns * chart.pixel_x_nm > kMostImageMm * 1e6 || chart.rows * chart.pixel_y_nm > kMostImageMm * 1e6)
+  if (chart.columns * chart.pixel_x_nm > kMaxImageMm * 1e6 || chart.rows * chart.pixel_y_nm > kMaxImageMm * 1e6)
     throw std::out_of_range("its image is too large");
   chart.scan_along_x = json.at("scan") == "x";
   chart.along_sign = json.at("along_sign").get<int>() < 0 ? -1 : 1;
@@ -62,10 +62,10 @@ Chart chart_of(const Json& json) {
   chart.gap_mm = json.at("gap_mm").get<double>();
   chart.mark_mm = json.at("mark_mm").get<double>();
   for (const double mm : {chart.between_mm, chart.gap_mm, chart.mark_mm}) {
-    if (!(mm > 0 && mm <= kMostMm)) throw std::out_of_range("its lengths are not positive, or too large");
+    if (!(mm > 0 && mm <= kMaxLengthMm)) throw std::out_of_range("its lengths are not positive, or too large");
   }
   if (json.contains("layer_mm")) json.at("layer_mm").get_to(chart.layer_mm);
-  if (!(chart.layer_mm >= 0 && chart.layer_mm <= kMostMm)) throw std::out_of_range("its layer has no thickness");
+  if (!(chart.layer_mm >= 0 && chart.layer_mm <= kMaxLengthMm)) throw std::out_of_range("its layer has no thickness");
   for (const Json& mark : json.at("marks")) chart.marks.push_back(box_of(mark, chart));
   if (chart.marks.size() != 4) throw std::out_of_range("it has not four marks");
   for (const Json& dash : json.at("dashes")) {

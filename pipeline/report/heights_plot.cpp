@@ -1,4 +1,4 @@
-#include "stages/heights/study/study_plot.h"
+#include "pipeline/report/heights_plot.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,12 @@
 
 #include "stages/data/ticks.h"
 
-namespace lamina::heights {
+namespace lamina::pipeline {
 namespace {
+
+using heights::Evaluation;
+using heights::FlatHit;
+using heights::Study;
 
 constexpr int kWidth = 1200, kHeight = 900, kTop = 96, kBottom = 70, kLeft = 80, kGap = 90, kRight = 150;
 constexpr int kPlotHeight = kHeight - kTop - kBottom;
@@ -169,4 +173,4 @@ Plot draw_study(const std::string& title, std::span<const Mesh> meshes, std::spa
   return plot;
 }
 
-}  // namespace lamina::heights
+}  // namespace lamina::pipeline
