@@ -20,7 +20,7 @@
 namespace lamina::load {
 namespace {
 
-constexpr std::size_t kWindow = std::size_t{32} << 20, kBlock = std::size_t{1} << 20;
+constexpr std::size_t kWindowBytes = std::size_t{32} << 20, kBlock = std::size_t{1} << 20;
 
 /// What a block of text holds. Blocks begin and end between facets.
 struct Block {
@@ -239,7 +239,7 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
     }
     return {};
   };
-  if (const Status read = for_each_window(source, kWindow, behind_last_facet, read_window); !read) return read.error();
+  if (const Status read = for_each_window(source, kWindowBytes, behind_last_facet, read_window); !read) return read.error();
   if (facets.triangles.empty() && dropped == 0) return source.error("holds no facets");
   if (dropped > 0)
     facets.notes.push_back(
