@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/data/ticks.h"
+#include "stages/data/plot.h"
 #include "stages/view/colour_scale.h"
 
 namespace lamina::view {
