@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
-#include "stages/support/text/text_shape.h"
 
 namespace lamina::pipeline {
 namespace {

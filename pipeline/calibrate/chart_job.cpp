@@ -13,7 +13,7 @@
 #include "stages/formats/chart/chart.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 

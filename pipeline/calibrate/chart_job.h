@@ -4,7 +4,7 @@
 #include <atomic>
 #include <string>
 
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/report/summary.h"
 #include "stages/data/status.h"
 

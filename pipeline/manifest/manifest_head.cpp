@@ -12,9 +12,9 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/program/dialect.h"
+#include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {

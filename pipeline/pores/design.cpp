@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "pipeline/job/file.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/design_page.h"
 #include "stages/support/text/number_text.h"

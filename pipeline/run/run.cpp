@@ -10,7 +10,7 @@
 #include "pipeline/flow/layers.h"
 #include "pipeline/job/job.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/slice_directory.h"
+#include "pipeline/output/slice_files.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/report/heights_study.h"
 #include "pipeline/report/image_observers.h"

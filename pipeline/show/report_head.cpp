@@ -3,7 +3,7 @@
 #include <cmath>
 #include <span>
 
-#include "stages/support/text/base64.h"
+#include "stages/support/text/escape.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::write::report {

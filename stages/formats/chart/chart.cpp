@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
+#include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {

@@ -6,7 +6,6 @@
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/order.h"
 #include "stages/geometry/contours/simplify.h"
 
 namespace lamina {

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "pipeline/calibrate/chart_reading.h"
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
