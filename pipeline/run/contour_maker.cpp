@@ -17,7 +17,7 @@ namespace {
 class ContourMaker : public Maker {
  public:
   ContourMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), files_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
+      : plan_(plan), sanity_(sanity), files_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 

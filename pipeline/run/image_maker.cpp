@@ -32,7 +32,7 @@ class ImageMaker : public Maker {
         imager_(plan),
         inspector_(plan),
         files_(plan),
-        work_(limits.most_in_flight),
+        work_(limits.max_in_flight),
         made_(limits.record_slots) {
     if (plan.images->machine) cost_.emplace(plan);
     for (const JobMaterial& material : plan.images->materials.used) {
