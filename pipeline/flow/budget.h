@@ -36,7 +36,7 @@ class Correction {
 };
 
 /// Slots are lent last in, first out, so that few of them grow large. Memory of an idle slot counts as used and is freed
-/// before a layer would have to wait for it. Thread-compatible: callers hold a lock.
+/// before a layer would have to wait for it. Thread-compatible.
 class Budget {
  public:
   struct Scratch {
@@ -62,7 +62,7 @@ class Budget {
     loan.bytes = std::max(loan.bytes, bytes);
     ++in_flight_;
     use(loan.bytes);
-    most_in_flight_ = std::max(most_in_flight_, in_flight_);
+    max_in_flight_ = std::max(max_in_flight_, in_flight_);
     return loan;
   }
 
@@ -91,13 +91,13 @@ class Budget {
   }
 
   std::uint64_t bytes() const { return budget_; }
-  std::uint32_t most_in_flight() const { return most_in_flight_; }
-  std::uint64_t most_bytes() const { return most_bytes_; }
+  std::uint32_t max_in_flight() const { return max_in_flight_; }
+  std::uint64_t max_bytes() const { return max_bytes_; }
 
  private:
   void use(std::uint64_t bytes) {
     used_ += bytes;
-    most_bytes_ = std::max(most_bytes_, used_ + idle_bytes_);
+    max_bytes_ = std::max(max_bytes_, used_ + idle_bytes_);
   }
 
   void make_room(std::uint64_t bytes) {
@@ -113,11 +113,11 @@ class Budget {
   std::uint64_t budget_;
   Scratch scratch_;
   std::vector<Loan> idle_;  // each with its retained bytes
-  std::uint32_t in_flight_ = 0, most_in_flight_ = 0;
+  std::uint32_t in_flight_ = 0, max_in_flight_ = 0;
   std::uint64_t used_ = 0;  // by layers in flight and beside them
   std::uint64_t beside_ = 0;
   std::uint64_t idle_bytes_ = 0;  // of idle slots
-  std::uint64_t most_bytes_ = 0;
+  std::uint64_t max_bytes_ = 0;
 };
 
 }  // namespace lamina::pipeline

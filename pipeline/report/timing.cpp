@@ -30,9 +30,8 @@ Lines timing_lines(const Timing& timing) {
   };
   for (const auto& [name, span] : timing.phases) phase_line(name, span);
   phase_line("all", timing.whole());
-  add(fmt::format("{:<12}{:>10}{:>14}", "step", "busy, s", "processor, s"));
-  for (const auto& [name, busy, processor] : timing.steps) add(fmt::format("{:<12}{:>10.4f}{:>14.4f}", name, busy, processor));
-  add(fmt::format("{:<12}{:>10.4f} over {} threads", "lock waits", timing.lock_seconds, timing.threads));
+  add(fmt::format("{:<12}{:>10}{:>14}", "node", "busy, s", "processor, s"));
+  for (const auto& [name, busy, processor] : timing.nodes) add(fmt::format("{:<12}{:>10.4f}{:>14.4f}", name, busy, processor));
   const write::Floor& floor = timing.floor;
   if (!timing.not_measured.empty()) {
     add("limit       not measured: " + timing.not_measured);
@@ -47,13 +46,13 @@ Lines timing_lines(const Timing& timing) {
 }
 
 Json timing_json(const Timing& timing) {
-  Json phases = Json::object(), steps = Json::object();
+  Json phases = Json::object(), nodes = Json::object();
   for (const auto& [name, span] : timing.phases) {
     phases[std::string(name)] = {
         {"wall", span.wall}, {"processor", span.processor}, {"serial_share", serial_share(span, timing.threads)}};
   }
-  for (const auto& [name, busy, processor] : timing.steps) {
-    steps[std::string(name)] = {{"busy", busy}, {"processor", processor}};
+  for (const auto& [name, busy, processor] : timing.nodes) {
+    nodes[std::string(name)] = {{"busy", busy}, {"processor", processor}};
   }
   const write::Floor& floor = timing.floor;
   Json limit = {{"read_bytes", floor.bytes_read}, {"read_seconds", floor.read},   {"write_bytes", floor.bytes_written},
@@ -63,11 +62,7 @@ Json timing_json(const Timing& timing) {
     limit = Json::object();
     limit["not_measured"] = timing.not_measured;
   }
-  return {{"threads", timing.threads},
-          {"phases", phases},
-          {"steps", steps},
-          {"lock_wait_seconds", timing.lock_seconds},
-          {"limit", limit}};
+  return {{"threads", timing.threads}, {"phases", phases}, {"nodes", nodes}, {"limit", limit}};
 }
 
 }  // namespace lamina::pipeline

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/flow/layers.h"
 #include "stages/formats/null/floor.h"
 #include "stages/support/clocks.h"
 #include "stages/support/text/json_value.h"
@@ -18,15 +19,10 @@ struct Timing {
     std::string_view name;
     Elapsed took;
   };
-  struct StepTime {
-    std::string_view name;
-    double busy = 0, processor = 0;  // seconds, over all threads
-  };
   std::uint32_t threads = 1;
   std::vector<Phase> phases;    // one after the other; together the run. Of "start", what the process did before, the
                                 // processor's time stands for both, in a batch with that of other jobs
-  std::vector<StepTime> steps;  // of layers, at the same time
-  double lock_seconds = 0;      // waited for other threads' turns, over all threads
+  std::vector<NodeTime> nodes;  // of the graph that makes the layers, at the same time
   write::Floor floor;
   std::string not_measured;  // why the limit is not; else empty
 

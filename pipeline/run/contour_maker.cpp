@@ -10,7 +10,7 @@ namespace {
 class ContourMaker : public Maker {
  public:
   ContourMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), files_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {
+      : plan_(plan), sanity_(sanity), files_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
     observe_contours(plan, observers_);
   }
 

@@ -15,7 +15,7 @@ namespace {
 class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
+      : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.max_in_flight), made_(limits.record_slots) {
     if (plan.images->machine) parts_.emplace(plan);
     observe_pixels(plan, observers_);
     inspector_ = &observers_.add<Inspector>(plan);

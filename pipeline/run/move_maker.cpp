@@ -18,7 +18,7 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {
+      : plan_(plan), sanity_(sanity), file_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
     observe_moves(plan, sums_, observers_);
   }
 

@@ -109,10 +109,8 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer, bool shared)
 
 void tell_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
   timing.phases.push_back({"layers", layers});
-  timing.lock_seconds = report.lock_seconds;
-  for (std::size_t s = 0; s < report.step_seconds.size(); ++s) {
-    timing.steps.push_back({report.step_seconds[s].first, report.step_seconds[s].second, report.step_processor_seconds[s]});
-  }
+  timing.nodes = {report.credits};
+  timing.nodes.insert(timing.nodes.end(), report.steps.begin(), report.steps.end());
 }
 
 bool cut_short(const Status& status) {
@@ -162,9 +160,9 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0, shared);
   const Elapsed moved_in = moving.elapsed();
   summary.layer_seconds = moved_in.wall;
-  summary.step_seconds = report.step_seconds;
-  summary.most_layers_in_flight = report.most_in_flight;
-  summary.peak_layer_bytes = report.most_bytes;
+  for (const NodeTime& step : report.steps) summary.step_seconds.emplace_back(step.name, step.busy);
+  summary.most_layers_in_flight = report.max_in_flight;
+  summary.peak_layer_bytes = report.max_bytes;
   summary.oversized_layers = report.oversized;
   if (summary.timing) tell_flow(report, moved_in, *summary.timing);
   return {};
@@ -217,10 +215,10 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (Status status = sanity::refuse_warnings(plan->warnings); job.strict && !status) return status.error();
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
-  limits.most_in_flight = layers_in_flight();
+  limits.max_in_flight = layers_in_flight();
   limits.processor_times = job.timing;
-  limits.record_slots = 2 * limits.most_in_flight;  // some layers wait for an older one, in a single file with their scratch
-  if (product != Product::kImages) limits.most_in_flight = limits.record_slots;
+  limits.record_slots = 2 * limits.max_in_flight;  // some layers wait for an older one, in a single file with their scratch
+  if (product != Product::kImages) limits.max_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
   if (job.timing) summary.timing = timing_of(*plan, {before, before});
   Sanity sanity(*plan, cancel);

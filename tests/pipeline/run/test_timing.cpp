@@ -79,9 +79,9 @@ TEST(Timing, ARunTellsEachStepAndWhatTheLimitReadsAndWrites) {
   const nlohmann::json &timing = timed["timing"], &limit = timing["limit"];
   double steps = 0;
   for (const char* step : {"raster", "dose", "encode", "store", "record"}) {
-    EXPECT_GT(timing["steps"][step]["processor"], 0) << step;
-    EXPECT_GT(timing["steps"][step]["busy"], 0) << step;
-    steps += timing["steps"][step]["processor"].get<double>();
+    EXPECT_GT(timing["nodes"][step]["processor"], 0) << step;
+    EXPECT_GT(timing["nodes"][step]["busy"], 0) << step;
+    steps += timing["nodes"][step]["processor"].get<double>();
   }
   EXPECT_LE(steps, timing["phases"]["layers"]["processor"]) << "steps are parts of the phase";
   EXPECT_EQ(limit["read_bytes"], std::filesystem::file_size(part));
