@@ -8,11 +8,9 @@
 #include <string_view>
 
 #include "pipeline/machine/materials.h"
-#include "pipeline/report/dose_text.h"
+#include "pipeline/report/image_text.h"
 #include "pipeline/report/job_cost.h"
-#include "pipeline/report/layer_text.h"
 #include "pipeline/report/machine_text.h"
-#include "pipeline/report/powder_drops.h"
 #include "pipeline/report/replay_text.h"
 #include "stages/checks/records.h"
 #include "stages/checks/rows.h"

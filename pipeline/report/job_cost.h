@@ -8,7 +8,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/cost_report.h"
-#include "pipeline/report/powder_drops.h"
+#include "pipeline/report/image_text.h"
 #include "pipeline/report/summary.h"
 
 namespace lamina::pipeline {

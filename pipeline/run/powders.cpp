@@ -8,7 +8,7 @@
 #include <atomic>
 
 #include "pipeline/plan/heights.h"
-#include "pipeline/report/layer_text.h"
+#include "pipeline/report/image_text.h"
 #include "stages/checks/mixed.h"
 #include "stages/program/vats.h"
 

@@ -4,7 +4,7 @@
 #include <random>
 #include <set>
 
-#include "pipeline/report/layer_text.h"
+#include "pipeline/report/image_text.h"
 #include "stages/checks/mixed.h"
 
 namespace lamina::sanity {

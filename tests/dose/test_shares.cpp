@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "pipeline/report/dose_text.h"
+#include "pipeline/report/image_text.h"
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"

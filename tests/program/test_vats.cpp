@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/report/layer_text.h"
+#include "pipeline/report/image_text.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"

@@ -1,11 +1,33 @@
-#include "pipeline/report/dose_text.h"
+#include "pipeline/report/image_text.h"
 
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
+namespace {
+
+double ml_of(std::uint64_t drops, double drop_pl) { return static_cast<double>(drops) * drop_pl * 1e-9; }
+
+}  // namespace
+
+std::string powder_text(const PowderDrops& powder, double drop_pl) {
+  const std::string count = readable_count(powder.pixels);
+  if (drop_pl <= 0) return fmt::format("{} of {}", count, powder.name);
+  return fmt::format("{} pixels of {}: {} drops, {:.3f} ml of binder", count, powder.name, readable_count(powder.drops),
+                     ml_of(powder.drops, drop_pl));
+}
+
+Json powder_json(const PowderDrops& powder, double drop_pl) {
+  Json fact = {{"name", powder.name}, {"set_pixels", powder.pixels}};
+  if (drop_pl <= 0) return fact;
+  fact["drops"] = powder.drops;
+  fact["binder_ml"] = ml_of(powder.drops, drop_pl);
+  return fact;
+}
 
 std::string binder_text(const dose::Budget& budget, const dose::BinderCount& count) {
   if (!budget.has_wish()) {
@@ -50,6 +72,32 @@ Json voxels_json(const dose::ShareCount& count, std::uint32_t levels, std::strin
           {"half_differs", count.half_differs},
           {"half_differs_share", count.differing_share()},
           {"half_far", count.half_far}};
+}
+
+std::string ranges_text(std::span<const sanity::LayerRange> ranges) {
+  constexpr std::size_t kMost = 6;
+  const std::size_t shown = std::min(kMost, ranges.size());
+  const bool one = ranges.size() == 1 && ranges[0][0] == ranges[0][1];
+  std::string text = one ? "layer " : "layers ";
+  for (std::size_t i = 0; i < shown; ++i) {
+    if (i > 0) text += i + 1 == ranges.size() ? " and " : ", ";
+    const auto [first, last] = ranges[i];
+    text += first == last ? fmt::format("{}", first) : fmt::format("{} to {}", first, last);
+  }
+  if (shown < ranges.size()) text += fmt::format(" and {} more ranges", ranges.size() - shown);
+  return text;
+}
+
+std::string refills_text(const std::vector<std::uint32_t>& refills) {
+  constexpr std::size_t kTold = 6;
+  if (refills.empty()) return {};
+  std::string text = refills.size() == 1 ? "pauses before layer " : "pauses before layers ";
+  for (std::size_t i = 0; i < std::min(kTold, refills.size()); ++i) {
+    const bool last = i + 1 == refills.size();
+    text += fmt::format("{}{}", i == 0 ? "" : last ? " and " : ", ", refills[i]);
+  }
+  if (refills.size() > kTold) text += fmt::format(" and {} more", refills.size() - kTold);
+  return text + " for vats to be filled";
 }
 
 }  // namespace lamina::pipeline
