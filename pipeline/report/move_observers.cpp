@@ -75,15 +75,15 @@ class SegmentObserver : public MoveObserver {
     add(ranges_.back(), laid.pores, record.paths->area_mm2);
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
-    std::string slow = segment::speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
+    std::string slow = speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
     if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
   }
   void report(Summary& summary) const override {
-    segment::tell_laid(sums_.laid, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results, summary.facts);
+    tell_laid(sums_.laid, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results, summary.facts);
   }
 
  private:
-  static void add(segment::LaidRange& range, const PoreCounts& pores, double area_mm2) {
+  static void add(LaidRange& range, const PoreCounts& pores, double area_mm2) {
     range.pores.add(pores);
     range.area_mm2 += area_mm2;
   }
@@ -91,8 +91,8 @@ class SegmentObserver : public MoveObserver {
   const Plan& plan_;
   const PathFacts& sums_;
   decltype(std::declval<SegmentPlan>().segmented()) segmented_;
-  bool by_layer_;                           // records have the pores of each range
-  std::vector<segment::LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
+  bool by_layer_;                  // records have the pores of each range
+  std::vector<LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
   std::uint64_t first_layer_points_ = 0;
 };
 
@@ -151,8 +151,8 @@ void report_move_plan(const Plan& plan, Summary& summary) {
   summary.machine = plan.moves->profile.machine.name;
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
-  segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out,
-                     plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
+  tell_bead(plan.moves->profile.machine, plan.moves->left_out,
+            plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
   summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",
                                                                        number_text(tolerance_um))
