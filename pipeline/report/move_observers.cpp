@@ -91,7 +91,7 @@ class SegmentObserver : public MoveObserver {
   const Plan& plan_;
   const PathFacts& sums_;
   decltype(std::declval<SegmentPlan>().segmented()) segmented_;
-  bool by_layer_;                           // records have the pores of each range
+  bool by_layer_;                  // records have the pores of each range
   std::vector<LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
   std::uint64_t first_layer_points_ = 0;
 };
@@ -152,7 +152,7 @@ void report_move_plan(const Plan& plan, Summary& summary) {
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
   tell_bead(plan.moves->profile.machine, plan.moves->left_out,
-                     plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
+            plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
   summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",
                                                                        number_text(tolerance_um))
