@@ -8,7 +8,7 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/contact.h"
-#include "stages/geometry/contours/simplify.h"
+#include "stages/geometry/contours/tidy.h"
 
 namespace lamina {
 namespace {
