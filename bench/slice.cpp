@@ -6,7 +6,7 @@
 
 #include "bench/named_parts.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/tidy.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/slice/slice.h"
 
 namespace lamina::bench {

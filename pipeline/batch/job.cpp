@@ -9,7 +9,7 @@
 #include <set>
 
 #include "stages/load/load.h"
-#include "stages/support/io/replaceable.h"
+#include "stages/support/io/file_target.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "stages/support/text/json.h"
-#include "stages/support/text/text_shape.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -7,10 +7,10 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
-#include "stages/formats/stl/block.h"
+#include "stages/formats/stl/mesh_stl.h"
 #include "stages/segment/widths_table.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -12,7 +12,7 @@
 #include "stages/calibration/chart/layout.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

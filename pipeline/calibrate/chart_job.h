@@ -4,7 +4,7 @@
 #include <atomic>
 #include <string>
 
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/run/summary.h"
 #include "stages/calibration/chart/chart.h"
 #include "stages/data/status.h"

@@ -14,7 +14,7 @@
 #include "pipeline/cli/outputs.h"
 #include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/names.h"
 

@@ -9,7 +9,7 @@
 #include <ctime>
 
 #include "stages/support/io/file.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 #include "stages/support/text/json.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/terminal.h"

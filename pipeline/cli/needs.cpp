@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -12,7 +12,7 @@
 #include "stages/cost/quote_table.h"
 #include "stages/formats/voxels/image.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/replaceable.h"
+#include "stages/support/io/file_target.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

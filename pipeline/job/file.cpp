@@ -12,7 +12,7 @@
 #include "pipeline/job/lists/named_files.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/replaceable.h"
+#include "stages/support/io/file_target.h"
 #include "stages/support/text/json_text.h"
 
 namespace lamina::pipeline {

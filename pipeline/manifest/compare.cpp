@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "stages/support/hash/digest_range.h"
+#include "stages/support/hash/hash.h"
 
 namespace lamina {
 namespace {

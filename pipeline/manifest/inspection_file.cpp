@@ -9,8 +9,8 @@
 
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/replaceable.h"
-#include "stages/support/text/text_shape.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina {
 namespace {

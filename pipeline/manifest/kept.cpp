@@ -8,9 +8,8 @@
 #include <cstring>
 #include <filesystem>
 
-#include "stages/support/hash/digest_range.h"
 #include "stages/support/hash/hash.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina {
 

@@ -9,7 +9,6 @@
 
 #include "stages/formats/image_format.h"
 #include "stages/program/dialect.h"
-#include "stages/support/io/leftovers.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/number_text.h"
 

@@ -11,10 +11,10 @@
 #include <utility>
 
 #include "pipeline/manifest/kept.h"
-#include "stages/support/hash/digest_range.h"
+#include "stages/support/hash/hash.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_target.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina {
 namespace {

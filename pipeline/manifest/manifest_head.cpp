@@ -13,8 +13,8 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/program/dialect.h"
+#include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {

@@ -8,9 +8,9 @@
 #include "pipeline/job/job.h"
 #include "pipeline/manifest/layer_files.h"
 #include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/plan.h"
 #include "stages/data/status.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/leftovers.h"
 #include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
@@ -44,5 +44,20 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made);
 
 /// How a layer's file is written in a claimed directory.
 write::FileOptions layer_file_options(const Job& job);
+
+// --- finds the intact layers of an interrupted job.
+
+/// Reads the manifest of `directory` (finished or partial) and hashes the files it names.
+///
+/// returns  the records, in layer order, of complete and unchanged files; empty without a manifest
+/// errors   kUsage if the manifest belongs to another job (names the key that differs) or covers layers outside this run
+/// cost     reads every finished file once, in parallel
+Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
+                                                  const ManifestHead& head);
+
+// --- the manifest keys common to all products.
+
+/// The manifest head of a plan, without product-specific keys.
+ManifestHead plan_head(const Plan& plan);
 
 }  // namespace lamina::pipeline

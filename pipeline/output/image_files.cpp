@@ -10,7 +10,6 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/resume.h"
 #include "stages/program/dialect.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/version.h"

@@ -10,15 +10,15 @@
 #include <vector>
 
 #include "pipeline/manifest/manifest.h"
-#include "pipeline/output/plan_head.h"
+#include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/formats/image_format.h"
-#include "stages/support/io/leftovers.h"
 #include "stages/support/io/sync.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 

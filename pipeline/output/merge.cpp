@@ -12,8 +12,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "stages/checks/records.h"
-#include "stages/support/io/bring.h"
-#include "stages/support/io/replaceable.h"
+#include "stages/support/io/file_target.h"
 #include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {

@@ -15,7 +15,7 @@
 #include <string_view>
 
 #include "pipeline/job/job.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/manifest.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"

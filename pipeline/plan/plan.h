@@ -13,9 +13,8 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/plan/beads.h"
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/progress.h"

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/data/machine.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 #include "stages/formats/images/layer_images.h"
@@ -55,5 +56,11 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request);
 /// grid    of the bed's pixels: parts may be images then
 /// errors  kUsage if a part does not fit the bed (with the excess and a remedy); kInput from load
 Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false, const PixelGrid* grid = nullptr);
+
+// --- checks that a powder printer can reach the parts of a job.
+
+/// Checks that all parts lie on the bed and below the build height.
+/// errors  kUsage with the part and its first point outside
+Status check_reach(const Machine& machine, const Scene& scene);
 
 }  // namespace lamina::pipeline

@@ -7,7 +7,7 @@
 
 #include "pipeline/plan/sections.h"
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/order.h"
+#include "stages/geometry/contours/nest.h"
 #include "stages/infill/fill.h"
 #include "stages/slice/bodies.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/plan/segment.h"
 #include "stages/segment/resolve.h"
 #include "stages/support/text/number_text.h"

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "pipeline/job/file.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/segment/design/design_page.h"
 #include "stages/segment/design/job_text.h"

@@ -11,7 +11,7 @@
 #include "pipeline/pores/bead_voxels.h"
 #include "pipeline/pores/window_choice.h"
 #include "pipeline/run/run.h"
-#include "stages/formats/stl/block.h"
+#include "stages/formats/stl/mesh_stl.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/json.h"
 

@@ -8,7 +8,7 @@
 
 #include "pipeline/pores/laid_look.h"
 #include "pipeline/pores/pore_page.h"
-#include "stages/data/ticks.h"
+#include "stages/data/plot.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/segment/pore_geometry.h"
 #include "stages/segment/predict.h"

@@ -1,4 +1,5 @@
 #include "pipeline/run/path_layer.h"
+#include "pipeline/plan/heights.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
 #include "stages/bead/even_starts.h"
 #include "stages/infill/skirt.h"

@@ -11,7 +11,7 @@
 #include "pipeline/flow/layers.h"
 #include "pipeline/job/job.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/slice_directory.h"
+#include "pipeline/output/slice_files.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "stages/support/text/base64.h"
+#include "stages/support/text/escape.h"
 
 namespace lamina::write::report {
 namespace {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -43,5 +44,16 @@ struct Plot {
   std::vector<Dot> dots;  // half transparent, so that many at one place are darker
   std::vector<Text> texts;
 };
+
+// --- round numbers along the axes of plots.
+
+/// 1, 2 or 5 times a power of ten, so that about `count` steps cover `span`; both above 0.
+inline double tick_step(double span, int count) {
+  const double raw = span / count, power = std::pow(10, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= raw) return factor * power;
+  }
+  return 10 * power;
+}
 
 }  // namespace lamina

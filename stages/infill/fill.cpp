@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/merge.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/raster.h"
 #include "stages/infill/spacing.h"

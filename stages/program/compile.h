@@ -9,8 +9,8 @@
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/program/drop_bits.h"
 #include "stages/program/fire.h"
+#include "stages/program/line_sets.h"
 #include "stages/program/scan_frame.h"
 
 namespace lamina::program {

@@ -6,7 +6,6 @@
 #include "stages/program/brundlefab/brundlefab.h"
 #include "stages/program/care/care_check.h"
 #include "stages/program/dialect.h"
-#include "stages/program/hp45/head.h"
 #include "stages/program/hp45/hp45.h"
 #include "stages/program/m578/m578.h"
 #include "stages/program/nuferbj/nuferbj.h"

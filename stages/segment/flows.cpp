@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/data/ticks.h"
+#include "stages/data/plot.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/table.h"

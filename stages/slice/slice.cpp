@@ -7,9 +7,7 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/order.h"
 #include "stages/geometry/contours/simplify.h"
-#include "stages/geometry/contours/tidy.h"
 
 namespace lamina::slice {
 namespace {

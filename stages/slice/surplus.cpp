@@ -9,7 +9,7 @@
 
 #include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/tidy.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/slice/chain.h"
 #include "stages/slice/cut.h"
 

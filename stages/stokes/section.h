@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 
-#include "stages/data/plane.h"
 #include "stages/data/voxels.h"
 #include "stages/stokes/cells.h"
 #include "stages/stokes/operator.h"

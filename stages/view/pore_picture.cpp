@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "stages/data/ticks.h"
+#include "stages/data/plot.h"
 
 namespace lamina::view {
 namespace {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "stages/data/contours.h"  // points
-#include "stages/data/plane.h"
 #include "stages/data/plot.h"
 #include "stages/data/voxels.h"
 

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "stages/formats/images/image.h"
-#include "stages/support/text/base64.h"
+#include "stages/support/text/escape.h"
 #include "stages/view/report/run_code.h"
 #include "tests/commands/program.h"
 #include "tests/commands/unpack_runs.h"

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "stages/formats/stl/block.h"
+#include "stages/formats/stl/mesh_stl.h"
 #include "stages/load/load.h"
 #include "tests/fuzz/laws.h"
 #include "tests/load/archives.h"

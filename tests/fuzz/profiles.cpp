@@ -1,7 +1,6 @@
 // Profiles of powder printers and of extrusion printers.
 #include "pipeline/machine/profiles.h"
 #include "pipeline/job/profiles/changes.h"
-#include "pipeline/machine/powder_printer.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {

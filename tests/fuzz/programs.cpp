@@ -1,7 +1,6 @@
 // Print programs, replayed: each dialect by a shipped machine with a small bed.
 #include <map>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/program/compile.h"
 #include "stages/program/dialect.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/order.h"
+#include "stages/geometry/contours/nest.h"
 
 namespace lamina {
 namespace {

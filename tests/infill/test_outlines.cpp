@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/merge.h"
 #include "stages/geometry/contours/simplify.h"
 #include "tests/infill/outlines.h"
 #include "tests/slice/contour_laws.h"

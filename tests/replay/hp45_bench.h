@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/replay/machine.h"
 #include "tests/program/machines.h"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "pipeline/job/profiles/printer.h"
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <regex>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"

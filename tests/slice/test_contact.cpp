@@ -9,7 +9,7 @@
 
 #include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/meet.h"
-#include "stages/geometry/contours/tidy.h"
+#include "stages/geometry/contours/simplify.h"
 
 namespace lamina::test {
 namespace {

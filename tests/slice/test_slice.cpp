@@ -6,7 +6,6 @@
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
 #include "stages/geometry/contours/simplify.h"
-#include "stages/geometry/contours/tidy.h"
 #include "stages/slice/slice.h"
 #include "tests/raster/shapes.h"
 #include "tests/slice/contour_laws.h"

@@ -4,8 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "stages/support/hash/digest_range.h"
-#include "stages/support/text/text_shape.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/text/json_text.h"
 #include "stages/support/text/toml.h"
 #include "tests/commands/program.h"
 

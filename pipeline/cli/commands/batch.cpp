@@ -17,7 +17,7 @@
 #include "stages/load/load.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 #include "stages/support/text/json.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

@@ -10,7 +10,7 @@
 #include "stages/calibration/chart/measured.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/replaceable.h"
+#include "stages/support/io/file_target.h"
 #include "stages/support/text/json.h"
 #include "stages/support/text/readable.h"
 

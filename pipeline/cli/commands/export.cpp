@@ -11,7 +11,7 @@
 #include "stages/formats/stl/mesh_stl.h"
 #include "stages/formats/threemf/mesh3mf.h"
 #include "stages/formats/threemf/threemf_package.h"
-#include "stages/support/io/replaceable.h"
+#include "stages/support/io/file_target.h"
 #include "stages/support/text/json.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/version.h"

@@ -6,13 +6,10 @@
 #include <vector>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/machine/extruder.h"
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
 #include "stages/program/dialect.h"
 #include "stages/program/explain.h"
-#include "stages/program/image_of_bed.h"
 #include "stages/program/orientation_target.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"

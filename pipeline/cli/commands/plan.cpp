@@ -12,7 +12,6 @@
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/job.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/laid_look.h"
 #include "pipeline/run/run_resolved.h"

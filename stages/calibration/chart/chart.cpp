@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "stages/support/text/json.h"
+#include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {

@@ -8,7 +8,7 @@
 #include "stages/calibration/scan/reading.h"
 #include "stages/data/shortage.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/text/text_shape.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina::scan {
 namespace {

@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <cstring>
 
-#include "stages/formats/g4/codes.h"
+#include "stages/geometry/t6_codes.h"
 
 namespace lamina::write::g4 {
+
+using namespace lamina::t6;
 
 /// Every word is followed by one unaligned 8-byte store and no branch: the bytes that it fills are final, what is
 /// beyond them is overwritten by the next word. So the memory must reach 8 bytes past the last byte written.

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "stages/formats/g4/bit_writer.h"
-#include "stages/formats/g4/codes.h"
 #include "stages/formats/g4/empty_rows.h"
 #include "stages/formats/g4/horizontal.h"
 #include "stages/formats/g4/steady_rows.h"

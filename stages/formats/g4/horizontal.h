@@ -4,7 +4,6 @@
 #include <cstdint>
 
 #include "stages/formats/g4/bit_writer.h"
-#include "stages/formats/g4/codes.h"
 
 namespace lamina::write::g4 {
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "stages/formats/gcode/bead_width.h"
-
 namespace lamina::read {
 namespace {
 

@@ -7,7 +7,6 @@
 #include <string_view>
 #include <utility>
 
-#include "stages/formats/gcode/bead_width.h"
 #include "stages/formats/gcode/commands.h"
 #include "stages/formats/gcode/layers.h"
 #include "stages/support/io/file_reader.h"

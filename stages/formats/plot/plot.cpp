@@ -7,8 +7,8 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/png/coloured.h"
 #include "stages/formats/svg/svg_writer.h"
-#include "stages/support/text/base64.h"
-#include "stages/support/text/text_shape.h"
+#include "stages/support/text/escape.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina {
 

@@ -8,8 +8,7 @@
 #include <cstdint>
 #include <span>
 
-#include "stages/formats/png/bit_writer.h"
-#include "stages/formats/png/codes.h"
+#include "stages/formats/png/deflate.h"
 
 namespace lamina::write::png {
 

@@ -4,12 +4,9 @@
 #include <span>
 
 #include "stages/formats/g4/empty_rows.h"
-#include "stages/formats/png/bit_writer.h"
-#include "stages/formats/png/block_head.h"
 #include "stages/formats/png/chunk.h"
-#include "stages/formats/png/codes.h"
+#include "stages/formats/png/deflate.h"
 #include "stages/formats/png/filtered_rows.h"
-#include "stages/formats/png/tables.h"
 #include "stages/geometry/bits.h"
 
 namespace lamina::write::png {

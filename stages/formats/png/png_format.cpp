@@ -17,9 +17,8 @@
 
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/image_formats.h"
-#include "stages/formats/png/bit_writer.h"
 #include "stages/formats/png/chunk.h"
-#include "stages/formats/png/huffman.h"
+#include "stages/formats/png/deflate.h"
 #include "stages/formats/png/image_data.h"
 #include "stages/geometry/bits.h"
 

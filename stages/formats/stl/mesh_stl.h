@@ -1,8 +1,10 @@
 // stages/formats/stl/mesh_stl.h: meshes as one binary STL file.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "stages/data/mesh.h"
@@ -27,5 +29,10 @@ struct StlCounts {
 /// cost     one pass; 50 bytes a triangle go to the file
 Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<const Instance> instances,
                             std::string_view program);
+
+// --- a closed block as a binary STL file.
+
+/// The file of a block from the origin to `size`, mm: 12 triangles, anticlockwise seen from outside, normals left at 0.
+std::string block(const std::array<double, 3>& size);
 
 }  // namespace lamina::write::stl

@@ -10,7 +10,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 #include "stages/formats/slice_format.h"
-#include "stages/formats/zip/deflate.h"
+#include "stages/formats/zip/zip.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::write {

@@ -7,7 +7,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/formats/zip/deflate.h"
+#include "stages/formats/zip/zip.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::write {

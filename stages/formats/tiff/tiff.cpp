@@ -14,8 +14,6 @@
 #include "stages/formats/g4/encode.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/image_formats.h"
-#include "stages/formats/tiff/ending.h"
-#include "stages/formats/tiff/memory_file.h"
 #include "stages/formats/tiff/tags.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"

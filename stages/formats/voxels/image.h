@@ -1,17 +1,30 @@
 // stages/formats/voxels/image.h: a box of voxels as one file of bytes, for programs of tomography and flow.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
-#include "stages/formats/voxels/rows.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::write::voxels {
+
+/// Which voxels of a box are meant: the set ones, or the others.
+enum class Side : std::uint8_t { kSolid, kVoid };
+
+/// Puts a row into nx bytes: 1 where it is of that side, else 0.
+inline void expand_row(std::span<const std::uint32_t> changes, Side side, std::span<std::uint8_t> bytes) {
+  const auto outside = static_cast<std::uint8_t>(side == Side::kVoid), inside = static_cast<std::uint8_t>(1 - outside);
+  std::ranges::fill(bytes, outside);
+  for (std::size_t i = 0; i + 1 < changes.size(); i += 2) {
+    std::fill(bytes.begin() + changes[i], bytes.begin() + changes[i + 1], inside);
+  }
+}
 
 /// One file each, head and voxels; the README tells what stands in them.
 enum class ImageKind : std::uint8_t { kNrrd, kMeta, kVti };

@@ -6,7 +6,7 @@
 
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
-#include "stages/formats/voxels/rows.h"
+#include "stages/formats/voxels/image.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::write::voxels {

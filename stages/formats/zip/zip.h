@@ -1,17 +1,30 @@
 // stages/formats/zip/zip.h: a ZIP archive of deflated entries, written from front to back.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/formats/zip/deflate.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::write {
+
+/// Raw deflate data (RFC 1951) that end on a byte, without a last block: pieces one behind the other are one stream.
+struct Deflated {
+  Buffer<std::byte> bytes;
+  std::uint32_t crc = 0;   // CRC-32 of what is deflated
+  std::uint64_t size = 0;  // bytes of what is deflated
+};
+
+/// Deflates a piece and appends it. The bytes depend on the text, the cuts between pieces and the release of zlib alone.
+/// errors  kOutput: memory ran out
+/// cost    15 ns a byte; 270 kB while it runs
+Status deflate_onto(Deflated& out, std::string_view text);
 
 /// The date and time that all entries of an archive have, as a ZIP file holds them: the date in the upper half.
 using ZipDate = std::uint32_t;

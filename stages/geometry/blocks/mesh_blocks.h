@@ -7,7 +7,6 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
-#include "stages/geometry/blocks/block_size.h"
 #include "stages/geometry/blocks/cluster.h"
 #include "stages/geometry/blocks/pages.h"
 

@@ -1,11 +1,33 @@
 // stages/geometry/contours/contact.h: do contours keep clear of each other and of themselves?
 #pragma once
 
+#include <cstdint>
+#include <utility>
+
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
-#include "stages/geometry/contours/monotone.h"
 
 namespace lamina {
+
+struct MonotoneChain {
+  std::uint32_t contour, begin, edges;  // from point `begin` of all on, wrapping at the contour's end
+  Point2 lo, hi;
+};
+
+struct MonotoneScratch {
+  Buffer<MonotoneChain> chain;
+  Buffer<std::uint32_t> open;
+  Buffer<std::pair<std::uint32_t, std::uint32_t>> contact;  // contours, one with itself too; some may come more than once
+
+  std::uint64_t bytes() const { return bytes_held(chain) + bytes_held(open) + bytes_held(contact); }
+};
+
+/// Leaves in scratch.contact enough of the pairs of contours in contact (contact.h says what that is) to join every
+/// group of them.
+///
+/// returns  false if the contours wind so much, or lie so close, that a grid is better; what is found then is void
+/// cost     O(P) for P points, else gives up after a few comparisons a point
+bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch);
 
 inline constexpr std::uint32_t kNoContact = UINT32_MAX;
 

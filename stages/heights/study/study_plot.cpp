@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/data/ticks.h"
+#include "stages/data/plot.h"
 
 namespace lamina::heights {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "stages/load/repair/overlaps.h"
+#include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/topology.h"
 
 namespace lamina::load {

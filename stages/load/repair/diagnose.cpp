@@ -13,10 +13,9 @@
 #include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/diagnosis/collector.h"
-#include "stages/load/diagnosis/repeats.h"
 #include "stages/load/diagnosis/side_lists.h"
+#include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
-#include "stages/load/repair/overlaps.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/vertices.h"
 

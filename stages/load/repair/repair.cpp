@@ -5,7 +5,6 @@
 
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
-#include "stages/load/repair/loops.h"
 #include "stages/load/repair/sheets.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/weld.h"

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "stages/geometry/blocks/pages.h"
-#include "stages/load/diagnosis/chunk_numbers.h"
+#include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/diagnosis/spatial_order.h"
 
 namespace lamina::load {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "stages/program/care/care_clock.h"
+#include "stages/program/care/care.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::write::brundlefab {

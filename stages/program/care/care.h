@@ -2,14 +2,58 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "stages/program/care/care_clock.h"
+#include "stages/data/machine.h"
 #include "stages/program/dialect.h"
+#include "stages/program/program_text.h"
 
 namespace lamina::write {
+
+/// Of a limit in seconds: speeds are written in whole mm a minute, and firmware rounds as well.
+inline constexpr double kOfCareLimit = 0.97;
+
+/// From rest to rest at a speed as it is spelt. way_mm  at least 0
+double move_seconds(const Machine& machine, double way_mm, double speed_mm_s);
+
+/// A shot off the bed at the head's highest frequency.
+double shot_seconds(const Machine& machine);
+
+/// The clock of a layer, which begins with it, so that a layer's care depends on that layer alone.
+class CareClock {
+ public:
+  using Place = std::array<double, 2>;  // of the carriage, x and y in mm
+
+  /// What is due, in this order; a shot follows each wipe where the profile has shots, since a wiper leaves binder and grains
+  /// at the nozzles.
+  struct Due {
+    bool wipe = false, shot = false;
+  };
+
+  /// machine outlives this object. shot_s  how long a shot takes
+  CareClock(const Machine& machine, double shot_s) : machine_(machine), shot_s_(shot_s) {}
+
+  /// Before the first sweep. at  where the head stands
+  Due begin_layer(std::uint32_t layer, Place at);
+  /// Before a sweep: what would be overdue at its end. The sweep is then made.
+  /// from, to  of the sweep. sweep_s  how long it takes without the way to it
+  Due before_sweep(Place from, Place to, double sweep_s);
+  Due before_sweep(Place from, Place to);
+
+ private:
+  Due serve(bool wipe, bool shot);
+  double seconds(Place from, Place to, double speed_mm_s) const;
+
+  const Machine& machine_;
+  double shot_s_;
+  Place at_{};
+  double since_shot_ = 0, since_wipe_ = 0;  // seconds
+};
 
 /// How a dialect spells it.
 struct CareWords {
@@ -48,6 +92,40 @@ class Care {
   const Machine& machine_;
   const CareWords& words_;
   CareClock clock_;
+};
+
+// --- care of head and powder in dialects of vectors alone, as records for their hosts.
+
+/// What a record tells; the READMEs of raw and planes have the numbers that follow each.
+enum class CareRecord : std::uint8_t { kGo, kFill, kBase, kRoller, kWipe, kShot, kDry, kOwn };
+
+/// Writes the care of one layer after the other.
+class CareRecords {
+ public:
+  using Put = void (*)(CareRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out);
+
+  /// machine and grid outlive this object. spell  how the dialect spells a record
+  CareRecords(const Machine& machine, const HeadGrid& grid, Put spell)
+      : machine_(machine), carriage_(machine, grid), clock_(machine, shot_seconds(machine)), put_(spell) {}
+
+  /// Behind the record that begins a layer.
+  void begin_layer(const LayerCycle& cycle, ProgramBytes& out);
+  void before_sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out);
+  /// Behind the last sweep.
+  void dry(ProgramBytes& out) const;
+
+ private:
+  void serve(CareClock::Due due, ProgramBytes& out) const;
+  void put_own(const std::vector<std::string>& lines, ProgramBytes& out) const;
+  void go(CareClock::Place to, ProgramBytes& out) const;
+  void put(CareRecord kind, std::initializer_list<std::uint32_t> numbers, ProgramBytes& out) const {
+    put_(kind, {numbers.begin(), numbers.size()}, out);
+  }
+
+  const Machine& machine_;
+  Carriage carriage_;
+  CareClock clock_;
+  Put put_;
 };
 
 }  // namespace lamina::write

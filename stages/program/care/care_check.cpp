@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/program/care/care_clock.h"
+#include "stages/program/care/care.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::write {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "stages/program/care/care.h"
-#include "stages/program/hp45/head.h"
+#include "stages/program/hp45/hp45.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::write::oasis {

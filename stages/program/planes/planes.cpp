@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "stages/program/binary_program.h"
-#include "stages/program/care/care_records.h"
+#include "stages/program/care/care.h"
 
 namespace lamina::write::planes {
 namespace {

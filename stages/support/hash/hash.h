@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "stages/data/status.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina {
 
@@ -43,5 +44,10 @@ struct TreeDigest {
 /// The regular files at or below `path`, in the order of their names; no file if there is none.
 /// errors  kVerification if one cannot be read
 Result<TreeDigest> digest_tree(const std::string& path);
+
+// --- the fingerprint of a stretch of a file.
+
+/// XXH3-128 of `bytes` bytes from `offset` on, read in pieces of 256 KiB; nothing if the file is shorter.
+std::optional<Hash128> digest_range(const FileReader& file, std::uint64_t offset, std::uint64_t bytes);
 
 }  // namespace lamina

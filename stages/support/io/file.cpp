@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "stages/support/io/file_target.h"
-#include "stages/support/io/leftovers.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/io/temporary.h"
 

@@ -1,11 +1,11 @@
 #include "stages/support/io/file_target.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
+
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -14,6 +14,8 @@
 #include <string_view>
 
 #include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::write {
 namespace {
@@ -99,6 +101,75 @@ Result<int> open_stream(const std::string& path, const FileTarget& target, bool 
                        : ::open(target.stream.c_str(), O_WRONLY | O_APPEND | O_NOCTTY | O_NOFOLLOW | O_CLOEXEC);
   if (file < 0) return write_failure(path, errno);
   return file;
+}
+
+namespace {
+
+constexpr std::size_t kMarkedHead = 4096;  // bytes of a file in which its mark stands
+
+}  // namespace
+
+std::optional<FileId> file_id(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return FileId{status.st_dev, status.st_ino};
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  const std::optional<FileId> first = file_id(a);
+  return first && first == file_id(b);
+}
+
+bool is_file(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+}
+
+bool is_stream(const std::string& path) {
+  struct stat status {};
+  const bool there = ::stat(path.c_str(), &status) == 0;
+  return path == "-" || (there && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
+}
+
+bool is_replaceable(const std::string& path, std::span<const std::string_view> marks) {
+  if (!is_file(path)) return true;
+  const auto file = FileReader::open(path, {});
+  std::string head(file ? static_cast<std::size_t>(std::min<std::uint64_t>(kMarkedHead, file->size())) : 0, '\0');
+  const bool read = file && file->read_at(0, head);
+  const bool marked = std::ranges::any_of(marks, [&](std::string_view mark) {
+    if (mark.empty()) return false;
+    return mark.front() == '^' ? head.starts_with(mark.substr(1)) : head.find(mark) != std::string::npos;
+  });
+  return read && (marked || head.empty());
+}
+
+Status check_plain(const std::string& file, std::optional<std::uint64_t> bytes) {
+  namespace fs = std::filesystem;
+  const auto refuse = [&](const std::string& what) {
+    return Error{Fault::kVerification, fmt::format("{}: {}; run its shard again with --resume", file, what)};
+  };
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(file, error);
+  if (!fs::is_regular_file(status)) return refuse(fs::exists(status) ? "is a link or a device, not a file" : "is missing");
+  if (!bytes) return {};
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) return refuse("is missing");
+  return size == *bytes ? Status() : Status(refuse(fmt::format("{} bytes, the manifest says {}", size, *bytes)));
+}
+
+Result<bool> bring_file(const std::string& from, const std::string& to) {
+  namespace fs = std::filesystem;
+  const std::string fresh = temporary_name(to);
+  const int watched = watch(fresh.c_str());
+  std::error_code error;
+  fs::create_hard_link(from, fresh, error);
+  const bool linked = !error;
+  if (!linked) fs::copy_file(from, fresh, error);
+  if (!error) fs::rename(fresh, to, error);
+  remove_or_note(fresh);  // stays if `to` was a name of the same file already, and after an error
+  forget(watched);
+  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", to, error.message())};
+  return linked;
 }
 
 }  // namespace lamina::write

@@ -1,5 +1,8 @@
 #include "stages/support/text/escape.h"
 
+#include <algorithm>
+#include <cstdint>
+
 namespace lamina {
 namespace {
 
@@ -49,5 +52,18 @@ std::string zsh_argument(std::string_view text) {
 }
 
 std::string fish_word(std::string_view text) { return "'" + with_backslashes(text, "\\'") + "'"; }
+
+std::string base64(std::span<const std::byte> bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t have = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < have ? static_cast<std::uint32_t>(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= have ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
 
 }  // namespace lamina

@@ -4,6 +4,8 @@
 // cost  one pass
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -23,5 +25,10 @@ std::string zsh_argument(std::string_view text);
 
 /// A word of fish, in single quotes.
 std::string fish_word(std::string_view text);
+
+// --- bytes as text.
+
+/// Base 64 as in RFC 4648, padded, without line ends.
+std::string base64(std::span<const std::byte> bytes);
 
 }  // namespace lamina

@@ -21,7 +21,6 @@
 
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/number_text.h"
-#include "stages/support/text/text_shape.h"
 
 namespace lamina {
 namespace {

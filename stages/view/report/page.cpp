@@ -1,6 +1,6 @@
 #include "stages/view/report/page.h"
 
-#include "stages/support/text/base64.h"
+#include "stages/support/text/escape.h"
 
 namespace lamina::write::report {
 namespace {

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/formats/images/image.h"

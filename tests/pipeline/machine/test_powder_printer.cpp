@@ -1,5 +1,5 @@
 // What a job asks for, and what follows from it and from its machine.
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/machine/powder_printer.h"
-
 namespace lamina::pipeline {
 namespace {
 

@@ -6,7 +6,7 @@
 #include <tuple>
 
 #include "pipeline/job/file.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/layer_files.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/manifest/manifest_line.h"

@@ -1,8 +1,6 @@
-#include "stages/formats/png/tables.h"
+#include "stages/formats/png/deflate.h"
 
 #include <array>
-
-#include "stages/formats/png/bit_writer.h"
 
 namespace lamina::write::png {
 namespace {
