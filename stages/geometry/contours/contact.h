@@ -9,12 +9,6 @@
 
 namespace lamina {
 
-// --- contacts between contours that wind smoothly, found by halving.
-//
-// A stretch of a contour along which x and y never turn back (a monotone chain) meets itself nowhere, and the box of any
-// part of it is that of the part's two ends. So two chains are compared by halving them where their boxes meet, and what
-// lies apart is done with at once. A smooth contour has a few chains, whatever the number of its points.
-
 struct MonotoneChain {
   std::uint32_t contour, begin, edges;  // from point `begin` of all on, wrapping at the contour's end
   Point2 lo, hi;
@@ -35,8 +29,6 @@ struct MonotoneScratch {
 /// cost     O(P) for P points, else gives up after a few comparisons a point
 bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch);
 
-// ---
-
 inline constexpr std::uint32_t kNoContact = UINT32_MAX;
 
 /// Reused from layer to layer.
@@ -55,12 +47,12 @@ struct ContactScratch {
 
 /// Groups contours by contact: two are in contact if an edge of one shares a point with an edge of the other, exactly,
 /// and a contour is in contact with itself if two of its edges that are not neighbours share a point. Contours without
-/// straight or repeated points (simplify.h) that are in no contact are simple and apart from all others, so they need no
+/// straight or repeated points (tidy.h) that are in no contact are simple and apart from all others, so they need no
 /// boolean operation.
 ///
 /// group    for each contour the lowest contour of its group, or kNoContact
 /// returns  whether there is any contact
-/// cost     O(P) as a rule: smooth contours are compared by halving, others edge by edge within the cells of a
+/// cost     O(P) as a rule: smooth contours are compared by halving (monotone.h), others edge by edge within the cells of a
 ///          grid about as fine as they are long
 bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group);
 

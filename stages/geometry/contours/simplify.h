@@ -50,13 +50,6 @@ struct SimplifyScratch {
 ///            digitized line or its caricature", Cartographica 10 (1973)
 void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch);
 
-// --- points of contours that say nothing are dropped.
-
-/// Drops points that lie exactly on the line through their neighbours: spikes that run back on themselves and repeated
-/// points among them. Contours that have no area left are dropped.
-/// cost  O(P)
-void tidy(Contours& contours);
-
 // --- short edges of contours become points.
 
 /// Reused from layer to layer.
@@ -73,5 +66,12 @@ struct MergeScratch {
 /// tolerance  nm; 0 changes nothing
 /// cost       that of find_contacts()
 void merge_short_edges(Contours& contours, Nm shortest, Nm tolerance, MergeScratch& scratch);
+
+// --- points of contours that say nothing are dropped.
+
+/// Drops points that lie exactly on the line through their neighbours: spikes that run back on themselves and repeated
+/// points among them. Contours that have no area left are dropped.
+/// cost  O(P)
+void tidy(Contours& contours);
 
 }  // namespace lamina
