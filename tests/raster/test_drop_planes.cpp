@@ -90,10 +90,10 @@ TEST(DropPlanes, FindWhatContradicts) {
   EXPECT_EQ(added_images({here, here}, 2, enough), "");
   for (const bool shared : {false, true}) {
     DropPlanes torn(2, shared);  // the second drop of one material where only the other has a first
-    EXPECT_EQ(torn.add(plane_of_counts(here, 1), 0), "");
-    EXPECT_EQ(torn.add(plane_of_counts(here, 2), 1), "");
-    EXPECT_EQ(torn.add(plane_of_counts(beside, 1), 0), "");
-    EXPECT_EQ(torn.add(plane_of_counts(here, 2), 1), "get no drop before");
+    EXPECT_TRUE(torn.add(plane_of_counts(here, 1), 0).ok());
+    EXPECT_TRUE(torn.add(plane_of_counts(here, 2), 1).ok());
+    EXPECT_TRUE(torn.add(plane_of_counts(beside, 1), 0).ok());
+    EXPECT_EQ(torn.add(plane_of_counts(here, 2), 1).error().message, "get no drop before");
   }
 }
 
