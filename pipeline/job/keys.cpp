@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pipeline/job/file.h"
-#include "pipeline/job/profiles/changes.h"
+#include "pipeline/job/profiles/extruder.h"
 #include "pipeline/job/profiles/printer.h"
 #include "stages/data/units.h"
 #include "stages/dose/field.h"

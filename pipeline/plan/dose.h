@@ -1,6 +1,8 @@
 // pipeline/plan/dose.h: the distribution of binder in a job's layers (stages/dose/).
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -8,7 +10,6 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/plan/dose_zones.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -16,12 +17,45 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/dose/budget.h"
+#include "stages/dose/edges/bleed.h"
 #include "stages/dose/edges/erode.h"
 #include "stages/dose/layer_drops.h"
+#include "stages/dose/stretches.h"
 #include "stages/dose/wish.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::pipeline {
+
+/// Parts of one bleed and one saturation are a zone. Zone 0 is that of the job's own values.
+class DoseZones {
+ public:
+  DoseZones(const Job& job, const PixelGrid& grid);
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(zones_.size()); }
+  bool several() const { return zones_.size() > 1; }
+  std::uint32_t of_part(std::size_t part) const { return of_part_[part]; }
+
+  /// The moves of their edges.
+  const dose::Bleeds& bleeds() const { return bleeds_; }
+  /// How far a zone grows along x and y at most.
+  std::array<std::int64_t, 2> grows_nm(std::uint32_t zone) const { return zones_[zone].grows_nm; }
+  /// The wishes of zones 1, 2, ...
+  std::vector<std::optional<dose::Wish>> wishes() const;
+
+ private:
+  struct Zone {
+    dose::ZoneBleed bleed;
+    std::optional<dose::Wish> wish;
+    std::array<std::int64_t, 2> grows_nm{};  // its outside
+    bool operator==(const Zone&) const = default;
+  };
+  std::vector<Zone> zones_;
+  std::vector<std::uint32_t> of_part_;
+  dose::Bleeds bleeds_;
+};
+
+/// What parts cover at most, after their edges moved.
+std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones, const PixelGrid& grid);
 
 /// What a machine's profile has that does nothing: care, joints.
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings);

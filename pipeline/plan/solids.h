@@ -8,7 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/plan/dose_zones.h"
+#include "pipeline/plan/dose.h"
 #include "pipeline/plan/scene.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/grid.h"

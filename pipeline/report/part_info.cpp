@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/load/diagnosis/collector.h"
+#include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/reader.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/support/text/json_text.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/formats/gcode/comments.h"
+#include "stages/formats/gcode/commands.h"
 #include "tests/formats/gcode_text.h"
 
 namespace lamina {

@@ -1,6 +1,6 @@
 // Profiles of powder printers and of extrusion printers.
 #include "pipeline/machine/profiles.h"
-#include "pipeline/job/profiles/changes.h"
+#include "pipeline/job/profiles/extruder.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {

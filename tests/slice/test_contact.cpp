@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "stages/geometry/contours/contact.h"
-#include "stages/geometry/contours/meet.h"
 #include "stages/geometry/contours/simplify.h"
 
 namespace lamina::test {

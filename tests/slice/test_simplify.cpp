@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "stages/geometry/contours/meet.h"
+#include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/simplify.h"
 #include "stages/load/load.h"
 #include "stages/slice/slice.h"

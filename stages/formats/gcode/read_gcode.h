@@ -42,7 +42,7 @@ struct GcodeOptions {
 /// Arcs (G2, G3) are chords within 5 um. Widths are those of ;WIDTH: tags; without them those of a rectangle with half circles
 /// at its sides whose volume is the filament that is fed, in a layer as high as ;HEIGHT:, the climb of a turn, or the distance
 /// to the beads below. The filament's diameter is the given one, or the one that comments tell
-/// (stages/formats/gcode/comments.h), or 1.75 mm.
+/// (stages/formats/gcode/commands.h), or 1.75 mm.
 ///
 /// memory  of the layers' places in the file; beads are read when they are asked for
 class GcodeFile {

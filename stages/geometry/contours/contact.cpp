@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/geometry/contours/meet.h"
-
 namespace lamina {
 namespace {
 

@@ -12,7 +12,6 @@
 
 #include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
-#include "stages/load/diagnosis/collector.h"
 #include "stages/load/diagnosis/side_lists.h"
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"

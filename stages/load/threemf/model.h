@@ -12,6 +12,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/load/load.h"
+#include "stages/load/threemf/xml.h"
 
 namespace lamina::load {
 
@@ -86,6 +87,28 @@ struct ModelPackage {
   void depart(std::string_view rule, std::string_view what);
   /// The index of a file, which is added if it is new.
   std::uint32_t file_of(const std::string& name);
+};
+
+// --- what a model, an object or a build item says about itself; internal to load.
+
+/// The metadata of one element. Names that are not as the specification wants them are told: many programs write such ones, and
+/// readers should pass over them.
+///
+/// source  3MF Consortium, Core Specification 1.3, section 3.4.1
+class Metadata {
+ public:
+  /// A <metadata> begins. errors  it has no name
+  std::string begin(const XmlReader& reader, XmlAttributes attributes, ModelPackage& package);
+  /// What older releases of Cura have instead.
+  void begin_setting(XmlAttributes attributes);
+  /// A piece of its text; what is long matters to nobody.
+  void text(std::string_view piece);
+  /// It ends; an object learns what Cura says of it.
+  void end(ModelObject* object);
+
+ private:
+  std::set<std::string> names_;
+  std::string name_, text_;
 };
 
 }  // namespace lamina::load

@@ -6,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/load/threemf/metadata.h"
 #include "stages/load/threemf/model.h"
 #include "stages/load/threemf/properties.h"
 #include "stages/load/threemf/xml.h"
