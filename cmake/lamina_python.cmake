@@ -1,5 +1,12 @@
 # The Python module (python/): `import lamina` over the library, with arrays of numpy. Debian's python3-dev, pybind11-dev
 # and python3-numpy. A module cannot be part of a sanitized build: Python itself is not sanitized.
+
+# A module must be loadable at any address; hidden symbols keep calls within it direct. The libraries are compiled like this with and
+# without the module, so that its packages can be installed later without compiling them again.
+if(NOT LAMINA_SANITIZE)
+  set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
+endif()
+
 set(Python_FIND_STRATEGY LOCATION)
 if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)
   set(Python_EXECUTABLE /usr/bin/python3)  # the system's, whose numpy a package can ask for; not one that stands before it
@@ -12,7 +19,9 @@ if(NOT LAMINA_SANITIZE)
     set(python_default ON)
   endif()
 endif()
-option(LAMINA_PYTHON "Build the Python module" ${python_default})
+if(NOT DEFINED LAMINA_PYTHON)
+  set(LAMINA_PYTHON ${python_default})  # -DLAMINA_PYTHON=ON or OFF otherwise; not kept, as packages may be installed later
+endif()
 if(NOT LAMINA_PYTHON)
   message(STATUS "NOT BUILT: the Python module (it needs python3-dev and pybind11-dev, and no sanitizer)")
   return()
@@ -21,8 +30,6 @@ if(NOT Python_FOUND OR NOT pybind11_FOUND)
   message(FATAL_ERROR "LAMINA_PYTHON: install Debian's python3-dev and pybind11-dev, or configure with -DLAMINA_PYTHON=OFF")
 endif()
 
-# What is linked into a module must be able to lie anywhere; hidden symbols keep calls within it direct.
-set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
 pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp python/words.cpp)
 if(LAMINA_UNITE STREQUAL "all")
   lamina_unite(lamina_python ${PROJECT_SOURCE_DIR}/python/module.cpp ${PROJECT_SOURCE_DIR}/python/arrays.cpp

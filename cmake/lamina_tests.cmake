@@ -4,7 +4,6 @@ if(NOT LAMINA_TESTS)
 endif()
 enable_testing()
 find_package(GTest REQUIRED)
-include(GoogleTest)
 
 set_source_files_properties(${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp
                             PROPERTIES COMPILE_OPTIONS -O3 SKIP_PRECOMPILE_HEADERS ON)
@@ -15,32 +14,41 @@ add_library(lamina_test_support STATIC ${test_support_sources})
 target_link_libraries(lamina_test_support PUBLIC lamina::pipeline GTest::gtest nlohmann_json::nlohmann_json)
 target_compile_definitions(lamina_test_support PUBLIC LAMINA_TEST_DIR="${PROJECT_SOURCE_DIR}/tests"
                            LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
-# Tests are compiled to be compiled fast; what they call is optimised, and so is the slow reference of the bitmaps.
-target_compile_options(lamina_test_support PUBLIC $<$<NOT:$<CONFIG:Debug>>:-O1> -fno-sanitize=undefined
-                       -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)  # g++ 12 has them wrong for std::string at -O1
+# Tests are compiled without optimisation, in two thirds of the time; what they call is optimised, and so is the slow reference of the bitmaps.
+target_compile_options(lamina_test_support PUBLIC -O0 -fno-sanitize=undefined)
 target_precompile_headers(lamina_test_support PRIVATE tests/precompiled.h)
 
 # Loaded before the program, to see what it syncs and renames.
 add_library(lamina_call_log MODULE EXCLUDE_FROM_ALL tests/commands/call_log.cc)
 set_target_properties(lamina_call_log PROPERTIES PREFIX "" OUTPUT_NAME call_log)
 
+# CI runs each test program in one of its two builds, g++ release or clang with sanitizers: programs whose result depends on
+# optimisation in both, whole commands, long runs and what loads OpenImageIO or OpenCV in the release.
+set(lamina_test_both raster coverage load geometry stokes write)
+set(lamina_test_release commands picture scan run bead cost dose pores segment slice heights)
+
 lamina_sources(all_test_sources "tests/*.cpp")
+list(REMOVE_ITEM all_test_sources ${test_support_sources} ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
 list(TRANSFORM all_test_sources REPLACE "^${PROJECT_SOURCE_DIR}/tests/([^/]*)/.*$" "\\1" OUTPUT_VARIABLE folders)
 list(REMOVE_DUPLICATES folders)
-foreach(folder ${folders})
-  if(NOT LAMINA_TEST_COMMANDS AND folder MATCHES "commands|picture")
-    continue()
-  endif()
-  lamina_sources(test_sources "tests/${folder}/*.cpp")
-  list(REMOVE_ITEM test_sources ${test_support_sources} ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
-  if(NOT (LAMINA_SCAN AND LAMINA_TEST_COMMANDS))
-    list(FILTER test_sources EXCLUDE REGEX "/tests/calibration/scan/")
+foreach(folder run ${folders})
+  set(test_sources ${all_test_sources})
+  if(folder STREQUAL "run")  # the rooms of the pipeline are one program, whole runs another
+    list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/run/")
+  else()
+    list(FILTER test_sources INCLUDE REGEX "/tests/${folder}/")
+    list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/run/")
   endif()
   if(LAMINA_TEST_ONLY)
     list(FILTER test_sources INCLUDE REGEX "${LAMINA_TEST_ONLY}")
-    if(NOT test_sources)
-      continue()
-    endif()
+  endif()
+  set(side sanitized)
+  if(folder IN_LIST lamina_test_release)
+    set(side release)
+  endif()
+  if(NOT test_sources OR (folder STREQUAL "scan" AND NOT LAMINA_SCAN)
+     OR (LAMINA_TEST_SIDE AND NOT side STREQUAL LAMINA_TEST_SIDE AND NOT folder IN_LIST lamina_test_both))
+    continue()
   endif()
   add_executable(test_${folder} ${test_sources})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
@@ -56,24 +64,50 @@ foreach(folder ${folders})
     endif()
   endif()
   add_dependencies(test_${folder} lamina)
-  if(LAMINA_TEST_COMMANDS AND NOT LAMINA_TEST_ONLY)
+  if(NOT LAMINA_TEST_SIDE STREQUAL "sanitized" AND NOT LAMINA_TEST_ONLY)
     add_dependencies(test_${folder} lamina-preview lamina_call_log)
     if(LAMINA_SCAN)
       add_dependencies(test_${folder} lamina-scan)
     endif()
   endif()
-  if(folder STREQUAL "calibration" AND LAMINA_SCAN AND LAMINA_TEST_COMMANDS)
+  if(folder STREQUAL "scan")
     target_link_libraries(test_${folder} PRIVATE lamina_scan)
-    add_dependencies(test_${folder} lamina-scan)
   endif()
   if(folder STREQUAL "picture")
     target_link_libraries(test_${folder} PRIVATE PkgConfig::OPENIMAGEIO)
   endif()
-  gtest_discover_tests(test_${folder} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 900)
+  # One process for each program; scripts/run_tests splits it into shards and reports each test.
+  add_test(NAME test_${folder} COMMAND test_${folder})
+  set_tests_properties(test_${folder} PROPERTIES LABELS gtest TIMEOUT 1800)
 endforeach()
 
+# What hands work and files from thread to thread, and no more: the graph, the queue of batches, writers of files and their
+# tests. CI builds this program with the thread sanitizer (scripts/check_threads --changed).
+if(LAMINA_SANITIZE STREQUAL "thread")
+  set(thread_sources)
+  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/write/file*.cpp" "stages/write/journal*.cpp" "stages/write/replaceable*.cpp"
+                  "tests/pipeline/flow/*.cpp" "tests/pipeline/batch/*.cpp" "tests/write/test_file.cpp" "tests/write/test_journal.cpp"
+                  "tests/write/test_replaceable.cpp")
+    lamina_sources(found ${pattern})
+    if(NOT found)
+      message(FATAL_ERROR "test_threads: no file matches ${pattern}")
+    endif()
+    list(APPEND thread_sources ${found})
+  endforeach()
+  list(REMOVE_DUPLICATES thread_sources)
+  lamina_add_included(thread_sources)
+  add_executable(test_threads EXCLUDE_FROM_ALL ${thread_sources})
+  target_include_directories(test_threads PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(test_threads SYSTEM PRIVATE ${lamina_late_headers})
+  target_link_libraries(test_threads PRIVATE TBB::tbb Eigen3::Eigen fmt::fmt PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING
+                        PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH nlohmann_json::nlohmann_json TIFF::TIFF GTest::gtest_main
+                        ${CMAKE_DL_LIBS})
+  target_compile_definitions(test_threads PRIVATE $<TARGET_PROPERTY:lamina_test_support,INTERFACE_COMPILE_DEFINITIONS>)
+  lamina_unite(test_threads ${thread_sources})
+endif()
+
 # What needs a release: other projects, other languages, other machines.
-if(LAMINA_SANITIZE)
+if(LAMINA_SANITIZE OR LAMINA_TEST_SIDE STREQUAL "sanitized")
   return()
 endif()
 find_program(PYTHON3 python3 REQUIRED)
@@ -86,7 +120,7 @@ add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/scripts/threemf_outcomes ${PROJECT_SOURCE_DIR}/tests/corpus/3mf
                  --program $<TARGET_FILE:lamina>)
 add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
-         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_judges $<TARGET_FILE:lamina>)
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/write/threemf_judges $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
@@ -101,3 +135,4 @@ if(LAMINA_PYTHON)
   set_tests_properties(Python.ArraysAreTheDecodedFilesOfTheProgram PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300
                        ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
 endif()
+add_test(NAME Landing.FilesOfThreeCommitsAreFound COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/landing/three_commits ${PROJECT_SOURCE_DIR})

@@ -1,0 +1,111 @@
+#include "pipeline/batch/queue.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+#include "tests/commands/program.h"
+
+namespace lamina::pipeline {
+namespace {
+
+BatchJob job_of(std::uint32_t number, std::uint64_t need_bytes, const std::string& output, decltype(Call::run) run) {
+  BatchJob job;
+  job.number = number;
+  job.entry.name = "job " + std::to_string(number);
+  job.call.output = job.output = job.place = output;
+  job.call.run = std::move(run);
+  job.need_bytes = need_bytes;
+  job.id.low = number;
+  return job;
+}
+
+Result<BatchSummary> run_jobs(const test::Directory& directory, std::vector<BatchJob> jobs, const BatchOptions& options,
+                              const BatchWatcher& watcher = {}, const std::atomic<bool>& interrupt = false) {
+  Result<BatchRecord> record = BatchRecord::open(directory.path().string(), options.resume, options.overwrite);
+  if (!record) return record.error();
+  return run_batch(std::move(jobs), std::move(*record), options, watcher, interrupt);
+}
+
+TEST(BatchQueue, JobsShareThreadsAndMemoryAndEachIsReportedOnce) {
+  const test::Directory directory;
+  std::atomic<std::uint64_t> need{0}, highest{0};
+  std::vector<BatchJob> jobs;
+  for (std::uint32_t number = 1; number <= 24; ++number) {
+    const std::uint64_t bytes = 10 + number % 5 * 10;
+    jobs.push_back(job_of(number, bytes, directory / ("out" + std::to_string(number)),
+                          [&, number, bytes](const CallSettings& settings, const ProgressCallback& progress, const std::atomic<bool>&) {
+                            const std::uint64_t now = need += bytes;
+                            for (std::uint64_t before = highest; before < now && !highest.compare_exchange_weak(before, now);) {
+                            }
+                            for (std::uint32_t layer = 1; layer <= 5; ++layer) {
+                              progress({ProgressEvent::Stage::kLayers, layer, 5});
+                              std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                            }
+                            std::ofstream(settings.output) << number;
+                            need -= bytes;
+                            BatchResult result;
+                            result.code = number % 6 == 0 ? 3 : 0;
+                            return result;
+                          }));
+  }
+  BatchOptions options;
+  options.jobs = 4;
+  options.memory_bytes = 100;
+  std::vector<std::uint32_t> reported;
+  BatchWatcher watcher;
+  watcher.progress = [](const BatchState& state) { EXPECT_LE(state.running.size(), 4u); };
+  watcher.ended = [&](const BatchJob& job, const BatchResult& result, const BatchState&) {
+    reported.push_back(job.number);
+    EXPECT_EQ(result.outcome, job.number % 6 == 0 ? BatchOutcome::kFailed : BatchOutcome::kDone) << job.number;
+  };
+  const Result<BatchSummary> summary = run_jobs(directory, jobs, options, watcher);
+  ASSERT_TRUE(summary) << summary.error().message;
+  std::sort(reported.begin(), reported.end());
+  ASSERT_EQ(reported.size(), 24u);
+  for (std::uint32_t number = 1; number <= 24; ++number) EXPECT_EQ(reported[number - 1], number);
+  EXPECT_LE(summary->most_need_bytes, 100u);
+  EXPECT_LE(highest.load(), 100u);
+  EXPECT_LE(summary->most_running, 4u);
+
+  // The second run continues the record: what is done and unchanged is kept, what failed runs again.
+  options.resume = true;
+  const Result<BatchSummary> again = run_jobs(directory, jobs, options);
+  ASSERT_TRUE(again) << again.error().message;
+  for (std::uint32_t i = 0; i < 24; ++i) {
+    EXPECT_EQ(again->results[i].outcome, (i + 1) % 6 == 0 ? BatchOutcome::kFailed : BatchOutcome::kKept) << i + 1;
+  }
+}
+
+TEST(BatchQueue, AnInterruptStopsRunningJobsAndStartsNoOther) {
+  const test::Directory directory;
+  std::atomic<bool> interrupt{false};
+  std::atomic<std::uint32_t> begun{0};
+  std::vector<BatchJob> jobs;
+  for (std::uint32_t number = 1; number <= 8; ++number) {
+    jobs.push_back(job_of(number, 1, {}, [&](const CallSettings&, const ProgressCallback&, const std::atomic<bool>& cancel) {
+      if (++begun == 2) interrupt = true;
+      while (!cancel) std::this_thread::yield();
+      BatchResult result;
+      result.code = static_cast<int>(Fault::kInterrupted);
+      return result;
+    }));
+  }
+  BatchOptions options;
+  options.jobs = 2;
+  const Result<BatchSummary> summary = run_jobs(directory, jobs, options, {}, interrupt);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_TRUE(summary->interrupted);
+  EXPECT_FALSE(summary->abandoned);
+  EXPECT_EQ(begun, 2u);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(summary->results[i].outcome, i < 2 ? BatchOutcome::kStopped : BatchOutcome::kNotRun) << i + 1;
+  }
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
