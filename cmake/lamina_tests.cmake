@@ -24,8 +24,8 @@ set_target_properties(lamina_call_log PROPERTIES PREFIX "" OUTPUT_NAME call_log)
 
 # CI runs each test program in one of its two builds, g++ release or clang with sanitizers: programs whose result depends on
 # optimisation in both, whole commands, long runs and what loads OpenImageIO or OpenCV in the release.
-set(lamina_test_both raster coverage load geometry stokes write)
-set(lamina_test_release commands picture scan run bead cost dose pores segment slice heights)
+set(lamina_test_both raster coverage load geometry stokes formats)
+set(lamina_test_release commands picture calibration run bead cost dose pores segment slice heights)
 
 lamina_sources(all_test_sources "tests/*.cpp")
 list(REMOVE_ITEM all_test_sources ${test_support_sources} ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
@@ -39,6 +39,9 @@ foreach(folder run ${folders})
     list(FILTER test_sources INCLUDE REGEX "/tests/${folder}/")
     list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/run/")
   endif()
+  if(NOT LAMINA_SCAN)
+    list(FILTER test_sources EXCLUDE REGEX "/tests/calibration/scan/")
+  endif()
   if(LAMINA_TEST_ONLY)
     list(FILTER test_sources INCLUDE REGEX "${LAMINA_TEST_ONLY}")
   endif()
@@ -46,7 +49,7 @@ foreach(folder run ${folders})
   if(folder IN_LIST lamina_test_release)
     set(side release)
   endif()
-  if(NOT test_sources OR (folder STREQUAL "scan" AND NOT LAMINA_SCAN)
+  if(NOT test_sources
      OR (LAMINA_TEST_SIDE AND NOT side STREQUAL LAMINA_TEST_SIDE AND NOT folder IN_LIST lamina_test_both))
     continue()
   endif()
@@ -70,7 +73,7 @@ foreach(folder run ${folders})
       add_dependencies(test_${folder} lamina-scan)
     endif()
   endif()
-  if(folder STREQUAL "scan")
+  if(folder STREQUAL "calibration" AND LAMINA_SCAN)
     target_link_libraries(test_${folder} PRIVATE lamina_scan)
   endif()
   if(folder STREQUAL "picture")
@@ -85,9 +88,9 @@ endforeach()
 # tests. CI builds this program with the thread sanitizer (scripts/check_threads --changed).
 if(LAMINA_SANITIZE STREQUAL "thread")
   set(thread_sources)
-  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/write/file*.cpp" "stages/write/journal*.cpp" "stages/write/replaceable*.cpp"
-                  "tests/pipeline/flow/*.cpp" "tests/pipeline/batch/*.cpp" "tests/write/test_file.cpp" "tests/write/test_journal.cpp"
-                  "tests/write/test_replaceable.cpp")
+  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/support/io/file.cpp" "stages/support/io/journal.cpp" "stages/support/io/replaceable.cpp"
+                  "tests/pipeline/flow/*.cpp" "tests/pipeline/batch/*.cpp" "tests/support/test_file.cpp" "tests/support/test_journal.cpp"
+                  "tests/support/test_replaceable.cpp")
     lamina_sources(found ${pattern})
     if(NOT found)
       message(FATAL_ERROR "test_threads: no file matches ${pattern}")
@@ -120,7 +123,7 @@ add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/scripts/threemf_outcomes ${PROJECT_SOURCE_DIR}/tests/corpus/3mf
                  --program $<TARGET_FILE:lamina>)
 add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
-         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/write/threemf_judges $<TARGET_FILE:lamina>)
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_judges $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
