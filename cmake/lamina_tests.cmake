@@ -88,7 +88,7 @@ endforeach()
 # tests. CI builds this program with the thread sanitizer (scripts/check_threads --changed).
 if(LAMINA_SANITIZE STREQUAL "thread")
   set(thread_sources)
-  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/support/io/file.cpp" "stages/support/io/journal.cpp" "stages/support/io/replaceable.cpp"
+  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/support/io/file*.cpp" "stages/support/io/journal.cpp"
                   "tests/pipeline/flow/*.cpp" "tests/pipeline/batch/*.cpp" "tests/support/test_file.cpp" "tests/support/test_journal.cpp"
                   "tests/support/test_replaceable.cpp")
     lamina_sources(found ${pattern})
