@@ -219,7 +219,7 @@ TEST(Brundlefab, NumbersAreReadAsTheFirmwareReadsThem) {
   using replay::brundle::Block;
   using replay::brundle::read_block;
   Block block;
-  EXPECT_EQ(read_block("G1 X12.25 Y-3 ; away", 1, block), "");
+  EXPECT_TRUE(read_block("G1 X12.25 Y-3 ; away", 1, block).ok());
   EXPECT_EQ(block.code, 'G');
   EXPECT_EQ(block.command, 1);
   EXPECT_EQ(block['X'], 12.25f);
