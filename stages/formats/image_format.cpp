@@ -32,7 +32,7 @@ constexpr Count most_strips(Count columns, Count rows, Count changes) {
 constexpr Count most_packbits(Count columns, Count rows, Count changes) {
   return std::min((columns / 512 + 3) * rows + 4 * changes, (columns / 8 + columns / 1024 + 2) * rows) + kFileRoom;
 }
-/// No byte takes more than 13 bits (png/tables.cpp). White takes at most 5 bits for 258 bytes; a change two bytes of its own
+/// No byte takes more than 13 bits (png/deflate.cpp). White takes at most 5 bits for 258 bytes; a change two bytes of its own
 /// and the end and the beginning of equal ones, in its row and in the row below; a row its filter's byte.
 constexpr Count most_png(Count columns, Count rows, Count changes) {
   const Count bytes = most_bits(columns, rows, changes) + rows;

@@ -227,7 +227,7 @@ class Printing {
   bool filled_ = false;           // vats are, and the head has not gone back to its safe place
   double dwelt_s_ = 0, rpm_ = 0;  // rpm: of the roller
   std::string fault_;             // the first one
-  std::string spread_wrong_;      // the first fault of spreading; see cycle.cpp
+  std::string spread_wrong_;      // the first fault of spreading
 };
 
 }  // namespace lamina::replay

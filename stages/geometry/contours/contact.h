@@ -48,12 +48,12 @@ struct ContactScratch {
 
 /// Groups contours by contact: two are in contact if an edge of one shares a point with an edge of the other, exactly,
 /// and a contour is in contact with itself if two of its edges that are not neighbours share a point. Contours without
-/// straight or repeated points (tidy.h) that are in no contact are simple and apart from all others, so they need no
+/// straight or repeated points (simplify.h) that are in no contact are simple and apart from all others, so they need no
 /// boolean operation.
 ///
 /// group    for each contour the lowest contour of its group, or kNoContact
 /// returns  whether there is any contact
-/// cost     O(P) as a rule: smooth contours are compared by halving (monotone.h), others edge by edge within the cells of a
+/// cost     O(P) as a rule: smooth contours are compared by halving, others edge by edge within the cells of a
 ///          grid about as fine as they are long
 bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group);
 
