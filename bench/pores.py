@@ -120,9 +120,9 @@ def first_table(folder, voxel, flow, porosity):
 
 def second_table(folder, voxel, flow):
     rows = []
-    for name, options in (("widths as the file tells them, by the calibration's tables", ["--beads", "told"]),
+    for name, options in (("widths as the file tells them, by the calibration's tables", ["--beads", "stated"]),
                           ("lag 0.047 s, 500 mm/s2: the profile", []),
-                          ("the same, not spread along the lines", ["--beads", "laid"]),
+                          ("the same, not spread along the lines", ["--beads", "deposited"]),
                           ("lag 0.046 s, 400 mm/s2", (0.046, 400)), ("lag 0.053 s, 500 mm/s2", (0.053, 500)),
                           ("lag 0.050 s, 1000 mm/s2", (0.050, 1000)), ("lag 0.052 s, speed at once", (0.052, 1000000))):
         if isinstance(options, tuple):
@@ -197,13 +197,13 @@ def main(arguments):
     parser.add_argument("--voxel", type=float, default=10, help="um")
     parser.add_argument("--keep-inertia", action="store_true")
     options = parser.parse_args(arguments)
-    place, kept = os.path.join(ROOT, "bench/pores.md"), ""
+    position, kept = os.path.join(ROOT, "bench/pores.md"), ""
     if options.keep_inertia:
-        with open(place, encoding="utf-8") as file:
+        with open(position, encoding="utf-8") as file:
             text = file.read()
         kept = text[text.index("Forchheimer's k2"):].rstrip("\n")
     written = "\n".join(page(options.voxel, kept)) + "\n"
-    with open(place, "w", encoding="utf-8") as file:
+    with open(position, "w", encoding="utf-8") as file:
         file.write(written)
     print("wrote bench/pores.md")
 

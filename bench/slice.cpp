@@ -36,7 +36,7 @@ Stack stack_of(const Part& part) {
   options.fill_rule = FillRule::kPositive;
   const auto slicer = slice::Slicer::build(part.meshes, {&as_it_is, 1}, {&body, 1}, planes, options);
   if (!slicer) return {{}, 0, slicer.error().message};
-  slice::LayerScratch scratch;
+  slice::SectionScratch scratch;
   slice::LayerContours contours;
   double sum = 0, volume = 0, shadow = 0;
   for (std::uint32_t p = 0; p < planes.size(); ++p) {

@@ -108,15 +108,15 @@ double zlib_seconds(const Runs& runs) {
   const auto start = std::chrono::steady_clock::now();
   z_stream stream{};
   if (deflateInit2(&stream, 1, Z_DEFLATED, MAX_WBITS, 8, Z_RLE) != Z_OK) return 0;
-  write::Bytes row(1 + row_bytes(runs.columns)), room(64 * 1024);
+  write::Bytes row(1 + row_bytes(runs.columns)), capacity(64 * 1024);
   for (std::uint32_t r = 0; r < runs.view().rows(); ++r) {
     row[0] = std::byte{0};
     expand_row(runs.view().row(r), std::span(row).subspan(1));
     stream.next_in = reinterpret_cast<Bytef*>(row.data());
     stream.avail_in = static_cast<uInt>(row.size());
     do {
-      stream.next_out = reinterpret_cast<Bytef*>(room.data());
-      stream.avail_out = static_cast<uInt>(room.size());
+      stream.next_out = reinterpret_cast<Bytef*>(capacity.data());
+      stream.avail_out = static_cast<uInt>(capacity.size());
       deflate(&stream, r + 1 == runs.view().rows() ? Z_FINISH : Z_NO_FLUSH);
     } while (stream.avail_out == 0);
   }

@@ -57,9 +57,9 @@ foreach(folder run ${folders})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
                         PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
   target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
-  if(LAMINA_UNITE_TESTS)
+  if(LAMINA_UNITY_TESTS)
     list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp)  # options of its own
-    lamina_unite(test_${folder} ${test_sources})
+    lamina_unity(test_${folder} ${test_sources})
     list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/")
     list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/(cli|run)/")  # the other rooms have a file or two each
     if(test_sources)
@@ -106,7 +106,7 @@ if(LAMINA_SANITIZE STREQUAL "thread")
                         PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH nlohmann_json::nlohmann_json TIFF::TIFF GTest::gtest_main
                         ${CMAKE_DL_LIBS})
   target_compile_definitions(test_threads PRIVATE $<TARGET_PROPERTY:lamina_test_support,INTERFACE_COMPILE_DEFINITIONS>)
-  lamina_unite(test_threads ${thread_sources})
+  lamina_unity(test_threads ${thread_sources})
 endif()
 
 # What needs a release: other projects, other languages, other machines.
@@ -123,7 +123,7 @@ add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/scripts/threemf_outcomes ${PROJECT_SOURCE_DIR}/tests/corpus/3mf
                  --program $<TARGET_FILE:lamina>)
 add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
-         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_judges $<TARGET_FILE:lamina>)
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_checkers $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled

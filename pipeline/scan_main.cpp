@@ -24,11 +24,11 @@ Result<std::string> answer(const Json& json, const cv::Mat& picture) {
 
 /// {"photo": path, "chart": ..., "picture": whether}
 Result<std::string> read_chart_of(const Json& request) {
-  constexpr int kLeast = 200;
+  constexpr int kMin = 200;
   const auto path = request.at("photo").get<std::string>();
   const auto chart = read_chart(json_text(request.at("chart")), "the chart");
   if (!chart) return chart.error();
-  const auto photo = read_photo(path, kLeast);
+  const auto photo = read_photo(path, kMin);
   if (!photo) return photo.error();
   const auto reading = read_chart_photo(*photo, *chart);
   if (!reading) return at_photo(path, reading.error());
@@ -39,7 +39,7 @@ Result<std::string> read_chart_of(const Json& request) {
 
 /// {"photo": path, "photo_um", "scan_along_x", "pixel_nm": [x, y], "columns", "row_offset", "change"}
 Result<std::string> compare_with(const Json& request) {
-  constexpr int kLeast = 50;
+  constexpr int kMin = 50;
   const auto path = request.at("photo").get<std::string>();
   Runs image;
   image.columns = request.at("columns").get<std::uint32_t>();
@@ -53,7 +53,7 @@ Result<std::string> compare_with(const Json& request) {
                             request.at("photo_um").get<double>()};
   good = good && layer.pixel_x_nm >= 1 && layer.pixel_y_nm >= 1 && layer.photo_um >= 1;
   if (!good) return Error{Fault::kUsage, "the request holds no image"};
-  const auto photo = read_photo(path, kLeast);
+  const auto photo = read_photo(path, kMin);
   if (!photo) return photo.error();
   const auto comparison = compare_layer(*photo, layer);
   if (!comparison) return at_photo(path, comparison.error());
@@ -63,7 +63,7 @@ Result<std::string> compare_with(const Json& request) {
 Result<std::string> run(const std::string& what) {
   if (what != "chart" && what != "compare")
     return Error{Fault::kUsage, "lamina-scan is run by lamina calibrate and lamina compare"};
-  const auto text = read_file("-", {.fault = Fault::kUsage, .most_bytes = 1u << 30, .streams = true});
+  const auto text = read_file("-", {.fault = Fault::kUsage, .max_bytes = 1u << 30, .streams = true});
   if (!text) return text.error();
   if (!json_nests_within(*text)) return Error{Fault::kUsage, "the request nests too deep"};
   return what == "chart" ? read_chart_of(parse_json(*text)) : compare_with(parse_json(*text));

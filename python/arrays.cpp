@@ -36,10 +36,10 @@ py::array bounds_array(const Box& box) {
   return array;
 }
 
-const write::ImageFormat& format_of(const std::string& path, const std::string& asked) {
-  if (!asked.empty()) {
-    if (const write::ImageFormat* format = write::find_image_format(asked)) return *format;
-    raise({Fault::kUsage, fmt::format("format '{}': no such format; lamina.image_formats() lists them", asked)});
+const write::ImageFormat& format_of(const std::string& path, const std::string& requested) {
+  if (!requested.empty()) {
+    if (const write::ImageFormat* format = write::find_image_format(requested)) return *format;
+    raise({Fault::kUsage, fmt::format("format '{}': no such format; lamina.image_formats() lists them", requested)});
   }
   const std::string extension = std::filesystem::path(path).extension();
   const auto formats = write::image_formats();

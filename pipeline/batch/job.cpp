@@ -69,11 +69,11 @@ class Preparation {
       return;
     }
     const fs::path below = below_batch(job.output, share_.directory);
-    job.place = below.empty() ? job.output : below.string();
+    job.position = below.empty() ? job.output : below.string();
   }
 
   void digest_inputs(BatchJob& job) {
-    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.place);
+    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.position);
     for (const std::string& word : job.entry.words) identity += fmt::format("{}:{}\n", word.size(), word);
     for (const std::string& input : std::set<std::string>(job.call.inputs.begin(), job.call.inputs.end())) {
       const auto [known, fresh] = digests_.try_emplace(input, Error{});

@@ -12,14 +12,14 @@
 namespace lamina::pipeline {
 namespace {
 
-std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id) : job.place; }
+std::string key_of(const BatchJob& job) { return job.position.empty() ? hex(job.id) : job.position; }
 
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::map<std::string, BatchRecord::Earlier>& earlier) try {
   if (!json_nests_within(line)) return;
   const Json json = parse_json(line);
   const bool ended = json.contains("ended");
-  const std::string id = json.at(ended ? "ended" : "begun").text(), place = json.at("output").text();
+  const std::string id = json.at(ended ? "ended" : "begun").text(), position = json.at("output").text();
   BatchRecord::Earlier entry;
   if (!read_hex(id, entry.begun)) return;
   if (ended) {
@@ -34,8 +34,8 @@ void read_line(const std::string& line, std::map<std::string, BatchRecord::Earli
     json.at("bytes").get_to(result.output.bytes);
     result.value = json.at("result");
   }
-  BatchRecord::Earlier& known = earlier[place.empty() ? id : place];
-  entry.foreign = ended ? known.foreign && !entry.ended : json.contains("foreign");
+  BatchRecord::Earlier& known = earlier[position.empty() ? id : position];
+  entry.unowned = ended ? known.unowned && !entry.ended : json.contains("unowned");
   known = std::move(entry);
 } catch (const JsonError&) {
   return;
@@ -47,7 +47,7 @@ Json result_json(const BatchJob& job, const BatchResult& result) {
   return {{"job", job.number},
           {"source", job.entry.source},
           {"words", job.entry.words},
-          {"output", job.place},
+          {"output", job.position},
           {"outcome", outcome_name(result.outcome)},
           {"code", result.code},
           {"reason", result.reason},
@@ -91,9 +91,9 @@ Status BatchRecord::append(const Json& entry) {
   return status ? status : Error{status.error().fault, status.error().message + ", and go on with --resume"};
 }
 
-Status BatchRecord::begun(const BatchJob& job, bool foreign) {
-  Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.place}};
-  if (foreign) entry["foreign"] = true;
+Status BatchRecord::begun(const BatchJob& job, bool unowned) {
+  Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.position}};
+  if (unowned) entry["unowned"] = true;
   return append(entry);
 }
 

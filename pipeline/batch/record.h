@@ -24,7 +24,7 @@ class BatchRecord {
   struct Earlier {
     Hash128 begun;         // id of the last job that wrote there
     bool ended = false;    // with exit code 0
-    bool foreign = false;  // it found files there that no batch had written, and did not finish
+    bool unowned = false;  // it found files there that no batch had written, and did not finish
     BatchResult result;    // set if it ended
   };
 
@@ -38,7 +38,7 @@ class BatchRecord {
 
   // --- from one thread at a time; errors  kOutput
   /// foreign  the output path holds unrecorded files: a later run must not treat them as its own
-  Status begun(const BatchJob& job, bool foreign);
+  Status begun(const BatchJob& job, bool unowned);
   Status ended(const BatchJob& job, const BatchResult& result);
 
  private:

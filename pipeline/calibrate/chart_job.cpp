@@ -64,10 +64,10 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
   // A controller that cannot fire some nozzles insists on them being blocked.
   const auto printer = all || machine->head.blocked.empty() ? all : resolve_profile(chart::chart_machine(*machine, true));
   if (!printer) return printer.error();
-  const auto drops = chart::lay_out_drops(printer->machine, printer->grid, std::max<std::uint64_t>(request.drops, 1));
-  auto laid = request.drops > 0 ? Result<Chart>(Chart()) : chart::lay_out(printer->machine, printer->grid);
-  if (!drops || !laid) return drops ? laid.error() : drops.error();
-  laid->layer_mm = request.layer_mm;
+  const auto drops = chart::layout_drops(printer->machine, printer->grid, std::max<std::uint64_t>(request.drops, 1));
+  auto deposited = request.drops > 0 ? Result<Chart>(Chart()) : chart::layout_chart(printer->machine, printer->grid);
+  if (!drops || !deposited) return drops ? deposited.error() : drops.error();
+  deposited->layer_mm = request.layer_mm;
   const fs::path directory = request.directory;
   std::error_code failed;
   fs::create_directories(directory / "images", failed);
@@ -82,7 +82,7 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
   const std::string profile = read::machine_text(printer->machine);
   Status status = files.add("machine.toml", std::as_bytes(std::span(profile)));
   const auto image = [&](std::uint32_t i) {
-    return request.drops > 0 ? chart::draw_drops(*drops, printer->grid, i) : chart::draw(*laid);
+    return request.drops > 0 ? chart::draw_drops(*drops, printer->grid, i) : chart::draw(*deposited);
   };
   if (status) status = write_images(printer->grid, request.drops > 0 ? drops->layers : 1, image, files);
   if (!status) return status.error();
@@ -97,7 +97,7 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
   auto summary = run(
       job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   if (!summary) return summary.error();
-  const std::string json = request.drops > 0 ? drops_text(*drops) : chart_text(*laid);
+  const std::string json = request.drops > 0 ? drops_text(*drops) : chart_text(*deposited);
   if (status = text->append(json); !status) return status.error();
   if (const auto whole = text->finish(); !whole) return whole.error();
   files.paths.clear();

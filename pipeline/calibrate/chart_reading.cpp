@@ -20,14 +20,14 @@ std::string list_of(const std::vector<std::uint32_t>& nozzles) {
   return nozzles.empty() ? "none" : fmt::format("{}", fmt::join(nozzles, ", "));
 }
 
-constexpr double kToldPixels = 0.1, kErrors = 4;  // as of single nozzles
+constexpr double kReportedPixels = 0.1, kErrors = 4;  // as of single nozzles
 
 /// Nozzles that were read along the scan or across it, with those that are too uncertain to be told.
-std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* seen, const char* error) {
+std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* detected, const char* error) {
   std::vector<std::optional<Located>> read(nozzles.size());
   for (std::size_t n = 0; n < nozzles.size(); ++n) {
-    if (nozzles[n].is_null() || nozzles[n].at(seen).is_null()) continue;
-    read[n] = Located{nozzles[n].at(seen).get<double>(), nozzles[n].at(error).get<double>()};
+    if (nozzles[n].is_null() || nozzles[n].at(detected).is_null()) continue;
+    read[n] = Located{nozzles[n].at(detected).get<double>(), nozzles[n].at(error).get<double>()};
   }
   return read;
 }
@@ -36,44 +36,44 @@ std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char
 std::string correct_rows(const std::vector<std::optional<Located>>& along, const Chart& chart, Machine& machine) {
   std::vector<double>& rows = machine.head.row_offset_um;
   if (rows.size() < 2) return "";
-  const auto seen = chart::rows_of(along, static_cast<std::uint32_t>(rows.size()));
+  const auto detected = chart::rows_of(along, static_cast<std::uint32_t>(rows.size()));
   const double pixel_um = 1e-3 * (chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm);
   std::string line;
-  std::size_t untold = 0;
+  std::size_t unreadable = 0;
   for (std::size_t r = 1; r < rows.size(); ++r) {
     line += line.empty() ? "rows      against the first one, changed by " : ", ";
-    if (!seen[r] || kErrors * seen[r]->error_um > kToldPixels * pixel_um) {
-      line += "untold";
-      ++untold;
+    if (!detected[r] || kErrors * detected[r]->error_um > kReportedPixels * pixel_um) {
+      line += "unreadable";
+      ++unreadable;
       continue;
     }
-    const double late = std::round(10 * seen[r]->um) / 10;
+    const double late = std::round(10 * detected[r]->um) / 10;
     rows[r] -= late;
-    line += fmt::format("{:+g} um (within {:.1f})", 0 - late, seen[r]->within_um);
+    line += fmt::format("{:+g} um (within {:.1f})", 0 - late, detected[r]->within_um);
   }
   const char* why = "the photograph does not show them within a tenth of a pixel";
-  if (untold + 1 == rows.size()) return fmt::format("rows      not told: {}", why);
-  return untold == 0 ? line : fmt::format("{}: {}", line, why);
+  if (unreadable + 1 == rows.size()) return fmt::format("rows      not told: {}", why);
+  return unreadable == 0 ? line : fmt::format("{}: {}", line, why);
 }
 
 /// How far nozzles lie off, of all that were read.
-std::string places_line(const std::vector<std::optional<Located>>& along, const std::vector<std::optional<Located>>& across) {
-  const auto most = [](const std::vector<std::optional<Located>>& nozzles) {
+std::string positions_line(const std::vector<std::optional<Located>>& along, const std::vector<std::optional<Located>>& across) {
+  const auto maximum = [](const std::vector<std::optional<Located>>& nozzles) {
     double um = 0;
     for (const auto& one : nozzles) um = std::max(um, one ? std::abs(one->um) : 0);
     return um;
   };
   const auto read = std::ranges::count_if(along, [](const auto& one) { return one.has_value(); });
   return fmt::format("nozzles   {} read, within {:.0f} um along the scan and {:.0f} across it of the head's line", read,
-                     most(along), most(across));
+                     maximum(along), maximum(across));
 }
 
 /// A length, or that it cannot be told.
-std::string told(const Json& json, const char* key) {
-  return json.at(key).is_null() ? "untold" : fmt::format("{:+.0f} um", json.at(key).get<double>());
+std::string reported(const Json& json, const char* key) {
+  return json.at(key).is_null() ? "unreadable" : fmt::format("{:+.0f} um", json.at(key).get<double>());
 }
-std::string told_within(const Json& json, const char* key, const char* within) {
-  if (json.at(key).is_null()) return "untold";
+std::string reported_within(const Json& json, const char* key, const char* within) {
+  if (json.at(key).is_null()) return "unreadable";
   return fmt::format("{:+.1f} um (within {:.1f})", json.at(key).get<double>(), json.at(within).get<double>());
 }
 
@@ -85,65 +85,65 @@ std::vector<std::string> swath_lines(const Json& swaths) {
       lines.push_back(fmt::format("swath {}   was not printed", s));
     } else if (s > 0) {
       lines.push_back(fmt::format("swath {}   {} across, {} along the scan against the first one", s,
-                                  told_within(swath, "across_um", "across_within_um"),
-                                  told_within(swath, "along_um", "along_within_um")));
+                                  reported_within(swath, "across_um", "across_within_um"),
+                                  reported_within(swath, "along_um", "along_within_um")));
     }
   }
   return lines;
 }
 
 /// Joints whose verniers and blocks show something else than the swaths' dashes: one of the two was read wrong.
-std::vector<std::string> joint_lines(const Json& joints) {
+std::vector<std::string> joint_lines(const Json& stitches) {
   std::vector<std::string> lines;
-  for (const Json& joint : joints) {
+  for (const Json& joint : stitches) {
     if (joint.at("agrees").get<bool>()) continue;
     const auto swath = joint.at("swath").get<std::uint32_t>();
     lines.push_back(fmt::format(
         "joint {}   shows {} across, {} along the scan from swath {} to {}, which its dashes do not: look at it in the photograph",
-        swath, told(joint, "across_um"), told(joint, "along_um"), swath - 1, swath));
+        swath, reported(joint, "across_um"), reported(joint, "along_um"), swath - 1, swath));
   }
   return lines;
 }
 
 /// Offsets that four standard errors do not hold within a tenth of a pixel.
-std::string untold_line(const Json& nozzles) {
-  std::size_t seen = 0, untold = 0;
+std::string unreadable_line(const Json& nozzles) {
+  std::size_t detected = 0, unreadable = 0;
   for (const Json& nozzle : nozzles) {
     if (nozzle.is_null()) continue;
     for (const char* key : {"along_um", "across_um"}) {
-      ++seen;
-      untold += nozzle.at(key).is_null();
+      ++detected;
+      unreadable += nozzle.at(key).is_null();
     }
   }
-  if (untold == 0) return "";
+  if (unreadable == 0) return "";
   return fmt::format("untold    {} of {} offsets of nozzles: the photograph does not show them within a tenth of a pixel",
-                     untold, seen);
+                     unreadable, detected);
 }
 
 std::vector<std::string> take(const Json& json, const Chart& chart, Machine& machine) {
-  const auto seen_blocked = json.at("blocked").get<std::vector<std::uint32_t>>();
+  const auto blocked_nozzles = json.at("blocked").get<std::vector<std::uint32_t>>();
   const auto weak = json.at("weak").get<std::vector<std::uint32_t>>(),
-             untold = json.at("untold").get<std::vector<std::uint32_t>>();
+             unreadable = json.at("unreadable").get<std::vector<std::uint32_t>>();
   const Json& nozzles = json.at("nozzles");
   // Blocked stay those that were not on the chart, and those of which nothing could be seen.
-  std::set<std::uint32_t> blocked(seen_blocked.begin(), seen_blocked.end());
+  std::set<std::uint32_t> blocked(blocked_nozzles.begin(), blocked_nozzles.end());
   for (const std::uint32_t n : machine.head.blocked) {
     if (n < nozzles.size() && nozzles[n].is_null()) blocked.insert(n);
   }
   std::vector<std::string> lines;
   lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's place",
                               json.at("pixels_a_mm").get<double>(), json.at("scatter_um").get<double>()));
-  const auto read_along = read_nozzles(nozzles, "along_seen_um", "along_error_um"),
-             read_across = read_nozzles(nozzles, "across_seen_um", "across_error_um");
-  lines.push_back(places_line(read_along, read_across));
+  const auto read_along = read_nozzles(nozzles, "along_detected_um", "along_error_um"),
+             read_across = read_nozzles(nozzles, "across_detected_um", "across_error_um");
+  lines.push_back(positions_line(read_along, read_across));
   machine.head.blocked.assign(blocked.begin(), blocked.end());
   lines.push_back("blocked   " + list_of(machine.head.blocked));
   if (!weak.empty()) lines.push_back(fmt::format("weak      {}: seen by times, not taken for blocked", list_of(weak)));
-  if (!untold.empty()) lines.push_back("unknown   " + list_of(untold) + ": nothing of theirs can be seen");
+  if (!unreadable.empty()) lines.push_back("unknown   " + list_of(unreadable) + ": nothing of theirs can be seen");
   if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
   for (std::string& line : joint_lines(json.at("joints"))) lines.push_back(std::move(line));
-  if (auto untold_offsets = untold_line(nozzles); !untold_offsets.empty()) lines.push_back(std::move(untold_offsets));
+  if (auto unreadable_offsets = unreadable_line(nozzles); !unreadable_offsets.empty()) lines.push_back(std::move(unreadable_offsets));
   if (const Json* gain = json.find("dot_gain_um")) {
     const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
     const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;
@@ -157,7 +157,7 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
     const double percent = wedge.at("pixels_percent").get<double>(), saturation = saturation_of(percent, chart, machine);
     lines.push_back(fmt::format("wedge     {:g} % of the pixels{}: {:.0f} % of full ink", percent,
                                 saturation > 0 ? fmt::format(", {:.1f} % saturation", saturation) : "",
-                                wedge.at("seen_percent").get<double>()));
+                                wedge.at("detected_percent").get<double>()));
   }
   return lines;
 }

@@ -85,9 +85,9 @@ CommandSpec spec_of(const Command& command) {
   spec.name = command.name;
   spec.brief = command.summary;
   // Each heading once, in order of first occurrence; options without one come first.
-  std::map<std::string, std::size_t> places{{"", 0}};
-  for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
-  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
+  std::map<std::string, std::size_t> positions{{"", 0}};
+  for (const OptionSpec& option : spec.options) positions.try_emplace(option.group, positions.size());
+  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return positions[option.group]; });
   return spec;
 }
 

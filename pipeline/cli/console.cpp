@@ -137,7 +137,7 @@ void Console::progress(const ProgressEvent& event) {
     using Style = terminal::Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);
   }
-  write_all(STDERR_FILENO, counted ? progress_->tell(event.done, event.total)
+  write_all(STDERR_FILENO, counted ? progress_->report(event.done, event.total)
                                    : progress_->begin(event.stage == Stage::kLoading ? "loading parts" : "indexing"));
 }
 

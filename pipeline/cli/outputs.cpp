@@ -63,8 +63,8 @@ constexpr OwnFile kOwnFiles[] = {
 /// The folder of a file, or of what a link leads to.
 std::optional<write::FileId> folder_id(const std::string& file) {
   std::error_code ignored;
-  const fs::path place = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
-  return write::file_id(place.parent_path().string());
+  const fs::path position = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
+  return write::file_id(position.parent_path().string());
 }
 
 /// The directory read, of a job or a chart, in which a file or what a link leads to lies; "" for none.
@@ -74,10 +74,10 @@ std::string directory_read(const std::string& file, const Arguments& arguments) 
     const std::string folder = write::is_file(chart) ? fs::absolute(chart).parent_path().string() : chart;
     read.insert(read.end(), {folder, folder + "/images", folder + "/print"});
   }
-  const auto place = folder_id(file);
+  const auto position = folder_id(file);
   const auto found = std::ranges::find_if(read, [&](const std::string& directory) {
     return std::ranges::any_of(std::array{"", "/layers", "/program"},
-                               [&](const char* below) { return place && place == write::file_id(directory + below); });
+                               [&](const char* below) { return position && position == write::file_id(directory + below); });
   });
   return found == read.end() ? "" : *found;
 }
@@ -127,18 +127,18 @@ std::vector<std::string> outputs_of(const Arguments& arguments) {
 
 /// Two outputs of one call are two files. errors  kUsage
 Status check_apart(const Arguments& arguments) {
-  std::vector<fs::path> places;
+  std::vector<fs::path> positions;
   for (const std::string_view flag : kOutputs) {
     const std::string path = arguments.text(flag);
     std::error_code ignored;
     if (path.empty() || write::is_stream(path)) continue;
     for (const char* ending : {"", ".json"}) {
-      const fs::path place = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
-      if (std::ranges::find(places, place) == places.end()) continue;
+      const fs::path position = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
+      if (std::ranges::find(positions, position) == positions.end()) continue;
       return Error{Fault::kUsage, fmt::format("{}: is named for two outputs of this call; name another file", path)};
     }
     for (const char* ending : {"", ".json"}) {
-      places.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
+      positions.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
     }
   }
   return {};

@@ -37,9 +37,9 @@ class JobContext : public Context {
   int complain(const Error& error) override { return outer_.complain(error); }
   Status print(std::string_view text) override { return outer_.print(std::exchange(line_, {}) + std::string(text)); }
   Status give(const Json& value) override {
-    Json told = value;
-    told["job"] = job_;
-    return outer_.give(told);
+    Json reported = value;
+    reported["job"] = job_;
+    return outer_.give(reported);
   }
   void progress(const ProgressEvent& event) override { outer_.progress(event); }
   const std::atomic<bool>& cancel() override { return outer_.cancel(); }
@@ -69,7 +69,7 @@ Result<Job> read_job_of(const Arguments& arguments) {
 
 /// The command that a saved job names in its first line; "" for others.
 std::string saved_command(const std::string& path) {
-  const auto text = read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .most_bytes = kMostTomlBytes});
+  const auto text = read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes});
   return text ? std::string(read::command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
 }
 
@@ -112,7 +112,7 @@ Arguments arguments_on(const std::string& files, const Job& job, Product product
   inner.operands = {files};
   std::erase_if(inner.options, [](const auto& option) { return option.first == "--set" || option.first == "--machine"; });
   // Toolpaths name no printer that a file describes.
-  if (product == Product::kMoves && !job.machine.profile.empty() && arguments.text("--beads") != "told")
+  if (product == Product::kMoves && !job.machine.profile.empty() && arguments.text("--beads") != "stated")
     inner.options.emplace_back("--machine", job.machine.profile);
   return inner;
 }
@@ -155,7 +155,7 @@ Outcome predict_job(const Arguments& arguments, Context& context, Predict predic
   Json parts = Json::array();
   for (const PartSummary& part : summary->parts) parts.push_back(part.path);
   const std::string machine = summary->machine.empty() ? "" : ", " + one_line(summary->machine);
-  JobContext told(context, job->output, one_line(path),
+  JobContext reported(context, job->output, one_line(path),
                   fmt::format("job       {}: planned as lamina {} does, {} layers {}{}\n", one_line(path),
                               command_name(*product), summary->layers_planned, summary->layer_text, machine),
                   {{"path", path},
@@ -164,9 +164,9 @@ Outcome predict_job(const Arguments& arguments, Context& context, Predict predic
                    {"layers", summary->layers_planned},
                    {"parts", parts},
                    {"warnings", warnings_json(summary->warnings)}});
-  Outcome outcome = predict(arguments_on(job->output, *job, *product, arguments), told,
+  Outcome outcome = predict(arguments_on(job->output, *job, *product, arguments), reported,
                             moves ? first_part(*summary, corner_mm) : std::nullopt);
-  if (outcome.error) outcome.error->message = told.shown(outcome.error->message);
+  if (outcome.error) outcome.error->message = reported.shown(outcome.error->message);
   return outcome;
 }
 

@@ -16,13 +16,13 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using write::voxels::Side;
+using write::voxels::VoxelPhase;
 
 struct Choice {
   const char *flag, *content;
-  Side side;
+  VoxelPhase side;
 };
-constexpr Choice kChoices[] = {{"--solid", "solid", Side::kSolid}, {"--void", "void", Side::kVoid}};
+constexpr Choice kChoices[] = {{"--solid", "solid", VoxelPhase::kSolid}, {"--void", "void", VoxelPhase::kVoid}};
 
 bool is_stl(const std::string& path) { return lower_case(fs::path(path).extension().string()) == ".stl"; }
 
@@ -39,9 +39,9 @@ Status check_window_files(const terminal::Arguments& arguments) {
   if (Status status = check_plot_name(arguments.text("--plot")); !status) return status;
   for (const Choice& choice : kChoices) {
     if (!arguments.has(choice.flag)) continue;
-    const std::string path = arguments.text(choice.flag), told = one_line(path);
+    const std::string path = arguments.text(choice.flag), reported = one_line(path);
     if (!is_stl(path) && !write::voxels::image_kind(path))
-      return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, told)};
+      return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, reported)};
     if (Status status = check_folder(choice.flag, path); !status) return status;
   }
   return {};

@@ -39,11 +39,11 @@ class Correction {
 /// before a layer would have to wait for it. Thread-compatible.
 class Budget {
  public:
-  struct Scratch {
+  struct ScratchHooks {
     const std::function<std::uint64_t(std::uint32_t)>& bytes_held;
     const std::function<void(std::uint32_t)>& let_go;
   };
-  Budget(std::uint64_t bytes, std::uint32_t slots, Scratch scratch) : budget_(bytes), scratch_(scratch) {
+  Budget(std::uint64_t bytes, std::uint32_t slots, ScratchHooks scratch) : budget_(bytes), scratch_(scratch) {
     for (std::uint32_t slot = slots; slot-- > 0;) idle_.push_back({slot, 0});
   }
 
@@ -55,7 +55,7 @@ class Budget {
   /// A slot and `bytes` for a layer, or nothing if it must wait. A layer larger than the budget runs alone.
   std::optional<Loan> take(std::uint64_t bytes) {
     if (in_flight_ > 0 && (idle_.empty() || used_ + bytes > budget_)) return std::nullopt;
-    make_room(bytes);
+    free_memory(bytes);
     Loan loan = idle_.back();
     idle_.pop_back();
     idle_bytes_ -= loan.bytes;
@@ -70,7 +70,7 @@ class Budget {
 
   /// Sets the bytes of a layer in flight, even beyond the budget.
   void settle(Loan& loan, std::uint64_t bytes) {
-    if (bytes > loan.bytes) make_room(bytes - loan.bytes);
+    if (bytes > loan.bytes) free_memory(bytes - loan.bytes);
     used_ -= loan.bytes;
     loan.bytes = bytes;
     use(bytes);
@@ -85,8 +85,8 @@ class Budget {
   }
 
   /// Bytes that no layer holds, and that they leave room for.
-  void hold_beside(std::uint64_t bytes) {
-    used_ -= std::exchange(beside_, bytes);
+  void hold_extra(std::uint64_t bytes) {
+    used_ -= std::exchange(extra_, bytes);
     use(bytes);
   }
 
@@ -100,7 +100,7 @@ class Budget {
     max_bytes_ = std::max(max_bytes_, used_ + idle_bytes_);
   }
 
-  void make_room(std::uint64_t bytes) {
+  void free_memory(std::uint64_t bytes) {
     for (Loan& slot : idle_) {  // the last slot is lent next, so it is emptied last
       if (used_ + idle_bytes_ + bytes <= budget_) return;
       if (slot.bytes == 0) continue;
@@ -111,11 +111,11 @@ class Budget {
   }
 
   std::uint64_t budget_;
-  Scratch scratch_;
+  ScratchHooks scratch_;
   std::vector<Loan> idle_;  // each with its retained bytes
   std::uint32_t in_flight_ = 0, max_in_flight_ = 0;
   std::uint64_t used_ = 0;  // by layers in flight and beside them
-  std::uint64_t beside_ = 0;
+  std::uint64_t extra_ = 0;
   std::uint64_t idle_bytes_ = 0;  // of idle slots
   std::uint64_t max_bytes_ = 0;
 };

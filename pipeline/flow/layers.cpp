@@ -243,7 +243,7 @@ class LayerFlow {
                              : layer.status;
       if (!result_) stop_.fail();
     }
-    if (steps_.bytes_beside) layer.beside = steps_.bytes_beside();
+    if (steps_.extra_bytes) layer.extra = steps_.extra_bytes();
     layer.phase = Phase::kRecorded;
     return message;
   }

@@ -20,20 +20,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Error refuse(const std::string& file, const Place& at, const std::string& what) {
+Error refuse(const std::string& file, const TextPosition& at, const std::string& what) {
   return {Fault::kUsage, fmt::format("{}{}", at.text(file), what)};
 }
 
 Status read_parts(const TomlValue& list, const std::string& file, Job& job) {
   if (!list.is_list() || list.value.empty() || !std::ranges::all_of(list.value, &TomlValue::is_table)) {
-    return refuse(file, list.place, "part: write one [[part]] table for each part");
+    return refuse(file, list.position, "part: write one [[part]] table for each part");
   }
   job.parts.clear();
   for (const TomlValue& table : list.value) {
     PartRequest part;
     if (Status status = read_section(table, "part", file, part_keys(), part); !status) return status;
-    if (part.path.empty()) return refuse(file, table.place, "part.path is missing; name a file");
-    const Place& named = table.find("path")->place;
+    if (part.path.empty()) return refuse(file, table.position, "part.path is missing; name a file");
+    const TextPosition& named = table.find("path")->position;
     part.named_at = fmt::format("{}:{}:{}", file, named.line, named.column);
     job.parts.push_back(std::move(part));
   }
@@ -43,7 +43,7 @@ Status read_parts(const TomlValue& list, const std::string& file, Job& job) {
 Status no_section(const TomlValue& value, std::string_view section, const std::string& file) {
   auto names = section_names(job_keys());
   names.push_back("part");
-  return refuse(file, value.place, fmt::format("{}: {}", section, no_such_section(section, names)));
+  return refuse(file, value.position, fmt::format("{}: {}", section, no_such_section(section, names)));
 }
 
 bool has_section(std::string_view section) {
@@ -86,7 +86,7 @@ void change_profiles(MachineRequest& machine, const Change& change) {
 TomlValue assigned_value(std::string_view text) {
   const bool toml = !text.empty() && (text.front() == '"' || text.front() == '[' || text.front() == '{');
   if (auto value = toml ? read_toml_value(text) : std::nullopt) {
-    value->place = {};
+    value->position = {};
     return *value;
   }
   if (text.size() >= 2 && text.front() == '[' && text.back() == ']') text = text.substr(1, text.size() - 2);  // [a, b]
@@ -97,7 +97,7 @@ TomlValue assigned_value(std::string_view text) {
 template <class Target>
 Status read_assigned(const TomlValue& table, std::string_view section, const std::string& option,
                      std::span<const Key<Target>> keys, Target& target) {
-  Place unused;
+  TextPosition unused;
   const std::string& name = table.name.front();
   std::string wrong;
   const auto* key = find_key(keys, section, name, wrong);
@@ -109,7 +109,7 @@ Status read_assigned(const TomlValue& table, std::string_view section, const std
 
 Status read_job(const std::string& path, Job& job) {
   const auto text =
-      read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .most_bytes = kMostTomlBytes, .streams = true});
+      read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes, .streams = true});
   return text ? read_job_text(*text, path, job) : Status(text.error());
 }
 

@@ -16,22 +16,22 @@ constexpr Word<Pattern> kPatterns[] = {{"none", Pattern::kNone},           {"ras
                                        {"honeycomb", Pattern::kHoneycomb}, {"quatrefoil", Pattern::kQuatrefoil}};
 constexpr Word<bool> kTurns[] = {{"angle", false}, {"layer", true}};
 
-constexpr Limits kFillLength{0, kMostMm, " mm"}, kWidth{kLeastMm, 100, " mm"}, kAngle{-36000, 36000, " degrees"},
+constexpr Limits kFillLength{0, kMaxMm, " mm"}, kWidth{kMinMm, 100, " mm"}, kAngle{-36000, 36000, " degrees"},
     kCount{0, 1'000'000}, kOneAndMore{1, 1'000'000};
 
 /// A list of one to a thousand lengths.
-constexpr Limits list_of(double low, double high, std::size_t least = 1) { return {low, high, " mm", false, least, 1000}; }
+constexpr Limits list_of(double low, double high, std::size_t minimum = 1) { return {low, high, " mm", false, minimum, 1000}; }
 
 std::string check_nothing(std::string_view) { return {}; }
 
-std::string read_gaps_by_height(const TomlValue& list, std::vector<std::array<double, 2>>& gaps, Place& at) {
+std::string read_gaps_by_height(const TomlValue& list, std::vector<std::array<double, 2>>& gaps, TextPosition& at) {
   if (!list.is_list()) return "is a list of heights and gaps, as in [[0, 0.75], [6, 0.1]]";
   std::vector<std::array<double, 2>> read;
   for (const TomlValue& entry : list.value) {
-    at = entry.place;
+    at = entry.position;
     if (!entry.is_list() || entry.value.size() != 2) return "holds what is not a height and a gap, as in [[0, 0.75], [6, 0.1]]";
     auto& [z, gap] = read.emplace_back();
-    if (auto wrong = read_number(entry.value[0].text, 0, kMostMm, " mm", z); !wrong.empty()) return wrong;
+    if (auto wrong = read_number(entry.value[0].text, 0, kMaxMm, " mm", z); !wrong.empty()) return wrong;
     if (auto wrong = read_number(entry.value[1].text, -100, 1000, " mm", gap); !wrong.empty()) return wrong;
     if (read.size() > 1 && nm_of(z) <= nm_of(read[read.size() - 2][0])) {
       return fmt::format("[{}, {}]: heights have to increase", number_text(z), number_text(gap));
@@ -66,7 +66,7 @@ constexpr Key<FillSettings> kFillKeys[] = {
                                  list_of(-100, 1000)),
     field<&FillSettings::distance_mm>({"fill", "distance_mm", "--line-distance", "MM[,MM...]",
                                        "from centre to centre of neighbouring lines, in place of gaps"},
-                                      list_of(kLeastMm, 1000, 0)),
+                                      list_of(kMinMm, 1000, 0)),
     field<&FillSettings::group>({"fill", "group", "", "N", "beads in contact before each gap"}, kOneAndMore),
     structure<read_gaps_by_height, gaps_by_height_text, &FillSettings::gap_by_height>(
         {"fill", "gap_by_height", "", "[[Z,MM],...]", "gaps at heights above the part's bottom, in proportion between them"}),
@@ -101,7 +101,7 @@ std::string check_distances(const FillChanges& changes) {
   return fmt::format("{} and {} both say how far lines lie from each other; give one of them", keys[0], keys[1]);
 }
 
-std::string read_fill_ranges(const TomlValue& list, std::vector<FillRange>& ranges, Place& at) {
+std::string read_fill_ranges(const TomlValue& list, std::vector<FillRange>& ranges, TextPosition& at) {
   std::vector<FillRange> read;
   if (auto wrong = read_ranges<FillSettings>(list, kFillKeys, read, at); !wrong.empty()) return wrong;
   for (const FillRange& range : read) {
@@ -132,7 +132,7 @@ std::span<const JobKey> fill_keys() {
   return keys;
 }
 
-std::string read_fill_changes(const TomlValue& table, FillChanges& changes, Place& at) {
+std::string read_fill_changes(const TomlValue& table, FillChanges& changes, TextPosition& at) {
   FillChanges read;
   if (auto wrong = read_changes<FillSettings>(table, kFillKeys, read, at); !wrong.empty()) return wrong;
   if (auto wrong = check_distances(read); !wrong.empty()) return wrong;
@@ -199,8 +199,8 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
          "aligned: a grid fixed to the part, ends thick; fukuda: the grid as it falls; thick-ends: each line on its own"}),
     field<&SegmentSettings::thick_mm>({"segment", "thick_mm", "--thick", "MM", "length of a thick stretch"}, kAny),
     field<&SegmentSettings::thin_mm>({"segment", "thin_mm", "--thin", "MM", "length of a thin stretch"}, kAny),
-    field<&SegmentSettings::least_end_mm>(
-        {"segment", "least_end_mm", "", "MM", "thick ends are at least so long; half of thick_mm if absent"}, kAny),
+    field<&SegmentSettings::min_end_mm>(
+        {"segment", "min_end_mm", "", "MM", "thick ends are at least so long; half of thick_mm if absent"}, kAny),
     field<&SegmentSettings::continuous>(
         {"segment", "continuous_lines", "--continuous", "N", "continuous lines between two segmented ones"}, {1, 1000}),
     field<&SegmentSettings::first>({"segment", "first_line", "", "N", "number of a segmented line"}, {-1000, 1000}),
@@ -244,7 +244,7 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
          "thin stretches have their middles on the segmented lines of the turned layer (thick_mm + thin_mm a multiple of their distance)"}),
 };
 
-std::string read_segment_ranges(const TomlValue& list, std::vector<Range<SegmentSettings>>& ranges, Place& at) {
+std::string read_segment_ranges(const TomlValue& list, std::vector<Range<SegmentSettings>>& ranges, TextPosition& at) {
   return read_ranges<SegmentSettings>(list, kSegmentKeys, ranges, at);
 }
 std::string segment_ranges_text(const std::vector<Range<SegmentSettings>>& ranges) {

@@ -10,7 +10,7 @@
 namespace lamina::pipeline {
 
 /// The keys of one filling.
-using FillSettings = infill::Settings;
+using FillSettings = infill::FillSettings;
 using FillChanges = Changes<FillSettings>;
 using FillRange = Range<FillSettings>;
 

@@ -50,7 +50,7 @@ struct SliceRequest {
 };
 
 /// The keys of one segmentation.
-using SegmentSettings = segment::Settings;
+using SegmentSettings = segment::SegmentSettings;
 
 /// Section [segment].
 struct SegmentRequest {
@@ -138,7 +138,7 @@ struct Job {
   bool dry_run = false;
   bool strict = false;                  // warnings are errors
   bool inspect = false;                 // look through the layers for islands, hollows, thin places
-  std::optional<double> least_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
+  std::optional<double> min_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
   bool allow_empty = false;             // a whole job may have nothing
   bool allow_unbound = false;           // layers may get less binder than the machine's powder needs
   bool timing = false;                  // tell where the time goes

@@ -21,17 +21,17 @@ namespace lamina::pipeline {
 
 namespace {
 
-// --- [bed], [layers], [place]
+// --- [bed], [layers], [placement]
 
-constexpr Limits kSize{kLeastMm, kMostMm, " mm"}, kDpi{1, 25400, "", true};
+constexpr Limits kSize{kMinMm, kMaxMm, " mm"}, kDpi{1, 25400, "", true};
 
 // With a machine, absent bed and dpi come from the machine; jobs without one show the defaults of a bare bed.
 template <auto Member, const auto& Bare>
 JobKey of_bed(const KeyName& name, const Limits& limits) {
   JobKey key = field<Member>(name, limits);
   key.write_text = [](const JobKey&, const Job& job) {
-    const auto& asked = job.*Member;
-    return asked || !job.machine.profile.empty() ? value_text(asked) : value_text(Bare);
+    const auto& requested = job.*Member;
+    return requested || !job.machine.profile.empty() ? value_text(requested) : value_text(Bare);
   };
   return key;
 }
@@ -45,9 +45,9 @@ const JobKey kBedKeys[] = {
     field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", decides::all}, kSize),
 };
 
-const JobKey kPlaceKeys[] = {
-    field<&Job::gap_mm>({"place", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
-                        {0, kMostMm, " mm"}),
+const JobKey kPlacementKeys[] = {
+    field<&Job::gap_mm>({"placement", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
+                        {0, kMaxMm, " mm"}),
 };
 
 // --- [heights]
@@ -86,7 +86,7 @@ std::string write_time_model(const std::array<double, 2>& model) {
 
 using Request = HeightsRequest;
 constexpr auto kHeights = &Job::heights;
-constexpr Limits kLength{kLeastMm, kMostMm, " mm"}, kArea{0, 1e9, " mm2"};
+constexpr Limits kLength{kMinMm, kMaxMm, " mm"}, kArea{0, 1e9, " mm2"};
 
 const JobKey kHeightsKeys[] = {
     word<kModes, kHeights, &Request::mode>(
@@ -119,7 +119,7 @@ const JobKey kHeightsKeys[] = {
         {"heights", "facets", "--facets", "range|plane",
          "what a layer looks at: facets within it, or only those that its bounding plane cuts, as in the documents",
          decides::all}),
-    field<kHeights, &Request::least_facet_mm2>(
+    field<kHeights, &Request::min_facet_mm2>(
         {"heights", "facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing", decides::all}, kArea),
     word<kPeaks, kHeights, &Request::peaks>(
         {"heights", "peaks", "--peaks", "flats|facets",
@@ -130,7 +130,7 @@ const JobKey kHeightsKeys[] = {
     field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",
                                       "optimal: do not aim at horizontal faces and tops, only keep the step", decides::all,
                                       "false"}),
-    field<kHeights, &Request::least_flat_mm2>(
+    field<kHeights, &Request::min_flat_mm2>(
         {"heights", "flat_mm2", "--flat-area", "MM2", "horizontal faces smaller than this are not aimed at", decides::all},
         kArea),
     field<kHeights, &Request::flat_tolerance_um>(
@@ -184,13 +184,13 @@ const JobKey kImageKeys[] = {
 // --- [machine], [dose]
 
 /// A wish of which each part may be left out.
-struct RangeWish {
+struct RangeTarget {
   std::optional<Saturation> percent, core;
 };
 
-constexpr Key<RangeWish> kRangeKeys[] = {
-    structure<read_saturation, saturation_text, &RangeWish::percent>({"saturation_range", "saturation_percent"}),
-    structure<read_saturation, saturation_text, &RangeWish::core>({"saturation_range", "core_saturation_percent"}),
+constexpr Key<RangeTarget> kRangeKeys[] = {
+    structure<read_saturation, saturation_text, &RangeTarget::percent>({"saturation_range", "saturation_percent"}),
+    structure<read_saturation, saturation_text, &RangeTarget::core>({"saturation_range", "core_saturation_percent"}),
 };
 
 std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at) {
@@ -198,13 +198,13 @@ std::string read_saturation_ranges(const TomlValue& list, std::vector<Saturation
   std::vector<SaturationRange> read;
   for (TomlValue table : list.value) {
     SaturationRange& range = read.emplace_back();
-    at = table.place;
+    at = table.position;
     if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
-    RangeWish wish;
-    if (auto wrong = read_table<RangeWish>(table, "saturation_range", kRangeKeys, wish, at); !wrong.empty()) return wrong;
-    if (!wish.percent) return fmt::format("{}: saturation_percent is missing", range_name(range.from_mm, range.to_mm));
-    range.percent = *wish.percent;
-    range.core_percent = wish.core;
+    RangeTarget target;
+    if (auto wrong = read_table<RangeTarget>(table, "saturation_range", kRangeKeys, target, at); !wrong.empty()) return wrong;
+    if (!target.percent) return fmt::format("{}: saturation_percent is missing", range_name(range.from_mm, range.to_mm));
+    range.percent = *target.percent;
+    range.core_percent = target.core;
   }
   ranges = std::move(read);
   return {};
@@ -490,8 +490,8 @@ const JobKey kRunKeys[] = {
     field<&Job::inspect>({"run", "inspect", "--inspect", "",
                           "look through the layers for what hangs on nothing, closed hollows, thin places and parts that touch",
                           0, "true"}),
-    field<&Job::least_wall_mm>(
-        {"run", "least_wall_mm", "--least-wall", "MM", "what --inspect tells as thin; two pixels, or a drop, if absent"},
+    field<&Job::min_wall_mm>(
+        {"run", "min_wall_mm", "--min-wall", "MM", "what --inspect tells as thin; two pixels, or a drop, if absent"},
         {0, 1000, " mm"}),
     field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
                                 "plan a job although layers get less binder than the machine's powder needs to hold", 0,
@@ -509,7 +509,7 @@ std::string read_saturation(const TomlValue& value, std::optional<Saturation>& p
   const std::string& text = value.text;
   const bool number = !text.empty() && text.find_first_not_of("0123456789.+-eE_") == std::string::npos;
   double read = 0;
-  const std::string wrong = read_value(text, Limits{0, dose::kMostPercent, " %"}, read);
+  const std::string wrong = read_value(text, Limits{0, dose::kMaxPercent, " %"}, read);
   if (wrong.empty()) {
     percent = read;
     return {};
@@ -535,7 +535,7 @@ std::span<const JobKey> job_keys() {
   static const std::vector<JobKey> keys = [] {
     std::vector<JobKey> all;
     for (const std::span<const JobKey> group : std::initializer_list<std::span<const JobKey>>{
-             kBedKeys, kHeightsKeys, kPlaceKeys, kImageKeys, kMachineKeys, kDoseKeys, kSliceKeys, fill_keys(), kExtrudeKeys,
+             kBedKeys, kHeightsKeys, kPlacementKeys, kImageKeys, kMachineKeys, kDoseKeys, kSliceKeys, fill_keys(), kExtrudeKeys,
              segment_keys(), kLoadKeys, kRunKeys}) {
       all.insert(all.end(), group.begin(), group.end());
     }

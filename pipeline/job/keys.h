@@ -33,12 +33,12 @@ std::span<const Key<SegmentSettings>> segment_settings_keys();
 
 /// Reads a table of filling keys. At most one of them may set the distance between lines.
 /// returns "" or an error message; at  its place
-std::string read_fill_changes(const TomlValue& table, FillChanges& changes, Place& at);
+std::string read_fill_changes(const TomlValue& table, FillChanges& changes, TextPosition& at);
 std::string fill_changes_text(const FillChanges& changes);
 
 inline constexpr Limits kBleedUm{-10'000, 10'000, " um", true};
 /// Reads a number of per cent or a formula of x, y and z. returns "" or an error message; at  its place
-std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, Place& at);
+std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, TextPosition& at);
 std::string saturation_text(const std::optional<Saturation>& percent);
 /// Reads a rule for shells that overlap.
 std::string read_fill_rule(std::string_view text, FillRule& rule);

@@ -19,7 +19,7 @@ namespace lamina::pipeline {
 
 namespace {
 
-constexpr double kMostFactor = 1e6, kLeastScale = 1e-6, kLeastShrink = 0.1;
+constexpr double kMaxFactor = 1e6, kMinScale = 1e-6, kMinShrink = 0.1;
 constexpr std::string_view kUnits[] = {"mm", "cm", "m", "um", "inch", "foot"};
 
 std::string check_unit(std::string_view text) {
@@ -31,7 +31,7 @@ std::string check_unit(std::string_view text) {
 template <const double& Low, bool Negative>
 std::string read_factors(std::string_view text, std::array<double, 3>& factors) {
   std::array<double, 3> read{};
-  if (auto wrong = read_value(text, {Negative ? -kMostFactor : Low, kMostFactor, "", true}, read); !wrong.empty()) return wrong;
+  if (auto wrong = read_value(text, {Negative ? -kMaxFactor : Low, kMaxFactor, "", true}, read); !wrong.empty()) return wrong;
   for (const double factor : read) {
     if (std::abs(factor) >= Low) continue;
     return fmt::format("{} is out of range; give factors of at least {}", number_text(factor), Low);
@@ -51,7 +51,7 @@ bool may_be_images(const PartRequest& part) {
 PartKey bottom_key() {
   PartKey key = field<&PartRequest::bottom_mm>(
       {"part", "bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed, in mm", decides::all},
-      {0, kMostMm, " mm"});
+      {0, kMaxMm, " mm"});
   key.write_text = [](const PartKey&, const PartRequest& part) { return value_text(part.bottom_mm.value_or(0)); };
   return key.shown_if([](const PartRequest& part) { return part.bottom_mm || !may_be_images(part); });
 }
@@ -67,15 +67,15 @@ const PartKey kPartKeys[] = {
                                 {1, 1'000'000}),
     field<&PartRequest::at_mm>({"part", "at_mm", "--at", "X,Y",
                                 "where the part's box starts, in mm from the bed's front left; else arranged", decides::all},
-                               {0, kMostMm, " mm"}),
+                               {0, kMaxMm, " mm"}),
     bottom_key(),
-    custom<PartRequest, read_factors<kLeastScale, true>, write_factors, &PartRequest::scale>(
+    custom<PartRequest, read_factors<kMinScale, true>, write_factors, &PartRequest::scale>(
         {"part", "scale", "--scale", "S|X,Y,Z", "factors per axis of the file; a negative one mirrors", decides::all},
         Form::kList),
     field<&PartRequest::rotate_deg>(
         {"part", "rotate_deg", "--rotate", "X,Y,Z", "degrees about x, then y, then z, after scaling", decides::all},
         {-36000, 36000, " degrees"}),
-    custom<PartRequest, read_factors<kLeastShrink, false>, write_factors, &PartRequest::shrink>(
+    custom<PartRequest, read_factors<kMinShrink, false>, write_factors, &PartRequest::shrink>(
         {"part", "shrink", "--shrink", "S|X,Y,Z", "factors per axis of the bed that make up for shrinkage, applied last",
          decides::all},
         Form::kList),
@@ -91,7 +91,7 @@ const PartKey kPartKeys[] = {
     field<&PartRequest::images, &PartImages::layer_mm>(
         {"part", "layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's",
          decides::images},
-        {0.001, kMostMm, " mm"}),
+        {0.001, kMaxMm, " mm"}),
     field<&PartRequest::images, &PartImages::threshold>(
         {"part", "threshold", "", "N", "grey below it is jetted, 1 to 255; of images", decides::images}, {1, 255})
         .shown_if([](const PartRequest& part) { return part.images.threshold != PartImages().threshold; }),
@@ -151,7 +151,7 @@ std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRang
   std::vector<MaterialRange> read;
   for (TomlValue table : list.value) {
     MaterialRange& range = read.emplace_back();
-    at = table.place;
+    at = table.position;
     if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
     if (auto wrong = read_table<MaterialRange>(table, "material_range", kMaterialKeys, range, at); !wrong.empty()) return wrong;
     if (range.material.empty()) return fmt::format("{}: material is missing", range_name(range.from_mm, range.to_mm));

@@ -44,7 +44,7 @@ Status use(const std::string& name, const std::string& part, const Machine* mach
 
 std::uint32_t PartMaterial::at(Nm plane) const {
   std::uint32_t material = elsewhere;
-  for (const Range& range : ranges) {
+  for (const MaterialInterval& range : ranges) {
     if (plane >= range.from && plane < range.to) material = range.material;
   }
   return material;

@@ -153,7 +153,7 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
 
 constexpr std::string_view kPublished = "Anet A8";  // whose widths Di Nisio 2022 measured
 
-constexpr double kLeastLag = 1e-3;  // s; what lags less makes no thin stretches
+constexpr double kMinLag = 1e-3;  // s; what lags less makes no thin stretches
 
 bool has_measured_widths(const ExtruderProfile& profile) {
   return profile.own_calibration || profile.machine.name == kPublished;
@@ -161,7 +161,7 @@ bool has_measured_widths(const ExtruderProfile& profile) {
 
 void predict_calibration(const Job& job, ExtruderProfile& profile) {
   const Extruder& m = profile.machine;
-  if (has_measured_widths(profile) || !(m.material.lag_s >= kLeastLag)) return;
+  if (has_measured_widths(profile) || !(m.material.lag_s >= kMinLag)) return;
   const double width = job.fill.all.width_mm, height = job.layer_mm;
   const double area = bead_area(width, height, m.material.shape()) * m.material.flow;
   if (!(area > 0)) return;  // layers that are too thick for such beads are refused elsewhere
@@ -221,7 +221,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
   auto resolved = resolve_profile(machine);
   if (!resolved) return resolved.error();
   if (job.dpi) {
-    if (Status status = program::ask_for_dpi(machine, resolved->grid, *job.dpi); !status) return status.error();
+    if (Status status = program::require_dpi(machine, resolved->grid, *job.dpi); !status) return status.error();
     resolved = resolve_profile(machine);
     if (!resolved) return resolved.error();
   }

@@ -79,7 +79,7 @@ struct Bed {
 };
 
 /// For parts without a printer.
-inline constexpr Bed kLargestBed{{kMostMm, kMostMm}};
+inline constexpr Bed kLargestBed{{kMaxMm, kMaxMm}};
 /// The bed of a job without a machine.
 inline Bed bare_bed(const Job& job) { return {job.bed_mm.value_or(kBareBedMm), false}; }
 

@@ -34,13 +34,13 @@ class PathComparison {
     const auto digest = digest_file(path.string(), manifest_.file.bytes);
     if (!digest) return faults_.add(digest.error().message);
     bytes_ = digest->bytes;
-    if (digest->bytes == manifest_.file.bytes && digest->hash == manifest_.file.hash) return check_places();
+    if (digest->bytes == manifest_.file.bytes && digest->hash == manifest_.file.hash) return check_positions();
     const std::uint64_t before = faults_.fault_count;
-    check_stretches(path);
+    check_intervals(path);
     if (faults_.fault_count > before) return;
     if (digest->bytes != manifest_.file.bytes) {
       faults_.add(fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, manifest_.file.bytes));
-    } else if (has_stretches()) {
+    } else if (has_intervals()) {
       faults_.add(fmt::format("{}: before its first or behind its last layer it is not what was written", name));
     } else {
       faults_.add(fmt::format("{}: its content is not what was written", name));
@@ -48,11 +48,11 @@ class PathComparison {
   }
 
   /// Whether layers are stretches of the file; those of a package are not.
-  bool has_stretches() const {
+  bool has_intervals() const {
     return std::ranges::any_of(manifest_.layers, [](const LayerRecord& record) { return record.bytes > 0; });
   }
 
-  void check_places() {
+  void check_positions() {
     for (std::size_t i = 0; i + 1 < manifest_.layers.size(); ++i) {
       const LayerRecord &layer = manifest_.layers[i], &next = manifest_.layers[i + 1];
       if (layer.offset + layer.bytes == next.offset) continue;
@@ -61,8 +61,8 @@ class PathComparison {
     }
   }
 
-  void check_stretches(const fs::path& path) {
-    if (!has_stretches()) return;
+  void check_intervals(const fs::path& path) {
+    if (!has_intervals()) return;
     const auto file = FileReader::open(path.string(), {});
     if (!file) return faults_.add(file.error().message);
     for (const LayerRecord& record : manifest_.layers) {

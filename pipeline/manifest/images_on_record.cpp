@@ -14,19 +14,19 @@ namespace lamina {
 namespace fs = std::filesystem;
 
 Result<ImagesOnRecord> images_on_record(const std::string& path) {
-  ImagesOnRecord told{path, 0, 0, {}, 0};
+  ImagesOnRecord reported{path, 0, 0, {}, 0};
   std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return told;
+  if (!fs::is_directory(path, ignored)) return reported;
   std::string manifest = path + "/manifest.json";
   if (product_of_manifest(manifest) == Product::kImages) {
-    told.path = path + "/layers";
+    reported.path = path + "/layers";
   } else {
     manifest = (fs::path(path).lexically_normal() / "../manifest.json").string();
     if (!fs::equivalent(path, fs::path(path) / "../layers", ignored) || product_of_manifest(manifest) != Product::kImages)
-      return told;
+      return reported;
   }
   const auto read = read_manifest(manifest);
-  if (!read || read->layers.empty()) return told;
+  if (!read || read->layers.empty()) return reported;
   if (read->head.grey_drops()) {
     return Error{Fault::kInput,
                  fmt::format("{}: its images are drops of a pixel as grey, which are no shares of a part; plan its "
@@ -40,10 +40,10 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
                              one_line(manifest))};
   }
   const Layer first = read->layers.front().layer;
-  told.bottom = first.bottom;
-  told.thickness = first.thickness;
-  told.mirror = read->head.mirror;
-  told.levels = read->head.full_level() > 0 ? read->head.levels : 0;
+  reported.bottom = first.bottom;
+  reported.thickness = first.thickness;
+  reported.mirror = read->head.mirror;
+  reported.levels = read->head.full_level() > 0 ? read->head.levels : 0;
   for (const LayerRecord& record : read->layers) {
     if (record.layer.thickness == first.thickness) continue;
     return Error{Fault::kInput,
@@ -51,7 +51,7 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
                              "one thickness",
                              one_line(manifest), record.layer.index, mm(record.layer.thickness), mm(first.thickness))};
   }
-  return told;
+  return reported;
 }
 
 bool are_grey_drops(const std::string& image) {

@@ -15,14 +15,14 @@
 namespace lamina {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 4 << 20;
+constexpr std::uint64_t kMaxBytes = 4 << 20;
 constexpr std::array<std::string_view, 1> kMarks = {"\"kind\":\"inspection\""};
 
 /// Of this job, or of any if head is null.
 std::optional<Json> read_of(const std::string& directory, const ManifestHead* head) {
   const std::string path = inspection_path(directory);
   if (!write::is_file(path)) return std::nullopt;
-  const auto text = read_file(path, {.most_bytes = kMostBytes});
+  const auto text = read_file(path, {.max_bytes = kMaxBytes});
   if (!text || !json_nests_within(*text)) return std::nullopt;
   Json json;
   try {

@@ -100,10 +100,10 @@ bool holds(const fs::path& file, std::uint64_t bytes, const Hash128& hash) {
 /// Whether all files of a finished job are there as they were recorded.
 bool is_whole(const std::string& directory, const Manifest& manifest) {
   const ManifestHead& head = manifest.head;
-  const fs::path place = directory;
-  if (!head.file.empty()) return holds(place / head.file, manifest.file.bytes, manifest.file.hash);
+  const fs::path position = directory;
+  if (!head.file.empty()) return holds(position / head.file, manifest.file.bytes, manifest.file.hash);
   return head.extension.empty() || std::ranges::all_of(manifest.layers, [&](const LayerRecord& record) {
-           return holds(place / layer_file_name(record.layer.index, head.extension), record.bytes, record.hash);
+           return holds(position / layer_file_name(record.layer.index, head.extension), record.bytes, record.hash);
          });
 }
 

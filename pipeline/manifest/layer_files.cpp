@@ -70,8 +70,8 @@ std::vector<fs::path> program_frames(const std::string& directory) {
 
 bool lies_in_job(const std::string& file, const std::string& directory) {
   std::error_code error;
-  const auto place = [&](const std::string& name) { return fs::weakly_canonical(fs::absolute(name, error), error); };
-  const fs::path inside = place(file).lexically_relative(place(directory));
+  const auto position = [&](const std::string& name) { return fs::weakly_canonical(fs::absolute(name, error), error); };
+  const fs::path inside = position(file).lexically_relative(position(directory));
   if (inside.empty()) return false;
   const fs::path& first = *inside.begin();
   ManifestFile manifest;
@@ -138,13 +138,13 @@ bool holds_layers(const std::string& directory) {
 
 Status check_stays_inside(const std::string& directory) {
   for (const char* name : {"layers", "program"}) {
-    const fs::path place = fs::path(directory) / name;
+    const fs::path position = fs::path(directory) / name;
     std::error_code error;
-    if (!fs::is_symlink(place, error)) continue;
-    const fs::path target = fs::weakly_canonical(place, error), inside = fs::weakly_canonical(directory, error);
+    if (!fs::is_symlink(position, error)) continue;
+    const fs::path target = fs::weakly_canonical(position, error), inside = fs::weakly_canonical(directory, error);
     const fs::path near = target.lexically_relative(inside);
     if (!near.empty() && *near.begin() != "..") continue;
-    return Error{Fault::kOutput, fmt::format("{}: is a link that leads out of {}; remove it", place.string(), directory)};
+    return Error{Fault::kOutput, fmt::format("{}: is a link that leads out of {}; remove it", position.string(), directory)};
   }
   return {};
 }

@@ -40,7 +40,7 @@ class Hasher {
 }  // namespace
 
 struct LayeredFile::State {
-  Options options;
+  LayeredFileOptions options;
   std::optional<write::File> file;
   std::optional<ManifestWriter> manifest;  // absent where the file is streamed
   std::vector<LayerRecord> kept;
@@ -95,7 +95,7 @@ void take_last_name(const std::string& manifest, const std::string& target) {
 
 /// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one. A begun file
 /// may stand beside a finished one of another job, which it was to replace.
-Status find_kept(const LayeredFile::Options& options, const ManifestHead& head, std::string_view start,
+Status find_kept(const LayeredFile::LayeredFileOptions& options, const ManifestHead& head, std::string_view start,
                  const std::string& target, std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
   if (!options.resume) return {};
   const std::string begun_file = write::part_of(target), begun_record = write::part_of(options.manifest);
@@ -136,7 +136,7 @@ Status LayeredFile::check_part(const std::string& file, const std::string& manif
                                           part)};
 }
 
-Result<LayeredFile> LayeredFile::open(Options options, const ManifestHead& head, std::string_view start,
+Result<LayeredFile> LayeredFile::open(LayeredFileOptions options, const ManifestHead& head, std::string_view start,
                                       std::optional<write::Claim> claim) {
   LayeredFile made;
   State& state = *made.state_;

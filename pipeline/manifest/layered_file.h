@@ -20,7 +20,7 @@ namespace lamina {
 
 class LayeredFile {
  public:
-  struct Options {
+  struct LayeredFileOptions {
     std::string file, manifest;  // paths
     bool resume = false;         // replaces an earlier file too, if a record of it is there
     bool replace = false;        // an earlier file of that name
@@ -32,7 +32,7 @@ class LayeredFile {
   /// claim   of the manifest; none: it is taken here
   /// errors  kUsage: the files to resume belong to another job; a file or NAME.part is there that must not be replaced;
   ///         kOutput
-  static Result<LayeredFile> open(Options options, const ManifestHead& head, std::string_view start,
+  static Result<LayeredFile> open(LayeredFileOptions options, const ManifestHead& head, std::string_view start,
                                   std::optional<write::Claim> claim = {});
   LayeredFile(LayeredFile&&) noexcept;
   LayeredFile& operator=(LayeredFile&&) noexcept;

@@ -108,19 +108,19 @@ Status check_begun_manifest(const std::string& part) {
                fmt::format("{}: is there already, and is no record of lamina; remove it, or name another output", part)};
 }
 
-std::uint8_t grey_level_of(std::uint32_t most_drops) {
-  return most_drops <= 1 ? 1 : most_drops <= 3 ? 3 : most_drops <= 15 ? 15 : 255;
+std::uint8_t grey_level_of(std::uint32_t max_drops) {
+  return max_drops <= 1 ? 1 : max_drops <= 3 ? 3 : max_drops <= 15 ? 15 : 255;
 }
 
-bool ManifestHead::grey_drops() const { return most_drops > 0 && write::find_level_format(format) != nullptr; }
+bool ManifestHead::grey_drops() const { return max_drops > 0 && write::find_level_format(format) != nullptr; }
 
 std::uint8_t ManifestHead::full_level() const {
-  if (grey_drops()) return grey_level_of(most_drops);
-  return static_cast<std::uint8_t>(levels > 0 && most_drops == 0 ? levels - 1 : 0);
+  if (grey_drops()) return grey_level_of(max_drops);
+  return static_cast<std::uint8_t>(levels > 0 && max_drops == 0 ? levels - 1 : 0);
 }
 
-std::uint8_t ManifestHead::most_of_pixel() const {
-  return std::max<std::uint8_t>(1, most_drops > 0 ? static_cast<std::uint8_t>(most_drops) : full_level());
+std::uint8_t ManifestHead::max_of_pixel() const {
+  return std::max<std::uint8_t>(1, max_drops > 0 ? static_cast<std::uint8_t>(max_drops) : full_level());
 }
 
 std::string ManifestHead::image_name(std::size_t number) const {
@@ -163,12 +163,12 @@ void add_line(const LayerRecord& record, const ManifestHead& head, bool first, s
 struct ManifestWriter::State {
   write::File file;
   ManifestHead head;
-  Options options;
+  ManifestOptions options;
   std::string buffer;
   std::uint32_t next_layer = 0;
   bool first_line = true;
 
-  State(write::File opened, const ManifestHead& of, Options chosen)
+  State(write::File opened, const ManifestHead& of, ManifestOptions chosen)
       : file(std::move(opened)), head(of), options(std::move(chosen)), next_layer(of.first_layer) {}
 
   void add(const LayerRecord& record) {
@@ -214,7 +214,7 @@ Status begin(write::File& file, const ManifestHead& head, const std::vector<Laye
 }  // namespace
 
 Result<ManifestWriter> ManifestWriter::open(const std::string& path, const ManifestHead& head,
-                                            const std::vector<LayerRecord>& kept_prefix, Options options,
+                                            const std::vector<LayerRecord>& kept_prefix, ManifestOptions options,
                                             std::optional<write::Claim> claim) {
   if (!claim) {
     auto taken = write::Claim::take(path, path);
@@ -305,12 +305,12 @@ std::string read_line(std::string_view line, const ManifestHead& head, std::uint
     if (!what.empty()) return fmt::format("layer {}: {}", index, what);
   }
   if (head.product != Product::kImages) record.paths = std::make_shared<const PathFacts>(paths);
-  if (head.most_drops == 1) record.most_drops = record.drops > 0 ? 1 : 0;
+  if (head.max_drops == 1) record.max_drops = record.drops > 0 ? 1 : 0;
   for (const ImageRecord& image : record.images) {
     record.bytes += image.bytes;
     if (head.drops_of_materials()) continue;
     record.set_pixels += head.materials.empty() && record.set_pixels > 0 ? 0 : image.set_pixels;  // drops fall on the same
-    if (head.materials.empty() && image.set_pixels > 0) ++record.most_drops;
+    if (head.materials.empty() && image.set_pixels > 0) ++record.max_drops;
   }
   return {};
 }

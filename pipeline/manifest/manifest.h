@@ -53,7 +53,7 @@ struct ManifestHead {
   std::string dialect, program_extension;  // of the print programs; empty without a machine
   Hash128 program_start, program_end;      // of program/start.* and end.*
   std::vector<JobMaterial> materials;      // if there are several
-  std::uint32_t most_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
+  std::uint32_t max_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
 
   std::uint32_t levels = 0;  // of shares of voxels; 0: pixels are set or not
   /// That a nozzle can fire on a pixel in one sweep, and does at the scan's speed.
@@ -61,15 +61,15 @@ struct ManifestHead {
 
   /// Whether the drops of a pixel are the level of a grey image, the only one of its layer.
   bool grey_drops() const;
-  /// The darkest level of images that carry levels: of a full voxel, or of grey_level_of(most_drops) drops; 0: images of one
+  /// The darkest level of images that carry levels: of a full voxel, or of grey_level_of(max_drops) drops; 0: images of one
   /// bit.
   std::uint8_t full_level() const;
 
   /// What a pixel has at most: drops, or levels of a full voxel; 1: it is set or not.
-  std::uint8_t most_of_pixel() const;
+  std::uint8_t max_of_pixel() const;
 
   /// Images of a material in a layer: one a drop of a pixel, if there can be several and the images are of one bit.
-  std::uint32_t drop_images() const { return most_drops > 1 && !grey_drops() ? most_drops : 1; }
+  std::uint32_t drop_images() const { return max_drops > 1 && !grey_drops() ? max_drops : 1; }
   /// Images of a layer that have names and records of their own: those of the first material, of the next, ... 0: the one
   /// image that the layer's own record is of.
   std::size_t named_images() const {
@@ -79,14 +79,14 @@ struct ManifestHead {
   /// bronze, drop2, or bronze-drop2
   std::string image_name(std::size_t number) const;
   /// Whether a pixel can get several drops, of several materials: its images do not say alone what the layer's record does.
-  bool drops_of_materials() const { return most_drops > 1 && !materials.empty(); }
+  bool drops_of_materials() const { return max_drops > 1 && !materials.empty(); }
 
   /// Hash of all fields above except the range: manifests of the same job have equal ids.
   Hash128 id() const;
 };
 
 /// The darkest level of grey images of so many drops: 1, 3, 15 or 255, that of as many bits.
-std::uint8_t grey_level_of(std::uint32_t most_drops);
+std::uint8_t grey_level_of(std::uint32_t max_drops);
 
 /// "bracket.stl and 2 more"; empty without parts.
 std::string title_of(const std::vector<PartSummary>& parts);
@@ -140,7 +140,7 @@ std::optional<Product> product_of_manifest(const std::string& path);
 /// Appends layers in order; thread-compatible (the flow records one layer at a time).
 class ManifestWriter {
  public:
-  struct Options {
+  struct ManifestOptions {
     Sync sync = Sync::kJob;
     bool sync_head = true;  // before the record has its name; false if the folder is synced at once, and nothing is replaced
     /// With Sync::kLayer: makes what the next lines record survive a power cut, before they are written.
@@ -152,11 +152,11 @@ class ManifestWriter {
   /// claim   of `path`; none: it is taken here
   /// errors  kOutput: cannot be written, or another run is writing it
   static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
-                                     const std::vector<LayerRecord>& kept_prefix, Options options,
+                                     const std::vector<LayerRecord>& kept_prefix, ManifestOptions options,
                                      std::optional<write::Claim> claim = {});
   static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
                                      const std::vector<LayerRecord>& kept_prefix) {
-    return open(path, head, kept_prefix, Options());
+    return open(path, head, kept_prefix, ManifestOptions());
   }
   ManifestWriter(ManifestWriter&&) noexcept;
   ManifestWriter& operator=(ManifestWriter&&) noexcept;

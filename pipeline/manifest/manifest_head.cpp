@@ -20,9 +20,9 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
-constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;     // of a layer, as a replay counts them
-constexpr std::uint32_t kMostDrops = 64;                          // of a pixel
-constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
+constexpr std::int64_t kMaxMicroseconds = 1'000'000'000'000;     // of a layer, as a replay counts them
+constexpr std::uint32_t kMaxDrops = 64;                          // of a pixel
+constexpr std::int64_t kMaxDots = 25'400, kMaxSpan = 1'000'000'000'000, kMinPixel = 1000;
 
 /// Of the letters that read::check_material allows.
 bool is_material(std::string_view name) {
@@ -43,7 +43,7 @@ bool is_file_name(std::string_view name) {
 
 /// The grid's axis. errors  throws std::invalid_argument for one that no bed has
 PixelAxis possible_axis(std::int64_t dots, std::int64_t length, std::int64_t span) {
-  if (dots < 1 || dots > kMostDots || span < 1 || span > kMostSpan || span / dots < kLeastPixel || length < 1 ||
+  if (dots < 1 || dots > kMaxDots || span < 1 || span > kMaxSpan || span / dots < kMinPixel || length < 1 ||
       length > kNmReach) {
     throw std::invalid_argument("its grid is none of a bed");
   }
@@ -59,19 +59,19 @@ std::string fault_of_images(const ManifestHead& head) {
   for (const JobMaterial& material : head.materials) {
     if (!is_material(material.name) || !names.insert(material.name).second) return no_such("materials", material.name);
   }
-  constexpr std::size_t kMostVats = 2;  // several drops are of a machine, whose vats the materials are in
-  if (head.most_drops > kMostDrops || (head.drops_of_materials() && head.materials.size() > kMostVats)) {
-    return no_such("most_drops", fmt::format("{}", head.most_drops));
+  constexpr std::size_t kMaxVats = 2;  // several drops are of a machine, whose vats the materials are in
+  if (head.max_drops > kMaxDrops || (head.drops_of_materials() && head.materials.size() > kMaxVats)) {
+    return no_such("max_drops", fmt::format("{}", head.max_drops));
   }
   const bool grey = write::find_level_format(head.format) != nullptr;
   const bool right = head.levels == 2 || head.levels == 4 || head.levels == 16;
-  const bool drops = head.most_drops > 0;  // also as grey, of a job with a machine
+  const bool drops = head.max_drops > 0;  // also as grey, of a job with a machine
   if (head.levels > 0 ? !right || (!grey && !drops) : grey && !drops) {
     return no_such("levels", fmt::format("{}", head.levels));
   }
   if (grey && (drops == head.machine.empty() || (!drops && !head.materials.empty()))) return no_such("format", head.format);
-  constexpr std::uint32_t kMostHeadDrops = 15;
-  if (head.head_drops > kMostHeadDrops || head.sweep_drops < 1 || head.sweep_drops > head.head_drops) {
+  constexpr std::uint32_t kMaxHeadDrops = 15;
+  if (head.head_drops > kMaxHeadDrops || head.sweep_drops < 1 || head.sweep_drops > head.head_drops) {
     return no_such("sweep_drops", fmt::format("{}", head.sweep_drops));
   }
   if (head.machine.empty()) return {};
@@ -178,7 +178,7 @@ void add_images(const ManifestHead& head, Json& json) {
     Json& materials = json["materials"] = Json::array();
     for (const JobMaterial& material : head.materials) materials.push_back({{"name", material.name}, {"vat", material.vat}});
   }
-  if (head.most_drops > 0) json["most_drops"] = head.most_drops;
+  if (head.max_drops > 0) json["max_drops"] = head.max_drops;
   if (head.levels > 0) json["levels"] = head.levels;
   if (head.machine.empty()) return;
   json["dialect"] = head.dialect;
@@ -199,7 +199,7 @@ void read_images(const Json& json, ManifestHead& head) {
     for (const Json& entry : json.at("materials"))
       head.materials.push_back({entry.at("name").text(), entry.at("vat").get<decltype(JobMaterial::vat)>()});
   }
-  if (json.contains("most_drops")) json.at("most_drops").get_to(head.most_drops);
+  if (json.contains("max_drops")) json.at("max_drops").get_to(head.max_drops);
   if (json.contains("levels")) json.at("levels").get_to(head.levels);
   if (head.machine.empty()) return;
   json.at("dialect").get_to(head.dialect);
@@ -283,7 +283,7 @@ std::string what_is_impossible(const ProgramRecord& program) {
   if (program.added_sweeps > program.sweeps || std::abs(program.added_microseconds) > program.microseconds) {
     return fmt::format("has {} added sweeps in {} microseconds", program.added_sweeps, program.added_microseconds);
   }
-  const bool possible = program.microseconds >= 0 && program.microseconds <= kMostMicroseconds;
+  const bool possible = program.microseconds >= 0 && program.microseconds <= kMaxMicroseconds;
   return possible ? "" : fmt::format("takes {} microseconds", program.microseconds);
 }
 

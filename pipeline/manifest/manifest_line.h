@@ -182,32 +182,32 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("moves", t.moves);
   io.number("travels", t.travels);
   io.number("retractions", t.retractions);
-  io.number("laid_mm", t.bead_mm);
+  io.number("deposited_mm", t.bead_mm);
   io.number("travel_mm", t.travel_mm);
   io.number("volume_mm3", t.volume_mm3);
-  io.number("beside_mm3", t.beside_mm3);
+  io.number("auxiliary_mm3", t.auxiliary_mm3);
   io.number("filament_mm", t.filament_mm);
   io.number("seconds", t.seconds);
   io.number("low_x_nm", t.lo_x);
   io.number("low_y_nm", t.lo_y);
   io.number("high_x_nm", t.hi_x);
   io.number("high_y_nm", t.hi_y);
-  io.number("beside_moves", t.beside_moves);
-  io.number("beside_mm", t.beside_mm);
-  io.number("beside_filament_mm", t.beside_filament_mm);
-  auto& laid = paths.laid;
-  io.number("segmented_lines", laid.segments.lines);
-  io.number("pieces", laid.segments.pieces);
-  io.number("stretches", laid.segments.stretches);
-  io.number("thin", laid.segments.thin);
-  io.number("solid_mm3", laid.porosity.solid_mm3);
-  io.number("extruded_mm3", laid.porosity.extruded_mm3);
-  io.number("measured_mm3", laid.porosity.measured_mm3);
-  describe_pores(io, laid.pores);
-  io.number("too_short", laid.shorts.count);
-  io.number("shortest_mm", laid.shorts.shortest_mm);
-  io.number("reached_mm_s", laid.shorts.reached_mm_s);
-  io.number("told_mm_s", laid.shorts.told_mm_s);
+  io.number("auxiliary_moves", t.auxiliary_moves);
+  io.number("auxiliary_mm", t.auxiliary_mm);
+  io.number("auxiliary_filament_mm", t.auxiliary_filament_mm);
+  auto& deposited = paths.deposited;
+  io.number("segmented_lines", deposited.segments.lines);
+  io.number("pieces", deposited.segments.pieces);
+  io.number("intervals", deposited.segments.intervals);
+  io.number("thin", deposited.segments.thin);
+  io.number("solid_mm3", deposited.porosity.solid_mm3);
+  io.number("extruded_mm3", deposited.porosity.extruded_mm3);
+  io.number("measured_mm3", deposited.porosity.measured_mm3);
+  describe_pores(io, deposited.pores);
+  io.number("too_short", deposited.shorts.count);
+  io.number("shortest_mm", deposited.shorts.shortest_mm);
+  io.number("reached_mm_s", deposited.shorts.reached_mm_s);
+  io.number("commanded_mm_s", deposited.shorts.commanded_mm_s);
   io.list("ranges", paths.by_range, [&](auto& range) {
     io.number("area_mm2", range.area_mm2);
     describe_pores(io, range.pores);
@@ -221,7 +221,7 @@ void describe_paths(Io& io, Product product, Paths& paths) {
   io.number("area_mm2", paths.area_mm2);
   io.number("paths", paths.paths);
   if (product == Product::kContours) io.number("bead_mm", paths.bead_mm);
-  io.number("united", paths.united);
+  io.number("merged", paths.merged);
   io.number("open", paths.open);
   if (product == Product::kMoves) describe_moves(io, paths);
 }
@@ -229,11 +229,11 @@ void describe_paths(Io& io, Product product, Paths& paths) {
 template <class Io, class Record>
 void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("capped_rows", record.capped_rows);
-  if (head.most_drops > 0 || head.levels > 0) io.number("dosed_pixels", record.dosed_pixels);
-  if (head.most_drops > 0) {
+  if (head.max_drops > 0 || head.levels > 0) io.number("dosed_pixels", record.dosed_pixels);
+  if (head.max_drops > 0) {
     io.number("drops", record.drops);
-    io.number("asked_drops", record.asked_drops);
-    if (head.grey_drops() || head.drops_of_materials()) io.number("most_drops", record.most_drops);
+    io.number("requested_drops", record.requested_drops);
+    if (head.grey_drops() || head.drops_of_materials()) io.number("max_drops", record.max_drops);
   }
   if (head.levels > 0) {
     io.number("half_differs", record.half_differs);

@@ -6,13 +6,13 @@ void PathFacts::add(const PathFacts& other) {
   contours += other.contours;
   points += other.points;
   paths += other.paths;
-  united += other.united > 0 ? 1 : 0;
+  merged += other.merged > 0 ? 1 : 0;
   open += other.open;
   area_mm2 += other.area_mm2;
   bead_mm += other.bead_mm;
   stored_points += other.stored_points;
   totals.add(other.totals);
-  laid.add(other.laid);
+  deposited.add(other.deposited);
 }
 
 std::vector<std::uint64_t> LayerRecord::pixels_of_materials(std::size_t materials) const {

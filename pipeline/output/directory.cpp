@@ -44,15 +44,15 @@ std::string manifest_name(const Job& job) {
 namespace {
 
 /// What the manifests of a directory say of who else is or was there.
-struct Neighbours {
+struct OtherRuns {
   bool begun = false, shared = false;  // an earlier run of this job or shard; other shards of the same split
 };
 
 /// claim   of the job's own manifest, if it is held
 /// errors  kOutput: another run writes now; kUsage: what is there may not be replaced
-Result<Neighbours> check_manifests(const Job& job, const write::Claim* claim) {
+Result<OtherRuns> check_manifests(const Job& job, const write::Claim* claim) {
   const std::string own = manifest_name(job);
-  Neighbours found;
+  OtherRuns found;
   for (const ManifestFile& file : find_manifests(job.output)) {
     const bool claimed = claim != nullptr && file.name == write::part_of(own);
     if (claimed && !claim->found()) continue;
@@ -151,8 +151,8 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
   if (!fs::is_directory(layers)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; remove it", layers.string())};
   }
-  for (const fs::path& place : {directory, layers}) {
-    if (::access(place.c_str(), W_OK | X_OK) != 0) return cannot(place, errno);
+  for (const fs::path& position : {directory, layers}) {
+    if (::access(position.c_str(), W_OK | X_OK) != 0) return cannot(position, errno);
   }
   if (!job.overwrite) {
     if (!job.shard) sweep_partial_files(job.output);

@@ -36,7 +36,7 @@ ManifestHead image_head(const Plan& plan) {
   head.mirror = value_of("image", "mirror", job);
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
-  head.most_drops = plan.images->dose.most_drops();
+  head.max_drops = plan.images->dose.max_drops();
   head.levels = job.levels;
   if (!plan.images->machine) return head;
   const Machine& machine = plan.images->machine->machine;
@@ -84,13 +84,13 @@ Status ImageFiles::open() {
       if (Status status = check_shares_known(head_, *kept); !status) return status;
     }
     kept_ = std::move(*kept);
-    for (LayerRecord& record : kept_) tell_unfed(record);
+    for (LayerRecord& record : kept_) report_unfed(record);
   }
-  auto stands = kept_.begin();
+  auto kept_record = kept_.begin();
   todo_.reserve(head_.last_layer - head_.first_layer - kept_.size());
   for (std::uint32_t index = head_.first_layer; index < head_.last_layer; ++index) {
-    if (stands != kept_.end() && stands->layer.index == index) {
-      ++stands;
+    if (kept_record != kept_.end() && kept_record->layer.index == index) {
+      ++kept_record;
     } else {
       todo_.push_back(index);
     }
@@ -118,13 +118,13 @@ Status ImageFiles::open() {
   return at_once ? Status() : sync_->begin();
 }
 
-std::uint64_t ImageFiles::Work::bytes() const {
+std::uint64_t ImageFiles::FileWork::bytes() const {
   std::uint64_t total = bytes_held(file) + program.bytes();
   for (const write::Bytes& one : files) total += bytes_held(one);
   return total;
 }
 
-Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& record) const {
+Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord& record) const {
   write::LayerTags tags = tags_of(plan_, record.layer);
   if (levels_ == nullptr) {
     if (!work.encoder) (work.encoder = format_->make_encoder())->use(plan_.job.isa);
@@ -153,7 +153,7 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   return {};
 }
 
-Status ImageFiles::encode_one(const Runs& image, const Levels* levels, Work& work, const LayerRecord& record,
+Status ImageFiles::encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
                               write::Bytes& file) const {
   file.clear();
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
@@ -163,7 +163,7 @@ Status ImageFiles::encode_one(const Runs& image, const Levels* levels, Work& wor
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
 
-Status ImageFiles::store(const LayerImages& images, Work& work, LayerRecord& record) const {
+Status ImageFiles::store(const LayerImages& images, FileWork& work, LayerRecord& record) const {
   const auto files = layer_images(head_, record);
   const write::FileOptions how = layer_file_options(plan_.job);
   for (std::size_t m = 0; m < files.size() && !files[m].name.empty(); ++m) {
@@ -179,7 +179,7 @@ Result<std::vector<std::uint32_t>> ImageFiles::feeds_of(const LayerRecord& recor
   return vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
 }
 
-void ImageFiles::tell_unfed(LayerRecord& record) const {
+void ImageFiles::report_unfed(LayerRecord& record) const {
   if (!program_ || head_.materials.empty()) return;
   const auto feeds = feeds_of(record);
   for (std::size_t i = 0; feeds && i < record.images.size(); ++i) {
@@ -188,27 +188,27 @@ void ImageFiles::tell_unfed(LayerRecord& record) const {
   }
 }
 
-Status ImageFiles::program(const LayerImages& images, Work& work, LayerRecord& record) const {
+Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecord& record) const {
   if (!program_) return {};
   const auto feeds = feeds_of(record);
   if (!feeds) {
     return Error{feeds.error().fault, fmt::format("layer {} (z {:.3f} mm): {}", record.layer.index, mm(record.layer.plane()),
                                                   feeds.error().message)};
   }
-  tell_unfed(record);
+  report_unfed(record);
   std::vector<RunsView> planes{images.whole};
-  if (head_.most_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
+  if (head_.max_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
   return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }
 
 std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
   const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
-  const std::uint32_t planes = std::max(1u, head_.most_drops);
-  const auto most_bytes = levels_ == nullptr ? format_->most_bytes : levels_->most_bytes;
+  const std::uint32_t planes = std::max(1u, head_.max_drops);
+  const auto max_bytes = levels_ == nullptr ? format_->max_bytes : levels_->max_bytes;
   // Planes of drops share their changes, images of materials each have all.
   const std::uint64_t of_plane = drops.changes_of_all / planes + 1;
   const std::uint64_t of_file = head_.materials.empty() && levels_ == nullptr ? of_plane : drops.changes;
-  return files * most_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
+  return files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
          (program_ ? program_->bytes_bound(of_plane, planes) : 0);
 }
 

@@ -53,7 +53,7 @@ class ImageFiles {
   const ManifestHead& head() const { return head_; }
 
   /// Scratch of a layer in flight; reused by later layers.
-  struct Work {
+  struct FileWork {
     std::unique_ptr<write::ImageEncoder> encoder;
     std::unique_ptr<write::LevelEncoder> level_encoder;
     write::Bytes file;
@@ -63,11 +63,11 @@ class ImageFiles {
   };
 
   // --- from many threads at once, each with its own work
-  Status encode(const LayerImages& images, Work& work, LayerRecord& record) const;
+  Status encode(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// errors  kOutput; kUsage: the machine cannot feed the layer
-  Status store(const LayerImages& images, Work& work, LayerRecord& record) const;
+  Status store(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
-  Status program(const LayerImages& images, Work& work, LayerRecord& record) const;
+  Status program(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// Upper bound of the bytes for a layer whose images have that many changes.
   std::uint64_t bytes_bound(const dose::DropBound& drops) const;
 
@@ -83,8 +83,8 @@ class ImageFiles {
  private:
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
-  void tell_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, const Levels* levels, Work& work, const LayerRecord& record, write::Bytes& file) const;
+  void report_unfed(LayerRecord& record) const;
+  Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record, write::Bytes& file) const;
 
   const Plan& plan_;
   ManifestHead head_;

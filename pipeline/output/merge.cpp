@@ -32,15 +32,15 @@ bool covers_all(const ManifestHead& head) { return head.first_layer == 0 && head
 
 Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directories, const std::string& output) {
   std::vector<Shard> shards;
-  std::vector<fs::path> seen;
+  std::vector<fs::path> detected;
   for (const std::string& directory : directories) {
     std::error_code error;
     if (!fs::is_directory(directory, error)) {
       return Error{Fault::kUsage, fmt::format("{}: no such directory; name those that the shards were written to", directory)};
     }
     const fs::path canonical = fs::canonical(directory, error);
-    if (std::ranges::find(seen, canonical) != seen.end()) continue;
-    seen.push_back(canonical);
+    if (std::ranges::find(detected, canonical) != detected.end()) continue;
+    detected.push_back(canonical);
     const std::vector<ManifestFile> files = find_manifests(directory);
     if (files.empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directory));
     for (const ManifestFile& file : files) {
@@ -124,7 +124,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
 
 /// Never replaces files of another job, nor of none: a merge that was killed left its begun manifest.
 /// returns  whether a finished manifest says so, of a shard or of all
-Result<bool> check_place(const std::string& output, const ManifestHead& head, const write::Claim& claim) {
+Result<bool> check_output(const std::string& output, const ManifestHead& head, const write::Claim& claim) {
   bool known = false, finished = false;
   for (const ManifestFile& file : find_manifests(output)) {
     const std::string path = (fs::path(output) / file.name).string();
@@ -174,11 +174,11 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
 }
 
 /// shards  that cover all layers, in their order
-Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, MergeReport& report) {
+Status check(std::span<const Shard> shards, bool strict, bool allow_empty, MergeReport& report) {
   const ManifestHead& head = shards.front().manifest.head;
   Job job;
   if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
-  sanity::LayerRecords records;
+  checks::LayerRecords records;
   std::vector<UnfedPowder> unfed;
   for (const JobMaterial& material : head.materials) unfed.push_back({material.name});
   for (const Shard& shard : shards) {
@@ -188,9 +188,9 @@ Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, Merge
       report.microseconds += record.program.microseconds;
     }
   }
-  for (const UnfedPowder& powder : unfed) sanity::warn_of_unfed(powder, report.warnings);
-  const Status status = records.judge(head.parts, thins(job), allow_empty, report.warnings);
-  return status && strict ? sanity::refuse_warnings(report.warnings) : status;
+  for (const UnfedPowder& powder : unfed) checks::warn_of_unfed(powder, report.warnings);
+  const Status status = records.check(head.parts, thins(job), allow_empty, report.warnings);
+  return status && strict ? checks::refuse_warnings(report.warnings) : status;
 }
 
 }  // namespace
@@ -202,7 +202,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   MergeReport report;
   report.output = output;
   if (const auto whole = whole_job(request.directories, *shards, output)) {
-    if (Status status = judge({&*whole, 1}, request.strict, true, report); !status) return status.error();
+    if (Status status = check({&*whole, 1}, request.strict, true, report); !status) return status.error();
     if (Status status = bring_files(*whole, output, report); !status) return status.error();
     if (Status status = end_earlier_merge(output); !status) return status.error();
     report.layers = whole->manifest.layers.size();
@@ -210,7 +210,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   }
   if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
-  const Status sane = judge(*shards, request.strict, request.allow_empty, report);
+  const Status sane = check(*shards, request.strict, request.allow_empty, report);
   if (!sane) return sane.error();
 
   std::error_code error;
@@ -219,7 +219,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
   if (!claim) return claim.error();
   ManifestHead head = shards->front().manifest.head;
-  const auto is_known = check_place(output, head, *claim);
+  const auto is_known = check_output(output, head, *claim);
   if (!is_known) return is_known.error();
   sweep_partial_files(output);
   if (Status status = check_stays_inside(output); !status) return status.error();

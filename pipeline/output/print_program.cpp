@@ -67,17 +67,17 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   work.text.clear();
   work.timer->begin(layer);
   work.writer->begin_layer(cycle, work.text);
-  const auto care = [&](const auto& write) {  // of the head alone
+  const auto maintenance = [&](const auto& write) {  // of the head alone
     const std::size_t from = work.text.size();
     write();
-    if (!dialect_.has_motion) work.timer->care(std::span(work.text).subspan(from));
+    if (!dialect_.has_motion) work.timer->maintenance(std::span(work.text).subspan(from));
   };
-  care([&] { work.writer->care_of_layer(cycle, work.text); });
+  maintenance([&] { work.writer->maintenance_of_layer(cycle, work.text); });
   constexpr std::size_t kPiece = 256 << 10;
   const auto count = program::compile(
       resolved_.grid, planes, work.compile,
       [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        care([&] { work.writer->care_before(sweep, vectors, work.text); });
+        maintenance([&] { work.writer->maintenance_before(sweep, vectors, work.text); });
         if (!dialect_.has_motion) {
           const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
           work.timer->sweep(static_cast<double>(write::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
@@ -88,7 +88,7 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
       },
       layer.index);
   if (!count) return count.error();
-  care([&] { work.writer->care_behind(work.text); });
+  maintenance([&] { work.writer->maintenance_after(work.text); });
   work.writer->end_layer(cycle, work.text);
   if (Status status = flush(); !status) return status;
   const auto taken = work.timer->end();
@@ -113,16 +113,16 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
   const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.most_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
+  const std::uint64_t sweeps = std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   // Lines of the base, and of shots off the bed: of one nozzle after the other (m578), of a dot a drop (brundlefab).
   const Machine& machine = resolved_.machine;
-  const std::uint64_t shots = machine.care.spits() ? 1 + (machine.care.spit_seconds > 0 ? sweeps : 0) : 0;
-  const std::uint64_t care = 512 * machine.powder.base_layers + shots * (256 + 16 * std::uint64_t{machine.care.spit_drops});
+  const std::uint64_t shots = machine.maintenance.spits() ? 1 + (machine.maintenance.spit_seconds > 0 ? sweeps : 0) : 0;
+  const std::uint64_t maintenance = 512 * machine.powder.base_layers + shots * (256 + 16 * std::uint64_t{machine.maintenance.spit_drops});
   // Lines of the bits of drops, at most twice those of the drops, and their changes sorted.
   const std::uint64_t bits = grid.drop_bits > 1 ? 16 * changes * grid.sweep_drops + 40 * grid.nozzles : 0;
-  return bits + 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
+  return bits + 4 * maintenance + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
          (512 << 10);
 }
 

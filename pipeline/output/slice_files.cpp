@@ -75,7 +75,7 @@ Status SliceFiles::open() {
     if (!package) return package.error();
     package_.emplace(std::move(*package));
   }
-  ManifestWriter::Options options{job.sync};
+  ManifestWriter::ManifestOptions options{job.sync};
   if (file_a_layer_) {
     sync_ = write::FolderSync::of({waiting});
     options.sync_layers = [waiting] {
@@ -267,9 +267,9 @@ Status check_slice_output(const Job& job) {
                    fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
     }
   }
-  const bool asks = !job.overwrite && record.begun && job.slice.file_a_layer == record.finished;
+  const bool requests = !job.overwrite && record.begun && job.slice.file_a_layer == record.finished;
   const auto known = [&](const fs::path& file) { return is_on_record(record, file.filename().string()); };
-  if (replaces && (!asks || std::ranges::all_of(layer_files(job), known))) return {};
+  if (replaces && (!requests || std::ranges::all_of(layer_files(job), known))) return {};
   if (!layer_files(job).empty()) {
     return Error{Fault::kUsage,
                  fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};

@@ -38,7 +38,7 @@ class SliceFiles {
   /// The output path for the summary.
   std::string output() const;
   /// Bytes of text for points and paths.
-  Sections::TextBytes text_bytes() const { return {format_.point_bytes, format_.stretch_bytes, 0}; }
+  Sections::TextBytes text_bytes() const { return {format_.point_bytes, format_.interval_bytes, 0}; }
 
   // --- from many threads at once, each with its own text
   /// errors  kUsage: the format cannot hold the layer

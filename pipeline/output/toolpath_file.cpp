@@ -48,12 +48,12 @@ Result<std::string> layer_table(const Plan& plan) {
   if (!own) return own.error();
   const heights::Plan& of = job.heights.per_part ? *own : plan.heights;
   heights::Evaluation evaluation;
-  if (of.looked_at.empty()) {
+  if (of.inspected.empty()) {
     evaluation = heights::evaluate(index_scene(job, *plan.scene, *options), heights::boundaries_of(of.table), *options);
   }
-  std::vector<write::rp3::Layer> layers;
+  std::vector<write::rp3::LayerSetting> layers;
   for (std::uint32_t i = plan.range[0]; i < std::min(plan.range[1], of.table.size()); ++i) {
-    const auto& slope = of.looked_at.empty() ? evaluation.layers[i].flattest : of.looked_at[i];
+    const auto& slope = of.inspected.empty() ? evaluation.layers[i].flattest : of.inspected[i];
     layers.push_back({mm(of.table[i].thickness), heights::angle_of(slope)});
   }
   const FillSettings& fill = job.fill.all;
@@ -72,11 +72,11 @@ Result<std::string> layer_table(const Plan& plan) {
 std::uint32_t after_first(const Plan& plan, std::uint32_t count) {
   if (!plan.job.heights.per_part) return std::max(count, plan.range[0]);
   const std::vector<ScheduledLayer>& layers = plan.sections->layers();
-  std::vector<bool> stands(plan.scene->parts.size());  // parts in the air have no first layer that has to stick
+  std::vector<bool> on_bed(plan.scene->parts.size());  // parts in the air have no first layer that has to stick
   std::uint32_t after = plan.range[0];
   for (std::uint32_t i = 0; i < layers.size(); ++i) {
-    if (layers[i].number == 0) stands[layers[i].part] = layers[i].layer.bottom == 0;
-    if (layers[i].number < count && stands[layers[i].part]) after = std::max(after, i + 1);
+    if (layers[i].number == 0) on_bed[layers[i].part] = layers[i].layer.bottom == 0;
+    if (layers[i].number < count && on_bed[layers[i].part]) after = std::max(after, i + 1);
   }
   return after;
 }
@@ -146,7 +146,7 @@ std::unique_ptr<write::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffe
 
 Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
   if (file_->finished()) return file_->size();
-  std::optional<write::File> beside;
+  std::optional<write::File> neighbour;
   if (plan_.moves->profile.machine.format == "sml" && !plan_.job.dry_run) {
     const auto table = layer_table(plan_);
     if (!table) return table.error();
@@ -156,7 +156,7 @@ Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
     Status status = file ? file->append(std::string_view(*table)) : Status(file.error());
     if (status) status = file->flush();
     if (!status) return status.error();
-    beside.emplace(std::move(*file));
+    neighbour.emplace(std::move(*file));
   }
   Buffer<char> end;
   format_->tail(totals, layers(), end);
@@ -164,7 +164,7 @@ Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
     std::error_code error;  // the older manifest goes before anything that it speaks of
     if (!plan_.job.dry_run && !write::is_stream(plan_.job.output)) fs::remove(manifest_path(plan_.job), error);
     if (error) return Error{Fault::kOutput, fmt::format("{}: {}", manifest_path(plan_.job), error.message())};
-    const auto named = beside ? beside->finish() : FileDigest();
+    const auto named = neighbour ? neighbour->finish() : FileDigest();
     return named ? Status() : Status(named.error());
   });
 }

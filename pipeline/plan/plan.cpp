@@ -108,8 +108,8 @@ class Planner {
   Status read_parts_as(bool blocks) {
     const Stopwatch loading;
     progress_({ProgressEvent::Stage::kLoading});
-    std::future<void> beside;  // without a thread to spare it is never run, and the index does it
-    if (images() && job().engine != Engine::kContours) beside = std::async(raster::BeamIndex::prepare);
+    std::future<void> neighbour;  // without a thread to spare it is never run, and the index does it
+    if (images() && job().engine != Engine::kContours) neighbour = std::async(raster::BeamIndex::prepare);
     auto scene = load_scene(job(), plan_.bed, blocks, images() ? &printer_.grid : nullptr);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
@@ -118,7 +118,7 @@ class Planner {
       const std::int64_t by = images.bottom - nm_of(job().parts[images.part].bottom_mm.value_or(0));
       if (materials_.part.empty() || raised_.contains(images.part)) continue;
       raised_.insert(images.part);
-      for (PartMaterial::Range& range : materials_.part[images.part].ranges) range.from += by, range.to += by;
+      for (PartMaterial::MaterialInterval& range : materials_.part[images.part].ranges) range.from += by, range.to += by;
     }
     plan_.triangles = 0;
     for (const Instance& instance : plan_.scene->instances) {
@@ -165,7 +165,7 @@ class Planner {
     if (!covers_top(job()) || job().heights.containment != Containment::kInside) return;
     const heights::LayerTable& table = plan_.heights.table;
     const Layer last = job().heights.per_part ? schedule_.layers.back().layer : table[table.size() - 1];
-    sanity::warn_of_open_top(last, plan_.scene->height, plan_.warnings);
+    checks::warn_of_open_top(last, plan_.scene->height, plan_.warnings);
   }
 
   /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory
@@ -173,13 +173,13 @@ class Planner {
     const auto options = heights_options(job());
     if (!options) return options.error();
     const double bytes_of_layer = images() && !beads_ ? 32 : 96;  // in the table, the schedule, the planes and their index
-    const double count = static_cast<double>(plan_.scene->height) / static_cast<double>(options->set.least());
+    const double count = static_cast<double>(plan_.scene->height) / static_cast<double>(options->set.minimum());
     if (options->mode != heights::Mode::kUniform || count * bytes_of_layer <= static_cast<double>(job().memory_bytes))
       return {};
     return usage(
         fmt::format("{:.0f} layers of {} mm take {} for their table alone, --memory is {}; give thicker layers or more "
                     "memory",
-                    std::ceil(count), number_text(mm(options->set.least())),
+                    std::ceil(count), number_text(mm(options->set.minimum())),
                     readable_bytes(static_cast<std::uint64_t>(count * bytes_of_layer)), readable_bytes(job().memory_bytes)));
   }
 
@@ -221,7 +221,7 @@ class Planner {
     if (!sections) return sections.error();
     plan_.sections = std::make_unique<Sections>(std::move(*sections));
     if (plan_.segments) {
-      if (Status status = check_thin_stretches(*plan_.segments, *plan_.sections); !status) return status;
+      if (Status status = check_thin_intervals(*plan_.segments, *plan_.sections); !status) return status;
     }
     end_indexing();
     return {};
@@ -229,12 +229,12 @@ class Planner {
 
   /// errors  kUsage: what doses of parts exclude, and edges that grow beyond the bed
   Status check_zones(const DoseZones& zones) {
-    constexpr std::uint32_t kMostZones = 100;
-    if (zones.count() > kMostZones) {
+    constexpr std::uint32_t kMaxZones = 100;
+    if (zones.count() > kMaxZones) {
       return usage(
           fmt::format("part.bleed_um, part.saturation_percent: the parts have {} different doses, at most {} are "
                       "planned together; plan them as several jobs",
-                      zones.count(), kMostZones));
+                      zones.count(), kMaxZones));
     }
     if (zones.several() && job().fill_rule == FillRule::kEvenOdd && (materials_.several() || job().levels > 0)) {
       return usage(

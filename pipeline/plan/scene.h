@@ -22,7 +22,7 @@ namespace lamina::pipeline {
 struct PlacedImages {
   std::uint32_t part = 0;  // index into Scene::parts
   std::shared_ptr<const read::LayerImages> images;
-  read::Placement place;
+  read::Placement position;
   Nm bottom = 0, thickness = 0;  // of the first layer; of each
 
   /// The image whose heights hold the plane, if any.

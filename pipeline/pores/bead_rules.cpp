@@ -18,8 +18,8 @@ Result<std::optional<Extruder>> shipped_extruder_named(const std::string& name) 
   return std::optional<Extruder>();
 }
 
-bead::LayRules rules_of(const Extruder& machine) {
-  bead::LayRules rules;
+bead::DepositionRules rules_of(const Extruder& machine) {
+  bead::DepositionRules rules;
   rules.machine.tau_s = machine.material.lag_s;
   rules.machine.acceleration_mm_s2 = machine.speed.acceleration_mm_s2;
   rules.corner_mm_s = machine.speed.corner_mm_s;
@@ -31,12 +31,12 @@ bead::LayRules rules_of(const Extruder& machine) {
 }  // namespace
 
 Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& beads, const std::string& machine) {
-  if (!beads.empty() && beads != "laid" && beads != "spread" && beads != "told")
+  if (!beads.empty() && beads != "deposited" && beads != "spread" && beads != "stated")
     return Error{Fault::kUsage, fmt::format("--beads: '{}' is none of laid, spread, told", one_line(beads))};
-  const std::string told = file.tells_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
-  if (beads == "told" && !machine.empty())
+  const std::string reported = file.states_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
+  if (beads == "stated" && !machine.empty())
     return Error{Fault::kUsage, "--machine does nothing beside --beads told; leave one out"};
-  if (beads == "told") return BeadRules{std::nullopt, told};
+  if (beads == "stated") return BeadRules{std::nullopt, reported};
   std::optional<Extruder> printer;
   if (!machine.empty()) {
     const Result<ExtruderProfile> profile = find_extruder(machine);
@@ -50,13 +50,13 @@ Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& bea
   if (printer) {
     BeadRules found{rules_of(*printer), fmt::format("widths are those that {} lays: lag {:g} s, {:g} mm/s2", printer->name,
                                                     printer->material.lag_s, printer->speed.acceleration_mm_s2)};
-    found.rules->spread = beads != "laid";
+    found.rules->spread = beads != "deposited";
     return found;
   }
   if (!beads.empty())
     return Error{Fault::kUsage,
                  fmt::format("--beads {}: the file names no printer that is shipped; add --machine NAME", beads)};
-  return BeadRules{std::nullopt, told};
+  return BeadRules{std::nullopt, reported};
 }
 
 }  // namespace lamina::pipeline

@@ -4,15 +4,15 @@
 #include <optional>
 #include <string>
 
-#include "stages/bead/laid.h"
+#include "stages/bead/deposition.h"
 #include "stages/data/status.h"
 #include "stages/formats/gcode/read_gcode.h"
 
 namespace lamina::pipeline {
 
 struct BeadRules {
-  std::optional<bead::LayRules> rules;  // none: beads are as wide as the file tells
-  std::string told;                     // for people: where widths come from
+  std::optional<bead::DepositionRules> rules;  // none: beads are as wide as the file tells
+  std::string reported;                     // for people: where widths come from
 };
 
 /// beads    "spread": by the model of a bead (docs/bead.md); "laid": the same, which do not spread along their lines; "told" by

@@ -14,7 +14,7 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::int64_t kLeastLayer = 1000;  // nm: what is thinner is none
+constexpr std::int64_t kMinLayer = 1000;  // nm: what is thinner is none
 
 /// The width of a bead at a height above the middle of its layer, nm; 0 where it is not.
 Nm width_at(Nm width, std::int64_t height, double above) {
@@ -39,7 +39,7 @@ bool passes_near(const Box& box, Point2 from, Point2 to, std::int64_t reach) {
 }
 
 /// Whether a piece goes on where the one before ended, in another direction.
-bool bends(const bead::LaidPiece& before, const bead::LaidPiece& piece) {
+bool bends(const bead::DepositedPiece& before, const bead::DepositedPiece& piece) {
   if (before.to != piece.from) return false;
   const double ax = (mm(before.to.x) - mm(before.from.x)), ay = (mm(before.to.y) - mm(before.from.y));
   const double bx = (mm(piece.to.x) - mm(piece.from.x)), by = (mm(piece.to.y) - mm(piece.from.y));
@@ -56,11 +56,11 @@ class SliceCutter {
 
   void clear() { raster_.clear(); }
   /// above  nm, of the slice, over the middle of the layer
-  void add(const LaidBead& bead, std::int64_t height, double above) {
+  void add(const DepositedBead& bead, std::int64_t height, double above) {
     const Nm width = width_at(bead.width, height, above);
     if (width > 0) raster_.add(at(bead.from), at(bead.to), width, raster::BeadEnds::kRound);
   }
-  void add(const bead::LaidPiece& piece, const bead::PieceSides& sides, std::int64_t height, double above) {
+  void add(const bead::DepositedPiece& piece, const bead::PieceSides& sides, std::int64_t height, double above) {
     const double height_mm = mm(height), above_mm = above * 1e-6;
     const double left = bead::reach_at(piece, sides.left, height_mm, above_mm);
     const double right = bead::reach_at(piece, sides.right, height_mm, above_mm);
@@ -78,7 +78,7 @@ class SliceCutter {
     raster_.add(moved(piece.from, -1), moved(piece.to, 1), width, raster::BeadEnds::kSquare);
   }
   /// What lies outside of a bend, as wide as the bead behind it.
-  void round_off(const bead::LaidPiece& piece, const bead::PieceSides& sides, std::int64_t height, double above) {
+  void round_off(const bead::DepositedPiece& piece, const bead::PieceSides& sides, std::int64_t height, double above) {
     const double reach = std::min(bead::reach_at(piece, sides.left, mm(height), above * 1e-6),
                                   bead::reach_at(piece, sides.right, mm(height), above * 1e-6));
     const auto width = static_cast<Nm>(std::llround(2e6 * reach));
@@ -109,17 +109,17 @@ class SliceCutter {
 /// The beads of one layer, or the pieces that they come to lie as.
 class LayerBeads {
  public:
-  LayerBeads(const Window& window, const bead::LayRules* rules) : window_(window) {
+  LayerBeads(const Window& window, const bead::DepositionRules* rules) : window_(window) {
     if (rules != nullptr) rules_ = *rules;
   }
 
-  Status read(const read::GcodeFile& file, const Pile::Layer& layer) {
+  Status read(const read::GcodeFile& file, const Pile::PileLayer& layer) {
     Result<read::GcodeLayer> found = file.layer(layer.index, rules_.has_value());
     if (!found) return found.error();
     beads_ = std::move(found->beads);
     height_ = layer.high - layer.low;
     if (!rules_) {
-      std::erase_if(beads_, [&](const LaidBead& b) { return !is_near(window_.box, b.from, b.to, b.width); });
+      std::erase_if(beads_, [&](const DepositedBead& b) { return !is_near(window_.box, b.from, b.to, b.width); });
       return {};
     }
     keep_lines(found->feeds);
@@ -127,20 +127,20 @@ class LayerBeads {
     rules_->within = window_.box;
     rules_->within.add(Point3{window_.box.lo.x - kNeighbours, window_.box.lo.y - kNeighbours, window_.box.lo.z});
     rules_->within.add(Point3{window_.box.hi.x + kNeighbours, window_.box.hi.y + kNeighbours, window_.box.lo.z});
-    bead::lay(beads_, found->feeds, *rules_, pieces_);
+    bead::deposit(beads_, found->feeds, *rules_, pieces_);
     const double area_mm2 = mm(rules_->within.width()) * mm(rules_->within.depth());
-    if (static_cast<double>(pieces_.size()) * rules_->piece_mm > kMostLaid * area_mm2)
+    if (static_cast<double>(pieces_.size()) * rules_->piece_mm > kMaxLineDensity * area_mm2)
       return Error{Fault::kInput,
                    fmt::format("layer {}: beads lie upon each other many times over; --beads told looks at them", layer.index)};
     left_out_mm3_ += bead::flow_along(pieces_, rules_->height_mm, sides_);
-    for (const bead::LaidPiece& p : pieces_)
-      laid_mm3_ += p.area_mm2 * std::hypot((mm(p.to.x) - mm(p.from.x)), (mm(p.to.y) - mm(p.from.y)));
+    for (const bead::DepositedPiece& p : pieces_)
+      deposited_mm3_ += p.area_mm2 * std::hypot((mm(p.to.x) - mm(p.from.x)), (mm(p.to.y) - mm(p.from.y)));
     return {};
   }
 
   void cut(double above, SliceCutter& cutter) const {
     if (!rules_)
-      for (const LaidBead& bead : beads_) cutter.add(bead, height_, above);
+      for (const DepositedBead& bead : beads_) cutter.add(bead, height_, above);
     else
       for (std::size_t i = 0; i < pieces_.size(); ++i) {
         cutter.add(pieces_[i], sides_[i], height_, above);
@@ -148,11 +148,11 @@ class LayerBeads {
       }
   }
 
-  double left_out() const { return laid_mm3_ > 0 ? left_out_mm3_ / laid_mm3_ : 0; }
+  double left_out() const { return deposited_mm3_ > 0 ? left_out_mm3_ / deposited_mm3_ : 0; }
 
  private:
   static constexpr Nm kNeighbours = 2'000'000;  // nm: what may push those that reach into the window
-  static constexpr double kMostLaid = 50;       // mm of line a mm2: fifty lines a millimetre
+  static constexpr double kMaxLineDensity = 50;       // mm of line a mm2: fifty lines a millimetre
 
   /// nm: what the melt and the head have forgotten does not count
   std::int64_t memory(std::span<const BeadFeed> feeds) const {
@@ -169,7 +169,7 @@ class LayerBeads {
     keep_.assign(beads_.size(), false);
     std::int64_t back = 0;  // nm: how far the melt remembers from a bead that is near
     for (std::size_t i = beads_.size(); i-- > 0;) {
-      const LaidBead& bead = beads_[i];
+      const DepositedBead& bead = beads_[i];
       const bool near = passes_near(window_.box, bead.from, bead.to, reach);
       keep_[i] = near || back > 0;
       const double length =
@@ -188,13 +188,13 @@ class LayerBeads {
   }
 
   const Window& window_;
-  std::optional<bead::LayRules> rules_;
-  Buffer<LaidBead> beads_;
+  std::optional<bead::DepositionRules> rules_;
+  Buffer<DepositedBead> beads_;
   std::vector<bool> keep_;
-  Buffer<bead::LaidPiece> pieces_;
+  Buffer<bead::DepositedPiece> pieces_;
   Buffer<bead::PieceSides> sides_;
   std::int64_t height_ = 1;
-  double laid_mm3_ = 0, left_out_mm3_ = 0;  // of all layers that were read
+  double deposited_mm3_ = 0, left_out_mm3_ = 0;  // of all layers that were read
 };
 
 }  // namespace
@@ -206,7 +206,7 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
     const Result<read::GcodeLayer> layer = file.layer(i);
     if (!layer) return layer.error();
     if (layer->beads.empty()) continue;
-    if (layer->z < top + kLeastLayer) {
+    if (layer->z < top + kMinLayer) {
       ++pile.skipped;
       continue;
     }
@@ -216,7 +216,7 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
   return pile;
 }
 
-Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window, const bead::LayRules* rules,
+Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window, const bead::DepositionRules* rules,
                                double* left_out) {
   const Box& box = window.box;
   const std::array<std::int64_t, 3> side = {box.width(), box.depth(), box.height()};
@@ -245,10 +245,10 @@ Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, co
 }
 
 Result<Repeat> find_repeat(const read::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer) {
-  constexpr Nm kVoxel = 10'000, kLeast = 150'000, kHalf = 4'500'000;  // nm
-  constexpr std::uint32_t kMostLayers = 8;
+  constexpr Nm kVoxel = 10'000, kMin = 150'000, kHalf = 4'500'000;  // nm
+  constexpr std::uint32_t kMaxLayers = 8;
   constexpr double kMiss = 0.02;
-  const auto around = [&](const Pile::Layer& of) {
+  const auto around = [&](const Pile::PileLayer& of) {
     Window window;
     const auto half = static_cast<Nm>((of.high - of.low) / 2);
     const auto low = static_cast<Nm>(of.low + half - 1);
@@ -263,7 +263,7 @@ Result<Repeat> find_repeat(const read::GcodeFile& file, const Pile& pile, Point2
   Repeat repeat;
   std::array<bool, 2> none{};
   // Each layer has its own period, or is the same all along: the longest one holds for all if the others go into it.
-  for (std::uint32_t n = 0; n <= kMostLayers && layer + n < pile.layers.size(); ++n) {
+  for (std::uint32_t n = 0; n <= kMaxLayers && layer + n < pile.layers.size(); ++n) {
     const Result<VoxelStack> above = around(pile.layers[layer + n]);
     if (!above) return above.error();
     if (n > 0 && pores::mismatch(image_of(*slice), image_of(*above)) <= kMiss) {
@@ -271,9 +271,9 @@ Result<Repeat> find_repeat(const read::GcodeFile& file, const Pile& pile, Point2
       break;
     }
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      const std::int64_t here = std::int64_t{kVoxel} * pores::period(image_of(*above), axis == 0, kLeast / kVoxel, kMiss);
+      const std::int64_t here = std::int64_t{kVoxel} * pores::period(image_of(*above), axis == 0, kMin / kVoxel, kMiss);
       const std::int64_t longer = std::max(here, repeat.length[axis]), shorter = std::min(here, repeat.length[axis]);
-      const std::int64_t rest = shorter > kLeast ? longer % shorter : 0;
+      const std::int64_t rest = shorter > kMin ? longer % shorter : 0;
       none[axis] = none[axis] || here == 0 || std::min(rest, shorter - rest) > kVoxel;
       repeat.length[axis] = longer;
     }

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "stages/bead/laid.h"
+#include "stages/bead/deposition.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
@@ -24,18 +24,18 @@ struct Window {
 
 /// Layers that beads of a file fill, one upon the other.
 struct Pile {
-  struct Layer {
+  struct PileLayer {
     std::uint32_t index;     // in the file
     std::int64_t low, high;  // nm
   };
-  std::vector<Layer> layers;
+  std::vector<PileLayer> layers;
   std::uint32_t skipped = 0;  // layers with beads that do not lie above those before
 };
 /// cost  reads the file once; 24 bytes a layer
 Result<Pile> pile_of(const read::GcodeFile& file);
 
 /// Cuts the voxels whose centres lie in a bead.
-/// rules   by which beads come to lie as what is fed makes them (stages/bead/laid.h, contacts.h); heights are those of the
+/// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h, contacts.h); heights are those of the
 /// pile.
 ///         None: a bead is a stadium, as high as its layer and as wide as the file tells, with round ends; one that is narrower
 ///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap
@@ -44,7 +44,7 @@ Result<Pile> pile_of(const read::GcodeFile& file);
 /// cost    O(runs) and reading the window's layers; 8 bytes a run. By rules, 150 bytes for each 20 um of line about the window.
 /// y of the voxels rises as that of the bed does
 Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
-                               const bead::LayRules* rules = nullptr, double* left_out = nullptr);
+                               const bead::DepositionRules* rules = nullptr, double* left_out = nullptr);
 
 /// What of a plan repeats, around a place where it does.
 struct Repeat {

@@ -17,12 +17,12 @@ namespace lamina::pipeline {
 namespace {
 
 constexpr double kNoNearer = 0.02;
-constexpr double kLeastNear = 0.01;  // walls fall between voxels
+constexpr double kMinNear = 0.01;  // walls fall between voxels
 
 /// The last comment before the keys.
 constexpr std::string_view kDesignedJobRuns = "# lamina extrude PART.stl --job FILE.toml -o PART.gcode\n\n";
 
-std::string segment_text(const segment::Settings& keys) {
+std::string segment_text(const segment::SegmentSettings& keys) {
   return fmt::format(
       "on = true\nrule = \"aligned\"\nthick_mm = {}\nthin_mm = {}\ncontinuous_lines = {}\nspacing_sc_mm = {}\n"
       "spacing_cc_mm = {}\nthick_extrusion_percent = {}\nthick_speed_percent = {}\nthin_speed_percent = {}\n",
@@ -33,7 +33,7 @@ std::string segment_text(const segment::Settings& keys) {
 
 /// The keys of a job that fills with segmented lines, as a person would write them.
 /// machine  as --machine takes it
-std::string designed_job_text(const std::string& machine, const ExtruderProfile& used, const segment::Settings& keys) {
+std::string designed_job_text(const std::string& machine, const ExtruderProfile& used, const segment::SegmentSettings& keys) {
   const Calibration& calibration = used.calibration;
   std::string profile = machine;
   if (machine.ends_with(".toml") || machine.find('/') != std::string::npos)
@@ -52,7 +52,7 @@ std::string designed_job_text(const std::string& machine, const ExtruderProfile&
 /// What fills a part between two heights.
 struct DesignRange {
   double from_mm = 0, to_mm = 0;
-  segment::Settings keys;
+  segment::SegmentSettings keys;
 };
 
 /// The same with ranges of heights; what lies above them is filled as the last one.
@@ -67,12 +67,12 @@ std::string designed_job_text(const std::string& machine, const ExtruderProfile&
 }
 
 /// Of the wish that a forward run meets worst: relative.
-double miss_of(const segment::PoreWish& wish, const ForwardRun& forward) {
+double miss_of(const segment::PoreTarget& target, const ForwardRun& forward) {
   segment::Slots slots{forward.porosity, forward.permeability_m2, 0};
   segment::Pores pores{};
   pores.width_mm = forward.pore_width_mm;
   pores.length_mm = forward.pore_length_mm;
-  return segment::miss_of(wish, slots, pores);
+  return segment::miss_of(target, slots, pores);
 }
 
 /// What of a choice lies beyond what was measured, one line each.
@@ -109,7 +109,7 @@ Result<ExtruderProfile> designable_extruder(const std::string& machine) {
   return profile;
 }
 
-Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& tell) {
+Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& report) {
   const auto profile = designable_extruder(request.machine);
   if (!profile) return profile.error();
   const Calibration& calibration = profile->calibration;
@@ -118,9 +118,9 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   std::vector<segment::RatioAt> known = request.known;
   std::vector<std::string> tries;
   std::optional<DesignedJob> best;
-  while (tries.size() < request.most_runs) {
+  while (tries.size() < request.max_runs) {
     DesignedJob tried;
-    tried.design = segment::search(request.wish, *limits, request.ratio, request.lines, known);
+    tried.design = segment::search(request.target, *limits, request.ratio, request.lines, known);
     // Out of reach, and no run to come is nearer.
     if (best && tried.design.miss > request.tolerance && tried.design.miss > best->miss - kNoNearer) break;
     tried.toml = designed_job_text(request.machine, *profile, tried.design.settings);
@@ -129,11 +129,11 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
     if (const Status status = read_job_text(tried.toml, "the job", job); !status) return status.error();
     const double done = static_cast<double>(tries.size());
     const auto forward = run_forward(job, request.machine, tried.design.plan, request.grid,
-                                     [&](double share) { return tell((done + share) / request.most_runs); });
+                                     [&](double share) { return report((done + share) / request.max_runs); });
     if (!forward) return forward.error();
     tries.push_back(tried.toml);
     tried.forward = *forward;
-    tried.miss = miss_of(request.wish, *forward);
+    tried.miss = miss_of(request.target, *forward);
     tried.met = tried.miss <= request.tolerance;
     tried.outside = outside_of(*limits, tried.design.choice);
     if (profile->predicted_calibration)
@@ -152,23 +152,23 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   best->known = std::move(known);
   best->widths = one_line(calibration.source);
   best->toml.insert(
-      0, "# Made by lamina design. By its forward run: " + told_by(best->forward) + ".\n" + std::string(kDesignedJobRuns));
+      0, "# Made by lamina design. By its forward run: " + predicted_lines(best->forward) + ".\n" + std::string(kDesignedJobRuns));
   return *best;
 }
 
 namespace {
 
 /// Of one step: with the number of lines that all share, or where that misses with any.
-Result<DesignedJob> design_step(DesignRequest request, const segment::WishStep& step, std::uint32_t lines,
-                                const std::function<bool(double)>& tell) {
-  request.wish = step.wish;
-  if (lines == 0) return design_job(request, tell);
+Result<DesignedJob> design_step(DesignRequest request, const segment::TargetStep& step, std::uint32_t lines,
+                                const std::function<bool(double)>& report) {
+  request.target = step.target;
+  if (lines == 0) return design_job(request, report);
   request.lines = {lines, lines};
-  auto shared = design_job(request, tell);
+  auto shared = design_job(request, report);
   if (!shared || shared->met) return shared;
   request.lines = {};
   request.known = shared->known;
-  auto own = design_job(request, tell);
+  auto own = design_job(request, report);
   if (!own) return own;
   own->runs += shared->runs;
   if (own->miss < shared->miss) return own;
@@ -177,43 +177,43 @@ Result<DesignedJob> design_step(DesignRequest request, const segment::WishStep& 
 }
 
 /// Neighbouring regions are not taken for each other: a quarter of the way from one wish to the next is near enough.
-double near_of(const std::vector<segment::WishStep>& steps, double most) {
+double near_of(const std::vector<segment::TargetStep>& steps, double maximum) {
   const auto way = [](const std::optional<double>& one, const std::optional<double>& next) {
     return one && next ? std::abs(*next / *one - 1) : 0.0;
   };
-  double least = 4 * most;
+  double minimum = 4 * maximum;
   for (std::size_t i = 0; i + 1 < steps.size(); ++i) {
-    const segment::PoreWish &one = steps[i].wish, &next = steps[i + 1].wish;
-    least =
-        std::min(least, std::max({way(one.porosity, next.porosity), way(one.permeability_m2, next.permeability_m2),
+    const segment::PoreTarget &one = steps[i].target, &next = steps[i + 1].target;
+    minimum =
+        std::min(minimum, std::max({way(one.porosity, next.porosity), way(one.permeability_m2, next.permeability_m2),
                                   way(one.pore_width_mm, next.pore_width_mm), way(one.pore_length_mm, next.pore_length_mm)}));
   }
-  return std::max(kLeastNear, least / 4);
+  return std::max(kMinNear, minimum / 4);
 }
 
 /// Within the layer in the middle of a step.
-double middle_of(const segment::WishStep& step, double layer_mm) {
+double middle_of(const segment::TargetStep& step, double layer_mm) {
   const double layers = std::round((step.to_mm - step.from_mm) / layer_mm);
   return step.from_mm + (std::floor(layers / 2) + 0.5) * layer_mm;
 }
 
 /// What the one file of all regions says takes the place of what the steps' own runs said.
 Status check_together(const DesignRequest& request, double layer_mm, GradientJob& all,
-                      const std::function<bool(double)>& tell) {
+                      const std::function<bool(double)>& report) {
   Job job;
   if (const Status status = read_job_text(all.toml, "the job", job); !status) return status.error();
   std::vector<ForwardRegion> regions;
   for (const GradientStep& one : all.steps) {
     regions.push_back({one.found.design.plan, middle_of(one.step, layer_mm), heights_text(one.step.from_mm, one.step.to_mm)});
   }
-  const auto forward = run_forward(job, request.machine, all.steps.back().step.to_mm, regions, request.grid, tell);
+  const auto forward = run_forward(job, request.machine, all.steps.back().step.to_mm, regions, request.grid, report);
   if (!forward) return forward.error();
   const double height = all.steps.back().step.to_mm;
   double resistance = 0;
   for (std::size_t i = 0; i < all.steps.size(); ++i) {
     GradientStep& one = all.steps[i];
     one.found.forward = forward->at(i);
-    one.found.miss = miss_of(one.step.wish, one.found.forward);
+    one.found.miss = miss_of(one.step.target, one.found.forward);
     one.found.met = one.found.miss <= request.tolerance;
     const double share = (one.step.to_mm - one.step.from_mm) / height;
     all.porosity += share * one.found.forward.porosity;
@@ -226,8 +226,8 @@ Status check_together(const DesignRequest& request, double layer_mm, GradientJob
 
 }  // namespace
 
-Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::WishStep>& steps,
-                                    const std::function<bool(double)>& tell) {
+Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
+                                    const std::function<bool(double)>& report) {
   const auto profile = designable_extruder(request.machine);
   if (!profile) return profile.error();
   const auto limits = segment::DesignLimits::of(profile->machine, profile->calibration);
@@ -238,9 +238,9 @@ Result<GradientJob> design_gradient(const DesignRequest& request, const std::vec
   next.near = near_of(steps, request.near);
   GradientJob all;
   std::vector<DesignRange> ranges;
-  for (const segment::WishStep& step : steps) {
+  for (const segment::TargetStep& step : steps) {
     const double done = static_cast<double>(all.steps.size());
-    auto found = design_step(next, step, lines, [&](double share) { return tell((done + share) / parts); });
+    auto found = design_step(next, step, lines, [&](double share) { return report((done + share) / parts); });
     if (!found) return found.error();
     next.known = found->known;
     all.runs += found->runs;
@@ -250,14 +250,14 @@ Result<GradientJob> design_gradient(const DesignRequest& request, const std::vec
   all.toml = designed_job_text(request.machine, *profile, ranges);
   const double layer_mm = profile->calibration.height_mm;
   if (const Status status =
-          check_together(request, layer_mm, all, [&](double share) { return tell((parts - 1 + share) / parts); });
+          check_together(request, layer_mm, all, [&](double share) { return report((parts - 1 + share) / parts); });
       !status)
     return status.error();
   std::string head = "# Made by lamina design. By one forward run of all regions:\n";
   all.met = true;
   all.lines = all.steps.front().found.design.settings.continuous;
   for (const auto& [step, found] : all.steps) {
-    head += fmt::format("# {}: {}\n", heights_text(step.from_mm, step.to_mm), told_by(found.forward));
+    head += fmt::format("# {}: {}\n", heights_text(step.from_mm, step.to_mm), predicted_lines(found.forward));
     all.met = all.met && found.met;
     all.miss = std::max(all.miss, found.miss);
     if (found.design.settings.continuous != all.lines) all.lines = 0;

@@ -16,9 +16,9 @@ namespace lamina::pipeline {
 
 struct DesignRequest {
   std::string machine;  // as --machine takes it
-  segment::PoreWish wish;
+  segment::PoreTarget target;
   double tolerance = 0.05;  // of what the forward run says of each wish, relative
-  std::uint32_t most_runs = 20;
+  std::uint32_t max_runs = 20;
   ForwardGrid grid;
   double near = 0.04;                   // a run that misses the wish by so little ends the search
   segment::SlotRatio ratio{1, 0.85};    // as most plans have it: where the search begins
@@ -47,11 +47,11 @@ Result<ExtruderProfile> designable_extruder(const std::string& machine);
 /// returns  the best that was run forward, whether it meets the wish or not
 /// tell     is told how far it is, 0 .. 1; false stops
 /// errors   kUsage: no such machine, or no calibration of segmented lines; of run_forward(); kInterrupted
-/// cost     of up to most_runs forward runs
-Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& tell);
+/// cost     of up to max_runs forward runs
+Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& advance);
 
 struct GradientStep {
-  segment::WishStep step;
+  segment::TargetStep step;
   DesignedJob found;  // its forward run, miss and met are of the one file of all regions
 };
 
@@ -74,8 +74,8 @@ struct GradientJob {
 /// returns  the nearest of steps that cannot be met
 /// errors   those of design_job() and run_forward()
 /// cost     of design_job() for each step, and of a forward run for each
-Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::WishStep>& steps,
-                                    const std::function<bool(double)>& tell);
+Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
+                                    const std::function<bool(double)>& advance);
 
 /// "3 to 5.7 mm", as a summary names the pores of a range.
 std::string heights_text(double from_mm, double to_mm);

@@ -12,13 +12,13 @@ constexpr std::string_view kSure =
     "sure      +- is of the voxels; prints of this kind by an Anet A8 have lain within a factor of 1.5 of measured k1,\n"
     "          2.5 points of measured porosity (bench/pores.md)\n";
 
-std::string lines_text(const segment::Settings& keys) {
+std::string lines_text(const segment::SegmentSettings& keys) {
   return fmt::format("thick {:g} mm, thin {:g} mm, {} continuous line{} between segmented ones, S-C {:g}, C-C {:g} mm",
                      keys.thick_mm, keys.thin_mm, keys.continuous, keys.continuous == 1 ? "" : "s", *keys.spacing_sc_mm,
                      *keys.spacing_cc_mm);
 }
 
-Json segment_json(const segment::Settings& keys) {
+Json segment_json(const segment::SegmentSettings& keys) {
   return {{"thick_mm", keys.thick_mm},
           {"thin_mm", keys.thin_mm},
           {"continuous_lines", keys.continuous},
@@ -30,25 +30,25 @@ Json segment_json(const segment::Settings& keys) {
 }
 
 /// What is wished for, as options.
-std::string wish_text(const segment::PoreWish& wish) {
+std::string target_text(const segment::PoreTarget& target) {
   std::string text;
   const auto add = [&](const std::string& part) { text += (text.empty() ? "" : " ") + part; };
-  if (wish.porosity) add(fmt::format("--porosity {:.4g}", 100 * *wish.porosity));
-  if (wish.permeability_m2) add(fmt::format("--permeability {:.4g}", *wish.permeability_m2 / segment::kDarcy));
-  if (wish.pore_width_mm) add(fmt::format("--pore {:.3g}x{:.3g}", *wish.pore_width_mm, *wish.pore_length_mm));
+  if (target.porosity) add(fmt::format("--porosity {:.4g}", 100 * *target.porosity));
+  if (target.permeability_m2) add(fmt::format("--permeability {:.4g}", *target.permeability_m2 / segment::kDarcy));
+  if (target.pore_width_mm) add(fmt::format("--pore {:.3g}x{:.3g}", *target.pore_width_mm, *target.pore_length_mm));
   return text;
 }
 
-Json wish_json(const segment::PoreWish& wish) {
+Json target_json(const segment::PoreTarget& target) {
   Json json = Json::object();
-  if (wish.porosity) json["porosity"] = *wish.porosity;
-  if (wish.permeability_m2) json["k1_darcy"] = *wish.permeability_m2 / segment::kDarcy;
-  if (wish.pore_width_mm) json["pore_mm"] = {*wish.pore_width_mm, *wish.pore_length_mm};
+  if (target.porosity) json["porosity"] = *target.porosity;
+  if (target.permeability_m2) json["k1_darcy"] = *target.permeability_m2 / segment::kDarcy;
+  if (target.pore_width_mm) json["pore_mm"] = {*target.pore_width_mm, *target.pore_length_mm};
   return json;
 }
 
 /// The filling and what its forward run says, into an object.
-void tell_plan(const DesignedJob& found, Json& json) {
+void report_plan(const DesignedJob& found, Json& json) {
   const ForwardRun& forward = found.forward;
   json["segment"] = segment_json(found.design.settings);
   json["porosity"] = forward.porosity;
@@ -64,20 +64,20 @@ void tell_plan(const DesignedJob& found, Json& json) {
 Json step_json(const GradientStep& one) {
   Json json{{"from_mm", one.step.from_mm},
             {"to_mm", one.step.to_mm},
-            {"wish", wish_json(one.step.wish)},
+            {"target", target_json(one.step.target)},
             {"met", one.found.met},
             {"miss", one.found.miss}};
-  tell_plan(one.found, json);
+  report_plan(one.found, json);
   json["beyond_measured"] = one.found.outside;
   return json;
 }
 
 std::string step_text(const GradientStep& one) {
-  const segment::Settings& keys = one.found.design.settings;
+  const segment::SegmentSettings& keys = one.found.design.settings;
   const ForwardRun& forward = one.found.forward;
-  std::string text = fmt::format("{}: wished {}\n", heights_text(one.step.from_mm, one.step.to_mm), wish_text(one.step.wish));
-  text += one.found.met ? fmt::format("  is        {}; within {:.1f} %\n", told_by(forward), 100 * one.found.miss)
-                        : fmt::format("  nearest   {}; not reachable, misses the wish by {:.0f} %\n", told_by(forward),
+  std::string text = fmt::format("{}: wished {}\n", heights_text(one.step.from_mm, one.step.to_mm), target_text(one.step.target));
+  text += one.found.met ? fmt::format("  is        {}; within {:.1f} %\n", predicted_lines(forward), 100 * one.found.miss)
+                        : fmt::format("  nearest   {}; not reachable, misses the wish by {:.0f} %\n", predicted_lines(forward),
                                       100 * one.found.miss);
   text += fmt::format("  lines     {}\n  laid at   {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
                       lines_text(keys), keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
@@ -88,14 +88,14 @@ std::string step_text(const GradientStep& one) {
 
 }  // namespace
 
-std::string told_by(const ForwardRun& forward) {
+std::string predicted_lines(const ForwardRun& forward) {
   return fmt::format("porosity {:.2f} %, k1 {:.4g} +- {:.2g} D along z, pores {:.3f} x {:.2f} mm", 100 * forward.porosity,
                      forward.permeability_m2 / segment::kDarcy, forward.permeability_error_m2 / segment::kDarcy,
                      forward.pore_width_mm, forward.pore_length_mm);
 }
 
 std::string as_text(const DesignedJob& found) {
-  const segment::Settings& keys = found.design.settings;
+  const segment::SegmentSettings& keys = found.design.settings;
   const ForwardRun& forward = found.forward;
   std::string text = fmt::format("lines     {}\nlaid at   {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
                                  lines_text(keys), keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
@@ -116,7 +116,7 @@ std::string as_text(const DesignedJob& found) {
 
 Json as_json(const DesignedJob& found, const std::string& output) {
   Json json{{"command", "design"}, {"met", found.met}, {"miss", found.miss}, {"job", output}};
-  tell_plan(found, json);
+  report_plan(found, json);
   json["runs"] = found.runs;
   json["k1_over_slots"] = found.model_ratio;
   json["widths"] = found.widths;
@@ -150,15 +150,15 @@ Json as_json(const GradientJob& found, const std::string& output) {
   return json;
 }
 
-std::string nearest_text(const segment::PoreWish& wish, const DesignedJob& found) {
+std::string nearest_text(const segment::PoreTarget& target, const DesignedJob& found) {
   const ForwardRun& forward = found.forward;
   std::string text;
-  const auto add = [&](bool wished, const std::string& part) {
-    if (wished) text += (text.empty() ? "" : ", ") + part;
+  const auto add = [&](bool requested_range, const std::string& part) {
+    if (requested_range) text += (text.empty() ? "" : ", ") + part;
   };
-  add(wish.porosity.has_value(), fmt::format("--porosity {:.2f}", 100 * forward.porosity));
-  add(wish.permeability_m2.has_value(), fmt::format("--permeability {:.4g}", forward.permeability_m2 / segment::kDarcy));
-  add(wish.pore_width_mm.has_value(), fmt::format("--pore {:.3f}x{:.2f}", forward.pore_width_mm, forward.pore_length_mm));
+  add(target.porosity.has_value(), fmt::format("--porosity {:.2f}", 100 * forward.porosity));
+  add(target.permeability_m2.has_value(), fmt::format("--permeability {:.4g}", forward.permeability_m2 / segment::kDarcy));
+  add(target.pore_width_mm.has_value(), fmt::format("--pore {:.3f}x{:.2f}", forward.pore_width_mm, forward.pore_length_mm));
   return text;
 }
 
@@ -172,8 +172,8 @@ std::string missed_text(const GradientJob& found) {
   }
   if (first == nullptr) return {};
   return fmt::format("{} of {} regions; from {} nearest to {} is {}, which misses it by {:.0f} %", missed, found.steps.size(),
-                     heights_text(first->step.from_mm, first->step.to_mm), wish_text(first->step.wish),
-                     nearest_text(first->step.wish, first->found), 100 * first->found.miss);
+                     heights_text(first->step.from_mm, first->step.to_mm), target_text(first->step.target),
+                     nearest_text(first->step.target, first->found), 100 * first->found.miss);
 }
 
 }  // namespace lamina::pipeline

@@ -21,7 +21,7 @@ namespace {
 constexpr double kBlockMm = 12;  // a side: three periods and more, and walls around them
 
 /// One period around the middle of the block, moved across the lines.
-Window window_of(const read::GcodeFile& file, const Pile::Layer& layer, const segment::Segmentation& plan,
+Window window_of(const read::GcodeFile& file, const Pile::PileLayer& layer, const segment::Segmentation& plan,
                  const ForwardGrid& grid, double share_of_voxel) {
   const double across = 2 * plan.spacing_sc_mm + (plan.continuous - 1.0) * plan.spacing_cc_mm;
   const std::int64_t x = std::llround(1e6 * across), y = std::llround(1e6 * (plan.thick_mm + plan.thin_mm));
@@ -40,7 +40,7 @@ Window window_of(const read::GcodeFile& file, const Pile::Layer& layer, const se
 }
 
 /// Plans the block. returns  what is said of its pores
-Result<Json> lay_block(Job job, double height_mm, const TemporaryFolder& folder) {
+Result<Json> print_block(Job job, double height_mm, const TemporaryFolder& folder) {
   if (const Status status = folder.status(); !status) return status.error();
   const std::string block = write::stl::block({kBlockMm, kBlockMm, height_mm});
   if (const Status status = write::write_file(folder.file("block.stl"), block); !status) return status.error();
@@ -55,15 +55,15 @@ Result<Json> lay_block(Job job, double height_mm, const TemporaryFolder& folder)
 }
 
 /// Voxels of a region, looked at in each place.
-Result<ForwardRun> look_at_region(const read::GcodeFile& file, const Pile& pile, const Pile::Layer& layer,
-                                  const bead::LayRules* rules, const ForwardRegion& region, const ForwardGrid& grid,
-                                  const std::function<bool(double)>& tell) {
+Result<ForwardRun> analyse_region(const read::GcodeFile& file, const Pile& pile, const Pile::PileLayer& layer,
+                                  const bead::DepositionRules* rules, const ForwardRegion& region, const ForwardGrid& grid,
+                                  const std::function<bool(double)>& advance) {
   ForwardRun forward;
   FlowRequest request;
   request.axes = {false, false, true};
   request.tolerance = 1e-2;  // of the equations; k1 is within 0.1 % of what 1e-3 gives
-  for (std::uint32_t i = 0; i < grid.places; ++i) {
-    const double done = i / static_cast<double>(grid.places), part = 1.0 / grid.places;
+  for (std::uint32_t i = 0; i < grid.positions; ++i) {
+    const double done = i / static_cast<double>(grid.positions), part = 1.0 / grid.positions;
     const Window window = window_of(file, layer, region.plan, grid, done);
     std::vector<VoxelStack> cut;
     for (const Window& in : {window, finer(window, kFiner), finer(with_half_as_many_voxels(window), kFiner)}) {
@@ -72,7 +72,7 @@ Result<ForwardRun> look_at_region(const read::GcodeFile& file, const Pile& pile,
       cut.push_back(std::move(*voxels));
     }
     const auto report =
-        look_at_pores({cut[0], cut[1], cut[2]}, request, [&](double share) { return tell(done + part * share); });
+        analyse_pores({cut[0], cut[1], cut[2]}, request, [&](double share) { return advance(done + part * share); });
     if (!report) return report.error();
     const Darcy& along = *report->flow[2];
     forward.porosity += part * report->porosity.total();
@@ -88,9 +88,9 @@ Result<ForwardRun> look_at_region(const read::GcodeFile& file, const Pile& pile,
 
 Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine, double height_mm,
                                             const std::vector<ForwardRegion>& regions, const ForwardGrid& grid,
-                                            const std::function<bool(double)>& tell) {
+                                            const std::function<bool(double)>& advance) {
   const TemporaryFolder folder("design");
-  const auto pores = lay_block(std::move(job), height_mm, folder);
+  const auto pores = print_block(std::move(job), height_mm, folder);
   if (!pores) return pores.error();
   const Result<read::GcodeFile> file = read::GcodeFile::open(folder.file("block.gcode"));
   if (!file) return file.error();
@@ -101,17 +101,17 @@ Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine,
   std::vector<ForwardRun> all;
   for (const ForwardRegion& region : regions) {
     const std::int64_t z = std::llround(1e6 * region.middle_mm);
-    const auto layer = std::ranges::find_if(pile->layers, [&](const Pile::Layer& one) { return one.low <= z && z < one.high; });
+    const auto layer = std::ranges::find_if(pile->layers, [&](const Pile::PileLayer& one) { return one.low <= z && z < one.high; });
     if (layer == pile->layers.end())
       return Error{Fault::kInternal, fmt::format("the block of a forward run has no layer at {:g} mm", region.middle_mm)};
     const double done = static_cast<double>(all.size()), count = static_cast<double>(regions.size());
-    auto forward = look_at_region(*file, *pile, *layer, beads->rules ? &*beads->rules : nullptr, region, grid,
-                                  [&](double share) { return tell((done + share) / count); });
+    auto forward = analyse_region(*file, *pile, *layer, beads->rules ? &*beads->rules : nullptr, region, grid,
+                                  [&](double share) { return advance((done + share) / count); });
     if (!forward) return forward.error();
-    for (const Json& laid : *pores) {
-      if (laid.at("heights").get<std::string>() != region.heights) continue;
-      forward->pore_length_mm = laid.at("length_mm").get<double>();
-      forward->pore_width_mm = laid.at("width_mm").get<double>();
+    for (const Json& deposited : *pores) {
+      if (deposited.at("heights").get<std::string>() != region.heights) continue;
+      forward->pore_length_mm = deposited.at("length_mm").get<double>();
+      forward->pore_width_mm = deposited.at("width_mm").get<double>();
     }
     all.push_back(*forward);
   }
@@ -119,9 +119,9 @@ Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine,
 }
 
 Result<ForwardRun> run_forward(Job job, const std::string& machine, const segment::Segmentation& plan, const ForwardGrid& grid,
-                               const std::function<bool(double)>& tell) {
+                               const std::function<bool(double)>& advance) {
   const double layer_mm = job.layer_mm;
-  const auto all = run_forward(std::move(job), machine, 3 * layer_mm, {{plan, 1.5 * layer_mm, ""}}, grid, tell);
+  const auto all = run_forward(std::move(job), machine, 3 * layer_mm, {{plan, 1.5 * layer_mm, ""}}, grid, advance);
   if (!all) return all.error();
   return all->front();
 }

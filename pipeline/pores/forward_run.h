@@ -15,7 +15,7 @@ namespace lamina::pipeline {
 /// Edges of voxels in um: pores are narrow across the lines, long along them.
 struct ForwardGrid {
   double across_um = 10, along_um = 20, height_um = 10;
-  std::uint32_t places = 2;  // of the voxels across the lines, whose results are averaged: walls fall between voxels otherwise
+  std::uint32_t positions = 2;  // of the voxels across the lines, whose results are averaged: walls fall between voxels otherwise
 };
 
 /// Of one period of the plan.
@@ -38,14 +38,14 @@ struct ForwardRegion {
 /// job      of extrusion, without parts and output; all layers at one angle of 90 degrees
 /// machine  as --machine takes it
 /// tell     is told how far it is, 0 .. 1; false stops
-/// errors   of run() and look_at_pores(); kOutput: no temporary folder; kInternal: there is no layer at that height
+/// errors   of run() and analyse_pores(); kOutput: no temporary folder; kInternal: there is no layer at that height
 /// cost     a second for each region and place of the voxels, 150 bytes a voxel of void
 Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine, double height_mm,
                                             const std::vector<ForwardRegion>& regions, const ForwardGrid& grid,
-                                            const std::function<bool(double)>& tell);
+                                            const std::function<bool(double)>& advance);
 
 /// The same of a job that is one region: in the middle of three layers.
 Result<ForwardRun> run_forward(Job job, const std::string& machine, const segment::Segmentation& plan, const ForwardGrid& grid,
-                               const std::function<bool(double)>& tell);
+                               const std::function<bool(double)>& advance);
 
 }  // namespace lamina::pipeline

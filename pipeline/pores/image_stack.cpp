@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kMostSlices = 4'000'000;
+constexpr std::int64_t kMaxSlices = 4'000'000;
 
 /// The first thing that a manifest of lamina tells is which lamina wrote it.
 bool begun_by_lamina(const std::string& path) {
@@ -37,7 +37,7 @@ void slice_layers(const std::vector<LayerRecord>& layers, ImageStack& stack) {
   for (const LayerRecord& record : layers) thinnest = std::min(thinnest, record.layer.thickness);
   const std::int64_t low = layers.front().layer.bottom;
   const std::int64_t height = std::int64_t{layers.back().layer.bottom} + layers.back().layer.thickness - low;
-  thinnest = static_cast<Nm>(std::max<std::int64_t>({thinnest, 1, height / kMostSlices}));
+  thinnest = static_cast<Nm>(std::max<std::int64_t>({thinnest, 1, height / kMaxSlices}));
   for (std::uint32_t l = 0; l < layers.size(); ++l) {
     const std::int64_t top = std::int64_t{layers[l].layer.bottom} + layers[l].layer.thickness;
     while (low + (2 * static_cast<std::int64_t>(stack.layer_of.size()) + 1) * thinnest / 2 < top) stack.layer_of.push_back(l);
@@ -83,7 +83,7 @@ Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head,
   Levels levels;
   auto image = read::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
   if (!image) return image.error();
-  at_least(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
+  min_level(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
   return std::move(image->runs);
 }
 
@@ -132,16 +132,16 @@ Result<ImageStack> open_stack(const std::string& folder, const StackRequest& req
   return read::stack_of_images(folder, request);
 }
 
-Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowWish& wish, const std::array<bool, 3>& periodic) {
+Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection, const std::array<bool, 3>& periodic) {
   std::array<std::uint32_t, 3> factor{}, low{}, count{}, twice{};
   std::uint64_t voxels = 1;
   for (std::size_t a = 0; a < 3; ++a) {
     const double edge = stack.edge[a], part_mm = stack.part[a] * edge * 1e-6;
-    factor[a] = static_cast<std::uint32_t>(std::clamp(std::round(1e3 * wish.voxel_um / edge), 1.0, 1000.0));
-    const double asked_mm = wish.size_mm[a] > 0 ? wish.size_mm[a] : std::min(2.0, part_mm);
-    const auto wanted = static_cast<std::uint32_t>(std::min(4e9, std::round(asked_mm * 1e6 / edge)));
+    factor[a] = static_cast<std::uint32_t>(std::clamp(std::round(1e3 * selection.voxel_um / edge), 1.0, 1000.0));
+    const double requested_mm = selection.size_mm[a] > 0 ? selection.size_mm[a] : std::min(2.0, part_mm);
+    const auto wanted = static_cast<std::uint32_t>(std::min(4e9, std::round(requested_mm * 1e6 / edge)));
     if (wanted > stack.part[a])
-      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the images have: {:.3f} mm", asked_mm,
+      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the images have: {:.3f} mm", requested_mm,
                                               "xyz"[a], part_mm)};
     // Whole blocks of those that the error is taken from.
     twice[a] = wanted >= 2 * factor[a] ? 2 : 1;

@@ -29,6 +29,6 @@ struct StackWindow {
 /// wish      voxel_um 0: those of the stack, else as near as whole factors allow; size_mm 0: 2 mm, or the part
 /// periodic  what is said to repeat
 /// errors    kUsage: larger than the part, or more than 2^31 voxels; those of cut_box()
-Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowWish& wish, const std::array<bool, 3>& periodic);
+Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection, const std::array<bool, 3>& periodic);
 
 }  // namespace lamina::pipeline

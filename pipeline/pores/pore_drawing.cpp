@@ -14,27 +14,27 @@ namespace lamina::pipeline {
 namespace {
 
 /// The middle of the longest run along x in the middle slice; that of the box where there is none.
-std::array<std::uint32_t, 3> widest_place(const VoxelView& set) {
-  std::array<std::uint32_t, 3> place{set.nx / 2, set.ny / 2, set.nz / 2};
+std::array<std::uint32_t, 3> widest_position(const VoxelView& set) {
+  std::array<std::uint32_t, 3> position{set.nx / 2, set.ny / 2, set.nz / 2};
   std::uint32_t longest = 0;
   for (std::uint32_t y = 0; y < set.ny; ++y) {
-    const auto row = set.row(y, place[2]);
+    const auto row = set.row(y, position[2]);
     for (std::size_t i = 0; i < row.size(); i += 2) {
       if (row[i + 1] - row[i] <= longest) continue;
       longest = row[i + 1] - row[i];
-      place[0] = row[i] + longest / 2;
-      place[1] = y;
+      position[0] = row[i] + longest / 2;
+      position[1] = y;
     }
   }
-  return place;
+  return position;
 }
 
 std::string title_of(const std::string& source, const PoreReport& report, std::size_t axis) {
   const std::filesystem::path path = source;
   const std::string name = one_line((path.has_filename() ? path : path.parent_path()).filename().string());
   if (!report.section) {
-    const bool asked = std::ranges::any_of(report.flow, [](const auto& darcy) { return darcy.has_value(); });
-    return asked ? name + ": no void leads through" : name;
+    const bool requested = std::ranges::any_of(report.flow, [](const auto& darcy) { return darcy.has_value(); });
+    return requested ? name + ": no void leads through" : name;
   }
   const Darcy& darcy = *report.flow[axis];
   return fmt::format("{}: k1 {:.4g} +- {:.2g} D along {} ({:.3e} m2)", name, darcy.k_m2[axis] / segment::kDarcy,
@@ -51,7 +51,7 @@ std::string repeats_of(const std::array<bool, 3>& periodic) {
 /// Tops of layers, and the middles of beads of the one that is cut.
 Status add_beads(const read::GcodeFile& file, const Pile& pile, const WindowChoice& choice, view::PorePicture& picture) {
   const Box& box = choice.window.box;
-  const double z = (picture.place[2] + 0.5) * mm(picture.solid.edge[2]);
+  const double z = (picture.position[2] + 0.5) * mm(picture.solid.edge[2]);
   picture.solid_name = "beads";
   std::uint32_t cut = 0;
   for (std::uint32_t l = 0; l < choice.layers; ++l) {
@@ -84,10 +84,10 @@ Result<Plot> draw_window(const std::string& source, const WindowChoice& choice, 
     picture.along = &section.along;
     for (std::size_t a = 0; a < 3; ++a) {
       const std::uint32_t finer = voxels.size()[a] / section.size[a];
-      picture.place[a] = section.fastest[a] * finer + finer / 2;
+      picture.position[a] = section.fastest[a] * finer + finer / 2;
     }
   } else {
-    picture.place = widest_place(through);
+    picture.position = widest_position(through);
   }
   const Box& box = choice.window.box;
   picture.corner_mm = {mm(box.lo.x), mm(box.lo.y), mm(box.lo.z)};

@@ -56,8 +56,8 @@ struct FlowRequest {
 /// tell    is told how far it is, 0 .. 1; false stops
 /// errors  kUsage: it does not fit the memory, with the voxels that do; kInput: no void; kInterrupted
 /// cost    of stokes::solve() for each axis and window
-Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& request,
-                                 const std::function<bool(double)>& tell);
+Result<PoreReport> analyse_pores(const PoreRasters& rasters, const FlowRequest& request,
+                                 const std::function<bool(double)>& advance);
 
 /// The box with fluid before both ends of an axis, which repeats then.
 VoxelStack with_fluid_at_ends(const VoxelView& box, int axis);

@@ -9,10 +9,10 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr double kMostReynolds = 40;
+constexpr double kMaxReynolds = 40;
 constexpr std::uint32_t kPoints = 6;
 
-Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, const std::function<bool(double)>& tell) {
+Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, const std::function<bool(double)>& advance) {
   const VoxelStack longer = box.periodic[2] ? VoxelStack() : with_fluid_at_ends(box, 2);
   const VoxelView used = box.periodic[2] ? box : longer.view();
   Result<stokes::Canonical> canonical = stokes::Canonical::of(used, 2, false);
@@ -27,8 +27,8 @@ Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, c
   result.reynolds_per_velocity = 4 / (surface_per_mm * 1e3 * velocity * h);
   stokes::InertiaOptions options;
   options.tolerance = 1e-3;
-  options.progress = [&](std::uint32_t, double) { return tell(0); };
-  const auto points = stokes::sweep(*grid, stokes::Canonical::kAxis, kMostReynolds / (result.reynolds_per_velocity * velocity),
+  options.progress = [&](std::uint32_t, double) { return advance(0); };
+  const auto points = stokes::sweep(*grid, stokes::Canonical::kAxis, kMaxReynolds / (result.reynolds_per_velocity * velocity),
                                     kPoints, options);
   if (!points) return points.error();
   for (const stokes::SweepPoint& point : *points) {
@@ -46,12 +46,12 @@ Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, c
 
 }  // namespace
 
-Result<Forchheimer> look_at_inertia(const PoreRasters& rasters, const PoreReport& report,
-                                    const std::function<bool(double)>& tell) {
+Result<Forchheimer> analyse_inertia(const PoreRasters& rasters, const PoreReport& report,
+                                    const std::function<bool(double)>& advance) {
   if (report.porosity.percolating(2) == 0) return Error{Fault::kInput, "no void leads through along z: there is no k2"};
-  Result<Forchheimer> result = sweep_through(rasters.fine, report.surface_per_mm, tell);
+  Result<Forchheimer> result = sweep_through(rasters.fine, report.surface_per_mm, advance);
   if (!result) return result.error();
-  const Result<Forchheimer> rough = sweep_through(rasters.coarse, report.surface_per_mm, tell);
+  const Result<Forchheimer> rough = sweep_through(rasters.coarse, report.surface_per_mm, advance);
   if (!rough && rough.error().fault != Fault::kInput) return rough.error();
   // Where pores are lost in larger voxels, these tell nothing: the error is the value.
   segment::Permeability& fit = result->fit;

@@ -22,7 +22,7 @@ struct Forchheimer {
 /// report  of the window, with its flow along z
 /// errors  kInput: nothing to fit, as in straight pores; kInterrupted
 /// cost    some hundred creeping flows through the window
-Result<Forchheimer> look_at_inertia(const PoreRasters& rasters, const PoreReport& report,
-                                    const std::function<bool(double)>& tell);
+Result<Forchheimer> analyse_inertia(const PoreRasters& rasters, const PoreReport& report,
+                                    const std::function<bool(double)>& advance);
 
 }  // namespace lamina::pipeline

@@ -51,7 +51,7 @@ Result<Window> window_of_plan(const read::GcodeFile& file, const Pile& pile, con
 
 Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile& pile, const ImageStack& scan,
                                          const std::array<double, 3>& size_mm, std::uint32_t range,
-                                         const bead::LayRules* rules) {
+                                         const bead::DepositionRules* rules) {
   const Result<Window> window = window_of_plan(file, pile, scan, size_mm, range);
   if (!window) return window.error();
   if (const auto& count = window->count; range > 16 && std::min({count[0], count[1], count[2]}) < 16)

@@ -40,7 +40,7 @@ struct ScanComparison {
 /// cost     of cut_box() and pores::find_shift()
 Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile& pile, const ImageStack& scan,
                                          const std::array<double, 3>& size_mm, std::uint32_t range,
-                                         const bead::LayRules* rules = nullptr);
+                                         const bead::DepositionRules* rules = nullptr);
 
 /// Lines that end with LF.
 std::string as_text(const ScanComparison& comparison);

@@ -11,13 +11,13 @@
 namespace lamina::pipeline {
 namespace {
 
-using ContourObserver = Observer<slice::LayerReport>;
+using ContourObserver = Observer<slice::SectionReport>;
 
 /// Contours and their filling.
 class PathObserver : public ContourObserver {
  public:
   explicit PathObserver(const Plan& plan) : plan_(plan) {}
-  void layer(const LayerRecord& record, const slice::LayerReport* made) override {
+  void layer(const LayerRecord& record, const slice::SectionReport* made) override {
     sums_.add(*record.paths);
     volume_mm3_ += record.paths->area_mm2 * mm(record.layer.thickness);
     if (made != nullptr) cuts_ += made->cuts;
@@ -26,7 +26,7 @@ class PathObserver : public ContourObserver {
     summary.volume_mm3 = volume_mm3_;
     summary.results.emplace_back(
         "contours", fmt::format("{} with {} points, {:.3f} cm3; {} layers needed a union", readable_count(sums_.contours),
-                                readable_count(sums_.points), volume_mm3_ / 1000, readable_count(sums_.united)));
+                                readable_count(sums_.points), volume_mm3_ / 1000, readable_count(sums_.merged)));
     if (sums_.paths > 0) {
       const std::string_view written = plan_.job.slice.format == "3mf" ? ", not in the file" : "";
       summary.results.emplace_back(
@@ -37,7 +37,7 @@ class PathObserver : public ContourObserver {
     summary.facts["points"] = sums_.points;
     summary.facts["paths"] = sums_.paths;
     summary.facts["bead_mm"] = sums_.bead_mm;
-    summary.facts["united_layers"] = sums_.united;
+    summary.facts["merged_layers"] = sums_.merged;
   }
 
  private:
@@ -50,7 +50,7 @@ class PathObserver : public ContourObserver {
 /// Gaps between cuts: closed, or left open.
 class GapObserver : public ContourObserver {
  public:
-  void layer(const LayerRecord& record, const slice::LayerReport* made) override {
+  void layer(const LayerRecord& record, const slice::SectionReport* made) override {
     open_chains_ += record.paths->open;
     if (made == nullptr) return;
     closed_ += made->gaps.closed;
@@ -78,14 +78,14 @@ class GapObserver : public ContourObserver {
  private:
   std::uint64_t closed_ = 0, open_chains_ = 0;
   double largest_mm_ = 0;  // of those closed
-  sanity::LayersTold open_;
+  checks::ReportedLayers open_;
 };
 
 /// Layers that are solid before a negative offset and empty after it.
 class OffsetObserver : public ContourObserver {
  public:
   explicit OffsetObserver(const Plan& plan) : plan_(plan) {}
-  void layer(const LayerRecord& record, const slice::LayerReport* made) override {
+  void layer(const LayerRecord& record, const slice::SectionReport* made) override {
     if (made == nullptr || plan_.job.slice.offset_mm >= 0) return;
     if (made->cuts > 0 && record.paths->contours == 0 && made->gaps.open == 0) emptied_.add(record.layer);
   }
@@ -100,14 +100,14 @@ class OffsetObserver : public ContourObserver {
 
  private:
   const Plan& plan_;
-  sanity::LayersTold emptied_;
+  checks::ReportedLayers emptied_;
 };
 
 /// Whether any bead of the filling fits into the parts.
 class FillingObserver : public ContourObserver {
  public:
   explicit FillingObserver(const Plan& plan) : plan_(plan) {}
-  void layer(const LayerRecord& record, const slice::LayerReport*) override {
+  void layer(const LayerRecord& record, const slice::SectionReport*) override {
     contours_ += record.paths->contours;
     paths_ += record.paths->paths;
   }
@@ -125,7 +125,7 @@ class FillingObserver : public ContourObserver {
 
 }  // namespace
 
-void observe_contours(const Plan& plan, Observers<slice::LayerReport>& observers) {
+void observe_contours(const Plan& plan, Observers<slice::SectionReport>& observers) {
   observers.add<PathObserver>(plan);
   observers.add<GapObserver>();
   observers.add<OffsetObserver>(plan);

@@ -8,6 +8,6 @@
 namespace lamina::pipeline {
 
 /// In the order of their lines. The plan must outlive them.
-void observe_contours(const Plan& plan, Observers<slice::LayerReport>& observers);
+void observe_contours(const Plan& plan, Observers<slice::SectionReport>& observers);
 
 }  // namespace lamina::pipeline

@@ -181,7 +181,7 @@ Account::Account(const Machine& machine, const PixelGrid& grid, std::span<const 
                  const std::string& title)
     : machine_(machine), parts_(named(parts, apart, title)), tally_(machine_, grid, parts_.size()) {}
 
-void Account::tell(std::vector<std::pair<std::string, std::string>>& lines, Json& use, Rows& rows) const {
+void Account::report(std::vector<std::pair<std::string, std::string>>& lines, Json& use, Rows& rows) const {
   const Quote quote = tally_.quote();
   for (auto& line : lines_of(quote, machine_.cost, parts_)) lines.push_back(std::move(line));
   use = json_of(quote, machine_.cost, parts_);

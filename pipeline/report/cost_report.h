@@ -56,7 +56,7 @@ class Account {
 
   using Rows = std::vector<std::vector<std::string>>;
   /// For people, and for programs (told.h); as a table.
-  void tell(std::vector<std::pair<std::string, std::string>>& lines, Json& use, Rows& rows) const;
+  void report(std::vector<std::pair<std::string, std::string>>& lines, Json& use, Rows& rows) const;
   Rows rows() const { return quote_rows(tally_.quote(), machine_.cost, parts_); }
 
  private:

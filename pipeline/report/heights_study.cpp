@@ -55,11 +55,11 @@ std::string text_of(const heights::Settings& settings, double layer_mm) {
   return text + fmt::format(", steps up to {} mm", number_text(settings.cusp_mm));
 }
 
-std::string small_peaks_text(const heights::Plan& plan, double least_flat_mm2) {
+std::string small_peaks_text(const heights::Plan& plan, double min_flat_mm2) {
   if (plan.small_peaks == 0) return {};
   return fmt::format(
       "{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
-      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(least_flat_mm2),
+      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(min_flat_mm2),
       plan.small_peaks == 1 ? "is" : "are", plan.small_peaks == 1 ? "" : "s");
 }
 
@@ -68,8 +68,8 @@ std::string_view reason(const Study& study, std::size_t layer) {
 }
 
 double angle(const Study& study, std::size_t layer) {
-  return heights::angle_of(study.plan.looked_at.empty() ? study.evaluation.layers[layer].flattest
-                                                        : study.plan.looked_at[layer]);
+  return heights::angle_of(study.plan.inspected.empty() ? study.evaluation.layers[layer].flattest
+                                                        : study.plan.inspected[layer]);
 }
 
 std::string study_page(const StudiedParts& parts, const Study& study) {
@@ -90,7 +90,7 @@ std::string study_page(const StudiedParts& parts, const Study& study) {
     line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
   }
   line("flats", flats_line(study));
-  if (const std::string small = small_peaks_text(study.plan, study.options.least_flat_mm2); !small.empty())
+  if (const std::string small = small_peaks_text(study.plan, study.options.min_flat_mm2); !small.empty())
     line("peaks", small);
   if (study.plan.one_less_reaches >= 0) {
     line("proof", fmt::format("{} that keeps these steps and flats gets higher than {:.4f} mm",
@@ -178,7 +178,7 @@ std::string study_json(const StudiedParts& parts, const std::vector<Study>& stud
 std::string comparison_page(const std::vector<Study>& studies) {
   const Study& first = studies.front();
   const double whole = first.evaluation.seconds;
-  const bool saves = first.options.tells_time;  // beside the first
+  const bool saves = first.options.estimates_time;  // beside the first
   std::string text = fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step",
                                  "mean step", "flats missed", "largest miss", "top",
                                  saves       ? "        time    saved"

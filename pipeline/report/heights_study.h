@@ -13,7 +13,7 @@ namespace lamina::pipeline {
 std::string text_of(const heights::Settings& settings, double layer_mm);
 
 /// The peaks that were passed over, as "2 heights with horizontal facets ..."; empty if there are none.
-std::string small_peaks_text(const heights::Plan& plan, double least_flat_mm2);
+std::string small_peaks_text(const heights::Plan& plan, double min_flat_mm2);
 
 /// Facts about the parts, in addition to their studies.
 struct StudiedParts {

@@ -66,7 +66,7 @@ class VanishObserver : public ImageObserver {
     if (made != nullptr) count_.add(record.layer, made->vanished);
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
-    count_.tell(plan_.images->grid, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror), warnings);
+    count_.report(plan_.images->grid, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror), warnings);
   }
 
  private:
@@ -82,7 +82,7 @@ class NozzleObserver : public ImageObserver {
     moved_ += record.program.moved;
     lost_ += record.program.lost;
   }
-  void warn(const Summary&, std::vector<Warning>& warnings) override { sanity::warn_of_lost_pixels(lost_, warnings); }
+  void warn(const Summary&, std::vector<Warning>& warnings) override { checks::warn_of_lost_pixels(lost_, warnings); }
   void report(Summary& summary) const override {
     if (moved_ > 0) {
       summary.end.emplace_back(
@@ -156,7 +156,7 @@ class MaterialObserver : public ImageObserver {
     }
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
-    for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
+    for (const UnfedPowder& powder : unfed_) checks::warn_of_unfed(powder, warnings);
   }
   void report(Summary& summary) const override {
     const auto& budget = plan_.images->dose.budget();
@@ -181,8 +181,8 @@ class BinderObserver : public ImageObserver {
  public:
   explicit BinderObserver(const dose::Budget& budget) : budget_(budget) {}
   void layer(const LayerRecord& record, const ImageNotes*) override {
-    count_.add(budget_, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost,
-               record.most_drops);
+    count_.add(budget_, record.layer, record.dosed_pixels, record.drops, record.requested_drops, record.program.lost,
+               record.max_drops);
   }
   void report(Summary& summary) const override {
     summary.results.emplace_back("binder", binder_text(budget_, count_));
@@ -204,11 +204,11 @@ class SweepObserver : public ImageObserver {
   }
   void report(Summary& summary) const override {
     const HeadGrid& grid = plan_.images->machine->grid;
-    const program::DropSweeps sweeps{std::max(1u, plan_.images->dose.most_drops()), added_,
+    const program::DropSweeps sweeps{std::max(1u, plan_.images->dose.max_drops()), added_,
                                      static_cast<double>(added_microseconds_) * 1e-6};
     summary.results.emplace_back("sweeps", program::sweeps_text(plan_.images->machine->machine, grid, sweeps));
     summary.facts["jetting"] = {{"head_drops", grid.head_drops},    {"sweep_drops", grid.sweep_drops},
-                                {"pixel_drops", sweeps.most_drops}, {"sweeps_a_place", grid.sweeps_for(sweeps.most_drops)},
+                                {"pixel_drops", sweeps.max_drops}, {"sweeps_per_position", grid.sweeps_for(sweeps.max_drops)},
                                 {"added_sweeps", sweeps.added},     {"added_seconds", sweeps.added_seconds}};
   }
 
@@ -261,7 +261,7 @@ class RowObserver : public ImageObserver {
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
     const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
-    rows_.tell(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
+    rows_.report(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
   }
   void report(Summary& summary) const override {
     if (capped_ > 0)
@@ -271,7 +271,7 @@ class RowObserver : public ImageObserver {
 
  private:
   const Plan& plan_;
-  sanity::RowWarnings rows_;
+  checks::RowWarnings rows_;
   std::uint64_t capped_ = 0;
 };
 

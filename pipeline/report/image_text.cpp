@@ -30,9 +30,9 @@ Json powder_json(const PowderDrops& powder, double drop_pl) {
 }
 
 std::string binder_text(const dose::Budget& budget, const dose::BinderCount& count) {
-  if (!budget.has_wish()) {
-    const auto [least, most] = budget.gets();
-    const std::string share = least == most ? fmt::format("{:.1f}", most) : fmt::format("{:.1f} to {:.1f}", least, most);
+  if (!budget.has_target()) {
+    const auto [minimum, maximum] = budget.gets();
+    const std::string share = minimum == maximum ? fmt::format("{:.1f}", maximum) : fmt::format("{:.1f} to {:.1f}", minimum, maximum);
     const double core = budget.jetting().core;
     const std::string thinned = core < 1 ? fmt::format(", of the core's {} %,", number_text(100 * core)) : "";
     const std::string pl = number_text(budget.binder().drop_pl);
@@ -41,19 +41,19 @@ std::string binder_text(const dose::Budget& budget, const dose::BinderCount& cou
     return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", pl, thinned, share);
   }
   return fmt::format("{:.2f} % of the voids reached, {:.2f} % asked; {} drops, {:.3f} ml of binder, up to {} a pixel",
-                     count.reached_percent(budget), count.asked_percent(budget), readable_count(count.drops()),
-                     count.binder_ml(budget), count.most_drops() > 0 ? count.most_drops() : budget.most_drops());
+                     count.reached_percent(budget), count.requested_percent(budget), readable_count(count.drops()),
+                     count.binder_ml(budget), count.max_drops() > 0 ? count.max_drops() : budget.max_drops());
 }
 
 Json binder_json(const dose::Budget& budget, const dose::BinderCount& count) {
-  if (!budget.has_wish())
-    return {{"asked", false}, {"least_percent", budget.gets().first}, {"most_percent", budget.gets().second}};
+  if (!budget.has_target())
+    return {{"asked", false}, {"min_percent", budget.gets().first}, {"max_percent", budget.gets().second}};
   return {{"asked", true},
-          {"asked_percent", count.asked_percent(budget)},
+          {"requested_percent", count.requested_percent(budget)},
           {"reached_percent", count.reached_percent(budget)},
           {"drops", count.drops()},
-          {"most_drops", budget.most_drops()},
-          {"most_jetted_drops", count.most_drops()},
+          {"max_drops", budget.max_drops()},
+          {"max_jetted_drops", count.max_drops()},
           {"binder_ml", count.binder_ml(budget)}};
 }
 
@@ -74,9 +74,9 @@ Json voxels_json(const dose::ShareCount& count, std::uint32_t levels, std::strin
           {"half_far", count.half_far}};
 }
 
-std::string ranges_text(std::span<const sanity::LayerRange> ranges) {
-  constexpr std::size_t kMost = 6;
-  const std::size_t shown = std::min(kMost, ranges.size());
+std::string ranges_text(std::span<const checks::LayerRange> ranges) {
+  constexpr std::size_t kMax = 6;
+  const std::size_t shown = std::min(kMax, ranges.size());
   const bool one = ranges.size() == 1 && ranges[0][0] == ranges[0][1];
   std::string text = one ? "layer " : "layers ";
   for (std::size_t i = 0; i < shown; ++i) {
@@ -89,14 +89,14 @@ std::string ranges_text(std::span<const sanity::LayerRange> ranges) {
 }
 
 std::string refills_text(const std::vector<std::uint32_t>& refills) {
-  constexpr std::size_t kTold = 6;
+  constexpr std::size_t kReported = 6;
   if (refills.empty()) return {};
   std::string text = refills.size() == 1 ? "pauses before layer " : "pauses before layers ";
-  for (std::size_t i = 0; i < std::min(kTold, refills.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kReported, refills.size()); ++i) {
     const bool last = i + 1 == refills.size();
     text += fmt::format("{}{}", i == 0 ? "" : last ? " and " : ", ", refills[i]);
   }
-  if (refills.size() > kTold) text += fmt::format(" and {} more", refills.size() - kTold);
+  if (refills.size() > kReported) text += fmt::format(" and {} more", refills.size() - kReported);
   return text + " for vats to be filled";
 }
 

@@ -33,7 +33,7 @@ std::string voxels_text(const dose::ShareCount& count, std::uint32_t levels, std
 Json voxels_json(const dose::ShareCount& count, std::uint32_t levels, std::string_view as);
 
 /// "layers 0 to 41, 60 and 72 to 80", at most six ranges, and how many more.
-std::string ranges_text(std::span<const sanity::LayerRange> ranges);
+std::string ranges_text(std::span<const checks::LayerRange> ranges);
 
 /// "pauses before layers 812, 1630 and 4 more for vats to be filled"; empty without refills.
 std::string refills_text(const std::vector<std::uint32_t>& refills);

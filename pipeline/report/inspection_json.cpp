@@ -15,20 +15,20 @@ Json json_of(const Found& found, const std::string& amount) {
   json[amount] = found.amount;
   json["largest_" + amount] = found.largest;
   json["largest_at"] = json_of(found.spot);
-  for (const Place& place : found.places) {
-    Json& one = json["places"].emplace_back(json_of(place.spot));
-    one["last_layer"] = place.last_layer;
-    one["box_mm"] = place.box_mm;
-    one[amount] = place.amount;
+  for (const Place& position : found.positions) {
+    Json& one = json["places"].emplace_back(json_of(position.spot));
+    one["last_layer"] = position.last_layer;
+    one["box_mm"] = position.box_mm;
+    one[amount] = position.amount;
   }
   return json;
 }
 
 }  // namespace
 
-Json json_of(const Findings& findings, double least_mm) {
+Json json_of(const Findings& findings, double min_mm) {
   Json json{{"layers", findings.layers},
-            {"least_wall_mm", least_mm},
+            {"min_wall_mm", min_mm},
             {"islands", json_of(findings.islands, "mm2")},
             {"loose", json_of(findings.loose, "mm3")},
             {"hollows", json_of(findings.hollows, "mm3")},

@@ -6,7 +6,7 @@
 
 namespace lamina::inspect {
 
-/// least_mm  least width of what is not thin
-Json json_of(const Findings& findings, double least_mm);
+/// min_mm  least width of what is not thin
+Json json_of(const Findings& findings, double min_mm);
 
 }  // namespace lamina::inspect

@@ -17,7 +17,7 @@ JobCost::JobCost(const Machine& machine, const Manifest& manifest)
                title_of(manifest.head.parts)),
       drop_pl_(machine.head.drop_pl) {
   for (const JobMaterial& material : manifest.head.materials) {
-    if (manifest.head.most_drops > 0) powders_.push_back({material.name});
+    if (manifest.head.max_drops > 0) powders_.push_back({material.name});
   }
 }
 
@@ -35,7 +35,7 @@ void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t m
 
 void JobCost::report(Summary& summary) const {
   Json& use = summary.facts["use"];
-  account_.tell(summary.results, use, summary.quote);
+  account_.report(summary.results, use, summary.quote);
   for (const PowderDrops& powder : powders_) {
     summary.results.emplace_back("", powder_text(powder, drop_pl_));
     use["materials"].push_back(powder_json(powder, drop_pl_));

@@ -12,11 +12,11 @@ namespace lamina::pipeline {
 namespace {
 
 /// The share of a speed that stretches come up to without a warning.
-constexpr double kNearTold = 0.75;
+constexpr double kNearStated = 0.75;
 
 double mean(double sum, std::uint64_t count) { return count > 0 ? sum / static_cast<double>(count) : 0; }
 
-std::string pores_text(const LaidRange& range) {
+std::string pores_text(const DepositedRange& range) {
   const PoreCounts& p = range.pores;
   std::string text = range.heights.empty() ? "" : range.heights + ": ";
   if (p.closed == 0) text += "none closes";
@@ -38,7 +38,7 @@ std::string pores_text(const LaidRange& range) {
   return text;
 }
 
-Json pores_json(const LaidRange& range) {
+Json pores_json(const DepositedRange& range) {
   const PoreCounts& p = range.pores;
   return {{"heights", range.heights},
           {"closed", p.closed},
@@ -53,49 +53,49 @@ Json pores_json(const LaidRange& range) {
           {"density_mm2", range.area_mm2 > 0 ? static_cast<double>(p.closed) / range.area_mm2 : 0}};
 }
 
-std::string short_text(const ShortStretches& shorts, const Extruder& machine) {
+std::string short_text(const ShortIntervals& shorts, const Extruder& machine) {
   return fmt::format(
       "{} stretches are too short for {:g} mm/s2: the shortest has {:.3f} mm, none comes beyond {:.1f} of {:g} mm/s",
       readable_count(shorts.count), machine.speed.acceleration_mm_s2, shorts.shortest_mm, shorts.reached_mm_s,
-      shorts.told_mm_s);
+      shorts.commanded_mm_s);
 }
 
 }  // namespace
 
-void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const Extruder& machine,
+void report_deposited(const DepositedSums& sums, const std::vector<DepositedRange>& ranges, const Extruder& machine,
                std::uint64_t points_first_layer, Lines& lines, Json& facts) {
   const SegmentCounts& segments = sums.segments;
   const PlannedPorosity& porosity = sums.porosity;
-  const ShortStretches& shorts = sums.shorts;
+  const ShortIntervals& shorts = sums.shorts;
   const bool solid = porosity.solid_mm3 > 0;
-  if (segments.stretches > 0) {
+  if (segments.intervals > 0) {
     lines.emplace_back("segments",
                        fmt::format("{} lines, {} thick and {} thin stretches, {} points", readable_count(segments.lines),
-                                   readable_count(segments.stretches - segments.thin), readable_count(segments.thin),
+                                   readable_count(segments.intervals - segments.thin), readable_count(segments.thin),
                                    readable_count(segments.points())));
   }
   if (solid) {
     std::string text = fmt::format("{:.2f} % by what is extruded", 100 * porosity.by_extrusion());
-    if (segments.stretches > 0) text += fmt::format(", {:.2f} % by measured widths", 100 * porosity.by_widths());
+    if (segments.intervals > 0) text += fmt::format(", {:.2f} % by measured widths", 100 * porosity.by_widths());
     lines.emplace_back("porosity", text);
   }
-  facts["segments"] = {{"lines", segments.lines}, {"pieces", segments.pieces},   {"stretches", segments.stretches},
+  facts["segments"] = {{"lines", segments.lines}, {"pieces", segments.pieces},   {"intervals", segments.intervals},
                        {"thin", segments.thin},   {"points", segments.points()}, {"points_first_layer", points_first_layer}};
   facts["solid_mm3"] = porosity.solid_mm3;
   facts["porosity"] = {{"by_extrusion", solid ? porosity.by_extrusion() : 0}, {"by_widths", solid ? porosity.by_widths() : 0}};
   facts["pores"] = Json::array();
-  for (const LaidRange& range : ranges) {
+  for (const DepositedRange& range : ranges) {
     if (ranges.size() == 1 || range.area_mm2 > 0) lines.emplace_back("pores", pores_text(range));  // else no layer lies in it
     facts["pores"].push_back(pores_json(range));
   }
   if (shorts.count > 0) lines.emplace_back("speeds", short_text(shorts, machine));
-  facts["too_short"] = {{"stretches", shorts.count},
+  facts["too_short"] = {{"intervals", shorts.count},
                         {"shortest_mm", shorts.shortest_mm},
                         {"reached_mm_s", shorts.reached_mm_s},
-                        {"told_mm_s", shorts.told_mm_s}};
+                        {"commanded_mm_s", shorts.commanded_mm_s}};
 }
 
-void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines, Json& facts) {
+void report_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines, Json& facts) {
   constexpr std::array<std::string_view, 3> kShapes{"stadium", "rectangle", "ellipse"};
   const auto& material = machine.material;
   const std::string_view shape = kShapes[static_cast<std::size_t>(material.shape())];
@@ -111,8 +111,8 @@ void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view
                                         left_out == 1 ? " is" : "s are", cut_at));
 }
 
-std::string speed_warning(const ShortStretches& shorts, const Extruder& machine) {
-  return shorts.reached_mm_s < kNearTold * shorts.told_mm_s ? short_text(shorts, machine) : std::string();
+std::string speed_warning(const ShortIntervals& shorts, const Extruder& machine) {
+  return shorts.reached_mm_s < kNearStated * shorts.commanded_mm_s ? short_text(shorts, machine) : std::string();
 }
 
 }  // namespace lamina::pipeline

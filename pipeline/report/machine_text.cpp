@@ -12,7 +12,7 @@ namespace {
 
 /// The speed at which all drops of a pixel fit into one sweep, not above it.
 double whole_drops_mm_s(const Machine& machine, const HeadGrid& grid) {
-  return std::floor(machine.head.highest_frequency_hz / grid.head_drops * grid.place_nm / kNmPerMm * 10) / 10;
+  return std::floor(machine.head.highest_frequency_hz / grid.head_drops * grid.position_nm / kNmPerMm * 10) / 10;
 }
 
 /// "every 4 layers and 30 s"; empty without any.
@@ -22,22 +22,22 @@ std::string how_often(std::uint32_t layers, double seconds) {
   return text;
 }
 
-std::string care_text(const Machine& machine, const FullLayer& full) {
-  const auto& care = machine.care;
-  const std::string shots = how_often(care.spit_layers, care.spit_seconds),
-                    wipes = how_often(care.wipe_layers, care.wipe_seconds);
+std::string maintenance_text(const Machine& machine, const FullLayer& full) {
+  const auto& maintenance = machine.maintenance;
+  const std::string shots = how_often(maintenance.spit_layers, maintenance.spit_seconds),
+                    wipes = how_often(maintenance.wipe_layers, maintenance.wipe_seconds);
   std::string text = shots.empty() ? "" : "fired off the bed " + shots;
   if (!wipes.empty()) text += (text.empty() ? "wiped " : ", wiped ") + wipes;
   return text +
-         fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.care_seconds, full.spat_drops);
+         fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.maintenance_seconds, full.spat_drops);
 }
 
 }  // namespace
 
 std::string sweeps_text(const Machine& machine, const HeadGrid& grid, const DropSweeps& sweeps) {
-  const std::uint32_t count = grid.sweeps_for(sweeps.most_drops);
+  const std::uint32_t count = grid.sweeps_for(sweeps.max_drops);
   std::string text =
-      fmt::format("{} over a place for up to {} drop{} a pixel", count, sweeps.most_drops, sweeps.most_drops == 1 ? "" : "s");
+      fmt::format("{} over a place for up to {} drop{} a pixel", count, sweeps.max_drops, sweeps.max_drops == 1 ? "" : "s");
   if (grid.sweep_drops == grid.head_drops) return text + fmt::format(", up to {} in each", grid.sweep_drops);
   text += fmt::format(": {:g} Hz allow {} of the head's {} drops at {:g} mm/s, all of them at {:.1f} mm/s",
                       machine.head.highest_frequency_hz, grid.sweep_drops, grid.head_drops, machine.motion.scan_speed_mm_s,
@@ -66,13 +66,13 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                             grid.scan_axis == ScanAxis::kX ? "x" : "y"));
   line("across", fmt::format("{:.3f} dpi, lines {:.4f} um apart{}", dpi(grid.line_nm), grid.line_nm / 1000.0,
                              grid.passes > 1 ? fmt::format(" in {} interlaced passes", grid.passes) : ""));
-  line("along", fmt::format("{:.3f} dpi, pixels of {:.4f} um{}", dpi(grid.place_nm), grid.place_nm / 1000.0,
+  line("along", fmt::format("{:.3f} dpi, pixels of {:.4f} um{}", dpi(grid.position_nm), grid.position_nm / 1000.0,
                             grid.steps_per_pixel > 1
                                 ? fmt::format(" in {} steps of {:.4f} um", grid.steps_per_pixel, grid.step_nm() / 1000.0)
                                 : ""));
   line("lag", fmt::format("{:.6f} pixels a nozzle, {} steps in all; drops land up to {:.2f} um along and {:.2f} um across "
                           "from the centre of their pixel",
-                          grid.lag_pixels, grid.most_lag, grid.worst_place_nm / 1000.0, grid.worst_line_nm / 1000.0));
+                          grid.lag_pixels, grid.max_lag, grid.worst_position_nm / 1000.0, grid.worst_line_nm / 1000.0));
   line("swath", fmt::format("{} lines, {:.3f} mm wide{}", grid.swath_lines(), grid.swath_lines() * grid.line_nm / kNmPerMm,
                             grid.overlap > 0 ? fmt::format(", {} of them shared with the next", grid.overlap) : "") +
                     (grid.joint_shift > 0 ? fmt::format(", {} lines further back in each layer", grid.joint_shift) : ""));
@@ -81,7 +81,7 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                    grid.image.columns(), grid.image.rows(), (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(),
                    grid.swaths(0), sweeps, grid.steps(), sweeps * grid.steps() * ((grid.nozzles + 7) / 8)));
   line("speed", fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
-                            machine.head.highest_frequency_hz * grid.place_nm / kNmPerMm, machine.head.highest_frequency_hz));
+                            machine.head.highest_frequency_hz * grid.position_nm / kNmPerMm, machine.head.highest_frequency_hz));
   if (grid.head_drops > 1) {
     line("drops", grid.sweep_drops == grid.head_drops
                       ? fmt::format("all {} of a pixel in one sweep at that speed, as {} bits", grid.head_drops, grid.drop_bits)
@@ -94,7 +94,7 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                                ? fmt::format(", {:.1f} s one of {} drops on every pixel", full->drops_seconds, grid.head_drops)
                                : "")
                     : "not told: the program of a full layer is too long");
-  if (full && (machine.care.spits() || machine.care.wipes())) line("care", care_text(machine, *full));
+  if (full && (machine.maintenance.spits() || machine.maintenance.wipes())) line("maintenance", maintenance_text(machine, *full));
   line("dialect", machine.dialect);
   return text;
 }

@@ -12,7 +12,7 @@ namespace lamina::program {
 
 /// What several drops a pixel take of a head that fires them in one sweep.
 struct DropSweeps {
-  std::uint32_t most_drops = 1;  // that a pixel of the job can get
+  std::uint32_t max_drops = 1;  // that a pixel of the job can get
   std::uint64_t added = 0;       // sweeps that are there for the frequency (Sweep::added), and their time
   double added_seconds = 0;
 };
@@ -26,7 +26,7 @@ struct FullLayer {
   double seconds = 0;        // of the layer; care that is not due in each one is averaged
   double empty_seconds = 0;  // of a layer without a pixel: powder, pauses, care; averaged likewise
   double drops_seconds = 0;  // of all drops that the head has on every pixel; 0: it has one
-  double care_seconds = 0;   // of `seconds`: what they are more than without care of the head
+  double maintenance_seconds = 0;   // of `seconds`: what they are more than without care of the head
   double spat_drops = 0;     // off the bed, averaged likewise
 };
 

@@ -22,32 +22,32 @@ class BeadObserver : public MoveObserver {
  public:
   BeadObserver(const Plan& plan, const PathFacts& sums) : plan_(plan), sums_(sums) {}
   void layer(const LayerRecord& record, const void*) override {
-    const LaidSums& laid = record.paths->laid;
-    paths_.add(record.layer, record.paths->open, laid.segments.lines, laid.segments.thin);
+    const DepositedSums& deposited = record.paths->deposited;
+    paths_.add(record.layer, record.paths->open, deposited.segments.lines, deposited.segments.thin);
   }
   void warn(const Summary& summary, std::vector<Warning>& warnings) override {
-    paths_.tell(plan_.sections->fills(), sums_.totals.part_moves(), summary.layers_planned, warnings);
+    paths_.report(plan_.sections->fills(), sums_.totals.part_moves(), summary.layers_planned, warnings);
   }
   void report(Summary& summary) const override {
     const write::MoveTotals& totals = sums_.totals;
-    summary.volume_mm3 = totals.volume_mm3 - totals.beside_mm3;
+    summary.volume_mm3 = totals.volume_mm3 - totals.auxiliary_mm3;
     summary.results.emplace_back(
         "beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
-                             (totals.bead_mm - totals.beside_mm) / 1000, summary.volume_mm3 / 1000,
+                             (totals.bead_mm - totals.adjacent_mm) / 1000, summary.volume_mm3 / 1000,
                              readable_count(totals.travels), totals.travel_mm / 1000));
     const char* none = plan_.moves->profile.machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
                        : plan_.range[0] > 0 ? "none: --layers leaves the first layer out"
                                             : "none: no room on the bed";
-    summary.results.emplace_back("skirt", totals.beside_moves == 0
+    summary.results.emplace_back("skirt", totals.auxiliary_moves == 0
                                               ? std::string(none)
                                               : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts",
-                                                            totals.beside_mm, totals.beside_mm3, totals.beside_filament_mm));
+                                                            totals.adjacent_mm, totals.auxiliary_mm3, totals.auxiliary_filament_mm));
   }
 
  private:
   const Plan& plan_;
   const PathFacts& sums_;
-  sanity::PathsTold paths_;
+  checks::PathWarnings paths_;
 };
 
 /// Segmented lines and the pores between them, by range of heights.
@@ -58,8 +58,8 @@ class SegmentObserver : public MoveObserver {
     for (const auto& [heights, range] : segmented_) ranges_.push_back({heights, {}});
   }
   void layer(const LayerRecord& record, const void*) override {
-    const LaidSums& laid = record.paths->laid;
-    if (record.layer.index == plan_.range[0]) first_layer_points_ = laid.segments.points();
+    const DepositedSums& deposited = record.paths->deposited;
+    if (record.layer.index == plan_.range[0]) first_layer_points_ = deposited.segments.points();
     const std::vector<RangePores>& by_range = record.paths->by_range;
     const auto& areas = plan_.sections->areas();
     const SegmentRange& in = plan_.segments->at(record.layer.plane() - (areas.empty() ? 0 : areas.front().box.lo.z));
@@ -67,23 +67,23 @@ class SegmentObserver : public MoveObserver {
       if (by_layer_) {
         if (i < by_range.size()) add(ranges_[i], by_range[i].pores, by_range[i].area_mm2);
       } else if (segmented_[i].second == &in) {
-        add(ranges_[i], laid.pores, record.paths->area_mm2);
+        add(ranges_[i], deposited.pores, record.paths->area_mm2);
       }
     }
-    if (!by_layer_ || !by_range.empty() || laid.segments.lines == 0) return;
+    if (!by_layer_ || !by_range.empty() || deposited.segments.lines == 0) return;
     if (ranges_.size() == segmented_.size()) ranges_.push_back({"all ranges, layers of an earlier build", {}});
-    add(ranges_.back(), laid.pores, record.paths->area_mm2);
+    add(ranges_.back(), deposited.pores, record.paths->area_mm2);
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
-    std::string slow = speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
+    std::string slow = speed_warning(sums_.deposited.shorts, plan_.moves->profile.machine);
     if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
   }
   void report(Summary& summary) const override {
-    tell_laid(sums_.laid, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results, summary.facts);
+    report_deposited(sums_.deposited, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results, summary.facts);
   }
 
  private:
-  static void add(LaidRange& range, const PoreCounts& pores, double area_mm2) {
+  static void add(DepositedRange& range, const PoreCounts& pores, double area_mm2) {
     range.pores.add(pores);
     range.area_mm2 += area_mm2;
   }
@@ -92,7 +92,7 @@ class SegmentObserver : public MoveObserver {
   const PathFacts& sums_;
   decltype(std::declval<SegmentPlan>().segmented()) segmented_;
   bool by_layer_;                  // records have the pores of each range
-  std::vector<LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
+  std::vector<DepositedRange> ranges_;  // of segmented_, and one of layers of an earlier build
   std::uint64_t first_layer_points_ = 0;
 };
 
@@ -114,14 +114,14 @@ class FilamentObserver : public MoveObserver {
     facts["travels"] = totals.travels;
     facts["retractions"] = totals.retractions;
     facts["stored_points"] = sums_.stored_points;
-    facts["bead_mm"] = totals.bead_mm - totals.beside_mm;
+    facts["bead_mm"] = totals.bead_mm - totals.adjacent_mm;
     facts["travel_mm"] = totals.travel_mm;
     facts["filament_mm"] = totals.filament_mm;
     facts["filament_g"] = filament_g;
-    facts["skirt"] = {{"moves", totals.beside_moves},
-                      {"bead_mm", totals.beside_mm},
-                      {"volume_mm3", totals.beside_mm3},
-                      {"filament_mm", totals.beside_filament_mm}};
+    facts["skirt"] = {{"moves", totals.auxiliary_moves},
+                      {"bead_mm", totals.adjacent_mm},
+                      {"volume_mm3", totals.auxiliary_mm3},
+                      {"filament_mm", totals.auxiliary_filament_mm}};
     facts["print_seconds"] = totals.seconds;
   }
 
@@ -151,7 +151,7 @@ void report_move_plan(const Plan& plan, Summary& summary) {
   summary.machine = plan.moves->profile.machine.name;
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
-  tell_bead(plan.moves->profile.machine, plan.moves->left_out,
+  report_bead(plan.moves->profile.machine, plan.moves->left_out,
             plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
   summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",

@@ -23,7 +23,7 @@ using load::LoadOptions;
 using load::PlannedVolumes;
 using load::SurplusAreas;
 
-constexpr std::size_t kPlaces = 3;
+constexpr std::size_t kPositions = 3;
 constexpr std::size_t kMeshesShown = 24;
 
 struct Description {
@@ -79,12 +79,12 @@ bool is_sound(const Diagnosis& found) {
 /// Loads a part as it is in the file and diagnoses it. A sound mesh that comes as blocks is diagnosed as such: where shells lie
 /// apart, its list is never made. `sound` is true then: repair would change nothing.
 Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& options, Description& description, bool& sound) {
-  load::DegenerateFacets degenerate(kPlaces);
+  load::DegenerateFacets degenerate(kPositions);
   LoadOptions as_is = options;
   as_is.repair = false;
   as_is.blocks = true;
   Result<Part> part =
-      load::load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.look(first, facets); });
+      load::load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspection(first, facets); });
   if (!part) return part;
   as_is.blocks = false;
   sound = false;
@@ -101,7 +101,7 @@ Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& optio
   if (sound) return part;
   const bool alone = part->instances.size() == 1;  // the lists of others may be sliced together
   for (Mesh& mesh : part->meshes) {
-    description.diagnosis.push_back(alone ? load::diagnose_alone(mesh, kPlaces) : load::diagnose(mesh, kPlaces));
+    description.diagnosis.push_back(alone ? load::diagnose_alone(mesh, kPositions) : load::diagnose(mesh, kPositions));
     description.balanced = description.balanced && description.diagnosis.back().balanced;
   }
   return part;
@@ -171,13 +171,13 @@ std::string short_name(const Description& description, std::size_t mesh) {
 void row(std::string& text, const char* label, const std::string& value) { text += fmt::format("  {:<20} {}\n", label, value); }
 
 /// The first places of a kind in all meshes.
-std::string first_places(const Description& description, const Kind& kind) {
+std::string first_positions(const Description& description, const Kind& kind) {
   std::string text;
   std::size_t shown = 0;
-  for (std::size_t i = 0; i < description.diagnosis.size() && shown < kPlaces; ++i) {
-    for (const auto& place : (description.diagnosis[i].*kind.finding).first) {
-      if (shown == kPlaces) break;
-      text += fmt::format("{}{}", shown == 0 ? "" : "  ", point(place.at));
+  for (std::size_t i = 0; i < description.diagnosis.size() && shown < kPositions; ++i) {
+    for (const auto& position : (description.diagnosis[i].*kind.finding).first) {
+      if (shown == kPositions) break;
+      text += fmt::format("{}{}", shown == 0 ? "" : "  ", point(position.at));
       if (description.diagnosis.size() > 1) text += " of mesh " + std::to_string(i + 1);
       ++shown;
     }
@@ -205,7 +205,7 @@ void describe_findings(const Description& description, std::string& text) {
   text += "\n  found                     count  first places, mm\n";
   for (const Kind& kind : kKinds)
     if (const std::uint64_t count = count_of(description, kind); count > 0)
-      text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, readable_count(count), first_places(description, kind));
+      text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, readable_count(count), first_positions(description, kind));
   if (inverted > 0)
     text +=
         fmt::format("  {:<20} {:>10}  a hollow within a shell, or a shell turned inside out\n", "inverted shells", inverted);
@@ -246,9 +246,9 @@ Json as_json(const Diagnosis& found) {
   mesh["volume_mm3"] = found.volume_mm3;
   for (const Kind& kind : kKinds) {
     const auto& finding = found.*kind.finding;
-    Json places = Json::array();
-    for (const auto& place : finding.first) places.push_back({{"triangle", place.triangle + 1}, {"at_mm", as_json(place.at)}});
-    mesh[kind.key] = {{"count", finding.count}, {"first", places}};
+    Json positions = Json::array();
+    for (const auto& position : finding.first) positions.push_back({{"triangle", position.triangle + 1}, {"at_mm", as_json(position.at)}});
+    mesh[kind.key] = {{"count", finding.count}, {"first", positions}};
   }
   return mesh;
 }

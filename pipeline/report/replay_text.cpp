@@ -23,9 +23,9 @@ std::vector<std::string> totals_text(const Totals& totals) {
     lines.push_back(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
                                 readable_count(totals.moved), readable_count(totals.lost)));
   }
-  if (count.most_at_place > 1) {
+  if (count.max_per_position > 1) {
     lines.push_back(
-        fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency", count.most_at_place) +
+        fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency", count.max_per_position) +
         (count.added > 0 ? fmt::format(", which adds {} sweeps", readable_count(count.added)) : ""));
   }
   lines.push_back(
@@ -56,7 +56,7 @@ Json totals_json(const Totals& totals) {
           {"drops", count.drops},
           {"vectors", count.vectors},
           {"sweeps", count.sweeps},
-          {"drops_at_once", count.most_at_place},
+          {"drops_at_once", count.max_per_position},
           {"added_sweeps", count.added},
           {"moved", totals.moved},
           {"lost", totals.lost},

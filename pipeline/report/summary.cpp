@@ -35,7 +35,7 @@ void add_costs(const Summary& s, std::vector<Line>& lines) {
   lines.emplace_back("memory", fmt::format("{} at most (mesh {}, index {}; room kept for layers {} of {}, {} at once)",
                                            readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes),
                                            readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
-                                           readable_bytes(s.memory_budget_bytes), s.most_layers_in_flight));
+                                           readable_bytes(s.memory_budget_bytes), s.max_layers_in_flight));
   if (s.oversized_layers > 0) {
     lines.emplace_back(
         "", fmt::format("{} layers ran alone: each holds more than --memory by itself", readable_count(s.oversized_layers)));
@@ -145,7 +145,7 @@ std::string Summary::json() const {
            {"peak_layer_bytes", peak_layer_bytes},
            {"memory_budget_bytes", memory_budget_bytes},
            {"peak_resident_bytes", peak_resident_bytes},
-           {"most_layers_in_flight", most_layers_in_flight},
+           {"max_layers_in_flight", max_layers_in_flight},
            {"oversized_layers", oversized_layers},
            {"parts", part_list},
            {"warnings", warnings_json(warnings)}};

@@ -9,8 +9,8 @@ namespace {
 
 class ContourMaker : public Maker {
  public:
-  ContourMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), files_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
+  ContourMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
+      : plan_(plan), checks_(checks), files_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
     observe_contours(plan, observers_);
   }
 
@@ -41,7 +41,7 @@ class ContourMaker : public Maker {
                Sections::Work& work = work_[ticket.work];
                PathFacts facts = facts_of(work);
                facts.bead_mm = length_mm(work.paths);
-               facts.area_mm2 = sanity_.add_contours(made_[ticket.work].layer, work.contours);
+               facts.area_mm2 = checks_.add_contours(made_[ticket.work].layer, work.contours);
                made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
                return files_.encode(view_of(made_[ticket.work].layer, work), work.text);
              }},
@@ -56,12 +56,12 @@ class ContourMaker : public Maker {
     LayerRecord& record = made_[ticket.work];
     if (Status status = files_.record(view_of(record.layer, work), work.text, record); !status) return status;
     observers_.layer(record, &work.report);
-    sanity_.record(record.layer.index, record.paths->contours > 0);
+    checks_.record(record.layer.index, record.paths->contours > 0);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
     observers_.layer(record, nullptr);
-    sanity_.keep(record.layer.index, record.paths->contours > 0);
+    checks_.keep(record.layer.index, record.paths->contours > 0);
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
@@ -86,7 +86,7 @@ class ContourMaker : public Maker {
       warnings.push_back({"planned-again", "--resume: no layer of an interrupted job was found; all were planned again"});
     }
   }
-  void tell(Summary& summary) const override {
+  void report(Summary& summary) const override {
     summary.output = files_.output();
     summary.format = plan_.job.slice.format;
     summary.bytes_written = bytes_written_;
@@ -100,18 +100,18 @@ class ContourMaker : public Maker {
   }
 
   const Plan& plan_;
-  Sanity& sanity_;
+  JobChecks& checks_;
   SliceFiles files_;
   std::vector<Sections::Work> work_;
   std::vector<LayerRecord> made_;
-  Observers<slice::LayerReport> observers_;
+  Observers<slice::SectionReport> observers_;
   std::uint64_t bytes_written_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<Maker> make_contour_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
-  return std::make_unique<ContourMaker>(plan, sanity, limits);
+std::unique_ptr<Maker> make_contour_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits) {
+  return std::make_unique<ContourMaker>(plan, checks, limits);
 }
 
 }  // namespace lamina::pipeline

@@ -14,8 +14,8 @@ namespace {
 
 class ImageMaker : public Maker {
  public:
-  ImageMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.max_in_flight), made_(limits.record_slots) {
+  ImageMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
+      : plan_(plan), checks_(checks), imager_(plan), files_(plan), work_(limits.max_in_flight), made_(limits.record_slots) {
     if (plan.images->machine) parts_.emplace(plan);
     observe_pixels(plan, observers_);
     inspector_ = &observers_.add<Inspector>(plan);
@@ -55,7 +55,7 @@ class ImageMaker : public Maker {
       made = {};
       made.record.layer = layer;
       const Status status = imager_.raster(layer, work.images, made.record, made.notes);
-      if (status) sanity_.add_image(layer, work.images.runs);
+      if (status) checks_.add_image(layer, work.images.runs);
       return status;
     });
     if (plan_.job.levels > 0) {
@@ -78,23 +78,23 @@ class ImageMaker : public Maker {
     }
     if (inspector_->on()) {
       add("inspect", [this](const Layer&, Work& work, Made&) {
-        inspector_->looks().look(work.images.runs, work.look);
+        inspector_->inspection().prepare(work.images.runs, work.layer_inspection);
         return Status();
       });
       steps.back().needs = [this](std::uint32_t, const Ticket& ticket) -> Result<std::uint64_t> {
-        return inspector_->looks().look_needs(work_[ticket.work].images.runs);
+        return inspector_->inspection().bytes_needed(work_[ticket.work].images.runs);
       };
     }
     const auto dose_needs = [this](std::uint32_t layer, const Ticket& ticket) -> Result<std::uint64_t> {
       const ImageWork& work = work_[ticket.work].images;
       const Layer of = plan_.layer(layer);
       return bytes_of(of, plan_.images->dose.parted_pixels(work.runs, work.drops)) - bytes_of(of, 0) +
-             work_[ticket.work].look.bytes();
+             work_[ticket.work].layer_inspection.bytes();
     };
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
       if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
       // What walls and fillings left out is no bleed.
-      if (plan_.images->dose.bleeds() && !plan_.images->beads) sanity_.add_left(layer, work.images.runs);
+      if (plan_.images->dose.bleeds() && !plan_.images->beads) checks_.add_left(layer, work.images.runs);
       if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
       if (parts_) parts_->count(work.images, made.notes, made.record);
       return Status();
@@ -118,22 +118,22 @@ class ImageMaker : public Maker {
     if (!plan_.job.dry_run) {
       if (Status status = files_.record(made.record); !status) return status;
     }
-    if (inspector_->on()) inspector_->record(made.record.layer, work_[ticket.work].look);
+    if (inspector_->on()) inspector_->record(made.record.layer, work_[ticket.work].layer_inspection);
     observers_.layer(made.record, &made.notes);
-    sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
+    checks_.record(made.record.layer.index, made.record.set_pixels > 0);
     crossings_ += made.notes.report.crossings;
     bytes_written_ += made.record.bytes + made.record.program.bytes;
     return {};
   }
   void add_kept(const LayerRecord& record) override {
     observers_.layer(record, nullptr);
-    sanity_.keep(record.layer.index, record.set_pixels > 0);
+    checks_.keep(record.layer.index, record.set_pixels > 0);
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override {
-    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].look.bytes();
+    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].layer_inspection.bytes();
   }
-  std::uint64_t bytes_beside() const override { return inspector_->bytes(); }
+  std::uint64_t extra_bytes() const override { return inspector_->bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
 
   std::uint64_t crossings() const override { return crossings_; }
@@ -154,7 +154,7 @@ class ImageMaker : public Maker {
   }
 
   void warn(const Summary& summary, std::vector<Warning>& warnings) const override { observers_.warn(summary, warnings); }
-  void tell(Summary& summary) const override {
+  void report(Summary& summary) const override {
     summary.bytes_written = bytes_written_;
     observers_.report(summary);
     sort_image_facts(summary);
@@ -163,8 +163,8 @@ class ImageMaker : public Maker {
  private:
   struct Work {
     ImageWork images;
-    ImageFiles::Work files;
-    inspect::LayerLook look;
+    ImageFiles::FileWork files;
+    inspect::LayerInspection layer_inspection;
   };
   struct Made {
     LayerRecord record;
@@ -180,7 +180,7 @@ class ImageMaker : public Maker {
   }
 
   const Plan& plan_;
-  Sanity& sanity_;
+  JobChecks& checks_;
   LayerImager imager_;
   ImageFiles files_;
   std::vector<Work> work_;
@@ -194,8 +194,8 @@ class ImageMaker : public Maker {
 
 }  // namespace
 
-std::unique_ptr<Maker> make_image_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
-  return std::make_unique<ImageMaker>(plan, sanity, limits);
+std::unique_ptr<Maker> make_image_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits) {
+  return std::make_unique<ImageMaker>(plan, checks, limits);
 }
 
 }  // namespace lamina::pipeline

@@ -49,25 +49,25 @@ Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& rec
   for (const Solid& solid : images.solids.all()) {
     Runs& image = several || zones ? work.section : work.runs;
     if (Status status = section_of(solid, layer, work, image, record, notes); !status) return status;
-    if (several) work.materials.lay(solid.material.at(plane(layer)), image, work.runs);
-    if (zones) work.zones.lay(solid.zone, image, work.runs, plan_.job.fill_rule == FillRule::kEvenOdd);
+    if (several) work.materials.deposit(solid.material.at(plane(layer)), image, work.runs);
+    if (zones) work.zones.deposit(solid.zone, image, work.runs, plan_.job.fill_rule == FillRule::kEvenOdd);
   }
   return {};
 }
 
-Status LayerImager::place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const {
+Status LayerImager::position(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const {
   const ImagePlan& images = *plan_.images;
   const std::uint32_t number = *part.image_at(plane(layer));
   if (const std::uint8_t full = images.dose.full(); full > 0) {
     const auto levels = part.images->levels(number, full);
     if (!levels) return levels.error();
-    read::place(*levels, part.place, work.drops.zones);
-    at_least(work.drops.zones, 1, work.section);
+    read::position(*levels, part.position, work.drops.zones);
+    min_level(work.drops.zones, 1, work.section);
     filled = sum_of_levels(work.drops.zones);
   } else {
     const auto read = part.images->read(number);
     if (!read) return read.error();
-    read::place(*read, part.place, work.section);
+    read::position(*read, part.position, work.section);
     filled = set_pixels(work.section);
   }
   const auto outside =
@@ -76,7 +76,7 @@ Status LayerImager::place(const Layer& layer, const PlacedImages& part, ImageWor
   return Error{Fault::kUsage,
                fmt::format("{}: layer {} sets a pixel at x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed of {}; "
                            "move the images",
-                           plan_.scene->parts[part.part].path, layer.index, mm(outside->place.x), mm(outside->place.y),
+                           plan_.scene->parts[part.part].path, layer.index, mm(outside->position.x), mm(outside->position.y),
                            outside->beyond_mm, images.machine->machine.name)};
 }
 
@@ -85,21 +85,21 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   for (const PlacedImages& part : plan_.scene->images) {
     if (!part.image_at(plane(layer))) continue;
     std::uint64_t filled = 0;
-    if (Status status = place(layer, part, work, filled); !status) return status;
+    if (Status status = position(layer, part, work, filled); !status) return status;
     if (!notes.part_pixels.empty()) notes.part_pixels[part.part] += filled;
     if (shares_voxels()) {
-      lay_shares(layer, part.part, work);
+      add_shares(layer, part.part, work);
       continue;
     }
     if (const std::uint8_t full = images.dose.full(); full > 0) {
       larger(work.drops.shares, work.drops.zones, work.drops.levels);
       std::swap(work.drops.shares, work.drops.levels);
-      at_least(work.drops.zones, dose::half_of(full), work.section);
+      min_level(work.drops.zones, dose::half_of(full), work.section);
     }
     const DoseZones& zones = images.dose.zones();
-    if (zones.several()) work.zones.lay(zones.of_part(part.part), work.section, work.runs);
+    if (zones.several()) work.zones.deposit(zones.of_part(part.part), work.section, work.runs);
     if (images.materials.several()) {
-      work.materials.lay(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
+      work.materials.deposit(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
     } else if (zones.several()) {
       continue;
     } else if (work.runs.change.empty()) {
@@ -111,7 +111,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   }
   if (!shares_voxels() || plan_.scene->images.empty()) return {};
   dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
-  at_least(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
+  min_level(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
   own_voxels(work);
   return {};
 }
@@ -134,7 +134,7 @@ Status LayerImager::fill(const Layer& layer, ImageWork& work) const {
 }
 
 Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const {
-  if (Status status = plan_.images->beads->lay(layer, *work.beads); !status) return status;
+  if (Status status = plan_.images->beads->deposit(layer, *work.beads); !status) return status;
   notes.solid_pixels = set_pixels(work.runs);
   plan_.images->beads->apply(work.runs, work.second, *work.beads);
   notes.bead_pixels = set_pixels(work.runs);
@@ -257,7 +257,7 @@ bool LayerImager::shares_voxels() const {
   return plan_.job.levels > 0 && (plan_.images->materials.several() || plan_.images->dose.zones().several());
 }
 
-cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const {
+cover::CoverageReport LayerImager::levels(const Layer& layer, cover::CoverageScratch& scratch, Levels& image) const {
   const Solid& solid = plan_.images->solids.all().front();
   if (solid.coverage) return solid.coverage->layer(layer, scratch, image);
   image.start(plan_.images->grid.columns());  // no mesh
@@ -276,7 +276,7 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes
     if (shares) dose::mirror(work.drops.shares, axes != Mirror::kY, axes != Mirror::kX, work.drops.zones);
     if (shares) std::swap(work.drops.shares, work.drops.zones);
     if (shares_voxels()) {
-      for (dose::LaidPart& part : work.drops.laid) {
+      for (dose::DepositedPart& part : work.drops.deposited) {
         dose::mirror(part.shares, axes != Mirror::kY, axes != Mirror::kX, part.zones);
         std::swap(part.shares, part.zones);
       }
@@ -293,16 +293,16 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes
                              "parts away from its edge",
                              layer.index, mm(layer.plane()))};
   }
-  const std::uint64_t least = least_vanished();
-  if (shares || least > 0) work.third = work.runs;
+  const std::uint64_t minimum = min_vanished();
+  if (shares || minimum > 0) work.third = work.runs;
   zones.bleeds().remove(layer, work.runs, work.zones.image, work.bleed);
-  if (least > 0) notes.vanished = inspect::vanished_pieces(work.third, work.runs, least, work.vanish);
+  if (minimum > 0) notes.vanished = inspect::vanished_pieces(work.third, work.runs, minimum, work.vanish);
   if (shares) empty_removed(work.third, shares_voxels(), work);
   return check_grown(layer, work);
 }
 
 /// Pixels of four discs of the widest bleed inwards; 0: there is none, or beads fill the parts.
-std::uint64_t LayerImager::least_vanished() const {
+std::uint64_t LayerImager::min_vanished() const {
   if (plan_.images->beads) return 0;
   double widest = 0;
   for (const auto& [x, y] : bleeds_of(plan_.job)) widest = std::max(widest, std::max(x, 0.0) * std::max(y, 0.0));
@@ -312,15 +312,15 @@ std::uint64_t LayerImager::least_vanished() const {
 }
 
 /// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
-void LayerImager::empty_removed(const Runs& before, bool laid, ImageWork& work) {
+void LayerImager::empty_removed(const Runs& before, bool deposited, ImageWork& work) {
   combine(before, work.runs, SetOperation::kDifference, work.second);
-  const dose::Reach beside{{1, 1}};
-  dose::dilate(work.second, beside, work.section);
+  const dose::Reach neighbour{{1, 1}};
+  dose::dilate(work.second, neighbour, work.section);
   combine(work.section, work.runs, SetOperation::kDifference, work.second);
   dose::without(work.drops.shares, work.second, work.drops.zones);
   std::swap(work.drops.shares, work.drops.zones);
-  if (!laid) return;
-  for (dose::LaidPart& part : work.drops.laid) {
+  if (!deposited) return;
+  for (dose::DepositedPart& part : work.drops.deposited) {
     dose::without(part.shares, work.second, part.zones);
     std::swap(part.shares, part.zones);
   }
@@ -336,7 +336,7 @@ Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const
       Fault::kUsage,
       fmt::format("dose.bleed_um: layer {} grows to x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed "
                   "of {}; move the parts away from its edge",
-                  layer.index, mm(outside->place.x), mm(outside->place.y), outside->beyond_mm, images.machine->machine.name)};
+                  layer.index, mm(outside->position.x), mm(outside->position.y), outside->beyond_mm, images.machine->machine.name)};
 }
 
 void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
@@ -362,23 +362,23 @@ void LayerImager::own_voxels(ImageWork& work) const {
   const bool several = images.materials.several(), zones = images.dose.zones().several();
   if (several) work.materials.start(images.materials.used.size(), columns, rows);
   if (zones) work.zones.start(images.dose.zones().count(), columns, rows);
-  for (std::size_t i = 0; i < work.drops.laid.size(); ++i) {
-    const dose::LaidPart& part = work.drops.laid[i];
-    const auto unite = [&](Runs& image) {
+  for (std::size_t i = 0; i < work.drops.deposited.size(); ++i) {
+    const dose::DepositedPart& part = work.drops.deposited[i];
+    const auto merge = [&](Runs& image) {
       combine(image, work.drops.shared.owner[i], SetOperation::kUnion, work.section);
       std::swap(image, work.section);
     };
-    if (several) unite(work.materials.image[part.material]);
-    if (zones) unite(work.zones.image[part.zone]);
+    if (several) merge(work.materials.image[part.material]);
+    if (zones) merge(work.zones.image[part.zone]);
   }
 }
 
 /// How full each solid makes the voxels.
 void LayerImager::cover(const Layer& layer, ImageWork& work) const {
   const std::span<const Solid> solids = plan_.images->solids.all();
-  work.drops.laid.resize(solids.size());
+  work.drops.deposited.resize(solids.size());
   for (std::size_t i = 0; i < solids.size(); ++i) {
-    dose::LaidPart& part = work.drops.laid[i];
+    dose::DepositedPart& part = work.drops.deposited[i];
     solids[i].coverage->layer(layer, work.coverage, part.shares);
     part.zone = solids[i].zone;
     part.material = plan_.images->materials.several() ? solids[i].material.at(plane(layer)) : 0;
@@ -387,15 +387,15 @@ void LayerImager::cover(const Layer& layer, ImageWork& work) const {
 
 /// Those of an image, as placed in work.drops.zones, lie over the parts before: of the same kind as the last one, the larger
 /// share counts.
-void LayerImager::lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const {
-  std::vector<dose::LaidPart>& laid = work.drops.laid;
+void LayerImager::add_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const {
+  std::vector<dose::DepositedPart>& deposited = work.drops.deposited;
   const std::uint32_t zone = plan_.images->dose.zones().of_part(part);
   const std::uint32_t material = plan_.images->materials.several() ? plan_.images->materials.part[part].at(plane(layer)) : 0;
-  if (laid.empty() || laid.back().zone != zone || laid.back().material != material) {
-    laid.push_back({work.drops.zones, {}, zone, material});
+  if (deposited.empty() || deposited.back().zone != zone || deposited.back().material != material) {
+    deposited.push_back({work.drops.zones, {}, zone, material});
   } else {
-    larger(laid.back().shares, work.drops.zones, work.drops.levels);
-    std::swap(laid.back().shares, work.drops.levels);
+    larger(deposited.back().shares, work.drops.zones, work.drops.levels);
+    std::swap(deposited.back().shares, work.drops.levels);
   }
 }
 
@@ -409,21 +409,21 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
         images.dose.saturate(layer, shares_voxels(), materials, work.runs, work.zones.image, work.second, work.drops);
     if (!sums) return sums.error();
     record.dosed_pixels = sums->full_voxels;
-    record.asked_drops = sums->asked_drops;
-    record.drops = images.dose.most_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
-    record.most_drops = images.dose.most_drops() > 1 ? highest(work.drops.levels) : record.drops > 0 ? 1 : 0;
+    record.requested_drops = sums->requested_drops;
+    record.drops = images.dose.max_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
+    record.max_drops = images.dose.max_drops() > 1 ? highest(work.drops.levels) : record.drops > 0 ? 1 : 0;
     // Of one drop a pixel the image alone was made.
     const bool levels = write::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
-    if (levels && images.dose.most_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
+    if (levels && images.dose.max_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
   } else if (plan_.job.levels > 0) {
-    at_least(work.drops.shares, 1, work.runs);
+    min_level(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
-  const bool grey = write::find_level_format(plan_.job.format) != nullptr, drops = images.dose.most_drops() > 1;
+  const bool grey = write::find_level_format(plan_.job.format) != nullptr, drops = images.dose.max_drops() > 1;
   if (images.materials.several() && (shares_voxels() || drops || grey))
-    dose::drops_of_materials(images.dose.most_drops(), shares_voxels(), work.materials.image, work.drops);
-  const bool counted = images.dose.saturates() && images.dose.most_drops() <= 1;
+    dose::drops_of_materials(images.dose.max_drops(), shares_voxels(), work.materials.image, work.drops);
+  const bool counted = images.dose.saturates() && images.dose.max_drops() <= 1;
   record.set_pixels = counted ? record.drops : set_pixels(work.runs);
   for (const Runs& image : several(work)) record.images.emplace_back().set_pixels = set_pixels(image);
   for (std::size_t m = 0; grey && m < record.images.size(); ++m)
@@ -432,7 +432,7 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
 }
 
 std::span<const Runs> LayerImager::several(const ImageWork& work) const {
-  const bool drops = plan_.images->dose.most_drops() > 1 && write::find_level_format(plan_.job.format) == nullptr;
+  const bool drops = plan_.images->dose.max_drops() > 1 && write::find_level_format(plan_.job.format) == nullptr;
   if (!drops) return work.materials.image;
   return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
 }

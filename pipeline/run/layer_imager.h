@@ -26,7 +26,7 @@ struct ImageWork {
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
   dose::DropWork drops;  // if a saturation or shares of voxels are asked for
-  cover::LayerScratch coverage;
+  cover::CoverageScratch coverage;
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
   dose::BleedWork bleed;
@@ -67,7 +67,7 @@ class LayerImager {
 
   /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
   /// The plan's job asks for levels.
-  cover::LayerReport levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const;
+  cover::CoverageReport levels(const Layer& layer, cover::CoverageScratch& scratch, Levels& image) const;
 
   static constexpr std::uint64_t kUnknown = UINT64_MAX;
   /// Upper bound of the bytes for scratch and runs of a layer.
@@ -84,15 +84,15 @@ class LayerImager {
                     ImageNotes& notes) const;
   raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
                               Runs& image) const;
-  Status place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const;
+  Status position(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
-  std::uint64_t least_vanished() const;
+  std::uint64_t min_vanished() const;
   bool shares_voxels() const;  // of several materials or doses
   void cover(const Layer& layer, ImageWork& work) const;
-  void lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const;
+  void add_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const;
   void own_voxels(ImageWork& work) const;
-  static void empty_removed(const Runs& before, bool laid, ImageWork& work);
+  static void empty_removed(const Runs& before, bool deposited, ImageWork& work);
   std::array<Nm, 2> planes(const Layer& layer) const;
   dose::DropSizes sizes_of(const Layer& layer, std::uint64_t pixels) const;
   std::uint64_t changes_of_images(Nm plane) const;

@@ -62,8 +62,8 @@ LayerSource::LayerSource(LayerSource&&) noexcept = default;
 LayerSource& LayerSource::operator=(LayerSource&&) noexcept = default;
 LayerSource::~LayerSource() = default;
 
-Result<LayerSource> LayerSource::make(const Job& asked) {
-  Job job = asked;
+Result<LayerSource> LayerSource::make(const Job& requested) {
+  Job job = requested;
   job.dry_run = true;  // nothing is written
   if (Status status = check_job(job); !status) return status.error();
   auto plan = plan_of(job, Product::kImages);

@@ -49,7 +49,7 @@ class Maker {
   virtual std::uint64_t bytes_held(std::uint32_t work) const = 0;
   virtual void let_go(std::uint32_t work) = 0;
   /// Of what record() keeps from layer to layer.
-  virtual std::uint64_t bytes_beside() const { return 0; }
+  virtual std::uint64_t extra_bytes() const { return 0; }
 
   // --- the end
   /// Adds the product's own warnings; before finish().
@@ -65,7 +65,7 @@ class Maker {
   /// Crossings of rows with surfaces in all layers made; 0 where there are no rows.
   virtual std::uint64_t crossings() const { return 0; }
   /// Adds the product's own lines to the summary.
-  virtual void tell(Summary& summary) const = 0;
+  virtual void report(Summary& summary) const = 0;
 };
 
 }  // namespace lamina::pipeline

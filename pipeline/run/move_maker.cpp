@@ -17,8 +17,8 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 
 class MoveMaker : public Maker {
  public:
-  MoveMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), file_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
+  MoveMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
+      : plan_(plan), checks_(checks), file_(plan), work_(limits.max_in_flight), made_(limits.max_in_flight) {
     observe_moves(plan, sums_, observers_);
   }
 
@@ -27,8 +27,8 @@ class MoveMaker : public Maker {
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = file_.open(); !status) return status.error();
     std::vector<std::uint32_t> todo;
-    const auto stand = static_cast<std::uint32_t>(file_.file().kept().size());
-    for (std::uint32_t i = plan_.range[0] + stand; i < plan_.range[1]; ++i) todo.push_back(i);
+    const auto kept_count = static_cast<std::uint32_t>(file_.file().kept().size());
+    for (std::uint32_t i = plan_.range[0] + kept_count; i < plan_.range[1]; ++i) todo.push_back(i);
     return todo;
   }
   std::vector<LayerRecord> kept() const override { return file_.file().kept(); }
@@ -48,8 +48,8 @@ class MoveMaker : public Maker {
            if (bytes && plan_.segments->crosses()) *bytes += *bytes + plan_.sections->bytes_bound(layer);  // the next layer too
            return bytes;
          }},
-        {"stretches", [this](std::uint32_t layer, const Ticket& ticket) {
-           return lay_waiting(layer, work_[ticket.work], made_[ticket.work]);
+        {"intervals", [this](std::uint32_t layer, const Ticket& ticket) {
+           return deposit_waiting(layer, work_[ticket.work], made_[ticket.work]);
          }}};
   }
   bool records_from_work() const override { return true; }
@@ -58,19 +58,19 @@ class MoveMaker : public Maker {
     Made& made = made_[ticket.work];
     Sections::Work& work = work_[ticket.work];
     if (!made.waits) {
-      if (Status status = lay_pieces(layer, work, made); !status) return status;
+      if (Status status = deposit_pieces(layer, work, made); !status) return status;
     }
     made.record.paths = std::make_shared<const PathFacts>(made.facts);
     const std::string_view text(work.text.data(), work.text.size());
     if (Status status = made.waits ? file_.file().append(text, made.record) : file_.file().end_pieces(made.record); !status)
       return status;
     add(made.record);
-    sanity_.record(layer, made.facts.totals.part_moves() > 0);
+    checks_.record(layer, made.facts.totals.part_moves() > 0);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
     add(record);
-    sanity_.keep(record.layer.index, record.paths->totals.part_moves() > 0);
+    checks_.keep(record.layer.index, record.paths->totals.part_moves() > 0);
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
@@ -91,7 +91,7 @@ class MoveMaker : public Maker {
   }
   void discard() override { file_.discard(); }
   void warn(const Summary& summary, std::vector<Warning>& warnings) const override { observers_.warn(summary, warnings); }
-  void tell(Summary& summary) const override {
+  void report(Summary& summary) const override {
     summary.bytes_written = bytes_written_;
     observers_.report(summary);
   }
@@ -109,15 +109,15 @@ class MoveMaker : public Maker {
   }
 
   /// Makes the layer's text unless it becomes too long to wait.
-  Status lay_waiting(std::uint32_t layer, Sections::Work& work, Made& made) {
+  Status deposit_waiting(std::uint32_t layer, Sections::Work& work, Made& made) {
     made.facts = facts_of(work);
-    made.facts.area_mm2 = sanity_.add_contours(made.record.layer, work.contours);
+    made.facts.area_mm2 = checks_.add_contours(made.record.layer, work.contours);
     work.text.clear();
     const auto out = file_.layer(made.record.layer, work.text);
-    const std::size_t most = plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
-    const auto laid = lay_moves(plan_, layer, work, {work.text, most, [] { return false; }}, *out, made.facts);
-    if (!laid) return laid.error();
-    made.waits = *laid;
+    const std::size_t maximum = plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
+    const auto deposited = deposit_moves(plan_, layer, work, {work.text, maximum, [] { return false; }}, *out, made.facts);
+    if (!deposited) return deposited.error();
+    made.waits = *deposited;
     if (made.waits) {
       made.record.bytes = work.text.size();
       made.record.hash = hash_bytes(std::as_bytes(std::span(work.text)));
@@ -127,7 +127,7 @@ class MoveMaker : public Maker {
     return {};
   }
 
-  Status lay_pieces(std::uint32_t layer, const Sections::Work& work, Made& made) {
+  Status deposit_pieces(std::uint32_t layer, const Sections::Work& work, Made& made) {
     piece_.clear();
     Status status;
     const auto give = [&] {
@@ -136,14 +136,14 @@ class MoveMaker : public Maker {
       return status.ok();
     };
     const auto out = file_.layer(made.record.layer, piece_);
-    const auto laid = lay_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
-    if (!laid) return laid.error();
+    const auto deposited = deposit_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
+    if (!deposited) return deposited.error();
     if (!status) return status;
     return file_.file().append_piece({piece_.data(), piece_.size()});
   }
 
   const Plan& plan_;
-  Sanity& sanity_;
+  JobChecks& checks_;
   ToolpathFile file_;
   std::vector<Sections::Work> work_;
   std::vector<Made> made_;
@@ -156,8 +156,8 @@ class MoveMaker : public Maker {
 
 }  // namespace
 
-std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
-  return std::make_unique<MoveMaker>(plan, sanity, limits);
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits) {
+  return std::make_unique<MoveMaker>(plan, checks, limits);
 }
 
 }  // namespace lamina::pipeline

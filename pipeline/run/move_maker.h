@@ -5,10 +5,10 @@
 
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
-#include "pipeline/run/sanity.h"
+#include "pipeline/run/job_checks.h"
 
 namespace lamina::pipeline {
 
-std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

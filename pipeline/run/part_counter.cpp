@@ -4,7 +4,7 @@
 
 #include "pipeline/report/job_cost.h"
 #include "pipeline/run/layer_imager.h"
-#include "pipeline/run/sanity.h"
+#include "pipeline/run/job_checks.h"
 #include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {
@@ -13,18 +13,18 @@ PartCounter::PartCounter(const Plan& plan) : plan_(plan) {
   const std::size_t parts = reported_parts(plan);
   if (parts < 2) return;
   saturates_ = plan.images->dose.saturates();
-  several_ = plan.images->dose.most_drops() > 1;
+  several_ = plan.images->dose.max_drops() > 1;
   full_ = plan.images->dose.full();
-  const std::vector<sanity::Solid> solids = solids_from_above(*plan.scene);
+  const std::vector<checks::Solid> solids = solids_from_above(*plan.scene);
   std::vector<Box> boxes;
-  for (const sanity::Solid& solid : solids) {
+  for (const checks::Solid& solid : solids) {
     Box box = full_ > 0 ? cost::box_of_voxels(solid.box, plan.images->grid) : solid.box;
     const auto [by_x, by_y] = plan.images->dose.zones().grows_nm(plan.images->dose.zones().of_part(solid.part));
     box.lo.x -= static_cast<Nm>(by_x), box.hi.x += static_cast<Nm>(by_x);
     box.lo.y -= static_cast<Nm>(by_y), box.hi.y += static_cast<Nm>(by_y);
     boxes.push_back(box);
   }
-  const std::vector<std::uint32_t> group = slice::group_seen_from_above(boxes);  // anew, for boxes have grown
+  const std::vector<std::uint32_t> group = slice::group_from_above(boxes);  // anew, for boxes have grown
   std::vector<cost::Body> bodies;
   for (std::size_t i = 0; i < solids.size(); ++i) bodies.push_back({boxes[i], solids[i].part, group[i]});
   const Mirror mirror = plan.job.mirror;
@@ -65,10 +65,10 @@ void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64
   std::vector<std::uint64_t> drops(zones.count(), 0);  // those of shared voxels count for all of theirs
   for (std::uint32_t zone = 0; full_ == 0 && zone < zones.count(); ++zone)
     drops[zone] = sum_of_levels(work.drops.levels, work.zones.image[zone]);
-  for (std::size_t i = 0; full_ > 0 && i < work.drops.laid.size(); ++i) {
+  for (std::size_t i = 0; full_ > 0 && i < work.drops.deposited.size(); ++i) {
     Runs voxels;
-    at_least(work.drops.laid[i].shares, 1, voxels);
-    drops[work.drops.laid[i].zone] += sum_of_levels(work.drops.levels, voxels);
+    lower_bound(work.drops.deposited[i].shares, 1, voxels);
+    drops[work.drops.deposited[i].zone] += sum_of_levels(work.drops.levels, voxels);
   }
   drops = shared(record.drops, drops);
   for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {

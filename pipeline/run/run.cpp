@@ -20,7 +20,7 @@
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
-#include "pipeline/run/sanity.h"
+#include "pipeline/run/job_checks.h"
 #include "stages/checks/records.h"
 
 namespace lamina::pipeline {
@@ -36,13 +36,13 @@ Status check_output_of(const Resolved& resolved) {
   return {};
 }
 
-std::unique_ptr<Maker> make_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
+std::unique_ptr<Maker> make_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits) {
   switch (plan.product) {
-    case Product::kImages: return make_image_maker(plan, sanity, limits);
-    case Product::kContours: return make_contour_maker(plan, sanity, limits);
+    case Product::kImages: return make_image_maker(plan, checks, limits);
+    case Product::kContours: return make_contour_maker(plan, checks, limits);
     case Product::kMoves: break;
   }
-  return make_move_maker(plan, sanity, limits);
+  return make_move_maker(plan, checks, limits);
 }
 
 Summary summary_of(const Plan& plan) {
@@ -51,7 +51,7 @@ Summary summary_of(const Plan& plan) {
   summary.dry_run = plan.job.dry_run;
   summary.output = plan.job.output;
   summary.layer_text = text_of(plan.job.heights, plan.job.layer_mm);
-  const std::string small = small_peaks_text(plan.heights, plan.job.heights.least_flat_mm2);
+  const std::string small = small_peaks_text(plan.heights, plan.job.heights.min_flat_mm2);
   if (!small.empty()) summary.layer_text += "; " + small;
   summary.layers_total = plan.layer_count;
   summary.triangles = plan.triangles;
@@ -86,7 +86,7 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
     return status;
   };
   steps.bytes_held = [&](std::uint32_t work) { return maker.bytes_held(work); };
-  steps.bytes_beside = [&] { return maker.bytes_beside(); };
+  steps.extra_bytes = [&] { return maker.extra_bytes(); };
   steps.let_go = [&](std::uint32_t work) { maker.let_go(work); };
   steps.records_from_work = maker.records_from_work();
   return steps;
@@ -107,7 +107,7 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer, bool shared)
   return {error.fault, error.message + "; finished layers are kept, go on with --resume"};
 }
 
-void tell_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
+void report_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
   timing.phases.push_back({"layers", layers});
   timing.nodes = {report.credits};
   timing.nodes.insert(timing.nodes.end(), report.steps.begin(), report.steps.end());
@@ -119,10 +119,10 @@ bool cut_short(const Status& status) {
 
 /// Collects the warnings while the files are unfinished still, and refuses what is empty or, if strict, doubtful. Then
 /// nothing stays, unless an earlier run had made a part of it.
-Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool shared, Summary& summary) {
+Status check_job(const Plan& plan, Maker& maker, const JobChecks& checks, bool shared, Summary& summary) {
   maker.warn(summary, summary.warnings);
-  Status status = sanity.end(summary.warnings);
-  if (status && plan.job.strict) status = sanity::refuse_warnings(summary.warnings);
+  Status status = checks.end(summary.warnings);
+  if (status && plan.job.strict) status = checks::refuse_warnings(summary.warnings);
   if (status) return {};
   if (cut_short(status)) return status;
   if (shared) {
@@ -134,7 +134,7 @@ Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool shared, 
 }
 
 /// Makes the remaining layers. errors  of the lowest failing layer
-Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const FlowLimits& limits, Summary& summary,
+Status make_layers(const Plan& plan, Maker& maker, const JobChecks& checks, const FlowLimits& limits, Summary& summary,
                    const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   auto todo = maker.open();
   if (!todo) return todo.error();
@@ -154,17 +154,17 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
   FlowReport report;
   const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
   if (!moved) return ended_early(maker, moved.error(), done > 0, shared);
-  if (Status status = judge(plan, maker, sanity, shared, summary); !status) {
+  if (Status status = check_job(plan, maker, checks, shared, summary); !status) {
     return cut_short(status) ? ended_early(maker, status.error(), done > 0, shared) : status;
   }
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0, shared);
   const Elapsed moved_in = moving.elapsed();
   summary.layer_seconds = moved_in.wall;
   for (const NodeTime& step : report.steps) summary.step_seconds.emplace_back(step.name, step.busy);
-  summary.most_layers_in_flight = report.max_in_flight;
+  summary.max_layers_in_flight = report.max_in_flight;
   summary.peak_layer_bytes = report.max_bytes;
   summary.oversized_layers = report.oversized;
-  if (summary.timing) tell_flow(report, moved_in, *summary.timing);
+  if (summary.timing) report_flow(report, moved_in, *summary.timing);
   return {};
 }
 
@@ -179,7 +179,7 @@ std::shared_ptr<Timing> timing_of(const Plan& plan, const Elapsed& before) {
 }
 
 /// Measures the least that any program would need for the same.
-void tell_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary, Timing& timing) {
+void report_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary, Timing& timing) {
   std::vector<std::string> parts;
   for (const PartSummary& part : plan.scene->parts) parts.push_back(part.path);
   timing.floor.bytes_written = summary.bytes_written;
@@ -187,8 +187,8 @@ void tell_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& c
   timing.floor.crossings = maker.crossings();
   std::error_code error;
   const bool is_folder = std::filesystem::is_directory(plan.job.output, error);
-  const std::string beside = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
-  if (Status status = write::measure_floor(parts, beside, cancel, timing.floor); !status)
+  const std::string neighbour = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
+  if (Status status = write::measure_floor(parts, neighbour, cancel, timing.floor); !status)
     timing.not_measured = status.error().message;
 }
 
@@ -212,7 +212,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
 
   const Job& job = plan->job;
-  if (Status status = sanity::refuse_warnings(plan->warnings); job.strict && !status) return status.error();
+  if (Status status = checks::refuse_warnings(plan->warnings); job.strict && !status) return status.error();
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
   limits.max_in_flight = layers_in_flight();
@@ -221,18 +221,18 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (product != Product::kImages) limits.max_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
   if (job.timing) summary.timing = timing_of(*plan, {before, before});
-  Sanity sanity(*plan, cancel);
-  const std::unique_ptr<Maker> maker = make_maker(*plan, sanity, limits);
+  JobChecks checks(*plan, cancel);
+  const std::unique_ptr<Maker> maker = make_maker(*plan, checks, limits);
   if (job.dry_run && !maker->times_dry_runs()) {
     for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, maker->bytes_of(i));
     }
-  } else if (Status status = make_layers(*plan, *maker, sanity, limits, summary, progress, cancel); !status) {
+  } else if (Status status = make_layers(*plan, *maker, checks, limits, summary, progress, cancel); !status) {
     return status.error();
   }
-  maker->tell(summary);
+  maker->report(summary);
   summary.peak_resident_bytes = peak_resident_bytes();
-  if (summary.timing) tell_floor(*plan, *maker, cancel, summary, *summary.timing);
+  if (summary.timing) report_floor(*plan, *maker, cancel, summary, *summary.timing);
   return summary;
 }
 

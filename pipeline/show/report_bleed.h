@@ -19,8 +19,8 @@ class ReportBleed {
                                            const Scene& scene);
 
   /// Makes a layer as it was before the bleed, and moves its edges; from many threads at once.
-  void look(const Layer& layer);
-  void tell(std::vector<Warning>& warnings) const;
+  void inspect(const Layer& layer);
+  void report(std::vector<Warning>& warnings) const;
 
  private:
   ReportBleed() = default;

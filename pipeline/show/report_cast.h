@@ -21,6 +21,6 @@ namespace lamina::pipeline {
 Result<Scene> find_parts(const ManifestHead& head, const Job& job, const std::vector<std::string>& folders);
 
 /// Parts from above, from the front and from the right, `most` pixels along the longest side of all.
-Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t most);
+Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t maximum);
 
 }  // namespace lamina::pipeline

@@ -22,7 +22,7 @@ Json part_json(const PartSummary& part) {
 }
 
 /// The layers' numbers, a list for each column.
-Json layers_json(const Manifest& manifest, const LayersSeen& seen) {
+Json layers_json(const Manifest& manifest, const ReportLayers& detected) {
   const ManifestHead& head = manifest.head;
   Json columns;
   const auto column = [&](const char* name, auto value) {
@@ -33,7 +33,7 @@ Json layers_json(const Manifest& manifest, const LayersSeen& seen) {
   column("bottom", [](const LayerRecord& r) { return r.layer.bottom; });
   column("thickness", [](const LayerRecord& r) { return r.layer.thickness; });
   column("reason", [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); });
-  columns["set"] = seen.set;
+  columns["set"] = detected.set;
   column("bytes", [](const LayerRecord& r) { return r.bytes; });
   column("capped", [](const LayerRecord& r) { return r.capped_rows; });
   column("hash", [](const LayerRecord& r) { return hex(r.hash); });
@@ -45,7 +45,7 @@ Json layers_json(const Manifest& manifest, const LayersSeen& seen) {
   }
   if (head.machine.empty()) return columns;
   columns["seconds"] = Json::array();
-  for (const double time : seen.seconds) columns["seconds"].push_back(rounded(time));
+  for (const double time : detected.seconds) columns["seconds"].push_back(rounded(time));
   return columns;
 }
 
@@ -53,7 +53,7 @@ Json layers_json(const Manifest& manifest, const LayersSeen& seen) {
 
 std::string page_title(const ManifestHead& head) { return head.parts.empty() ? "a job" : title_of(head.parts); }
 
-std::string head_json(const Manifest& manifest, const ManifestSeen& file, const PixelGrid& grid, const LayersSeen& seen,
+std::string head_json(const Manifest& manifest, const ReportManifest& file, const PixelGrid& grid, const ReportLayers& detected,
                       HeldLayers& held, const std::vector<ShownView>& views) {
   const ManifestHead& head = manifest.head;
   const double dpi_x = grid.x.dpi(), dpi_y = grid.y.dpi();
@@ -66,16 +66,16 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"rows", grid.rows()},
                {"dpi", {dpi_x, dpi_y}},
                {"pixel_mm", {25.4 / dpi_x, 25.4 / dpi_y}},
-               {"window", {seen.window.left, seen.window.top, seen.window.right, seen.window.bottom}},
+               {"window", {detected.window.left, detected.window.top, detected.window.right, detected.window.bottom}},
                {"layer_count", head.layer_count},
                {"first_layer", head.first_layer},
                {"stride", held.stride()},
                {"job", head.job_toml},
                {"manifest", {{"name", file.name}, {"bytes", file.digest.bytes}, {"hash", hex(file.digest.hash)}}},
-               {"sweeps", seen.sweeps},
-               {"laid", seen.laid},
-               {"laid_svg", base64(std::as_bytes(std::span(seen.laid_svg)))},
-               {"quote", seen.quote},
+               {"sweeps", detected.sweeps},
+               {"deposited", detected.deposited},
+               {"deposited_svg", base64(std::as_bytes(std::span(detected.deposited_svg)))},
+               {"quote", detected.quote},
                {"parts", Json::array()},
                {"warnings", Json::array()},
                {"places", Json::array()},
@@ -83,24 +83,24 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"reasons", Json::array()},
                {"embedded", Json::array()}};
   for (const PartSummary& part : head.parts) json["parts"].push_back(part_json(part));
-  for (const Warning& warning : seen.warnings) {
+  for (const Warning& warning : detected.warnings) {
     json["warnings"].push_back({{"code", warning.code}, {"text", warning.text}});
     if (warning.layer) json["warnings"].back()["layer"] = *warning.layer;
   }
-  for (const SeenPlace& place : seen.places) {
-    json["places"].push_back({{"code", place.code},
-                              {"mm", {place.x_mm, place.y_mm, place.z_mm}},
-                              {"box_mm", {place.column_mm, place.row_mm, place.width_mm, place.depth_mm}},
-                              {"layers", {place.layer, place.last_layer}},
-                              {"amount", place.amount},
-                              {"unit", place.unit}});
+  for (const ReportLocation& position : detected.positions) {
+    json["places"].push_back({{"code", position.code},
+                              {"mm", {position.x_mm, position.y_mm, position.z_mm}},
+                              {"box_mm", {position.column_mm, position.row_mm, position.width_mm, position.depth_mm}},
+                              {"layers", {position.layer, position.last_layer}},
+                              {"amount", position.amount},
+                              {"unit", position.unit}});
   }
   for (const ShownView& view : views)
-    json["views"][view.name] = {view.width, view.height, view.most, view.width_mm, view.height_mm};
+    json["views"][view.name] = {view.width, view.height, view.maximum, view.width_mm, view.height_mm};
   for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason)
     json["reasons"].push_back(reason_name(static_cast<LayerReason>(reason)));
-  for (const auto& [place, code] : held.layers()) json["embedded"].push_back(place);
-  json["layers"] = layers_json(manifest, seen);
+  for (const auto& [position, code] : held.layers()) json["embedded"].push_back(position);
+  json["layers"] = layers_json(manifest, detected);
   return json_text(json);
 }
 

@@ -18,13 +18,13 @@ namespace lamina::write::report {
 /// A view in the page: its entry in the head, and its pixels.
 struct ShownView {
   std::string name;
-  std::uint32_t width = 0, height = 0, most = 0;  // most: of a depth; 0 for light and cover
+  std::uint32_t width = 0, height = 0, maximum = 0;  // most: of a depth; 0 for light and cover
   double width_mm = 0, height_mm = 0;
   Buffer<std::byte> deflated;
 };
 
 /// Where something was found in the layers.
-struct SeenPlace {
+struct ReportLocation {
   std::string code;                     // of its warning
   double x_mm = 0, y_mm = 0, z_mm = 0;  // the middle, on the bed; the bottom
   double width_mm = 0, depth_mm = 0;    // of the box around it; 0: a spot
@@ -35,20 +35,20 @@ struct SeenPlace {
 };
 
 /// The result of one pass over all layers.
-struct LayersSeen {
+struct ReportLayers {
   PixelWindow window;
   std::vector<std::uint64_t> set;  // pixels of each
   std::vector<double> seconds;     // of each, with a machine
   std::vector<Warning> warnings;
-  std::vector<SeenPlace> places;
+  std::vector<ReportLocation> positions;
   std::string sweeps;                           // what drops of a pixel take of a head that fires several
-  std::string laid;                             // lines on what toolpaths leave open
-  std::string laid_svg;                         // a picture of it; "" for none
+  std::string deposited;                             // lines on what toolpaths leave open
+  std::string deposited_svg;                         // a picture of it; "" for none
   std::vector<std::vector<std::string>> quote;  // rows of a table of costs; empty for none
 };
 
 /// The manifest's own file.
-struct ManifestSeen {
+struct ReportManifest {
   std::string name;
   FileDigest digest;
 };
@@ -59,7 +59,7 @@ std::string page_title(const ManifestHead& head);
 /// One JSON object on a line: the job, its parts and views, and a list of numbers for each column of its layers.
 /// grid  of the layers' pixels
 /// cost  O(layers)
-std::string head_json(const Manifest& manifest, const ManifestSeen& file, const PixelGrid& grid, const LayersSeen& seen,
+std::string head_json(const Manifest& manifest, const ReportManifest& file, const PixelGrid& grid, const ReportLayers& detected,
                       HeldLayers& held, const std::vector<ShownView>& views);
 
 }  // namespace lamina::write::report

@@ -23,63 +23,63 @@ struct Shown {
   }
 
   /// Throws where something is missing or of another type.
-  SeenPlace place(const std::string& code, const std::string& unit, const Json& json) const {
-    SeenPlace place;
-    place.code = code;
-    json.at("x_mm").get_to(place.x_mm);
-    json.at("y_mm").get_to(place.y_mm);
-    json.at("z_mm").get_to(place.z_mm);
-    place.layer = place.last_layer = layer(json.at("layer"));
-    std::array<double, 4> box{place.x_mm, place.y_mm, place.x_mm, place.y_mm};
-    if (json.contains("last_layer")) place.last_layer = layer(json.at("last_layer"));
+  ReportLocation position(const std::string& code, const std::string& unit, const Json& json) const {
+    ReportLocation position;
+    position.code = code;
+    json.at("x_mm").get_to(position.x_mm);
+    json.at("y_mm").get_to(position.y_mm);
+    json.at("z_mm").get_to(position.z_mm);
+    position.layer = position.last_layer = layer(json.at("layer"));
+    std::array<double, 4> box{position.x_mm, position.y_mm, position.x_mm, position.y_mm};
+    if (json.contains("last_layer")) position.last_layer = layer(json.at("last_layer"));
     for (std::size_t i = 0; json.contains("box_mm") && i < box.size(); ++i) json.at("box_mm").at(i).get_to(box[i]);
     if (!unit.empty()) {
-      json.at(unit).get_to(place.amount);
-      place.unit = unit;
+      json.at(unit).get_to(position.amount);
+      position.unit = unit;
     }
     const auto side = [](const PixelAxis& axis) { return static_cast<double>(axis.count) / axis.pixels_per_nm() / kNmPerMm; };
     const double x = (box[0] + box[2]) / 2, y = (box[1] + box[3]) / 2;
-    place.width_mm = box[2] - box[0];
-    place.depth_mm = box[3] - box[1];
-    place.column_mm = mirrored_x ? side(grid.x) - x : x;
-    place.row_mm = mirrored_y ? y : side(grid.y) - y;
-    return place;
+    position.width_mm = box[2] - box[0];
+    position.depth_mm = box[3] - box[1];
+    position.column_mm = mirrored_x ? side(grid.x) - x : x;
+    position.row_mm = mirrored_y ? y : side(grid.y) - y;
+    return position;
   }
 };
 
-void add(const Json& json, const Shown& shown, LayersSeen& seen) {
+void add(const Json& json, const Shown& shown, ReportLayers& detected) {
   for (const Json& warning : json.at("warnings")) {
-    Warning& told = seen.warnings.emplace_back(Warning{warning.at("code").text(), warning.at("text").text()});
-    if (warning.contains("layer")) told.layer = shown.layer(warning.at("layer"));
+    Warning& reported = detected.warnings.emplace_back(Warning{warning.at("code").text(), warning.at("text").text()});
+    if (warning.contains("layer")) reported.layer = shown.layer(warning.at("layer"));
   }
   const Json& found = json.at("inspection");
   constexpr std::array<std::pair<const char*, const char*>, 4> kKinds = {
       {{"islands", "mm2"}, {"loose", "mm3"}, {"hollows", "mm3"}, {"thin", "mm2"}}};
   for (const auto& [code, unit] : kKinds) {
     if (!found.at(code).contains("places")) continue;
-    for (const Json& place : found.at(code).at("places")) seen.places.push_back(shown.place(code, unit, place));
+    for (const Json& position : found.at(code).at("places")) detected.positions.push_back(shown.position(code, unit, position));
   }
-  for (const Json& pair : found.at("touching")) seen.places.push_back(shown.place("touching", "", pair.at("at")));
-  if (found.contains("bed_edge")) seen.places.push_back(shown.place("bed-edge", "", found.at("bed_edge")));
+  for (const Json& pair : found.at("touching")) detected.positions.push_back(shown.position("touching", "", pair.at("at")));
+  if (found.contains("bed_edge")) detected.positions.push_back(shown.position("bed-edge", "", found.at("bed_edge")));
 }
 
 }  // namespace
 
 void add_inspection(const std::string& directory, const ManifestHead& head, bool mirrored_x, bool mirrored_y,
-                    LayersSeen& seen) {
+                    ReportLayers& detected) {
   if (head.product != Product::kImages) return;
   const auto json = read_inspection(directory, head);
   if (!json) return;
-  LayersSeen with = {};
+  ReportLayers with = {};
   const Shown shown{head.grid, mirrored_x, mirrored_y, head.layer_count};
   try {
     add(*json, shown, with);
   } catch (const std::exception&) {
-    seen.warnings.push_back({"inspection", "inspection.json is not as lamina wrote it; plan the job again with --inspect"});
+    detected.warnings.push_back({"inspection", "inspection.json is not as lamina wrote it; plan the job again with --inspect"});
     return;
   }
-  seen.warnings.insert(seen.warnings.end(), with.warnings.begin(), with.warnings.end());
-  seen.places = std::move(with.places);
+  detected.warnings.insert(detected.warnings.end(), with.warnings.begin(), with.warnings.end());
+  detected.positions = std::move(with.positions);
 }
 
 }  // namespace lamina::write::report

@@ -42,8 +42,8 @@ std::string title_of(const ManifestHead& head) {
   std::string title = parts.empty() ? "" : parts + "   |   ";
   title += fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm", head.layer_count, head.grid.x.dpi(),
                        head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
-  if (const int most = head.most_of_pixel(); most > 1)
-    title += head.most_drops > 0 ? fmt::format("   |   darkest {} drops", most) : fmt::format("   |   darkest level {}", most);
+  if (const int maximum = head.max_of_pixel(); maximum > 1)
+    title += head.max_drops > 0 ? fmt::format("   |   darkest {} drops", maximum) : fmt::format("   |   darkest level {}", maximum);
   return title;
 }
 
@@ -123,7 +123,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   write::picture::SheetRequest sheet;
   sheet.title = title_of(head);
   sheet.grid = head.grid;
-  sheet.most = head.most_of_pixel();
+  sheet.maximum = head.max_of_pixel();
   sheet.whole_bed = request.whole_bed;
   sheet.width = request.width.value_or(kSheetWidth);
   for (const std::size_t index : *chosen) {
@@ -148,7 +148,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,
                                                    made == all ? "" : fmt::format(" that are there, of {}", all))};
   preview.said += readable_bytes(preview.bytes.size());
-  if (!write::picture::have_font()) preview.doubts.push_back("lamina: no captions: no font; install fonts-dejavu-core");
+  if (!write::picture::have_font()) preview.warnings.push_back("lamina: no captions: no font; install fonts-dejavu-core");
   return preview;
 }
 
@@ -166,7 +166,7 @@ Result<Preview> draw_preview(const PreviewRequest& request) {
     const auto series = toolpaths ? gcode_series(request.source, request.gcode) : slice_series(request.source);
     if (!series) return series.error();
     auto preview = draw_series(*series, request, ending == ".svg");
-    if (preview) preview->doubts.insert(preview->doubts.end(), series->notes.begin(), series->notes.end());
+    if (preview) preview->warnings.insert(preview->warnings.end(), series->notes.begin(), series->notes.end());
     return preview;
   }
   if (ending != ".png") {

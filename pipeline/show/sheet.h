@@ -27,7 +27,7 @@ struct PreviewRequest {
 struct Preview {
   Buffer<std::byte> bytes;               // of the file
   std::string said;                      // what is drawn, one line
-  std::vector<std::string> doubts = {};  // what it lacks, or may have wrong, and why; a line each
+  std::vector<std::string> warnings = {};  // what it lacks, or may have wrong, and why; a line each
 };
 
 /// errors  kUsage: options that do not fit the source; kVerification: missing or changed files of the job; of the readers

@@ -7,7 +7,7 @@
 
 #include <span>
 
-#include "stages/bead/laid.h"
+#include "stages/bead/deposition.h"
 #include "stages/data/buffer.h"
 
 namespace lamina::bead {
@@ -25,8 +25,8 @@ struct PieceSides {
 
 /// What a piece has too much and what it could still hold, mm3: its half of open cusps, and a twentieth of what it is where a
 /// side is free.
-struct PieceRoom {
-  double over = 0, room = 0;
+struct PieceClearance {
+  double over = 0, clearance = 0;
 };
 
 /// height_mm  of the layer
@@ -34,11 +34,11 @@ struct PieceRoom {
 /// rooms      one for each piece; none: not told
 /// returns    mm3 that found no room and are left out
 /// cost       O(pieces x pieces within the widest bead's width of one), parallel; 100 bytes a piece. Same for any threads
-double find_contacts(std::span<const LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
-                     Buffer<PieceRoom>* rooms = nullptr);
+double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
+                     Buffer<PieceClearance>* clearances = nullptr);
 
 /// How far a side reaches at a height over or below the middle of the layer, mm; below 0: not at all.
-double reach_at(const LaidPiece& piece, const PieceSide& side, double height_mm, double above_mm);
+double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm);
 
 // --- melt that finds no room beside its neighbours flows along its own line.
 //
@@ -52,6 +52,6 @@ double reach_at(const LaidPiece& piece, const PieceSide& side, double height_mm,
 /// sides    one for each piece, as find_contacts() has them afterwards
 /// returns  mm3 that find no room on their whole line and are left out
 /// cost     that of find_contacts(), up to nine times where there is no room. Same for any threads
-double flow_along(std::span<LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides);
+double flow_along(std::span<DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides);
 
 }  // namespace lamina::bead

@@ -30,27 +30,27 @@ class EvenStarts {
 
   /// Gives lay(const BeadMove&) the move, or two pieces of it.
   /// returns  what both have laid; nothing if `lay` stops
-  template <class Lay>
-  std::optional<LaidMove> lay(const BeadMove& move, Lay&& lay) {
-    const Pieces pieces = take(move);
-    LaidMove sum{};
+  template <class Deposit>
+  std::optional<DepositedMove> deposit(const BeadMove& move, Deposit&& deposit) {
+    const MovePieces pieces = take(move);
+    DepositedMove sum{};
     for (int i = 0; i < pieces.count; ++i) {
-      const std::optional<LaidMove> laid = lay(pieces.move[i]);
-      if (!laid) return std::nullopt;
-      sum.length_mm += laid->length_mm;
-      sum.volume_mm3 += laid->volume_mm3;
+      const std::optional<DepositedMove> deposited = deposit(pieces.move[i]);
+      if (!deposited) return std::nullopt;
+      sum.length_mm += deposited->length_mm;
+      sum.volume_mm3 += deposited->volume_mm3;
     }
     return sum;
   }
 
  private:
-  struct Pieces {
+  struct MovePieces {
     BeadMove move[2];
     int count = 1;
   };
-  Pieces take(const BeadMove& move);
+  MovePieces take(const BeadMove& move);
   /// A move of a line that is not even yet.
-  Pieces made_even(const BeadMove& move);
+  MovePieces made_even(const BeadMove& move);
 
   double lag_;
   BeadLine line_;              // since the line is even

@@ -27,7 +27,7 @@ struct Phase {
     return followed + excess() * std::exp(-t / tau_s);
   }
   /// mm3 that were laid by then: the integral of the flow, not what was fed less what is held.
-  double laid_after(double t) const {
+  double deposited_after(double t) const {
     const double followed = area_mm2 * t * (speed_mm_s + acceleration_mm_s2 * (t / 2 - tau_s));
     if (tau_s <= 0) return followed;
     return followed - excess() * tau_s * std::expm1(-t / tau_s);

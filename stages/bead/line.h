@@ -23,7 +23,7 @@ namespace lamina::bead {
 
 /// A stretch and the speeds at its two ends.
 struct Planned {
-  Stretch stretch;
+  LineSegment segment;
   double begin_mm_s, end_mm_s;
   /// The highest speed within it: that of the stretch, or less where it is short.
   double peak(double acceleration_mm_s2) const;
@@ -36,7 +36,7 @@ class SpeedPlan {
 
   /// A new line; nothing may wait. speed  that the line before joins with; faster than the first stretch: it is left at once
   void begin(double speed_mm_s) { speed_ = speed_mm_s; }
-  void add(const Stretch& stretch) { waiting_.push_back(stretch); }
+  void add(const LineSegment& segment) { waiting_.push_back(segment); }
   /// The line ends with this speed. Whoever says so takes all that waits.
   bool take_last(double speed_mm_s, Planned& out);
   /// The next stretch whose speeds are final. cost  O(stretches that wait)
@@ -49,13 +49,13 @@ class SpeedPlan {
   bool give(double end_mm_s, Planned& out);
 
   double acceleration_, speed_ = 0;
-  Buffer<Stretch> waiting_;
+  Buffer<LineSegment> waiting_;
   std::size_t first_ = 0;  // those before it were taken
 };
 
 /// The speed with which a pattern that is repeated without end begins each time.
 /// errors  none; an empty pattern has 0
-double cyclic_speed(std::span<const Stretch> period, double acceleration_mm_s2);
+double cyclic_speed(std::span<const LineSegment> period, double acceleration_mm_s2);
 
 // ---
 
@@ -86,32 +86,32 @@ class BeadLine {
   void begin(const Joint& from);
   /// Gives the pieces of all stretches whose speeds are final, in order.
   /// stretch  an empty one is left out
-  void add(const Stretch& stretch, const TakePiece& take);
+  void add(const LineSegment& segment, const TakePiece& take);
   /// Gives the rest. speed  that the line after joins with
   /// returns  how the line ends
   Joint end(double speed_mm_s, const TakePiece& take);
 
-  double place_mm() const { return place_; }
+  double position_mm() const { return position_; }
   double seconds() const { return seconds_; }
-  double laid_mm3() const { return laid_; }
+  double deposited_mm3() const { return deposited_; }
   double fed_mm3() const { return fed_; }
 
  private:
-  void lay(const Planned& planned, const TakePiece& take);
-  void lay(const Phase& phase, const TakePiece& take);
+  void deposit(const Planned& planned, const TakePiece& take);
+  void deposit(const Phase& phase, const TakePiece& take);
   double step_within(const Phase& phase, double from, double step) const;
   double width(const Phase& phase, double s) const;
 
   BeadMachine machine_;
   double height_, tolerance_;
   SpeedPlan plan_;
-  double place_ = 0, seconds_ = 0, laid_ = 0, fed_ = 0;
+  double position_ = 0, seconds_ = 0, deposited_ = 0, fed_ = 0;
   double flow_ = 0, speed_ = 0;
   bool pressed_ = true;
 };
 
 /// How a pattern that is repeated without end begins each time: a line that begins like this is in its steady state at once.
 /// cost  O(stretches) and three periods: the lag is linear, so that the flow after a period is a line of the flow before
-Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const Stretch> period);
+Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const LineSegment> period);
 
 }  // namespace lamina::bead

@@ -22,7 +22,7 @@ struct BeadMachine {
 Status check(const BeadMachine& machine);
 
 /// A straight piece of a line as it is commanded.
-struct Stretch {
+struct LineSegment {
   double length_mm;   // > 0
   double area_mm2;    // that is fed for each mm, >= 0: area of 100 % x extrusion
   double speed_mm_s;  // > 0; reached if the stretch is long enough

@@ -27,9 +27,9 @@ struct Pattern {
 };
 
 /// What a stretch is like, mm.
-struct StretchWidths {
+struct IntervalWidths {
   double middle, mean;  // in its middle; over its length
-  double least, largest;
+  double minimum, largest;
 };
 
 /// Of a period.
@@ -41,15 +41,15 @@ struct PatternSums {
 };
 
 struct PatternWidths {
-  StretchWidths thick, thin;
+  IntervalWidths thick, thin;
   PatternSums sums;
 };
 
 /// A piece of a period, mm from where its thick stretch begins; the width between its ends is in proportion.
 struct ProfilePiece {
   double begin_mm, end_mm, begin_width_mm, end_width_mm;
-  double width_at(double place) const {
-    return begin_width_mm + (end_width_mm - begin_width_mm) * (place - begin_mm) / (end_mm - begin_mm);
+  double width_at(double position) const {
+    return begin_width_mm + (end_width_mm - begin_width_mm) * (position - begin_mm) / (end_mm - begin_mm);
   }
 };
 using TakeProfile = std::function<void(const ProfilePiece&)>;

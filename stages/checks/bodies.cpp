@@ -8,7 +8,7 @@ void Pieces::find(const RunsView& image, bool diagonal) {
   const std::size_t runs = image.change.size() / 2;
   sets_.start(runs);
   for (std::uint32_t r = 1; r < image.rows(); ++r) {
-    for_touching(image, r - 1, image, r, diagonal, [&](std::uint32_t above, std::uint32_t run) { sets_.unite(above, run); });
+    for_touching(image, r - 1, image, r, diagonal, [&](std::uint32_t above, std::uint32_t run) { sets_.merge(above, run); });
   }
   of_run.resize(runs);
   pixels.clear();

@@ -62,7 +62,7 @@ class Sets {
     return of;
   }
   /// returns  the number that stands for both, and the one that no longer does; equal if they were one set
-  std::pair<std::uint32_t, std::uint32_t> unite(std::uint32_t a, std::uint32_t b) {
+  std::pair<std::uint32_t, std::uint32_t> merge(std::uint32_t a, std::uint32_t b) {
     a = find(a);
     b = find(b);
     if (b < a) std::swap(a, b);
@@ -163,7 +163,7 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
     for_touching(below_, r, image, r, false, [&](std::uint32_t under, std::uint32_t over) {
       const std::uint32_t piece = pieces_.of_run[over];
       hangs_[piece] = 1;
-      const auto [stays, ends] = sets_.unite(body_below_[under], old + piece);
+      const auto [stays, ends] = sets_.merge(body_below_[under], old + piece);
       if (stays == ends) return;
       if (ends < old) rules.join(bodies_[stays], bodies_[ends], bodies_[old + piece]);
       Body& all = bodies_[stays];

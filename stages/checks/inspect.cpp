@@ -23,16 +23,16 @@ std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
 
 }  // namespace
 
-void Found::note_place(const Place& place) {
-  places.push_back(place);
-  if (places.size() >= 4 * kMost) sort_places();
+void Found::note_location(const Location& position) {
+  locations.push_back(position);
+  if (locations.size() >= 4 * kMax) sort_locations();
 }
 
-void Found::sort_places() {
-  std::ranges::stable_sort(places, [](const Place& a, const Place& b) {
+void Found::sort_locations() {
+  std::ranges::stable_sort(locations, [](const Location& a, const Location& b) {
     return a.amount != b.amount ? a.amount > b.amount : a.spot.layer < b.spot.layer;
   });
-  places.resize(std::min(places.size(), kMost));
+  locations.resize(std::min(locations.size(), kMax));
 }
 
 /// What set pixels are followed for.
@@ -43,8 +43,8 @@ struct Inspection::Solids {
   void grow(Body&) {}
   void begin(Body& body) {
     // A part begins in the layer that holds its bottom, or in the one above: then its first pixels lie above a layer's middle.
-    const std::uint32_t stand = all.owner_of(body, all.below_, body.top);
-    body.owner = stand != Body::kNone ? stand : all.first_of_several(body);
+    const std::uint32_t placed_part = all.owner_of(body, all.below_, body.top);
+    body.owner = placed_part != Body::kNone ? placed_part : all.first_of_several(body);
     body.open = body.owner != Body::kNone;  // it has the bottom of a part
     if (body.open) return;
     body.owner = all.owner_of(body, INT64_MIN, body.top);
@@ -74,24 +74,24 @@ struct Inspection::Powder {
   void join(const Body&, const Body&, const Body&) {}
   void end(const Body& body) {
     const double volume = static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_;
-    if (body.open || volume < all.least_mm_ * all.least_mm_ * all.least_mm_) return;
+    if (body.open || volume < all.min_mm_ * all.min_mm_ * all.min_mm_) return;
     all.note_body(all.findings_.hollows, body, volume, body.last_layer);
   }
 };
 
-Inspection::Inspection(const PixelGrid& grid, std::vector<sanity::Solid> stands, std::int64_t least_nm, std::uint64_t most_bytes)
+Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm, std::uint64_t max_bytes)
     : grid_(grid),
-      stands_(std::move(stands)),
-      stencils_(grid, least_nm),
-      least_mm_(static_cast<double>(least_nm) / kNmPerMm),
+      placed_parts_(std::move(placed_parts)),
+      stencils_(grid, min_nm),
+      min_mm_(static_cast<double>(min_nm) / kNmPerMm),
       pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)),
-      most_bytes_(most_bytes) {
-  std::ranges::stable_sort(stands_, {}, [](const sanity::Solid& stand) { return stand.box.lo.z; });
-  for (const sanity::Solid& stand : stands_) {
-    window_.push_back(window_of(stand.box));
+      max_bytes_(max_bytes) {
+  std::ranges::stable_sort(placed_parts_, {}, [](const checks::Solid& placed_part) { return placed_part.box.lo.z; });
+  for (const checks::Solid& placed_part : placed_parts_) {
+    window_.push_back(window_of(placed_part.box));
     all_.add(window_.back());
   }
-  if (stands_.empty()) all_ = {0, 0, 0, 0};
+  if (placed_parts_.empty()) all_ = {0, 0, 0, 0};
 }
 
 /// The pixels that the box may set, one more on each side, within the image.
@@ -113,7 +113,7 @@ Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) 
           static_cast<double>(z) / kNmPerMm};
 }
 
-Place Inspection::place(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
+Location Inspection::position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
   const auto mm_of = [](std::uint32_t pixels, const PixelAxis& axis) { return pixels / axis.pixels_per_nm() / kNmPerMm; };
   const std::uint32_t rows = grid_.rows();
   return {
@@ -127,22 +127,22 @@ void Inspection::note_body(Found& found, const Body& body, double amount, std::u
   const Spot at = spot(body.box, body.first_layer, body.bottom);
   ++found.count;
   found.amount += amount;
-  found.note_place(place(body.box, at, amount, last_layer));
+  found.note_location(position(body.box, at, amount, last_layer));
   if (amount <= found.largest) return;
   found.largest = amount;
   found.spot = at;
 }
 
 /// A thin wall is thin in many layers: the places that lie upon each other are one.
-void Inspection::note_thin(const Layer& layer, const ThinPlaces& thin) {
+void Inspection::note_thin(const Layer& layer, const ThinRegions& thin) {
   Found& found = findings_.thin;
   std::vector<Wall> walls;
-  for (const ThinPlace& place : thin.largest) {
-    const auto below = std::ranges::find_if(walls_, [&](const Wall& wall) { return wall.last.meets(place.box); });
-    Wall wall{place.box, place.box, place.pixels, layer, layer};
+  for (const ThinRegion& position : thin.largest) {
+    const auto below = std::ranges::find_if(walls_, [&](const Wall& wall) { return wall.last.meets(position.box); });
+    Wall wall{position.box, position.box, position.pixels, layer, layer};
     if (below != walls_.end()) {
       wall.all.add(below->all);
-      wall.most_pixels = std::max(wall.most_pixels, below->most_pixels);
+      wall.max_pixels = std::max(wall.max_pixels, below->max_pixels);
       wall.first = below->first;
       walls_.erase(below);
     }
@@ -154,7 +154,7 @@ void Inspection::note_thin(const Layer& layer, const ThinPlaces& thin) {
   found.count += thin.count;
   found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
   ++found.layers;
-  const ThinPlace& largest = thin.largest.front();
+  const ThinRegion& largest = thin.largest.front();
   const double mm2 = static_cast<double>(largest.pixels) * pixel_mm2_;
   if (mm2 <= found.largest) return;
   found.largest = mm2;
@@ -163,27 +163,27 @@ void Inspection::note_thin(const Layer& layer, const ThinPlaces& thin) {
 
 void Inspection::end_wall(const Wall& wall) {
   const Spot at = spot(wall.all, wall.first.index, wall.first.bottom);
-  findings_.thin.note_place(place(wall.all, at, static_cast<double>(wall.most_pixels) * pixel_mm2_, wall.latest.index));
+  findings_.thin.note_location(position(wall.all, at, static_cast<double>(wall.max_pixels) * pixel_mm2_, wall.latest.index));
 }
 
 /// Whether all of a body lies where a copy's box is.
-bool Inspection::stands_in(std::uint32_t stand, const Body& body) const {
-  const PixelBox &window = window_[stand], &box = body.box;
+bool Inspection::is_in(std::uint32_t placed_part, const Body& body) const {
+  const PixelBox &window = window_[placed_part], &box = body.box;
   return window.left <= box.left && box.right <= window.right && window.top <= box.top && box.bottom <= window.bottom &&
-         stands_[stand].box.lo.z < body.top && body.bottom <= stands_[stand].box.hi.z;
+         placed_parts_[placed_part].box.lo.z < body.top && body.bottom <= placed_parts_[placed_part].box.hi.z;
 }
 
 /// The copy with the narrowest box around a body, of those whose bottoms lie in [from, to); kNone without one.
 std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int64_t to) const {
-  const auto bottom = [](const sanity::Solid& stand) { return std::int64_t{stand.box.lo.z}; };
-  const auto first = std::ranges::lower_bound(stands_, from, {}, bottom),
-             last = std::ranges::lower_bound(stands_, to, {}, bottom);
+  const auto bottom = [](const checks::Solid& placed_part) { return std::int64_t{placed_part.box.lo.z}; };
+  const auto first = std::ranges::lower_bound(placed_parts_, from, {}, bottom),
+             last = std::ranges::lower_bound(placed_parts_, to, {}, bottom);
   std::uint32_t owner = Body::kNone;
   std::int64_t narrowest = 0;
-  for (auto stand = first; stand < last; ++stand) {
-    const auto number = static_cast<std::uint32_t>(stand - stands_.begin());
-    if (!stands_in(number, body)) continue;
-    const std::int64_t area = stand->box.width() / 1000 * (stand->box.depth() / 1000);
+  for (auto placed_part = first; placed_part < last; ++placed_part) {
+    const auto number = static_cast<std::uint32_t>(placed_part - placed_parts_.begin());
+    if (!is_in(number, body)) continue;
+    const std::int64_t area = placed_part->box.width() / 1000 * (placed_part->box.depth() / 1000);
     if (owner != Body::kNone && area >= narrowest) continue;
     owner = number;
     narrowest = area;
@@ -194,19 +194,19 @@ std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int
 /// The first of the copies that begin together as one piece, wider than the box of any; kNone if it is none of them.
 std::uint32_t Inspection::first_of_several(const Body& body) {
   std::uint32_t first = Body::kNone;
-  const auto begins = [&](std::uint32_t s) { return stands_[s].box.lo.z >= below_ && window_[s].meets(body.box); };
-  for (std::uint32_t s = 0; s < stands_.size() && stands_[s].box.lo.z < body.top; ++s) {
+  const auto begins = [&](std::uint32_t s) { return placed_parts_[s].box.lo.z >= below_ && window_[s].meets(body.box); };
+  for (std::uint32_t s = 0; s < placed_parts_.size() && placed_parts_[s].box.lo.z < body.top; ++s) {
     if (!begins(s)) continue;
     if (first == Body::kNone) {
       first = s;
       continue;
     }
     // The one beside it, of those before it.
-    std::uint32_t beside = first;
+    std::uint32_t neighbour = first;
     for (std::uint32_t before = first; before < s; ++before) {
-      if (begins(before) && window_[before].meets(window_[s])) beside = before;
+      if (begins(before) && window_[before].meets(window_[s])) neighbour = before;
     }
-    note_touching(beside, s, body.box, layer_);
+    note_touching(neighbour, s, body.box, layer_);
   }
   return first;
 }
@@ -217,19 +217,19 @@ void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const PixelBox&
   for (const PixelBox& window : {window_[a], window_[b]}) {
     if (window.meets(box)) box = box.common(window);
   }
-  const std::uint32_t part = std::min(stands_[a].part, stands_[b].part), other = std::max(stands_[a].part, stands_[b].part);
+  const std::uint32_t part = std::min(placed_parts_[a].part, placed_parts_[b].part), other = std::max(placed_parts_[a].part, placed_parts_[b].part);
   auto& noted = findings_.touching;
   const bool known = std::ranges::any_of(noted, [&](const auto& pair) { return pair.part == part && pair.other == other; });
-  if (!known && noted.size() < Findings::kMost) noted.push_back({part, other, spot(box, layer.index, layer.bottom)});
+  if (!known && noted.size() < Findings::kMax) noted.push_back({part, other, spot(box, layer.index, layer.bottom)});
 }
 
 /// Bodies that have left the box of the copy that they began with: they have grown into another one.
 void Inspection::note_outgrown(const Layer& layer) {
   for (Body& body : solid_.live()) {
     if (body.owner == Body::kNone) continue;
-    if (stands_in(body.owner, body) && layer.bottom < stands_[body.owner].box.hi.z) continue;
-    for (std::uint32_t other = 0; other < stands_.size(); ++other) {
-      const Box& box = stands_[other].box;
+    if (is_in(body.owner, body) && layer.bottom < placed_parts_[body.owner].box.hi.z) continue;
+    for (std::uint32_t other = 0; other < placed_parts_.size(); ++other) {
+      const Box& box = placed_parts_[other].box;
       if (other == body.owner || !window_[other].meets(body.box) || box.lo.z >= layer.bottom + layer.thickness ||
           box.hi.z <= layer.bottom) {
         continue;
@@ -254,25 +254,25 @@ void Inspection::note_edges(const Layer& layer, const RunsView& image) {
   }
 }
 
-std::uint64_t Inspection::look_needs(const RunsView& image) const {
+std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
   // The image, what lies around it and what is left of it; rows of these, and of four that hold little.
   return stopped_ ? 0 : 3 * image.change.size_bytes() + 7 * image.row_offset.size_bytes();
 }
 
-void Inspection::look(const RunsView& image, LayerLook& look) const {
+void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
   // The image, the numbers of its runs, and the layer below; the same of the powder, whose rows have one run less or more.
   constexpr std::uint64_t kOfRun = 8 + 8 + 12;
-  const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), least = kOfRun * (2 * runs - std::min(runs, rows));
-  if (stopped_ || least > most_bytes_) {
-    look = {};
-    look.least_bytes = stopped_ ? least : expected_bytes(image, all_);
+  const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), minimum = kOfRun * (2 * runs - std::min(runs, rows));
+  if (stopped_ || minimum > max_bytes_) {
+    inspection = {};
+    inspection.min_bytes = stopped_ ? minimum : expected_bytes(image, all_);
     return;
   }
-  look.least_bytes = 0;
-  look.image.columns = image.columns;
-  look.image.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
-  look.image.change.assign(image.change.begin(), image.change.end());
-  look.thin = thin_places(image, stencils_, look.scratch);
+  inspection.min_bytes = 0;
+  inspection.image.columns = image.columns;
+  inspection.image.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
+  inspection.image.change.assign(image.change.begin(), image.change.end());
+  inspection.thin = thin_regions(image, stencils_, inspection.scratch);
 }
 
 void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
@@ -287,16 +287,16 @@ void Inspection::leave() {
   between_ = {};
 }
 
-void Inspection::add(const Layer& layer, const LayerLook& look) {
+void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
   if (stopped_) return;
-  if (look.least_bytes > 0) return stop(layer, look.least_bytes);
-  const RunsView image = look.image;
+  if (inspection.min_bytes > 0) return stop(layer, inspection.min_bytes);
+  const RunsView image = inspection.image;
   solid_.find(image);
   complement(image, all_, between_);
   powder_.find(between_);
-  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + look.thin.bytes + solid_.need(image) +
+  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + inspection.thin.bytes + solid_.need(image) +
                               between_.view().change.size_bytes() + powder_.need(between_);
-  if (bytes > most_bytes_) return stop(layer, bytes);
+  if (bytes > max_bytes_) return stop(layer, bytes);
   layer_ = layer;
   // The first layer that holds anything is the bottom of what it holds.
   if (!holds_) below_ = INT64_MIN;
@@ -308,7 +308,7 @@ void Inspection::add(const Layer& layer, const LayerLook& look) {
   Powder powder{*this};
   powder_.add(layer, between_, powder);
   note_edges(layer, image);
-  note_thin(layer, look.thin);
+  note_thin(layer, inspection.thin);
   ++findings_.layers;
   below_ = layer.bottom;
 }
@@ -322,7 +322,7 @@ const Findings& Inspection::finish() {
   } open;
   powder_.finish(open);
   note_thin({}, {});
-  for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.thin}) found->sort_places();
+  for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.thin}) found->sort_locations();
   return findings_;
 }
 

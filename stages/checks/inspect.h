@@ -37,7 +37,7 @@ struct Spot {
 };
 
 /// One of a kind: what it holds, and the box around it.
-struct Place {
+struct Location {
   double amount = 0;  // as Found::amount
   Spot spot;
   std::array<double, 4> box_mm{};  // left, front, right, back, from the left and the front of the bed
@@ -51,13 +51,13 @@ struct Found {
   double largest = 0;         // the same of the largest
   Spot spot;                  // of the largest, the first of equals
   std::uint32_t layers = 0;   // that hold them; of bodies none
-  std::vector<Place> places;  // the largest, at most kMost: the largest first, equal ones from the bottom up; thin ones that
+  std::vector<Location> locations;  // the largest, at most kMax: the largest first, equal ones from the bottom up; thin ones that
                               // lie upon each other are one, as large as in the layer where most of it is thin
 
-  static constexpr std::size_t kMost = 20;
-  void note_place(const Place& place);
+  static constexpr std::size_t kMax = 20;
+  void note_location(const Location& position);
   /// Puts places in their order.
-  void sort_places();
+  void sort_locations();
 };
 
 struct Findings {
@@ -67,7 +67,7 @@ struct Findings {
     std::uint32_t part = 0, other = 0;  // of the job; equal for copies of one
     Spot spot;
   };
-  std::vector<Touching> touching;  // each pair of parts once, the first kMost
+  std::vector<Touching> touching;  // each pair of parts once, the first kMax
   std::optional<Spot> bed_edge;    // of the first layer that reaches it
   struct Stop {
     std::uint32_t layer = 0;  // from which on none was looked at
@@ -75,15 +75,15 @@ struct Findings {
     std::uint64_t bytes = 0;  // that looking at it takes, at least
   };
   std::optional<Stop> stop;  // for want of memory
-  static constexpr std::size_t kMost = 20;
+  static constexpr std::size_t kMax = 20;
 };
 
 /// What of a layer is looked at before its turn; kept from layer to layer.
-struct LayerLook {
+struct LayerInspection {
   Runs image;
   ThinScratch scratch;
-  ThinPlaces thin;
-  std::uint64_t least_bytes = 0;  // of looking at it, if that is more than there may be: then the rest is empty
+  ThinRegions thin;
+  std::uint64_t min_bytes = 0;  // of looking at it, if that is more than there may be: then the rest is empty
   std::uint64_t bytes() const { return bytes_held(image.row_offset) + bytes_held(image.change) + scratch.bytes(); }
 };
 
@@ -95,21 +95,21 @@ class Inspection {
  public:
   /// grid        of the images; must outlive this object
   /// stands      the boxes of all copies; a piece at the bottom of one is not an island
-  /// least_nm    what is narrower is thin; 0: nothing is
-  /// most_bytes  that it may take, with the look at one layer
-  Inspection(const PixelGrid& grid, std::vector<sanity::Solid> stands, std::int64_t least_nm,
-             std::uint64_t most_bytes = UINT64_MAX);
+  /// min_nm    what is narrower is thin; 0: nothing is
+  /// max_bytes  that it may take, with the look at one layer
+  Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
+             std::uint64_t max_bytes = UINT64_MAX);
 
   // --- from any thread
-  /// About what look() adds to what a layer holds.
-  std::uint64_t look_needs(const RunsView& image) const;
+  /// About what prepare() adds to what a layer holds.
+  std::uint64_t bytes_needed(const RunsView& image) const;
   /// Keeps the image, and finds its thin places.
-  void look(const RunsView& image, LayerLook& look) const;
+  void prepare(const RunsView& image, LayerInspection& inspection) const;
 
   // --- in layer order
   /// Looks at no more layers, and lets go of what it holds.
   void leave();
-  void add(const Layer& layer, const LayerLook& look);
+  void add(const Layer& layer, const LayerInspection& inspection);
   /// After the last layer.
   const Findings& finish();
   const Findings& findings() const { return findings_; }
@@ -125,18 +125,18 @@ class Inspection {
   /// A thin place that goes on from layer to layer.
   struct Wall {
     PixelBox all, last;  // of all its layers; of the last one
-    std::uint64_t most_pixels = 0;
+    std::uint64_t max_pixels = 0;
     Layer first, latest;
   };
 
   Spot spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const;
-  Place place(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const;
+  Location position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const;
   void note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer);
-  void note_thin(const Layer& layer, const ThinPlaces& thin);
+  void note_thin(const Layer& layer, const ThinRegions& thin);
   void end_wall(const Wall& wall);
   void stop(const Layer& layer, std::uint64_t bytes);
   PixelBox window_of(const Box& box) const;
-  bool stands_in(std::uint32_t stand, const Body& body) const;
+  bool is_in(std::uint32_t placed_part, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
   std::uint32_t first_of_several(const Body& body);
   void note_touching(std::uint32_t a, std::uint32_t b, const PixelBox& within, const Layer& layer);
@@ -144,12 +144,12 @@ class Inspection {
   void note_edges(const Layer& layer, const RunsView& image);
 
   const PixelGrid& grid_;
-  std::vector<sanity::Solid> stands_;  // by bottom
+  std::vector<checks::Solid> placed_parts_;  // by bottom
   std::vector<PixelBox> window_;
   PixelBox all_;  // of all stands, a pixel wider
   Stencils stencils_;
-  double least_mm_, pixel_mm2_;
-  std::uint64_t most_bytes_;
+  double min_mm_, pixel_mm2_;
+  std::uint64_t max_bytes_;
   std::atomic<bool> stopped_ = false;
   std::int64_t below_ = 0;  // bottom of the layer before
   bool holds_ = false;      // any layer so far
@@ -161,6 +161,6 @@ class Inspection {
 };
 
 /// One warning for each kind. part  names of files
-void tell(const Findings& findings, std::span<const std::string> part, double least_mm, std::vector<Warning>& warnings);
+void report(const Findings& findings, std::span<const std::string> part, double min_mm, std::vector<Warning>& warnings);
 
 }  // namespace lamina::inspect

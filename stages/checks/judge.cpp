@@ -10,13 +10,13 @@
 
 #include "stages/support/text/number_text.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 namespace {
 
 /// Sound jobs stay well between these shares of a mesh. Shells that overlap within a mesh make less of it.
-constexpr double kLeast = 0.55, kMost = 1.2;
+constexpr double kMin = 0.55, kMax = 1.2;
 /// A top that ends amid a layer adds or takes up to half of one; at most this much of a part's height is forgiven.
-constexpr double kMostOfTop = 0.2;
+constexpr double kMaxTopShare = 0.2;
 /// A bleed that leaves less of a part is hardly meant.
 constexpr double kLeft = 0.7;
 /// Pixels and layers are coarse if fewer than these lie across a solid.
@@ -67,38 +67,38 @@ std::string and_more(const Worst& worst) {
 
 /// By how much planned and mesh differ beyond what sound jobs show; 1 or less: not at all.
 double badness_of(const Group& group, double planned_mm3, const Sampling& sampling) {
-  const double top = std::min(kMostOfTop, 0.5 * sampling.thickest_mm / std::max(1e-6, mm(group.box.height())));
-  if (group.most_mm3 <= 0) return 0;
-  if (sampling.offset_mm <= 0 && planned_mm3 > (kMost + top) * group.most_mm3) return planned_mm3 / group.most_mm3;
-  if (sampling.offset_mm >= 0 && planned_mm3 < (kLeast - top) * group.least_mm3) {
-    return group.least_mm3 / std::max(planned_mm3, 1e-9);
+  const double top = std::min(kMaxTopShare, 0.5 * sampling.thickest_mm / std::max(1e-6, mm(group.box.height())));
+  if (group.max_mm3 <= 0) return 0;
+  if (sampling.offset_mm <= 0 && planned_mm3 > (kMax + top) * group.max_mm3) return planned_mm3 / group.max_mm3;
+  if (sampling.offset_mm >= 0 && planned_mm3 < (kMin - top) * group.min_mm3) {
+    return group.min_mm3 / std::max(planned_mm3, 1e-9);
   }
   return 0;
 }
 
 /// The same, with what the group's solids hold together where their meshes speak against them. `group` is then that.
-Result<double> badness_as_united(std::uint32_t g, Group& group, double planned_mm3, const Sampling& sampling) {
+Result<double> badness_as_union(std::uint32_t g, Group& group, double planned_mm3, const Sampling& sampling) {
   const double badness = badness_of(group, planned_mm3, sampling);
-  if (badness <= 1 || !sampling.united_mm3) return badness;
-  const Result<double> united = sampling.united_mm3(g);
-  if (!united) {
-    const Fault fault = united.error().fault;
-    if (fault == Fault::kInterrupted || fault == Fault::kMemory) return united.error();
+  if (badness <= 1 || !sampling.union_mm3) return badness;
+  const Result<double> merged = sampling.union_mm3(g);
+  if (!merged) {
+    const Fault fault = merged.error().fault;
+    if (fault == Fault::kInterrupted || fault == Fault::kMemory) return merged.error();
     return 0.0;
   }
-  if (*united <= 0) return badness;
-  group.least_mm3 = group.most_mm3 = *united;
+  if (*merged <= 0) return badness;
+  group.min_mm3 = group.max_mm3 = *merged;
   return badness_of(group, planned_mm3, sampling);
 }
 
-Status judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+Status check_volumes(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst;
   std::vector<Group> groups(tally.groups().begin(), tally.groups().end());
   for (std::uint32_t g = 0; g < groups.size(); ++g) {
     Group& group = groups[g];
     // What has vanished as a whole is told as such.
     if (!group.closed || !tally.measured(g) || tally.planned_mm3(g) == 0) continue;
-    const Result<double> badness = badness_as_united(g, group, tally.planned_mm3(g), sampling);
+    const Result<double> badness = badness_as_union(g, group, tally.planned_mm3(g), sampling);
     if (!badness) return badness.error();
     if (*badness > 1) note(worst, group.part, g, *badness);
   }
@@ -108,7 +108,7 @@ Status judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<W
     const double planned = tally.planned_mm3(worst[part].at);
     std::string why = too_coarse(group.box, sampling);
     if (why.empty()) why = "its walls are too thin, or its shells overlap, cancel or are inside out: look at `lamina info`";
-    const double mesh = planned > group.most_mm3 ? group.most_mm3 : group.least_mm3;
+    const double mesh = planned > group.max_mm3 ? group.max_mm3 : group.min_mm3;
     warnings.push_back({"volume",
                         fmt::format("{}: {} are planned where the mesh holds {} ({:.0f} %){}; {}", sampling.part[part],
                                     volume_text(planned), volume_text(mesh), 100 * planned / mesh, and_more(worst[part]), why),
@@ -138,11 +138,11 @@ bool was_taken(const Tally& tally, std::uint32_t solid, const Sampling& sampling
          mm(tally.solids()[solid].box.height()) >= sampling.thickest_mm;
 }
 
-void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+void check_lost(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst, taken;  // taken: by bleed or dose
   for (std::uint32_t s = 0; s < tally.solids().size(); ++s) {
     const Solid& solid = tally.solids()[s];
-    if (tally.seen(s) || solid.box.empty()) continue;
+    if (tally.detected(s) || solid.box.empty()) continue;
     note(was_taken(tally, s, sampling) ? taken : worst, solid.part, s, std::abs(solid.mesh_mm3));
   }
   for (std::uint32_t part = 0; part < taken.size() && sampling.bleeds; ++part) {
@@ -159,13 +159,13 @@ void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warnin
   }
 }
 
-void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+void check_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst;
   for (std::uint32_t g = 0; g < tally.groups().size(); ++g) {
     const Group& group = tally.groups()[g];
     const double left = sampling.finished ? tally.planned_mm3(g) : tally.left_mm3(g);
     const bool known = group.closed && !sampling.one_sided && too_coarse(group.box, sampling).empty();
-    const double planned = !sampling.finished ? tally.planned_mm3(g) : known ? group.least_mm3 : 0;
+    const double planned = !sampling.finished ? tally.planned_mm3(g) : known ? group.min_mm3 : 0;
     if (!tally.measured(g) || planned <= 0 || left >= kLeft * planned || (sampling.finished && left == 0)) continue;
     note(worst, group.part, g, 1 - left / planned);
   }
@@ -176,16 +176,16 @@ void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warni
 
 }  // namespace
 
-Status judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
-  judge_lost(tally, sampling, warnings);
+Status check_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+  check_lost(tally, sampling, warnings);
   if (!sampling.one_sided && !sampling.bleeds) {
-    if (Status status = judge_volumes(tally, sampling, warnings); !status) return status;
+    if (Status status = check_volumes(tally, sampling, warnings); !status) return status;
   }
-  if (tally.looked_at_bleed() || sampling.bleeds) judge_bleed(tally, sampling, warnings);
+  if (tally.measures_bleed() || sampling.bleeds) check_bleed(tally, sampling, warnings);
   return {};
 }
 
-void judge_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,
+void check_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,
                   const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
   const auto first = std::ranges::find(filled, 1);
   if (first == filled.end()) return;
@@ -210,11 +210,11 @@ void judge_layers(std::span<const Solid> solids, std::span<const std::uint8_t> f
                       "", lowest->index, z});
 }
 
-void judge_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {
+void check_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {
   const double tolerance = sampling.tolerance_um * 1e-3;
   for (const Solid& solid : solids) {
-    const double most = std::clamp(0.02 * mm(std::min(solid.box.width(), solid.box.depth())), 0.05, 0.25);
-    if (solid.box.empty() || tolerance <= most * (1 + 1e-9)) continue;
+    const double maximum = std::clamp(0.02 * mm(std::min(solid.box.width(), solid.box.depth())), 0.05, 0.25);
+    if (solid.box.empty() || tolerance <= maximum * (1 + 1e-9)) continue;
     warnings.push_back({"tolerance",
                         fmt::format("{}: --tolerance {} moves contours by up to {:.3g} mm; it counts in um",
                                     sampling.part[solid.part], number_text(sampling.tolerance_um), tolerance),
@@ -223,7 +223,7 @@ void judge_tolerance(std::span<const Solid> solids, const Sampling& sampling, st
   }
 }
 
-void judge_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {
+void check_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {
   std::vector<std::int64_t> lowest(sampling.part.size(), std::numeric_limits<std::int64_t>::max());
   for (const Solid& solid : solids) {
     if (!solid.box.empty()) lowest[solid.part] = std::min<std::int64_t>(lowest[solid.part], solid.box.lo.z);
@@ -249,8 +249,8 @@ Status check_anything(const Tally& tally, const Sampling& sampling) {
   const auto because = [](std::string why) { return Error{Fault::kInput, std::move(why)}; };
   const auto solids = tally.solids();
   for (std::uint32_t s = 0; s < solids.size(); ++s) {
-    if (tally.seen(s)) {
-      const bool bleeds = tally.looked_at_bleed() && tally.left_mm3(solids[s].group) == 0;
+    if (tally.detected(s)) {
+      const bool bleeds = tally.measures_bleed() && tally.left_mm3(solids[s].group) == 0;
       if (!bleeds) return {};
       return because(bleed_text(sampling, "the bleed") + " takes away all of the parts: --bleed counts in um");
     }
@@ -266,9 +266,9 @@ Status check_anything(const Tally& tally, const Sampling& sampling) {
 std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span<const Instance> instances,
                                          std::span<const Nm> planes) {
   std::vector<std::uint8_t> crossed(planes.size(), 0);
-  std::set<std::pair<std::uint32_t, Nm>> seen;
+  std::set<std::pair<std::uint32_t, Nm>> detected;
   for (const Instance& instance : instances) {
-    if (!seen.emplace(instance.mesh, instance.offset.z).second) continue;
+    if (!detected.emplace(instance.mesh, instance.offset.z).second) continue;
     for (const Triangle& t : meshes[instance.mesh].triangles) {
       const std::int64_t lowest = std::int64_t{std::min({t.a.z, t.b.z, t.c.z})} + instance.offset.z,
                          highest = std::int64_t{std::max({t.a.z, t.b.z, t.c.z})} + instance.offset.z;
@@ -279,7 +279,7 @@ std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span
   return crossed;
 }
 
-United::United(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
+GroupUnion::GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
                Again again)
     : meshes_(meshes), volume_(std::move(volume)), again_(std::move(again)) {
   for (std::size_t i = 0; i < instances.size(); ++i) {
@@ -288,7 +288,7 @@ United::United(std::span<const Mesh> meshes, std::span<const Instance> instances
   }
 }
 
-United::Key United::key_of(std::span<const Instance> members) {
+GroupUnion::Key GroupUnion::key_of(std::span<const Instance> members) {
   Key key;
   for (const Instance& one : members) key.push_back({one.mesh, one.offset.x, one.offset.y, one.offset.z});
   std::ranges::sort(key);
@@ -297,7 +297,7 @@ United::Key United::key_of(std::span<const Instance> members) {
   return key;
 }
 
-Result<double> United::compute(std::span<const Instance> members) {
+Result<double> GroupUnion::compute(std::span<const Instance> members) {
   if (!again_) return volume_(meshes_, members);
   if (!reread_) reread_.emplace(again_());
   if (!*reread_) return reread_->error();
@@ -311,7 +311,7 @@ Result<double> United::compute(std::span<const Instance> members) {
   return volume_(now, members);
 }
 
-Result<double> United::mm3(std::uint32_t group) {
+Result<double> GroupUnion::mm3(std::uint32_t group) {
   if (group >= members_.size()) return 0.0;
   const std::vector<Instance>& members = members_[group];
   Key key = key_of(members);

@@ -22,7 +22,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 /// How the job sees its solids.
 struct Sampling {
@@ -39,22 +39,22 @@ struct Sampling {
   std::span<const std::string> part;  // names of files
   /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0: the volumes of the meshes
   /// count. Asked only of groups that are doubted by those; where it fails, no volume is doubted.
-  std::function<Result<double>(std::uint32_t group)> united_mm3 = {};
+  std::function<Result<double>(std::uint32_t group)> union_mm3 = {};
 };
 
 /// One warning for each part and kind at most; the worst of its copies is named.
-/// errors  kInterrupted and kMemory of sampling.united_mm3
-Status judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings);
+/// errors  kInterrupted and kMemory of sampling.union_mm3
+Status check_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings);
 
 /// filled  by layer: whether it has anything; of the whole job
-void judge_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,
+void check_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,
                   const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
 
 /// Contours may move by a fiftieth of a part's narrower side, at least 0.05 and at most 0.25 mm.
-void judge_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
+void check_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
 
 /// Parts that neither stand on the bed nor on the box of another solid; for printers that lay beads.
-void judge_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
+void check_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
 
 /// errors  kInput: why nothing at all is planned, and what to do; none if the solids do not explain it
 Status check_anything(const Tally& tally, const Sampling& sampling);
@@ -68,7 +68,7 @@ std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span
 // --- what the solids of a group hold together, computed once for groups that are copies of each other.
 
 /// Not thread-safe.
-class United {
+class GroupUnion {
  public:
   /// What instances hold together, mm3; 0 if that is not known.
   using Volume = std::function<Result<double>(std::span<const Mesh>, std::span<const Instance>)>;
@@ -78,7 +78,7 @@ class United {
   /// meshes  of the job; only their fingerprints are looked at if `again` is given. Must outlive this object
   /// solids  one for each instance; both must outlive this object
   /// again   where the triangles of the meshes are gone: asked once, when the first volume is
-  United(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
+  GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
          Again again = {});
 
   /// errors  of `again` and `volume`; kInput: a mesh of the group has changed since

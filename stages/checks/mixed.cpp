@@ -4,27 +4,27 @@
 
 #include <algorithm>
 
-namespace lamina::sanity {
+namespace lamina::checks {
 namespace {
 
 /// The layers whose planes lie in a stretch, [first, last).
-LayerRange layers_in(const PowderStretch& stretch, std::span<const Nm> planes) {
+LayerRange layers_in(const PowderInterval& span, std::span<const Nm> planes) {
   const auto below = [&](std::int64_t z) {
     return static_cast<std::uint32_t>(std::ranges::lower_bound(planes, z) - planes.begin());
   };
-  return {below(stretch.from), below(stretch.to)};
+  return {below(span.from), below(span.to)};
 }
 
 }  // namespace
 
-std::vector<LayerRange> mixed_layers(std::vector<PowderStretch> stretches, std::uint32_t materials,
+std::vector<LayerRange> mixed_layers(std::vector<PowderInterval> intervals, std::uint32_t materials,
                                      std::span<const Nm> planes) {
-  std::ranges::sort(stretches, {}, &PowderStretch::from);
+  std::ranges::sort(intervals, {}, &PowderInterval::from);
   std::vector<std::uint32_t> done(materials, 0);         // layers below are counted for the material
   std::vector<std::uint32_t> powders(planes.size(), 0);  // of each layer
-  for (const PowderStretch& stretch : stretches) {
-    const auto [first, last] = layers_in(stretch, planes);
-    std::uint32_t& from = done[stretch.material];
+  for (const PowderInterval& span : intervals) {
+    const auto [first, last] = layers_in(span, planes);
+    std::uint32_t& from = done[span.material];
     for (from = std::max(from, first); from < last; ++from) ++powders[from];
   }
   std::vector<LayerRange> ranges;

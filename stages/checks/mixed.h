@@ -8,10 +8,10 @@
 
 #include "stages/data/layer.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 /// Heights at which a part is of one powder: planes from <= z < to, nm, as sections have them.
-struct PowderStretch {
+struct PowderInterval {
   std::int64_t from = 0, to = 0;
   std::uint32_t material = 0;
 };
@@ -23,6 +23,6 @@ using LayerRange = std::array<std::uint32_t, 2>;
 /// or lie under others there: such a layer can have pixels of one material alone.
 /// planes  of the layers, increasing
 /// cost    sorts the stretches, then one step a layer and a stretch; independent of meshes
-std::vector<LayerRange> mixed_layers(std::vector<PowderStretch> stretches, std::uint32_t materials, std::span<const Nm> planes);
+std::vector<LayerRange> mixed_layers(std::vector<PowderInterval> intervals, std::uint32_t materials, std::span<const Nm> planes);
 
 }  // namespace lamina::sanity

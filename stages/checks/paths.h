@@ -13,10 +13,10 @@
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 /// Counts the layers with a fault and names the first.
-struct LayersTold {
+struct ReportedLayers {
   std::uint32_t count = 0;
   std::string first;  // "layer 12 at z 0.300 mm"
   std::uint32_t index = 0;
@@ -27,13 +27,13 @@ struct LayersTold {
 };
 
 /// What toolpaths lack.
-struct PathsTold {
-  LayersTold open, undivided;
+struct PathWarnings {
+  ReportedLayers open, undivided;
 
   /// A layer's open chains of cuts, its segmented lines and its thin stretches.
   void add(const Layer& layer, std::uint64_t open_chains, std::uint64_t lines, std::uint64_t thin);
   /// fills  whether walls or lines are asked for. moves  of the parts, of all layers. layers  of the job
-  void tell(bool fills, std::uint64_t moves, std::uint32_t layers, std::vector<Warning>& warnings) const;
+  void report(bool fills, std::uint64_t moves, std::uint32_t layers, std::vector<Warning>& warnings) const;
 };
 
 }  // namespace lamina::sanity

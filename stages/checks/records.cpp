@@ -7,7 +7,7 @@
 #include "stages/checks/judge.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 void LayerRecords::add(const Layer& layer, std::uint64_t set_pixels, std::uint64_t lost_pixels, std::uint32_t capped_rows) {
   layers_.push_back(layer);
@@ -17,26 +17,26 @@ void LayerRecords::add(const Layer& layer, std::uint64_t set_pixels, std::uint64
   capped_ += capped_rows;
 }
 
-Status LayerRecords::judge(std::span<const PartSummary> parts, bool thins, bool allow_empty,
+Status LayerRecords::check(std::span<const PartSummary> parts, bool thins, bool allow_empty,
                            std::vector<Warning>& warnings) const {
   const bool nothing = std::ranges::find(filled_, 1) == filled_.end();
-  constexpr std::string_view kLook = "look at `lamina info` of the parts, and at the summary of a shard";
+  constexpr std::string_view kHint = "look at `lamina info` of the parts, and at the summary of a shard";
   if (nothing && !allow_empty) {
     return Error{Fault::kInput, fmt::format("not one pixel in {} layer{}, so nothing is joined: {}; --allow-empty joins it "
                                             "nevertheless",
-                                            layers_.size(), layers_.size() == 1 ? "" : "s", kLook)};
+                                            layers_.size(), layers_.size() == 1 ? "" : "s", kHint)};
   }
-  if (nothing) warnings.push_back({"empty", fmt::format("the whole job is empty: {}", kLook)});
-  tell(parts, warnings);
+  if (nothing) warnings.push_back({"empty", fmt::format("the whole job is empty: {}", kHint)});
+  report(parts, warnings);
   if (thins) return {};
   std::vector<Solid> solids(parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) solids[i].box = parts[i].bounds;
-  judge_layers(
+  check_layers(
       solids, filled_, [&](std::uint32_t i) { return layers_[i]; }, warnings);
   return {};
 }
 
-void LayerRecords::tell(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const {
+void LayerRecords::report(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const {
   warn_of_lost_pixels(lost_, warnings);
   if (capped_ == 0) return;
   const double z = mm(first_capped_.plane());

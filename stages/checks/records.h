@@ -13,7 +13,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 /// Of all layers of an image job, in their order.
 class LayerRecords {
@@ -21,12 +21,12 @@ class LayerRecords {
   void add(const Layer& layer, std::uint64_t set_pixels, std::uint64_t lost_pixels, std::uint32_t capped_rows);
 
   /// Lost pixels and capped rows.
-  void tell(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const;
+  void report(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const;
 
   /// Those and the rest. parts  of the manifest: a layer within the height of one is expected to have pixels
   /// thins  beads or a dose may leave layers empty on purpose
   /// errors kInput: no layer has a pixel, and that is not allowed
-  Status judge(std::span<const PartSummary> parts, bool thins, bool allow_empty, std::vector<Warning>& warnings) const;
+  Status check(std::span<const PartSummary> parts, bool thins, bool allow_empty, std::vector<Warning>& warnings) const;
 
  private:
   std::vector<Layer> layers_;

@@ -10,7 +10,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 /// Of layers in their order.
 class RowWarnings {
@@ -28,16 +28,16 @@ class RowWarnings {
   /// The instance whose cap closes the first of the rows.
   std::uint32_t first_capped() const { return instance_; }
   /// part  of that instance
-  void tell(const std::string& part, std::vector<Warning>& warnings) const;
+  void report(const std::string& part, std::vector<Warning>& warnings) const;
 
  private:
   struct Rows {
     std::uint64_t rows = 0;
     std::uint32_t layers = 0, layer = 0;  // layer: the first
     double z_mm = 0;
-    std::string place;
+    std::string position;
   };
-  static bool note(Rows& told, const Layer& layer, std::uint32_t rows, std::uint32_t first, const PixelGrid& grid);
+  static bool note(Rows& reported, const Layer& layer, std::uint32_t rows, std::uint32_t first, const PixelGrid& grid);
 
   Rows capped_, open_;
   std::uint32_t instance_ = 0;

@@ -13,7 +13,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 
 /// A mesh where it stands.
 struct Solid {
@@ -28,7 +28,7 @@ struct Solid {
 struct Group {
   Box box;
   std::uint32_t part = 0;              // of the first solid
-  double least_mm3 = 0, most_mm3 = 0;  // between these lies the union of its solids, as far as their meshes tell
+  double min_mm3 = 0, max_mm3 = 0;  // between these lies the union of its solids, as far as their meshes tell
   bool closed = true;                  // all of them
 };
 
@@ -42,7 +42,7 @@ class Tally {
   explicit Tally(std::vector<Solid> solids);
 
   // --- images
-  void look_through(const PixelGrid& grid);
+  void inspect_layers(const PixelGrid& grid);
   /// The section of all solids. cost  some rows of each group, a few of a solid's until its first pixel is found
   void add_image(const Layer& layer, const RunsView& image, bool mirror_x = false, bool mirror_y = false);
   /// The same image after the bleed was removed.
@@ -54,36 +54,36 @@ class Tally {
   std::span<const Solid> solids() const { return solids_; }
   std::span<const Group> groups() const { return groups_; }
   /// Whether any layer has a pixel in the solid's box, or an area in its group.
-  bool seen(std::uint32_t solid) const {
-    return grid_ ? seen_[solid].load(std::memory_order_relaxed) != 0 : planned_mm3(solids_[solid].group) > 0;
+  bool detected(std::uint32_t solid) const {
+    return grid_ ? detected_[solid].load(std::memory_order_relaxed) != 0 : planned_mm3(solids_[solid].group) > 0;
   }
   /// Whether a pixel's centre lies in the solid's box, seen from above; of images.
   bool has_pixels(std::uint32_t solid) const {
-    const Window& window = solid_window_[solid];
+    const ImageWindow& window = solid_window_[solid];
     return window.first_column < window.last_column && window.first_row < window.last_row;
   }
   /// Groups beyond the first kMeasured are not measured in images.
   bool measured(std::uint32_t group) const { return !grid_ || group < kMeasured; }
   double planned_mm3(std::uint32_t group) const { return volume(planned_[group]); }
   double left_mm3(std::uint32_t group) const { return volume(left_[group]); }
-  bool looked_at_bleed() const { return bleeds_.load(std::memory_order_relaxed); }
+  bool measures_bleed() const { return bleeds_.load(std::memory_order_relaxed); }
 
  private:
   static constexpr std::uint32_t kMeasured = 4096;  // groups; the copies beyond them cost nothing
-  struct Window {
+  struct ImageWindow {
     std::uint32_t first_column = 0, last_column = 0, first_row = 0, last_row = 0;  // [first, last), of the image
   };
   using Sum = std::atomic<std::uint64_t>;  // 1e-6 mm3
   static double volume(const Sum& sum) { return static_cast<double>(sum.load(std::memory_order_relaxed)) * 1e-6; }
-  Window window_of(const Box& box) const;
-  static Window mirrored(Window window, const RunsView& image, bool mirror_x, bool mirror_y);
+  ImageWindow window_of(const Box& box) const;
+  static ImageWindow mirrored(ImageWindow window, const RunsView& image, bool mirror_x, bool mirror_y);
   void add(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const;
 
   std::vector<Solid> solids_;
   std::vector<Group> groups_;
   const PixelGrid* grid_ = nullptr;
-  std::vector<Window> solid_window_, group_window_;
-  std::vector<std::atomic<std::uint8_t>> seen_;  // by solid
+  std::vector<ImageWindow> solid_window_, group_window_;
+  std::vector<std::atomic<std::uint8_t>> detected_;  // by solid
   std::vector<Sum> planned_, left_;              // by group
   std::atomic<bool> bleeds_{false};
 };

@@ -9,18 +9,18 @@ namespace lamina::inspect {
 
 // A stencil grows by a column where its width in nm passes a whole number of them, and so by a row. Where it does both, two of
 // three times or so it grows along a diagonal: a regular octagon has 2 - sqrt(2) of its width there, about 41 of 70.
-Stencils::Stencils(const PixelGrid& grid, std::int64_t least_nm) {
+Stencils::Stencils(const PixelGrid& grid, std::int64_t min_nm) {
   const auto ends = [](std::uint32_t pixels, const PixelAxis& one, const PixelAxis& other) {
     return static_cast<__int128>(pixels) * one.span * other.dots;
   };
   // Less one: so many whole pixels in nm, rounded, are no pixel more.
-  const __int128 least = static_cast<__int128>(least_nm - 1) * grid.x.dots * grid.y.dots;
+  const __int128 minimum = static_cast<__int128>(min_nm - 1) * grid.x.dots * grid.y.dots;
   Sum sum;
   sums_.push_back(sum);
   for (std::uint32_t both = 0;;) {
     const __int128 column = ends(sum.columns(), grid.x, grid.y), row = ends(sum.rows(), grid.y, grid.x);
     const __int128 next = std::min(column, row);
-    if (next >= least || sum.columns() > grid.columns() || sum.rows() > grid.rows()) return;
+    if (next >= minimum || sum.columns() > grid.columns() || sum.rows() > grid.rows()) return;
     if (column != row) {
       ++(column < row ? sum.right : sum.down);
     } else if (const std::uint32_t diagonal = (41 * both++ + 17) / 70; diagonal == sum.falling + sum.rising) {
@@ -130,7 +130,7 @@ void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, c
 }
 
 /// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
-std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t least, std::uint64_t most, Runs& result) {
+std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t minimum, std::uint64_t maximum, Runs& result) {
   std::uint64_t largest = 0;
   result.columns = image.columns;
   result.row_offset.assign(1, 0);
@@ -138,7 +138,7 @@ std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t le
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
       const std::uint64_t pixels = pieces.pixels[pieces.of_run[i]];
-      if (pixels <= least || pixels > most) continue;
+      if (pixels <= minimum || pixels > maximum) continue;
       largest = std::max(largest, pixels);
       result.change.push_back(image.change[2 * i]);
       result.change.push_back(image.change[2 * i + 1]);
@@ -149,21 +149,21 @@ std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t le
 }
 
 /// Puts the largest in front, and no more than so many.
-void keep_largest(std::vector<ThinPlace>& places, std::size_t most) {
-  const auto order = [](const ThinPlace& place) { return std::tuple(~place.pixels, place.box.top, place.box.left); };
-  std::ranges::stable_sort(places, {}, order);
-  places.resize(std::min(places.size(), most));
+void keep_largest(std::vector<ThinRegion>& locations, std::size_t maximum) {
+  const auto order = [](const ThinRegion& position) { return std::tuple(~position.pixels, position.box.top, position.box.left); };
+  std::ranges::stable_sort(locations, {}, order);
+  locations.resize(std::min(locations.size(), maximum));
 }
 
 /// Takes pieces of more pixels than `least` into the places.
-void take(const Pieces& pieces, std::uint64_t least, ThinPlaces& places) {
+void take(const Pieces& pieces, std::uint64_t minimum, ThinRegions& locations) {
   for (std::size_t p = 0; p < pieces.count(); ++p) {
     const std::uint64_t pixels = pieces.pixels[p];
-    if (pixels <= least) continue;
-    ++places.count;
-    places.pixels += pixels;
-    places.largest.push_back({pixels, pieces.box[p]});
-    if (places.largest.size() >= 4 * ThinPlaces::kMost) keep_largest(places.largest, ThinPlaces::kMost);
+    if (pixels <= minimum) continue;
+    ++locations.count;
+    locations.pixels += pixels;
+    locations.largest.push_back({pixels, pieces.box[p]});
+    if (locations.largest.size() >= 4 * ThinRegions::kMax) keep_largest(locations.largest, ThinRegions::kMax);
   }
 }
 
@@ -203,33 +203,33 @@ std::uint64_t ThinScratch::bytes() const {
 
 // From wide to narrow. What a stencil covers is thin for none that is narrower, so that each looks at what those before it
 // left, and of that at pieces that are large enough for it: of corners few are.
-ThinPlaces thin_places(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
-  ThinPlaces places;
-  if (stencils.count() < 2 || image.change.empty()) return places;
+ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
+  ThinRegions locations;
+  if (stencils.count() < 2 || image.change.empty()) return locations;
   const PixelBox box = box_of(image);
   auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
   const std::uint64_t corner = stencils.two_squares(1);
   std::uint32_t number = stencils.count() - 1;
   uncovered(image, box, image, stencils.at(number), scratch);
   pieces.find(left, true);
-  places.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinPlace);
-  for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) places.bytes += held->view().change.size_bytes();
-  take(pieces, stencils.two_squares(number), places);
-  std::uint64_t most = pick(left, pieces, corner, stencils.two_squares(number), pending);
+  locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinRegion);
+  for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) locations.bytes += held->view().change.size_bytes();
+  take(pieces, stencils.two_squares(number), locations);
+  std::uint64_t maximum = pick(left, pieces, corner, stencils.two_squares(number), pending);
   while (--number > 0) {
-    const std::uint64_t least = stencils.two_squares(number);
-    if (most <= least) continue;
+    const std::uint64_t minimum = stencils.two_squares(number);
+    if (maximum <= minimum) continue;
     pieces.find(pending, true);
-    pick(pending, pieces, least, UINT64_MAX, chosen);
-    most = pick(pending, pieces, corner, least, waiting);
+    pick(pending, pieces, minimum, UINT64_MAX, chosen);
+    maximum = pick(pending, pieces, corner, minimum, waiting);
     uncovered(image, box, chosen, stencils.at(number), scratch);
     pieces.find(left, true);
-    take(pieces, least, places);
-    most = std::max(most, pick(left, pieces, corner, least, chosen));
+    take(pieces, minimum, locations);
+    maximum = std::max(maximum, pick(left, pieces, corner, minimum, chosen));
     combine(waiting, chosen, SetOperation::kUnion, pending);
   }
-  keep_largest(places.largest, ThinPlaces::kMost);
-  return places;
+  keep_largest(locations.largest, ThinRegions::kMax);
+  return locations;
 }
 
 }  // namespace lamina::inspect

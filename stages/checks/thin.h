@@ -30,9 +30,9 @@ struct Stencil {
 
 class Stencils {
  public:
-  /// The last one is just as wide and as high as a square of `least_nm`, in whole pixels upwards, or does not fit into the
-  /// image. least_nm  0 .. kNmReach; 0: there is only the first one, of one pixel
-  Stencils(const PixelGrid& grid, std::int64_t least_nm);
+  /// The last one is just as wide and as high as a square of `min_nm`, in whole pixels upwards, or does not fit into the
+  /// image. min_nm  0 .. kNmReach; 0: there is only the first one, of one pixel
+  Stencils(const PixelGrid& grid, std::int64_t min_nm);
 
   std::uint32_t count() const { return static_cast<std::uint32_t>(sums_.size()); }
   /// By width; the first is one pixel, the second at least two in one direction.
@@ -52,21 +52,21 @@ class Stencils {
 
 // ---
 
-struct ThinPlace {
+struct ThinRegion {
   std::uint64_t pixels = 0;
   PixelBox box;
 };
 
 /// What a layer holds of thin places.
-struct ThinPlaces {
+struct ThinRegions {
   std::uint32_t count = 0;
   std::uint64_t pixels = 0;        // of all
-  std::vector<ThinPlace> largest;  // at most kMost, the largest first; equal ones from the top, then from the left
+  std::vector<ThinRegion> largest;  // at most kMax, the largest first; equal ones from the top, then from the left
   std::uint64_t bytes = 0;         // that finding them took
-  static constexpr std::size_t kMost = 20;
+  static constexpr std::size_t kMax = 20;
 };
 
-/// Scratch of thin_places(); kept from layer to layer.
+/// Scratch of thin_regions(); kept from layer to layer.
 struct ThinScratch {
   Runs outside, anchors, grown, fits, left, chosen, waiting, pending;
   Buffer<std::uint64_t> spans;
@@ -79,7 +79,7 @@ struct ThinScratch {
 /// Corners of thick bodies leave less: of a width of 2 r 0.22 r squared at right angles and 4.3 r squared at 20 degrees. More
 /// stencils find more: never less. cost  O(rows of the last stencil x runs), and for narrower ones that of the places that are
 /// left
-ThinPlaces thin_places(const RunsView& image, const Stencils& stencils, ThinScratch& scratch);
+ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch);
 
 /// The pixels between the runs of `image`, in rows and columns [first, last) of the window; nothing beyond it.
 void complement(const RunsView& image, const PixelBox& window, Runs& result);

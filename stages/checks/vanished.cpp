@@ -4,7 +4,7 @@
 
 namespace lamina::inspect {
 
-VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t least, VanishScratch& scratch) {
+VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch) {
   VanishedPieces found;
   if (before.change.empty()) return found;
   scratch.pieces.find(before, true);
@@ -15,7 +15,7 @@ VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, st
   }
   for (std::size_t p = 0; p < scratch.pieces.count(); ++p) {
     const std::uint64_t pixels = scratch.pieces.pixels[p];
-    if (scratch.stays[p] != 0 || pixels <= least) continue;
+    if (scratch.stays[p] != 0 || pixels <= minimum) continue;
     ++found.count;
     if (pixels <= found.largest) continue;
     found.largest = pixels;
@@ -25,7 +25,7 @@ VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, st
 }
 
 void VanishCount::add(const Layer& layer, const VanishedPieces& found) {
-  if (found.count == 0 || layer.index != next_) end_stretch();
+  if (found.count == 0 || layer.index != next_) end_span();
   next_ = layer.index + 1;
   if (found.count == 0) return;
   ++now_.layers;
@@ -39,9 +39,9 @@ void VanishCount::add(const Layer& layer, const VanishedPieces& found) {
   if (now_.layers >= kLayers && now_.largest > worst_.largest) worst_ = now_;
 }
 
-void VanishCount::end_stretch() { now_ = {}; }
+void VanishCount::end_span() { now_ = {}; }
 
-void VanishCount::tell(const PixelGrid& grid, bool mirrored_x, bool mirrored_y, std::vector<Warning>& warnings) const {
+void VanishCount::report(const PixelGrid& grid, bool mirrored_x, bool mirrored_y, std::vector<Warning>& warnings) const {
   if (layers_ == 0) return;
   std::int64_t column = (std::int64_t{worst_.box.left} + worst_.box.right - 1) / 2;
   std::int64_t row = (std::int64_t{worst_.box.top} + worst_.box.bottom - 1) / 2;

@@ -31,7 +31,7 @@ struct VanishScratch {
 
 /// Pieces of `before`, of pixels that touch at sides or corners, in which `after` sets nothing; of more than `least` pixels,
 /// since tips of domes and ridges are of no more. before, after  of the same size. cost  O(runs)
-VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t least, VanishScratch& scratch);
+VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch);
 
 /// Counts them over a job. The last layers of a slope vanish rightly: fewer than kLayers on end are not told.
 class VanishCount {
@@ -41,21 +41,21 @@ class VanishCount {
   /// In layer order.
   void add(const Layer& layer, const VanishedPieces& found);
   /// mirrored  whether columns and rows of the images are
-  void tell(const PixelGrid& grid, bool mirrored_x, bool mirrored_y, std::vector<Warning>& warnings) const;
+  void report(const PixelGrid& grid, bool mirrored_x, bool mirrored_y, std::vector<Warning>& warnings) const;
 
  private:
-  struct Stretch {
+  struct LayerSpan {
     std::uint32_t layers = 0;
     std::uint64_t largest = 0;
     PixelBox box;
     Layer layer{};  // of the largest
   };
-  void end_stretch();
+  void end_span();
 
   std::uint32_t next_ = 0;  // layer
-  Stretch now_;
+  LayerSpan now_;
   std::uint32_t layers_ = 0;  // told
-  Stretch worst_;
+  LayerSpan worst_;
 };
 
 }  // namespace lamina::inspect

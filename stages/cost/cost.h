@@ -63,13 +63,13 @@ class Tally {
   Quote quote() const;
 
  private:
-  struct Part {
+  struct PartTotals {
     std::uint64_t pixels = 0, drops = 0, pixel_nm = 0;
     std::int64_t microseconds = 0, fed_nl = 0;
   };
   const Machine& machine_;
   double pixel_mm2_, fed_mm2_;
-  std::vector<Part> parts_;
+  std::vector<PartTotals> parts_;
   std::uint64_t drops_ = 0, pixels_ = 0, pixel_nm_ = 0;
   std::int64_t microseconds_ = 0, fed_nl_ = 0;
   std::int64_t unshared_microseconds_ = 0, unshared_nl_ = 0;

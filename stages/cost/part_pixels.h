@@ -42,21 +42,21 @@ class PartPixels {
   std::vector<std::uint64_t> sum(const Layer& layer, const LevelsView& image) const;
 
  private:
-  struct Window {
+  struct BodyWindow {
     std::uint32_t left = 0, right = 0, top = 0, bottom = 0;  // [left, right) x [top, bottom)
     std::int64_t low = 0, high = 0;                          // nm
     std::uint32_t part = 0;
   };
-  struct Group {
-    Window around;
-    std::vector<Window> bodies;
+  struct BodyGroup {
+    BodyWindow around;
+    std::vector<BodyWindow> bodies;
     bool one_part = true;
   };
   template <class Row>
-  static std::uint64_t sum_in(const Window& window, std::uint32_t rows, const Row& row_of);
+  static std::uint64_t sum_in(const BodyWindow& window, std::uint32_t rows, const Row& row_of);
   template <class Row>
   std::vector<std::uint64_t> sums(const Layer& layer, std::uint32_t rows, const Row& row_of) const;
-  std::vector<Group> groups_;
+  std::vector<BodyGroup> groups_;
   std::size_t parts_;
 };
 

@@ -33,7 +33,7 @@ struct Copy {
 };
 
 /// Boxes that each facet of a copy is compared with.
-constexpr std::size_t kMostOthers = 64;
+constexpr std::size_t kMaxOthers = 64;
 
 bool boxes_meet(const Box& a, const Box& b) {
   return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y && a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
@@ -46,7 +46,7 @@ Box moved(const Box& box, const Point3& by) {
 }
 
 void note_other(Copy& copy, const Box& other) {
-  copy.crowded |= copy.others.size() == kMostOthers;
+  copy.crowded |= copy.others.size() == kMaxOthers;
   if (!copy.crowded) copy.others.push_back(other);
 }
 
@@ -92,12 +92,12 @@ struct Coverage::State {
   std::vector<Copy> copies;
 
   State(const PixelGrid& pixel_grid, Rule of_rows, Isa widest)
-      : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(isa_at_most(widest)) {}
+      : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(limited_isa(widest)) {}
 
   std::uint32_t bands() const { return (grid.rows() + kBandRows - 1) / kBandRows; }
-  HeldBound::Count held_in(const Layer& layer) const;
-  void gather(const Layer& layer, LayerScratch& scratch) const;
-  void order_by_band(LayerScratch& scratch) const;
+  HeldBound::HeldCount held_in(const Layer& layer) const;
+  void gather(const Layer& layer, CoverageScratch& scratch) const;
+  void order_by_band(CoverageScratch& scratch) const;
 };
 
 Coverage::Coverage(Coverage&&) noexcept = default;
@@ -131,12 +131,12 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   return coverage;
 }
 
-void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
+void Coverage::State::gather(const Layer& layer, CoverageScratch& scratch) const {
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
   scratch.facets.clear();
-  make_room(scratch.facets, held_in(layer).facets);
+  ensure_capacity(scratch.facets, held_in(layer).facets);
   SlabFacet taken;
-  Cluster room;
+  Cluster slack;
   for (const Copy& copy : copies) {
     const CoveredMesh& mesh = meshes[copy.mesh];
     const Point3 by = copy.offset;
@@ -144,7 +144,7 @@ void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
       return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
     };
     mesh.index.find(bottom - by.z, top - by.z - 1, [&](std::uint32_t c) {
-      const Cluster& cluster = mesh.blocks->cluster(c, room);
+      const Cluster& cluster = mesh.blocks->cluster(c, slack);
       const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
       for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
         const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
@@ -158,25 +158,25 @@ void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
   }
 }
 
-void Coverage::State::order_by_band(LayerScratch& scratch) const {
+void Coverage::State::order_by_band(CoverageScratch& scratch) const {
   scratch.begins.assign(std::size_t{bands()} + 2, 0);
   for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row / kBandRows + 2];
   for (std::size_t r = 1; r < scratch.begins.size(); ++r) scratch.begins[r] += scratch.begins[r - 1];
-  make_room(scratch.order, scratch.facets.size());
+  ensure_capacity(scratch.order, scratch.facets.size());
   scratch.order.resize(scratch.facets.size());
   for (std::uint32_t i = 0; i < scratch.facets.size(); ++i)
     scratch.order[scratch.begins[scratch.facets[i].last_row / kBandRows + 1]++] = i;
 }
 
-LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& out) const {
+CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Levels& out) const {
   const State& state = *state_;
-  LayerReport report;
+  CoverageReport report;
   state.gather(layer, scratch);
   state.order_by_band(scratch);
   report.facets = static_cast<std::uint32_t>(scratch.facets.size());
   out.start(state.grid.columns());
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
-  const Slab slab{state.grid.x,
+  const BandSlab slab{state.grid.x,
                   state.grid.y,
                   state.x,
                   state.rule,
@@ -204,11 +204,11 @@ LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& o
   return report;
 }
 
-HeldBound::Count Coverage::State::held_in(const Layer& layer) const {
-  HeldBound::Count held;
+HeldBound::HeldCount Coverage::State::held_in(const Layer& layer) const {
+  HeldBound::HeldCount held;
   for (const Copy& copy : copies) {
     const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
-    HeldBound::Count own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
+    HeldBound::HeldCount own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
     if (copy.crowded || !copy.others.empty()) own.runs = own.voxels, own.edges = 2 * own.voxels;  // facets may meet others
     held.facets += own.facets, held.voxels += own.voxels, held.runs += own.runs, held.edges += own.edges;
   }
@@ -217,7 +217,7 @@ HeldBound::Count Coverage::State::held_in(const Layer& layer) const {
 
 LayerBound Coverage::bound(const Layer& layer) const {
   const State& state = *state_;
-  const HeldBound::Count held = state.held_in(layer);
+  const HeldBound::HeldCount held = state.held_in(layer);
   // Samples of a row come on top where facets meet.
   const std::uint64_t columns = state.grid.columns(), rows = state.grid.rows(), facets = held.facets + held.facets / 8;
   const std::uint64_t bytes = facets * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +

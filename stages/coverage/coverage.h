@@ -34,7 +34,7 @@ namespace lamina::cover {
 // --- memory of one layer in flight.
 
 /// Any layer may follow any other in it.
-struct LayerScratch {
+struct CoverageScratch {
   Buffer<SlabFacet> facets;             // that reach into the layer
   Buffer<std::uint32_t> begins, order;  // facets by the band of the last row they reach: where a band's begin; indices
   BandMaker maker;
@@ -45,12 +45,12 @@ struct LayerScratch {
 // ---
 
 /// What a layer told besides its levels.
-struct LayerReport {
+struct CoverageReport {
   double volume_mm3 = 0;             // sum of share x voxel, before shares become levels
   std::uint32_t facets = 0;          // that reach into the layer
   std::uint64_t held_voxels = 0;     // that hold facets
   std::uint64_t sampled_voxels = 0;  // whose share is that of samples
-  std::uint64_t looked_at = 0;       // voxels whose samples were counted, for a facet in them meets another one
+  std::uint64_t inspected = 0;       // voxels whose samples were counted, for a facet in them meets another one
   std::uint64_t exact_voxels = 0;    // that rationals decided; a stretch of one share counts once
   std::uint64_t scratch_bytes = 0;
 };
@@ -81,7 +81,7 @@ class Coverage {
 
   /// The levels of the layer's voxels, into `out` (its capacity is reused).
   /// cost  O(facets near the layer + voxels that hold facets), no matter how large the bed is; the same bytes on any thread
-  LayerReport layer(const Layer& layer, LayerScratch& scratch, Levels& out) const;
+  CoverageReport layer(const Layer& layer, CoverageScratch& scratch, Levels& out) const;
 
   /// What the layer has at most. cost  O(copies)
   LayerBound bound(const Layer& layer) const;

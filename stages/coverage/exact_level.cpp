@@ -39,10 +39,10 @@ mpq_class volume_behind(const Triangle& facet, const Voxel& voxel) {
 }  // namespace
 
 std::uint32_t exact_level(const Voxel& voxel, std::int64_t winding, std::span<const SlabFacet> facets,
-                          std::span<const RowFacet> stretch, std::uint32_t column, std::uint32_t top_level) {
+                          std::span<const RowFacet> span, std::uint32_t column, std::uint32_t top_level) {
   const mpq_class whole = rational(voxel.x1 - voxel.x0) * rational(voxel.y1 - voxel.y0) * rational(voxel.z1 - voxel.z0);
   mpq_class volume = rational(winding) * whole;
-  for (const RowFacet& of_row : stretch) {
+  for (const RowFacet& of_row : span) {
     const SlabFacet& facet = facets[of_row.index];
     if (facet.edgewise || of_row.first > column) continue;
     volume += volume_behind(facet.facet, voxel);

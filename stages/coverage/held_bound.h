@@ -11,7 +11,7 @@
 
 namespace lamina::cover {
 
-/// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMostSlabs; 112 bytes a slab.
+/// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMaxSlabs; 112 bytes a slab.
 ///
 /// Seen from above, what lies of a facet in a layer is convex: of area A, width w and depth d in voxels it touches at most
 /// A + 2 w + 2 d + 4 voxels, in d + 2 rows. Twice its width is how far its border runs along x: along the facet's edges, of
@@ -23,7 +23,7 @@ namespace lamina::cover {
 /// other facets add begins or ends with them.
 class HeldBound {
  public:
-  struct Count {
+  struct HeldCount {
     std::uint64_t facets = 0;  // that reach into the layer
     std::uint64_t voxels = 0;  // that hold them, and as many more as there can be rows of voxels without a gap
     std::uint64_t runs = 0;    // of levels, full ones between facets too
@@ -33,11 +33,11 @@ class HeldBound {
   /// top_level  n. cost  some ten nanoseconds a facet
   HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level);
   /// Between two heights, nm in the frame of the mesh. cost  O(1)
-  Count at(std::int64_t bottom, std::int64_t top) const;
+  HeldCount at(std::int64_t bottom, std::int64_t top) const;
   std::uint64_t bytes() const { return slab_.capacity() * sizeof(Slab); }
 
  private:
-  static constexpr std::size_t kMostSlabs = 8192;
+  static constexpr std::size_t kMaxSlabs = 8192;
   static constexpr std::uint32_t kFinest = 12;  // 4 micrometres
 
   /// Voxels, or levels x nm of height, in 1024ths, so that sums do not depend on their order.

@@ -47,8 +47,8 @@ bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::
     last = std::max(last, out.y[i]);
   }
   if (out.corners == 0) return false;
-  out.first_row = rows.at(front + first - kRoom);
-  out.last_row = rows.at(front + last + kRoom);
+  out.first_row = rows.at(front + first - kSlack);
+  out.last_row = rows.at(front + last + kSlack);
   return true;
 }
 

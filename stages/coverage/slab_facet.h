@@ -89,14 +89,14 @@ struct Tent {
 
 /// Room for `count` elements, an eighth more than that at most; what was in it is lost.
 template <class T>
-void make_room(Buffer<T>& buffer, std::size_t count) {
+void ensure_capacity(Buffer<T>& buffer, std::size_t count) {
   if (count <= buffer.capacity()) return;
   buffer = {};
   buffer.reserve(count + count / 8);
 }
 
 /// How far computed corners may lie from where they are, nm, and more: those of facets of 4 m by 4 million roundings.
-inline constexpr double kRoom = 1.0 / 1024;
+inline constexpr double kSlack = 1.0 / 1024;
 
 struct SlabFacet {
   Triangle facet;                     // nm, on the bed

@@ -20,7 +20,7 @@ struct Extruder {
   std::string name, description;
   std::string format = "gcode";  // "gcode" or "sml"
 
-  struct Bed {
+  struct ExtruderBed {
     std::array<double, 2> size_mm{220, 220};
     double build_height_mm = 250;
     std::array<double, 2> corner_mm{0, 0};  // machine coordinates of its front left corner
@@ -54,14 +54,14 @@ struct Extruder {
 
   struct Retraction {
     double length_mm = 1, speed_mm_s = 35;
-    double least_travel_mm = 1.5;  // shorter travels are made without it
+    double min_travel_mm = 1.5;  // shorter travels are made without it
   } retraction;
 
   /// Beads before the first one of the part: the nozzle has oozed while it was heated and the axes were homed.
   struct Skirt {
     std::uint32_t loops = 1;  // around all parts; 0: none
     double distance_mm = 5;   // from the parts' box to the nearest loop
-    double least_mm = 100;    // loops are added until they are so long in all
+    double min_mm = 100;    // loops are added until they are so long in all
   } skirt;
 
   struct Fan {

@@ -10,7 +10,7 @@ struct SwathBand {
 };
 
 /// A nozzle at a step.
-struct NozzlePlace {
+struct NozzlePosition {
   double column, row;  // of its centre, in pixels
   bool fires;
 };

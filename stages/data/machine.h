@@ -49,8 +49,8 @@ struct Machine {
     std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
     double highest_frequency_hz = 5000;    // of one nozzle
     double drop_pl = 50;
-    std::uint32_t most_drops = 1;        // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
-    std::uint32_t most_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
+    std::uint32_t max_drops = 1;        // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
+    std::uint32_t max_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
     std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;
     std::array<double, 2> dot_gain_um{0, 0};  // how far edges of full ink stand out of their pixels along x, y; as measured
@@ -108,11 +108,11 @@ struct Machine {
     double roller_rpm = 0;                // of a roller that turns against its way while it spreads; 0: not told
     double packing = 0.6;                 // share of the powder bed that is solid
     double evaporates_percent = 0;        // of the jetted binder, before the next layer is spread
-    double least_saturation_percent = 0;  // of the voids, that binds; 0: not stated
+    double min_saturation_percent = 0;  // of the voids, that binds; 0: not stated
   } powder;
 
   /// Keeps the nozzles from drying: firing off the bed, and wiping. Positions are those of the carriage.
-  struct Care {
+  struct Maintenance {
     std::uint32_t spit_layers = 0, wipe_layers = 0;  // before the sweeps of every so many layers, from the first; 0: never
     double spit_seconds = 0, wipe_seconds = 0;       // and at most so long before the end of any sweep; 0: no limit
     std::uint32_t spit_drops = 100;                  // of each nozzle that is not blocked
@@ -124,7 +124,7 @@ struct Machine {
 
     bool spits() const { return spit_layers > 0 || spit_seconds > 0; }
     bool wipes() const { return wipe_layers > 0 || wipe_seconds > 0; }
-  } care;
+  } maintenance;
 
   /// Prices, in units of the currency; 0: none. Powder by volume is that of the bed, as fed.
   struct Cost {

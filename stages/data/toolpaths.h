@@ -97,7 +97,7 @@ enum class Thickness : std::uint8_t {
 };
 
 /// A straight piece of a layer's toolpaths, in the order in which they are laid.
-struct Stretch {
+struct PathInterval {
   Point2 from, to;  // nm; never equal
   PathKind kind;
   Thickness thickness;
@@ -119,21 +119,21 @@ struct BeadMove {
 };
 
 /// What a move has laid.
-struct LaidMove {
+struct DepositedMove {
   double length_mm, volume_mm3;
 };
 
 /// Segmented lines as they were laid. A piece is a line, or what holes leave of it, that is divided.
 struct SegmentCounts {
   std::uint64_t pieces = 0;
-  std::uint64_t stretches = 0;  // points of the lists of Fukuda 2020: the start of a piece and its marks
+  std::uint64_t intervals = 0;  // points of the lists of Fukuda 2020: the start of a piece and its marks
   std::uint64_t thin = 0;
-  std::uint64_t points() const { return stretches + pieces; }  // with the ends of pieces
+  std::uint64_t points() const { return intervals + pieces; }  // with the ends of pieces
   std::uint64_t lines = 0;  // segmented lines, divided or not; a line cut by holes counts once
 
   void add(const SegmentCounts& other) {
     pieces += other.pieces;
-    stretches += other.stretches;
+    intervals += other.intervals;
     thin += other.thin;
     lines += other.lines;
   }
@@ -165,18 +165,18 @@ struct PoreCounts {
 };
 
 /// Stretches that end before the machine has reached their speed.
-struct ShortStretches {
+struct ShortIntervals {
   std::uint64_t count = 0;
   double shortest_mm = 0;                  // of them; 0 without any
-  double reached_mm_s = 0, told_mm_s = 0;  // of the one that becomes fastest: its speed, and the one it is told
+  double reached_mm_s = 0, commanded_mm_s = 0;  // of the one that becomes fastest: its speed, and the one it is told
 
-  void add(const ShortStretches& other) {
+  void add(const ShortIntervals& other) {
     if (other.count == 0) return;
     shortest_mm = count == 0 ? other.shortest_mm : std::min(shortest_mm, other.shortest_mm);
     count += other.count;
     if (other.reached_mm_s <= reached_mm_s) return;
     reached_mm_s = other.reached_mm_s;
-    told_mm_s = other.told_mm_s;
+    commanded_mm_s = other.commanded_mm_s;
   }
 };
 
@@ -196,13 +196,13 @@ struct PlannedPorosity {
 };
 
 /// All that is counted while the moves of a layer are laid.
-struct LaidSums {
+struct DepositedSums {
   SegmentCounts segments;
   PlannedPorosity porosity;
   PoreCounts pores;
-  ShortStretches shorts;
+  ShortIntervals shorts;
 
-  void add(const LaidSums& other) {
+  void add(const DepositedSums& other) {
     segments.add(other.segments);
     porosity.add(other.porosity);
     pores.add(other.pores);
@@ -211,7 +211,7 @@ struct LaidSums {
 };
 
 /// A straight move of a toolpath file that lays a bead.
-struct LaidBead {
+struct DepositedBead {
   Point2 from, to;     // nm on the bed
   Nm width;            // nm
   std::uint32_t type;  // what it is for, as the file numbers it

@@ -24,9 +24,9 @@ struct MoveTotals {
   double seconds = 0;      // estimated: changes of speed take the profile's acceleration, corners its corner speed
   std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
   // The share of moves, beads, volume and filament that lies beside the parts: skirts and prime lines.
-  std::uint64_t beside_moves = 0;
-  double beside_mm = 0, beside_mm3 = 0, beside_filament_mm = 0;
-  std::uint64_t part_moves() const { return moves - beside_moves; }
+  std::uint64_t auxiliary_moves = 0;
+  double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
+  std::uint64_t part_moves() const { return moves - auxiliary_moves; }
 
   void add(const MoveTotals& other) {
     moves += other.moves;
@@ -41,23 +41,23 @@ struct MoveTotals {
     lo_y = std::min(lo_y, other.lo_y);
     hi_x = std::max(hi_x, other.hi_x);
     hi_y = std::max(hi_y, other.hi_y);
-    beside_moves += other.beside_moves;
-    beside_mm += other.beside_mm;
-    beside_mm3 += other.beside_mm3;
-    beside_filament_mm += other.beside_filament_mm;
+    auxiliary_moves += other.auxiliary_moves;
+    auxiliary_mm += other.auxiliary_mm;
+    auxiliary_mm3 += other.auxiliary_mm3;
+    auxiliary_filament_mm += other.auxiliary_filament_mm;
   }
   /// Adds a bead. feed  mm of filament a mm3
-  void lay(const BeadMove& move, double length_mm, double feed) {
+  void deposit(const BeadMove& move, double length_mm, double feed) {
     const double volume = length_mm * move.area_mm2;
     ++moves;
     bead_mm += length_mm;
     volume_mm3 += volume;
     filament_mm += volume * feed;
     if (move.kind == PathKind::kSkirt) {
-      ++beside_moves;
-      beside_mm += length_mm;
-      beside_mm3 += volume;
-      beside_filament_mm += volume * feed;
+      ++auxiliary_moves;
+      auxiliary_mm += length_mm;
+      auxiliary_mm3 += volume;
+      auxiliary_filament_mm += volume * feed;
     }
     for (const Point2 p : {move.from, move.to}) {
       lo_x = std::min<std::int64_t>(lo_x, p.x);
@@ -86,7 +86,7 @@ class LayerMoves {
  public:
   virtual ~LayerMoves() = default;
   /// Writes a move; returns its length in mm.
-  virtual double lay(const BeadMove& move) = 0;
+  virtual double deposit(const BeadMove& move) = 0;
   /// Ends the layer. returns its sums
   virtual const MoveTotals& finish() = 0;
 };

@@ -55,7 +55,7 @@ struct ImageFormat {
   std::string_view description;  // for --help
   std::unique_ptr<ImageEncoder> (*make_encoder)();
   /// Bytes that the file of a layer may have at most, and so what an encoder may hold for it.
-  std::uint64_t (*most_bytes)(std::uint64_t columns, std::uint64_t rows, std::uint64_t changes);
+  std::uint64_t (*max_bytes)(std::uint64_t columns, std::uint64_t rows, std::uint64_t changes);
 };
 
 /// All formats, the default first.
@@ -92,7 +92,7 @@ struct LevelFormat {
   std::string_view description;  // for --help
   std::unique_ptr<LevelEncoder> (*make_encoder)();
   /// Bytes that the file of a layer may have at most, and so what an encoder may hold for it. changes  two a run
-  std::uint64_t (*most_bytes)(std::uint64_t columns, std::uint64_t rows, std::uint64_t changes);
+  std::uint64_t (*max_bytes)(std::uint64_t columns, std::uint64_t rows, std::uint64_t changes);
 };
 
 std::span<const LevelFormat> level_formats();

@@ -59,7 +59,7 @@ struct SliceFormat {
   bool layer_files;                                                  // may have one for each layer
   bool paths;                                                        // refuses no filling
   std::unique_ptr<SliceEncoder> (*make)(const SliceFormatOptions&);  // null: none, or a package
-  std::uint32_t point_bytes, stretch_bytes;  // of its text, at most: per point, and per element of a path
+  std::uint32_t point_bytes, interval_bytes;  // of its text, at most: per point, and per element of a path
 };
 std::span<const SliceFormat> slice_formats();
 /// The format with this id, or nullptr.

@@ -94,9 +94,9 @@ class IntervalTable {
 
   /// append() appends no more than this.
   std::uint64_t max_found(std::int64_t number) const {
-    std::uint64_t most = 0;
-    for (const Level& level : levels_) most += level.near(number, number).size();
-    return most;
+    std::uint64_t maximum = 0;
+    for (const Level& level : levels_) maximum += level.near(number, number).size();
+    return maximum;
   }
 
   std::uint64_t bytes() const {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "stages/heights/greedy.h"
-#include "stages/heights/ladder.h"
+#include "stages/heights/candidate_heights.h"
 #include "stages/heights/optimal.h"
 
 namespace lamina::heights {
@@ -18,13 +18,13 @@ Result<Options> options_of(const Settings& settings, double layer_mm) {
   options.surface.peak_angle_deg = settings.peak_angle_deg;
   options.surface.normal_tolerance = settings.normal_tolerance;
   options.surface.flat_tolerance = static_cast<Nm>(nm_of(settings.flat_tolerance_um / 1000));
-  options.surface.least_facet_mm2 = settings.least_facet_mm2;
+  options.surface.min_facet_mm2 = settings.min_facet_mm2;
   options.surface.nominal_cusps = settings.cusp_of == CuspOf::kNominal;
   options.peaks = settings.peaks;
   options.cover_top = settings.cover_top;
   options.facets = settings.facets;
   options.flats = settings.flats;
-  options.least_flat_mm2 = settings.least_flat_mm2;
+  options.min_flat_mm2 = settings.min_flat_mm2;
   options.time = {settings.time_model[0], settings.time_model[1]};
   if (!settings.thickness_mm.empty()) {
     Result<ThicknessSet> set = read_thicknesses(settings.thickness_mm);
@@ -68,16 +68,16 @@ Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options) {
   if (Status status = check_options(options); !status) return status.error();
   if (options.mode == Mode::kUniform) {
     Plan plan;
-    plan.table = LayerTable::uniform(index.top, options.set.least());
+    plan.table = LayerTable::uniform(index.top, options.set.minimum());
     return plan;
   }
-  const Result<Ladder> ladder = Ladder::reachable(options.set, std::int64_t{index.top} + options.set.most());
-  if (!ladder) return ladder.error();
+  const Result<CandidateHeights> candidate_heights = CandidateHeights::reachable(options.set, std::int64_t{index.top} + options.set.maximum());
+  if (!candidate_heights) return candidate_heights.error();
   switch (options.mode) {
-    case Mode::kAngle: return plan_by_angle(index, options, *ladder);
-    case Mode::kCusp: return plan_by_cusp(index, options, *ladder);
-    case Mode::kStepwise: return plan_stepwise(index, options, *ladder);
-    default: return plan_optimal(index, options, *ladder);
+    case Mode::kAngle: return plan_by_angle(index, options, *candidate_heights);
+    case Mode::kCusp: return plan_by_cusp(index, options, *candidate_heights);
+    case Mode::kStepwise: return plan_stepwise(index, options, *candidate_heights);
+    default: return plan_optimal(index, options, *candidate_heights);
   }
 }
 

@@ -14,7 +14,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 #include "stages/heights/flats.h"
-#include "stages/heights/ladder.h"
+#include "stages/heights/candidate_heights.h"
 #include "stages/heights/settings.h"
 #include "stages/heights/surface.h"
 #include "stages/heights/table.h"
@@ -38,12 +38,12 @@ struct Options {
   double adapt_angle_deg = 45;  // angle: slopes at least this flat get thinner layers
   SurfaceOptions surface;
   Facets facets = Facets::kRange;  // angle, cusp, stepwise
-  double least_flat_mm2 = 1;       // smaller flats are not aimed at
+  double min_flat_mm2 = 1;       // smaller flats are not aimed at
   Peaks peaks = Peaks::kFlats;     // angle
   bool cover_top = false;          // angle, optimal: the last layer ends at or above the top, within the flat tolerance
   bool flats = true;               // optimal: end layers on flats and on tops and bottoms of parts
   TimeModel time;                  // optimal
-  bool tells_time = false;         // evaluate: by kPlainTime if no model is given
+  bool estimates_time = false;         // evaluate: by kPlainTime if no model is given
   std::int64_t slab = 0;           // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
                                    // nearer below the top than the least thickness
 };
@@ -57,7 +57,7 @@ struct FlatHit {
 /// A table and what can be said for it.
 struct Plan {
   LayerTable table;
-  std::vector<Steepness> looked_at;  // angle: of each layer, the flattest slope that decided; else empty
+  std::vector<Steepness> inspected;  // angle: of each layer, the flattest slope that decided; else empty
   std::vector<bool> stepped_back;    // cusp: thinner than the slopes at its bottom ask for
   std::uint32_t small_peaks = 0;     // angle: heights with horizontal facets that are peaks in the documents, but no flats
   /// optimal: no table of one layer less (or, with a time model, of less time) that ends as near to the flats and keeps

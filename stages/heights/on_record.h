@@ -27,7 +27,7 @@ class OnRecord {
   std::optional<Options> options_;
   std::optional<std::int64_t> begins_;  // the next layer
   // Of a slab that is divided evenly: the layers of it so far, and into how many it can be divided.
-  std::int64_t count_ = -1, fewest_ = 1, most_ = 1;  // count_: below 0 within a slab whose first layers are not known
+  std::int64_t count_ = -1, fewest_ = 1, max_ = 1;  // count_: below 0 within a slab whose first layers are not known
 };
 
 }  // namespace lamina::heights

@@ -6,7 +6,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/heights/heights.h"
-#include "stages/heights/ladder.h"
+#include "stages/heights/candidate_heights.h"
 
 namespace lamina::heights {
 
@@ -28,7 +28,7 @@ namespace lamina::heights {
 ///
 /// cost  O(states * log thicknesses) where the thicknesses are all of a range and its flats can be hit, else
 ///       O(states * thicknesses)
-Plan plan_optimal(const SurfaceIndex& index, const Options& options, const Ladder& ladder);
+Plan plan_optimal(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights);
 
 // --- of all stacks with the fewest layers, the one with the least steps.
 
@@ -37,7 +37,7 @@ struct Stacks {
   std::span<const std::int32_t> layers;  // the fewest of any stack that ends on each rung; above that of `end`: none does
   std::span<const std::uint32_t> limit;  // by rung; r or less where no layer starts, else it only grows
   std::span<const double> below;         // mm2 of slopes below each rung; only grows
-  std::uint32_t least;                   // rungs
+  std::uint32_t minimum;                   // rungs
   std::uint32_t end;                     // the rung on which the stack ends
 };
 
@@ -49,6 +49,6 @@ struct Stacks {
 /// "Efficient dynamic programming using quadrangle inequalities", 1980), and halving finds all of them.
 ///
 /// cost  O(rungs * log(rungs of the same number of layers))
-Buffer<std::uint32_t> least_steps(const Stacks& stacks);
+Buffer<std::uint32_t> fewest_steps(const Stacks& stacks);
 
 }  // namespace lamina::heights

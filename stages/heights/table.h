@@ -41,7 +41,7 @@ class LayerTable {
     if (thickness_ > 0) {
       return {index, static_cast<Nm>(std::int64_t{index} * thickness_), thickness_, LayerReason::kUniform};
     }
-    const Entry& entry = entries_[index];
+    const LayerEntry& entry = entries_[index];
     return {index, entry.bottom, entry.thickness, entry.reason};
   }
   /// Where the last layer ends, nm.
@@ -51,13 +51,13 @@ class LayerTable {
   }
 
  private:
-  struct Entry {
+  struct LayerEntry {
     Nm bottom, thickness;
     LayerReason reason;
   };
   Nm thickness_ = 0;  // > 0: uniform, and nothing is stored
   std::uint32_t count_ = 0;
-  Buffer<Entry> entries_;
+  Buffer<LayerEntry> entries_;
 };
 
 // --- whether the build vat of a powder printer can make a table of layers.

@@ -12,14 +12,14 @@
 namespace lamina::heights {
 namespace {
 
-constexpr std::size_t kMostThicknesses = 10'000;
+constexpr std::size_t kMaxThicknesses = 10'000;
 constexpr double kDefaultStepMm = 0.001;
 
 Error refused(std::string what) { return {Fault::kUsage, std::move(what)}; }
 
 Status read_nm(std::string_view text, Nm& nm) {
   double millimetres = 0;
-  if (auto wrong = read_number(text, kLeastMm, kMostMm, " mm", millimetres); !wrong.empty()) return refused(std::move(wrong));
+  if (auto wrong = read_number(text, kMinMm, kMaxMm, " mm", millimetres); !wrong.empty()) return refused(std::move(wrong));
   nm = static_cast<Nm>(std::llround(millimetres * static_cast<double>(kNmPerMm)));
   return {};
 }
@@ -36,8 +36,8 @@ Result<ThicknessSet> read_range(std::string_view text, std::size_t dots) {
     return refused(fmt::format("the least thickness, {} mm, is above the greatest, {} mm; write the smaller one first", mm(low),
                                mm(high)));
   }
-  if ((high - low) / step >= static_cast<Nm>(kMostThicknesses)) {
-    return refused(fmt::format("'{}' is more than {} thicknesses; give a coarser step, as {}..{}:{}", text, kMostThicknesses,
+  if ((high - low) / step >= static_cast<Nm>(kMaxThicknesses)) {
+    return refused(fmt::format("'{}' is more than {} thicknesses; give a coarser step, as {}..{}:{}", text, kMaxThicknesses,
                                mm(low), mm(high), mm((high - low) / 1000 + 1)));
   }
   if (const Nm rest = (high - low) % step; rest != 0) {
@@ -60,8 +60,8 @@ Result<ThicknessSet> read_thicknesses(std::string_view text) {
   for (const std::string_view piece : split(text, ",")) {
     if (const Status read = read_nm(piece, set.values.emplace_back()); !read) return read.error();
   }
-  if (set.values.size() > kMostThicknesses) {
-    return refused(fmt::format("holds {} thicknesses; {} are enough", set.values.size(), kMostThicknesses));
+  if (set.values.size() > kMaxThicknesses) {
+    return refused(fmt::format("holds {} thicknesses; {} are enough", set.values.size(), kMaxThicknesses));
   }
   std::ranges::sort(set.values);
   if (const auto twice = std::ranges::adjacent_find(set.values); twice != set.values.end()) {

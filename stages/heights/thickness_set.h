@@ -15,8 +15,8 @@ namespace lamina::heights {
 struct ThicknessSet {
   std::vector<Nm> values;
 
-  Nm least() const { return values.front(); }
-  Nm most() const { return values.back(); }
+  Nm minimum() const { return values.front(); }
+  Nm maximum() const { return values.back(); }
   std::uint32_t size() const { return static_cast<std::uint32_t>(values.size()); }
   /// The length of which all of them are multiples.
   Nm step() const {
@@ -25,7 +25,7 @@ struct ThicknessSet {
     return common;
   }
   /// Whether they are all the multiples of step() from the least to the most.
-  bool is_contiguous() const { return (most() - least()) / step() + 1 == static_cast<Nm>(values.size()); }
+  bool is_contiguous() const { return (maximum() - minimum()) / step() + 1 == static_cast<Nm>(values.size()); }
 };
 
 /// Reads a set "0.178,0.254" or a range "0.05..0.3:0.01" of thicknesses in mm; a range without a step has steps of

@@ -51,7 +51,7 @@ Status append_fill(Outlines outlines, const FillContext& context, const FillPara
 struct FillBound {
   std::uint64_t points = 0;  // of toolpaths
   std::uint64_t paths = 0;
-  std::uint64_t stretches = 0;      // of one kind each, into which files divide paths
+  std::uint64_t intervals = 0;      // of one kind each, into which files divide paths
   std::uint64_t scratch_bytes = 0;  // while they are made
 };
 /// errors  as append_fill

@@ -57,7 +57,7 @@ struct FillParameters {
 };
 
 /// Settings as the stage takes them, in nm and micro-degrees; not checked, see check() in fill.h.
-FillParameters parameters_of(const Settings& settings);
+FillParameters parameters_of(const FillSettings& settings);
 
 /// The mean distance of lines, mm; for estimates: tables and expressions of gaps do not count.
 double mean_distance_mm(const FillParameters& fill);

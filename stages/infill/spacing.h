@@ -15,7 +15,7 @@
 namespace lamina::infill {
 
 /// Lines first_number, first_number + 1, ... at these places, nm, strictly increasing.
-struct LinePlaces {
+struct LinePositions {
   std::int32_t first_number = 0;
   Buffer<std::int64_t> at;
 };
@@ -32,11 +32,11 @@ struct Extent {
 /// Lines of a layer by the gaps or distances of the parameters.
 /// errors  kUsage: a distance that is not positive, with the line after which it would be; an expression that fails
 /// cost    O(lines from the part's side to the far end of what is filled)
-Result<LinePlaces> place_lines(const FillParameters& parameters, const FillContext& context, const Extent& extent);
+Result<LinePositions> line_positions(const FillParameters& parameters, const FillContext& context, const Extent& extent);
 
 /// Where line 0 lies from the part's side, before the stagger: first_line, or its default.
-/// errors  as place_lines
-Result<std::int64_t> first_place(const FillParameters& parameters, const FillContext& context, const Extent& extent);
+/// errors  as line_positions
+Result<std::int64_t> first_position(const FillParameters& parameters, const FillContext& context, const Extent& extent);
 
 // --- a gap as a formula.
 

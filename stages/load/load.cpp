@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "stages/data/shortage.h"
-#include "stages/load/foreign/foreign.h"
+#include "stages/load/foreign/unsupported.h"
 #include "stages/load/matrix.h"
 #include "stages/load/obj.h"
 #include "stages/load/repair/finish.h"

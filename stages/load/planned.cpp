@@ -73,8 +73,8 @@ Rule gauss_rule(std::span<const Nm> ends, double planes) {
 }
 
 /// Ends of at most so many stretches; the outermost stay.
-std::vector<Nm> thinned(std::span<const Nm> ends, double stretches) {
-  const std::size_t all = ends.size() - 1, count = std::min(all, static_cast<std::size_t>(std::max(1.0, stretches)));
+std::vector<Nm> thinned(std::span<const Nm> ends, double intervals) {
+  const std::size_t all = ends.size() - 1, count = std::min(all, static_cast<std::size_t>(std::max(1.0, intervals)));
   std::vector<Nm> kept;
   for (std::size_t i = 0; i <= count; ++i) kept.push_back(ends[i * all / count]);
   return kept;
@@ -85,14 +85,14 @@ std::vector<Nm> thinned(std::span<const Nm> ends, double stretches) {
 bool find_rule(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Nm> ends,
                const Effort& effort, Rule& rule, bool& exact) {
   const double height = static_cast<double>(std::int64_t{ends.back()} - ends.front());
-  double planes = std::min(kPlanes, effort.most_crossed / std::max(1.0, crossed_by_a_plane(meshes, instances, height)));
+  double planes = std::min(kPlanes, effort.max_crossed / std::max(1.0, crossed_by_a_plane(meshes, instances, height)));
   if (planes < effort.fewest_planes) return false;
   exact = true;
   rule = gauss_rule(ends, planes);
-  for (double crossed = 0; (crossed = crossed_by(meshes, instances, rule.planes)) > effort.most_crossed;) {
+  for (double crossed = 0; (crossed = crossed_by(meshes, instances, rule.planes)) > effort.max_crossed;) {
     exact = false;
     // A quarter of them as stretches and half as planes of even stretches are not more than all of them.
-    const double fewer = 0.9 * static_cast<double>(rule.planes.size()) * effort.most_crossed / crossed;
+    const double fewer = 0.9 * static_cast<double>(rule.planes.size()) * effort.max_crossed / crossed;
     planes = std::min(planes, fewer / 2);
     if (planes < effort.fewest_planes) return false;
     rule = gauss_rule(thinned(ends, fewer / 4), planes);
@@ -101,7 +101,7 @@ bool find_rule(std::span<const Mesh> meshes, std::span<const Instance> instances
 }
 
 /// Of instances that stand together, the signed sum of whose volumes is known.
-Result<PlannedVolume> united(std::span<const Mesh> meshes, std::span<const Instance> instances, std::vector<Nm> ends,
+Result<PlannedVolume> merged(std::span<const Mesh> meshes, std::span<const Instance> instances, std::vector<Nm> ends,
                              double signed_mm3, const SurplusAreas& surplus, const Effort& effort) {
   std::ranges::sort(ends);
   ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
@@ -146,7 +146,7 @@ Result<PlannedVolume> volume_of(std::span<const Mesh> meshes, std::uint32_t m, c
   if (!meshes[m].closed) return PlannedVolume{meshes[m].volume_mm3, Known::kSummed};
   if (found.shells_apart) return PlannedVolume{found.outward_mm3, Known::kExactly};
   const Instance alone{m, {0, 0, 0}};
-  return united(meshes, std::span(&alone, 1), found.shell_ends, found.volume_mm3, surplus, effort);
+  return merged(meshes, std::span(&alone, 1), found.shell_ends, found.volume_mm3, surplus, effort);
 }
 
 /// Of instances whose boxes overlap. of_mesh: what each holds alone
@@ -164,7 +164,7 @@ Result<PlannedVolume> volume_of(std::span<const Mesh> meshes, std::span<const In
     closed = closed && meshes[instance.mesh].closed;
   }
   if (!closed) return PlannedVolume{alone_mm3, Known::kSummed};
-  Result<PlannedVolume> volume = united(meshes, together, std::move(ends), signed_mm3, surplus, effort);
+  Result<PlannedVolume> volume = merged(meshes, together, std::move(ends), signed_mm3, surplus, effort);
   if (volume && volume->known == Known::kSummed) volume->mm3 = alone_mm3;
   return volume;
 }
@@ -204,7 +204,7 @@ Result<PlannedVolumes> planned_volumes(std::span<const Mesh> meshes, std::span<c
   return volumes;
 }
 
-double united_mm3(std::span<const Mesh> meshes, std::span<const Instance> instances, const SurplusAreas& surplus) {
+double union_mm3(std::span<const Mesh> meshes, std::span<const Instance> instances, const SurplusAreas& surplus) {
   std::vector<Diagnosis> diagnosis(meshes.size());
   for (const Instance& instance : instances)
     if (diagnosis[instance.mesh].triangles == 0) diagnosis[instance.mesh] = diagnose(meshes[instance.mesh], 0);

@@ -33,7 +33,7 @@ struct PlannedVolumes {
 
 /// How much may be sliced for one volume.
 struct Effort {
-  double most_crossed = 1.5e7;  // facets that all planes together may cross: some seconds
+  double max_crossed = 1.5e7;  // facets that all planes together may cross: some seconds
   double fewest_planes = 16;    // with less than these it is not integrated
 };
 
@@ -53,6 +53,6 @@ Result<PlannedVolumes> planned_volumes(std::span<const Mesh> meshes, std::span<c
 
 /// The same for meshes that nobody has diagnosed. returns  mm3; 0 if it cannot be told
 /// cost  a diagnosis of each mesh, and slicing for about a second
-double united_mm3(std::span<const Mesh> meshes, std::span<const Instance> instances, const SurplusAreas& surplus);
+double union_mm3(std::span<const Mesh> meshes, std::span<const Instance> instances, const SurplusAreas& surplus);
 
 }  // namespace lamina::load

@@ -17,7 +17,7 @@ namespace lamina::load {
 
 /// The file's length contradicts what it says about itself. If its facets close, the statement was wrong and the
 /// facets are right; if not, some of them are missing.
-struct Doubt {
+struct ReadWarning {
   std::string note;                // if the mesh is balanced
   std::string error;               // if it is not, and `claimed` is 0
   std::uint64_t claimed = 0;       // facets that the file says it holds where it holds more: the others may be rubbish
@@ -32,7 +32,7 @@ struct Facets {
   Buffer<Triangle> triangles;
   Box bounds;
   std::vector<Note> notes;
-  std::optional<Doubt> doubt;
+  std::optional<ReadWarning> warning;
 };
 
 /// Is shown the triangles of a file in pieces, each in the order of the file, by any thread. first  the number of the first

@@ -87,11 +87,11 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
       within_member = true;
     }
     if (written == output.size()) output.resize(output.size() + output.size() / 2 + kStep);
-    const std::size_t room = std::min(output.size() - written, kStep * 64);
+    const std::size_t capacity = std::min(output.size() - written, kStep * 64);
     stream.next_out = reinterpret_cast<Bytef*>(output.data() + written);
-    stream.avail_out = static_cast<uInt>(room);
+    stream.avail_out = static_cast<uInt>(capacity);
     const int status = inflate(&stream, Z_NO_FLUSH);
-    written += room - stream.avail_out;
+    written += capacity - stream.avail_out;
     if (status == Z_STREAM_END) {
       within_member = false;
     } else if (status != Z_OK && !(status == Z_BUF_ERROR && (stream.avail_in == 0 || stream.avail_out == 0))) {

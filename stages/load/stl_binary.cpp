@@ -39,7 +39,7 @@ struct Scratch {
   explicit Scratch(Isa isa) : workers([isa] { return std::make_unique<Worker>(isa); }) {}
 };
 
-std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch>(isa_at_most(isa)); }
+std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch>(limited_isa(isa)); }
 
 namespace {
 
@@ -166,10 +166,10 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     facets.notes.push_back({false, stray_bytes(stray, claimed)});
   } else if (claimed < held) {
     const std::string differ = fmt::format("the header says {} facets, the file holds {}", claimed, held);
-    facets.doubt =
-        Doubt{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacetBytes, claimed)};
+    facets.warning =
+        ReadWarning{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacetBytes, claimed)};
   } else if (claimed > held) {
-    facets.doubt = Doubt{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
+    facets.warning = ReadWarning{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
                          cut_short(source, claimed, held), 0, ""};
   }
   if (count > options.triangle_limit)
@@ -196,13 +196,13 @@ class Disorder {
  public:
   bool is_found(const MeshBlocks& blocks, std::uint32_t block) {
     constexpr std::uint32_t kFew = 8;
-    const std::uint32_t seen = ++seen_;
+    const std::uint32_t visited = ++detected_;
     if (blocks.indexed(block * MeshBlocks::kClusters).cluster != nullptr) return false;
-    return ++listed_ > kFew + seen / 4;
+    return ++listed_ > kFew + visited / 4;
   }
 
  private:
-  std::atomic<std::uint32_t> seen_{0}, listed_{0};
+  std::atomic<std::uint32_t> detected_{0}, listed_{0};
 };
 
 /// Of all facets, nm3; the sum is taken in the order of blocks, whichever thread read them.
@@ -240,7 +240,7 @@ Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
 }
 
 bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box) {
-  return is_plain(snapper) ? load_kernels_for(isa_at_most(isa)).snap(facets, count, out, box.plain)
+  return is_plain(snapper) ? load_kernels_for(limited_isa(isa)).snap(facets, count, out, box.plain)
                            : snap_transformed(facets, count, snapper, out, box.transformed);
 }
 
@@ -249,13 +249,13 @@ Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, con
   const Result<std::uint64_t> count = count_facets(source, options, facets);
   if (!count) return count.error();
   Status read = read_facets(source, snapper, options, *count, facets);
-  if (!read && facets.doubt && facets.doubt->claimed > 0) {
+  if (!read && facets.warning && facets.warning->claimed > 0) {
     // What follows the claimed facets is none.
-    facets.notes.push_back({false, facets.doubt->rest_left_out});
-    read = read_facets(source, snapper, options, facets.doubt->claimed, facets);
-    facets.doubt.reset();
-  } else if (!read && facets.doubt) {
-    return source.error(facets.doubt->error);
+    facets.notes.push_back({false, facets.warning->rest_left_out});
+    read = read_facets(source, snapper, options, facets.warning->claimed, facets);
+    facets.warning.reset();
+  } else if (!read && facets.warning) {
+    return source.error(facets.warning->error);
   }
   if (!read) return read.error();
   return facets;
@@ -265,7 +265,7 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
                                    const SeeTriangles& see, std::vector<Note>& notes) {
   Facets header;
   const Result<std::uint64_t> count = count_facets(source, options, header);
-  if (!count || header.doubt) return std::nullopt;
+  if (!count || header.warning) return std::nullopt;
   const auto triangles = static_cast<std::uint32_t>(*count);
   const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
   Buffer<Prisms> pieces(blocks->block_count());

@@ -179,13 +179,13 @@ VoxelStack close_gaps(const VoxelView& solid, int axis, Nm gap) {
   const auto a = static_cast<std::size_t>(axis);
   const auto voxels = static_cast<std::uint32_t>(std::max(gap, 0) / solid.edge[a]);
   // A gap as long as the axis is none.
-  const std::uint32_t most = std::min(voxels, solid.size()[a]);
+  const std::uint32_t maximum = std::min(voxels, solid.size()[a]);
   std::vector<Rows> slices(solid.nz);
   tbb::parallel_for(std::uint32_t{0}, solid.nz, [&](std::uint32_t z) {
     const VoxelView slice = solid.slice(z);
-    if (axis == 1 && solid.ny > 0) slices[z] = closed_along_y(slice, most);
+    if (axis == 1 && solid.ny > 0) slices[z] = closed_along_y(slice, maximum);
     for (std::uint32_t y = 0; axis == 0 && y < solid.ny; ++y) {
-      close_row(slice.row(y, 0), solid.nx, solid.periodic[0], most, slices[z]);
+      close_row(slice.row(y, 0), solid.nx, solid.periodic[0], maximum, slices[z]);
     }
   });
   VoxelStack out(solid.nx, solid.ny, solid.edge, solid.periodic);

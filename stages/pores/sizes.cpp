@@ -45,8 +45,8 @@ Ends ends_of(const VoxelView& slice, const Parts& parts) {
 PoreSizes sizes_of(const VoxelView& slice, const VoxelView* outside, std::uint32_t number) {
   PoreSizes sizes;
   const Parts parts = parts_of(slice);
-  Buffer<std::uint8_t> beside(parts.size(), std::uint8_t{0});
-  if (outside != nullptr) beside = parts_beside(slice, parts, *outside);
+  Buffer<std::uint8_t> neighbour(parts.size(), std::uint8_t{0});
+  if (outside != nullptr) neighbour = adjacent_parts(slice, parts, *outside);
   Ends ends = ends_of(slice, parts);
   const double pixel_mm2 = mm(slice.edge[0]) * mm(slice.edge[1]);
   const std::array<double, 2> size_mm{slice.nx * mm(slice.edge[0]), slice.ny * mm(slice.edge[1])};
@@ -56,12 +56,12 @@ PoreSizes sizes_of(const VoxelView& slice, const VoxelView* outside, std::uint32
       ++sizes.endless;
       sizes.endless_mm2 += area;
       if (parts.wraps[p] < 3) sizes.channels_mm.push_back(area / (parts.wraps[p] == 1 ? size_mm[0] : size_mm[1]));
-    } else if (beside[p] != 0 || (parts.faces[p] & (kFacesX | kFacesY)) != 0) {
+    } else if (neighbour[p] != 0 || (parts.faces[p] & (kFacesX | kFacesY)) != 0) {
       ++sizes.cut;
       sizes.cut_mm2 += area;
     } else {
       const std::span<Pixel> pixels = std::span(ends.pixels).subspan(ends.begin[p], ends.begin[p + 1] - ends.begin[p]);
-      const BoxSides box = least_box(pixels, {slice.edge[0], slice.edge[1]});
+      const BoxSides box = smallest_box(pixels, {slice.edge[0], slice.edge[1]});
       sizes.pores.push_back({box.length / kNmPerMm, box.width / kNmPerMm, area, number});
     }
   }
@@ -82,8 +82,8 @@ PoreSizes pore_sizes(const VoxelView& solid, const VoxelView* body) {
   const VoxelStack outside = body == nullptr ? VoxelStack() : without(void_of(solid), *body);
   std::vector<PoreSizes> found(solid.nz);
   tbb::parallel_for(std::uint32_t{0}, solid.nz, [&](std::uint32_t z) {
-    const VoxelView beside = body == nullptr ? VoxelView() : outside.view().slice(z);
-    found[z] = sizes_of(empty.view().slice(z), body == nullptr ? nullptr : &beside, z);
+    const VoxelView neighbour = body == nullptr ? VoxelView() : outside.view().slice(z);
+    found[z] = sizes_of(empty.view().slice(z), body == nullptr ? nullptr : &neighbour, z);
   });
   PoreSizes all;
   for (PoreSizes& slice : found) {
@@ -102,8 +102,8 @@ Distribution distribution(std::span<const double> values, double bin, std::uint3
   result.bins.assign(bins, 0);
   result.count = values.size();
   if (values.empty()) return result;
-  const auto [least, most] = std::ranges::minmax(values);
-  result.least = least, result.most = most;
+  const auto [minimum, maximum] = std::ranges::minmax(values);
+  result.minimum = minimum, result.maximum = maximum;
   double sum = 0, squares = 0;
   for (const double value : values) {
     sum += value;
@@ -145,8 +145,8 @@ std::size_t hull_of(std::span<Pixel> pixels) {
                                            [&](Pixel p) { return turn(first, last, p) < 0; });
   const auto middle = static_cast<std::size_t>(right - pixels.begin());
   std::size_t size = 1;
-  const auto push = [&](Pixel p, std::size_t least) {
-    while (size > least && turn(pixels[size - 2], pixels[size - 1], p) <= 0) --size;
+  const auto push = [&](Pixel p, std::size_t minimum) {
+    while (size > minimum && turn(pixels[size - 2], pixels[size - 1], p) <= 0) --size;
     pixels[size++] = p;
   };
   for (std::size_t i = 1; i < middle; ++i) push(pixels[i], 1);
@@ -177,7 +177,7 @@ std::array<double, 2> extents(std::span<const Pixel> hull, std::array<Nm, 2> edg
 
 }  // namespace
 
-BoxSides least_box(std::span<Pixel> pixels, std::array<Nm, 2> edge) {
+BoxSides smallest_box(std::span<Pixel> pixels, std::array<Nm, 2> edge) {
   const std::span<const Pixel> hull = pixels.first(hull_of(pixels));
   std::tuple<double, double, double> best;  // area, width, length
   const auto attempt = [&](Wide dx, Wide dy, bool first) {

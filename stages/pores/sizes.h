@@ -42,7 +42,7 @@ PoreSizes pore_sizes(const VoxelView& solid, const VoxelView* body = nullptr);
 /// Mean, standard deviation (of a sample, n - 1) and histogram.
 struct Distribution {
   std::uint64_t count = 0;
-  double mean = 0, deviation = 0, least = 0, most = 0;
+  double mean = 0, deviation = 0, minimum = 0, maximum = 0;
   double bin = 0;
   std::vector<std::uint64_t> bins;  // bin i holds i * bin <= value < (i + 1) * bin; the last holds all beyond too
 };
@@ -69,6 +69,6 @@ struct BoxSides {
 /// have the same box, to the last bit.
 /// pixels  at least one, any order; they are sorted, and their convex hull is left in front
 /// edge    nm, along x and y
-BoxSides least_box(std::span<Pixel> pixels, std::array<Nm, 2> edge);
+BoxSides smallest_box(std::span<Pixel> pixels, std::array<Nm, 2> edge);
 
 }  // namespace lamina::pores

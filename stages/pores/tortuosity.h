@@ -9,7 +9,7 @@
 namespace lamina::pores {
 
 struct Tortuosity {
-  double mean = 0, least = 0, most = 0;  // shortest way / thickness, over the void voxels of the far face that are reached
+  double mean = 0, minimum = 0, maximum = 0;  // shortest way / thickness, over the void voxels of the far face that are reached
   std::uint64_t reached = 0;             // of these
   std::uint64_t outlet = 0;              // void voxels of the far face
 };

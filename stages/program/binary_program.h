@@ -58,13 +58,13 @@ void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::si
   std::size_t next = backward ? end : out.size();
   out.resize(end);
   const std::size_t stride = vectors.words * sizeof(std::uint64_t), plane_stride = stride / planes;
-  for_each_segment(vectors, kHead, step_bytes, [&](std::uint32_t place, std::uint32_t count) {
+  for_each_segment(vectors, kHead, step_bytes, [&](std::uint32_t position, std::uint32_t count) {
     const std::size_t bytes = kHead + count * step_bytes;
     if (backward) next -= bytes;
     std::byte* to = out.data() + next;
-    head(to, place, count);
+    head(to, position, count);
     to += kHead;
-    const auto* from = reinterpret_cast<const std::byte*>(vectors.bits.data()) + place * stride;
+    const auto* from = reinterpret_cast<const std::byte*>(vectors.bits.data()) + position * stride;
     if (stride == vector_bytes && !turn) {
       std::memcpy(to, from, count * stride);
     } else {

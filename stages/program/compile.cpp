@@ -99,8 +99,8 @@ class LayerCompiler {
     const bool lower = swath > 0 && own < grid_.overlap, upper = swath + 1 < swaths_ && own >= stride_;
     if (whole.empty() || (!lower && !upper)) return whole;
     if (nozzle_blocked(lower ? own + stride_ : own - stride_)) return whole;  // the other swath cannot
-    const std::uint32_t place = lower ? own : own - stride_;
-    const std::uint32_t share = (grid_.overlap - place) * 64 / (grid_.overlap + 1);
+    const std::uint32_t position = lower ? own : own - stride_;
+    const std::uint32_t share = (grid_.overlap - position) * 64 / (grid_.overlap + 1);
     Buffer<std::uint32_t>& part = new_line();
     divide(whole, number, share, upper, part);
     return part;
@@ -110,7 +110,7 @@ class LayerCompiler {
   template <class Under>
   void load(const Under& under) {
     plane_ = first_drop_;
-    most_here_ = 1;
+    max_here_ = 1;
     if (grid_.drop_bits == 1) {
       for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(i);
       return;
@@ -121,7 +121,7 @@ class LayerCompiler {
       std::uint32_t drops = 0;
       for (plane_ = first_drop_; plane_ < end && !(fired_[drops] = under(i)).empty(); ++plane_) ++drops;
       scratch_.bits.add({fired_.data(), drops});
-      most_here_ = std::max(most_here_, drops);
+      max_here_ = std::max(max_here_, drops);
     }
     scratch_.bits.end(scratch_.nozzle);
     plane_ = first_drop_;
@@ -137,8 +137,8 @@ class LayerCompiler {
     backward_ = !backward_;
     // A sweep of all drops that the head has would have fired these with those before.
     const auto whole = [&](std::uint32_t drops) { return (drops + grid_.head_drops - 1) / grid_.head_drops; };
-    sweep.drops = most_here_;
-    sweep.added = whole(first_drop_ + most_here_) == whole(first_drop_);
+    sweep.drops = max_here_;
+    sweep.added = whole(first_drop_ + max_here_) == whole(first_drop_);
     count_.added += sweep.added ? 1 : 0;
     for (std::size_t i = 0; i < scratch_.nozzle.size(); ++i) {
       count_.drops += pixels_of(scratch_.nozzle[i]) << (i / grid_.nozzles);
@@ -213,7 +213,7 @@ class LayerCompiler {
   CompileScratch& scratch_;
   const EmitSweep& emit_;
   std::vector<bool> blocked_;
-  std::uint32_t planes_, plane_ = 0, first_drop_ = 0, most_here_ = 1;
+  std::uint32_t planes_, plane_ = 0, first_drop_ = 0, max_here_ = 1;
   std::vector<Line> fired_;  // of a nozzle, drop after drop
   std::int64_t first_ = 0;   // line of the first swath
   std::uint32_t stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "stages/program/brundlefab/brundlefab.h"
-#include "stages/program/care/care_check.h"
+#include "stages/program/care/maintenance_check.h"
 #include "stages/program/dialect.h"
 #include "stages/program/hp45/hp45.h"
 #include "stages/program/m578/m578.h"
@@ -24,7 +24,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
     {"planes", ".planes", "32-bit padded planes of a swath, as production heads take them; our own definition", 65'535, 31,
      false, kSaysAll | kSaysDrops, planes::make_writer},
     {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
-     true, kSaysBase | kSaysCare | kSaysSeconds | kSaysCap, hp45::make_writer, hp45::check},
+     true, kSaysBase | kSaysMaintenance | kSaysSeconds | kSaysCap, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
      kSaysAll, oasis::make_writer, oasis::check},
     {"brundlefab",
@@ -36,7 +36,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
      kSaysBase | kSaysShots | kSaysSeconds,
      brundlefab::make_writer,
      brundlefab::check,
-     {.own_places = true}},
+     {.own_positions = true}},
     {"m578",
      ".gcode",
      "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
@@ -59,18 +59,18 @@ const Dialect* find_dialect(std::string_view id) {
 }
 
 Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
-  if (machine.head.most_drops > 1 && (dialect.says & kSaysDrops) == 0) {
+  if (machine.head.max_drops > 1 && (dialect.says & kSaysDrops) == 0) {
     return Error{Fault::kUsage,
-                 fmt::format("{}: head.most_drops: {}, and a command of {} fires one drop of a nozzle; give 1, and "
+                 fmt::format("{}: head.max_drops: {}, and a command of {} fires one drop of a nozzle; give 1, and "
                              "each drop of a pixel is a sweep",
-                             machine.name, machine.head.most_drops, dialect.id)};
+                             machine.name, machine.head.max_drops, dialect.id)};
   }
-  if (grid.nozzles <= dialect.most_nozzles) {
-    if (Status status = check_care(dialect, machine, grid); !status) return status;
+  if (grid.nozzles <= dialect.max_nozzles) {
+    if (Status status = check_maintenance(dialect, machine, grid); !status) return status;
     return dialect.check != nullptr ? dialect.check(machine, grid) : Status();
   }
   return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}", machine.name,
-                                          dialect.id, dialect.most_nozzles, grid.nozzles)};
+                                          dialect.id, dialect.max_nozzles, grid.nozzles)};
 }
 
 }  // namespace lamina::write

@@ -32,9 +32,9 @@ class ProgramWriter {
 
   // --- care in dialects of vectors alone, as records of their own; all others spell it within the lines above
   /// Behind begin_layer(), before each sweep(), before end_layer().
-  virtual void care_of_layer(const LayerCycle&, ProgramBytes&) {}
-  virtual void care_before(const Sweep&, const SweepVectors&, ProgramBytes&) {}
-  virtual void care_behind(ProgramBytes&) {}
+  virtual void maintenance_of_layer(const LayerCycle&, ProgramBytes&) {}
+  virtual void maintenance_before(const Sweep&, const SweepVectors&, ProgramBytes&) {}
+  virtual void maintenance_after(ProgramBytes&) {}
 };
 
 /// What a dialect can say beside the drops and the powder of a layer, a bit each.
@@ -48,16 +48,16 @@ enum Saying : std::uint32_t {
   kSaysSeconds = 64,  // what it says of both between sweeps as well, by the clock
   kSaysOwn = 128,     // lines of the machine's own, which its profile has
   kSaysCap = 256,     // where the head waits in pauses
-  kSaysCare = kSaysShots | kSaysWipes,
+  kSaysMaintenance = kSaysShots | kSaysWipes,
   kSaysAll = 511,
   kSaysDrops = 512  // several drops of a pixel in one sweep
 };
 
 /// Care where a head does not go to it as to any place, at the speed of travels, and fire at its highest frequency.
-struct CareRules {
+struct MaintenanceRules {
   double (*shot_s)(const Machine&) = nullptr;
   double (*longest_sweep_s)(const Machine&, const HeadGrid&) = nullptr;  // without the way to it
-  bool own_places = false;  // the dialect's check() holds places and limits in seconds itself
+  bool own_positions = false;  // the dialect's check() holds places and limits in seconds itself
 };
 
 /// One row of the registry.
@@ -65,7 +65,7 @@ struct Dialect {
   std::string_view id;         // as in machine.dialect
   std::string_view extension;  // with the dot
   std::string_view description;
-  std::uint32_t most_nozzles;
+  std::uint32_t max_nozzles;
   std::uint32_t bit_order;  // HeadGrid::bit_order that its vectors have
   bool has_motion;          // the text moves axes and vats; else it is the data of the head alone
   std::uint32_t says;       // bits of Saying
@@ -73,7 +73,7 @@ struct Dialect {
   std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
   /// What it cannot say beside the number of nozzles. errors  kUsage
   Status (*check)(const Machine& machine, const HeadGrid& grid) = nullptr;
-  CareRules care = {};
+  MaintenanceRules maintenance = {};
 };
 
 std::span<const Dialect> dialects();

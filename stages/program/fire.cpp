@@ -52,11 +52,11 @@ void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch
   const std::uint32_t ticks = grid.steps_per_pixel, words = vectors.words;
   auto& offset = scratch.event_offset;
   offset.assign(std::size_t{vectors.steps} + 2, 0);
-  const auto place_of = [&](std::uint32_t change, std::uint32_t lag) {
+  const auto position_of = [&](std::uint32_t change, std::uint32_t lag) {
     return std::min(std::uint64_t{change} * ticks + lag - vectors.first_step, std::uint64_t{vectors.steps});
   };
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    for (const std::uint32_t change : lines[l]) ++offset[place_of(change, grid.lag[l % grid.nozzles]) + 1];
+    for (const std::uint32_t change : lines[l]) ++offset[position_of(change, grid.lag[l % grid.nozzles]) + 1];
   }
   for (std::size_t s = 0; s + 1 < offset.size(); ++s) offset[s + 1] += offset[s];
   scratch.event_bit.resize(offset.back());
@@ -64,7 +64,7 @@ void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch
     const auto i = static_cast<std::uint32_t>(l % grid.nozzles);
     const std::size_t bit = (i ^ grid.bit_order) + l / grid.nozzles * grid.words() * 64;
     for (const std::uint32_t change : lines[l]) {
-      scratch.event_bit[offset[place_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(bit);
+      scratch.event_bit[offset[position_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(bit);
     }
   }
   // Filling moved each offset to the end of its step.

@@ -28,9 +28,9 @@ std::uint64_t pixels_of(Line line) {
 void divide(Line line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result) {
   for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
     bool before = false;
-    for (std::uint32_t place = line[i]; place < line[i + 1]; ++place) {
-      const bool fires = upper_fires(number, place, share) == upper;
-      if (fires != before) result.push_back(place);
+    for (std::uint32_t position = line[i]; position < line[i + 1]; ++position) {
+      const bool fires = upper_fires(number, position, share) == upper;
+      if (fires != before) result.push_back(position);
       before = fires;
     }
     if (before) result.push_back(line[i + 1]);
@@ -80,7 +80,7 @@ void DropBits::end(std::span<Line> nozzle) const {
 
 std::uint64_t DropBits::bytes() const {
   std::uint64_t total = 0;
-  for (std::uint32_t bit = 0; bit < kMost; ++bit) total += bytes_held(change_[bit]) + bytes_held(end_[bit]);
+  for (std::uint32_t bit = 0; bit < kMax; ++bit) total += bytes_held(change_[bit]) + bytes_held(end_[bit]);
   return total;
 }
 

@@ -19,8 +19,8 @@ void combine(Line one, Line other, LineOperation operation, Buffer<std::uint32_t
 std::uint64_t pixels_of(Line line);
 
 /// Whether the upper of two swaths fires a place of a line that they share. `share` of 64 places, evenly spread.
-constexpr bool upper_fires(std::uint64_t line, std::uint32_t place, std::uint32_t share) {
-  const std::uint32_t turned = (place + static_cast<std::uint32_t>(line) * 23) & 63;
+constexpr bool upper_fires(std::uint64_t line, std::uint32_t position, std::uint32_t share) {
+  const std::uint32_t turned = (position + static_cast<std::uint32_t>(line) * 23) & 63;
   // The order 0, 32, 16, 48, ... puts each further place into the largest gap.
   const std::uint32_t order = ((turned & 1) << 5) | ((turned & 2) << 3) | ((turned & 4) << 1) | ((turned & 8) >> 1) |
                               ((turned & 16) >> 3) | ((turned & 32) >> 5);
@@ -37,9 +37,9 @@ void divide(Line line, std::uint64_t number, std::uint32_t share, bool upper, Bu
 class DropBits {
  public:
   /// Most bits of a number of drops.
-  static constexpr std::uint32_t kMost = 4;
+  static constexpr std::uint32_t kMax = 4;
 
-  /// bits  1 .. kMost
+  /// bits  1 .. kMax
   void begin(std::uint32_t bits);
   /// The next nozzle. drops  line k, from 0, has the places of more than k drops, each within the one before; fewer than
   /// 2 ^ bits. cost  O(drops x changes)
@@ -52,8 +52,8 @@ class DropBits {
 
  private:
   std::uint32_t bits_ = 1;
-  std::array<Buffer<std::uint32_t>, kMost> change_;  // of all nozzles, for each bit
-  std::array<Buffer<std::uint32_t>, kMost> end_;     // where those of a nozzle end
+  std::array<Buffer<std::uint32_t>, kMax> change_;  // of all nozzles, for each bit
+  std::array<Buffer<std::uint32_t>, kMax> end_;     // where those of a nozzle end
   std::vector<std::size_t> next_;
 };
 

@@ -42,7 +42,7 @@ class Carriage {
     return grid_.line_position_nm(line) / kNmPerMm + machine_.mounting.offset_mm[grid_.scan_axis == ScanAxis::kX ? 1 : 0];
   }
   /// x and y of the carriage.
-  std::array<double, 2> place(double along_mm, std::int64_t line) const {
+  std::array<double, 2> position(double along_mm, std::int64_t line) const {
     const double across_mm = across(line);
     return grid_.scan_axis == ScanAxis::kX ? std::array{along_mm, across_mm} : std::array{across_mm, along_mm};
   }
@@ -52,7 +52,7 @@ class Carriage {
 
  private:
   double end_of(const SweepVectors& vectors, bool last) const {
-    const double ramp = machine_.motion.ramp_mm * (last == grid_.places_from_end ? -1 : 1);
+    const double ramp = machine_.motion.ramp_mm * (last == grid_.positions_from_end ? -1 : 1);
     return along(last ? vectors.first_step + vectors.steps - 1.0 : vectors.first_step) + ramp;
   }
   const Machine& machine_;
@@ -82,11 +82,11 @@ template <class Visit>
 void for_each_vector(const Sweep& sweep, const SweepVectors& vectors, const Visit& visit) {
   const auto& firing = vectors.firing;
   for (std::size_t i = 0; i < firing.size(); i += 2) {
-    const std::size_t stretch = sweep.backward ? firing.size() - 2 - i : i;
-    const std::uint32_t count = firing[stretch + 1] - firing[stretch];
+    const std::size_t span = sweep.backward ? firing.size() - 2 - i : i;
+    const std::uint32_t count = firing[span + 1] - firing[span];
     for (std::uint32_t k = 0; k < count; ++k) {
-      const std::uint32_t place = firing[stretch] + (sweep.backward ? count - 1 - k : k);
-      visit(vectors.first_step + place, vectors.bits.data() + std::size_t{place} * vectors.words);
+      const std::uint32_t position = firing[span] + (sweep.backward ? count - 1 - k : k);
+      visit(vectors.first_step + position, vectors.bits.data() + std::size_t{position} * vectors.words);
     }
   }
 }

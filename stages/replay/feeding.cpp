@@ -47,8 +47,8 @@ Status VatLevels::take(std::uint32_t layer, const std::optional<Count>& taken) {
   for (std::size_t vat = 0; vat < 2; ++vat) {
     const double before = left_mm_[vat];
     left_mm_[vat] -= count.fed_mm[vat];
-    if (depth_mm_[vat] == 0 || told_[vat] || left_mm_[vat] > -1e-3) continue;
-    told_[vat] = true;
+    if (depth_mm_[vat] == 0 || reports_[vat] || left_mm_[vat] > -1e-3) continue;
+    reports_[vat] = true;
     status =
         Error{Fault::kVerification, fmt::format("layer {}: takes {:g} mm of the {} vat, where {:g} of {:g} are left", layer,
                                                 count.fed_mm[vat], vat == 0 ? "first" : "second", before, depth_mm_[vat])};

@@ -36,7 +36,7 @@ class VatLevels {
 
  private:
   std::array<double, 2> depth_mm_, left_mm_;
-  std::array<bool, 2> told_{};
+  std::array<bool, 2> reports_{};
   std::uint32_t next_ = 0;  // layer
   bool known_ = false;
 };

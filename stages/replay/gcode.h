@@ -67,7 +67,7 @@ class Axes {
   double last_way(const std::string& axis) { return way_[axis[0]]; }
 
  private:
-  bool ways_are_free(const GcodeLine& line);
+  bool paths_are_clear(const GcodeLine& line);
   Printing& printing_;
   GcodeReader& reader_;
   std::map<char, double> at_, way_;

@@ -23,7 +23,7 @@ Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose pu
       fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0),
       fires_row_(purpose == Purpose::kPrint ? machine.rows_ : 0, 0) {}
 
-Standing Printing::standing() const {
+AxisPositions Printing::axis_positions() const {
   const auto& motion = profile().motion;
   return {motion.safe_mm[0], motion.safe_mm[1], profile().powder.build_sign * (mm(layer_.bottom) - base_mm()),
           profile().powder.roller_mm[0]};
@@ -36,18 +36,18 @@ void Printing::fail(std::string what) {
 void Printing::fault(std::string_view what) {
   if (!ok()) return;
   const bool ahead = reading_sweep_ != INT64_MIN;  // its words are read, and it has not begun
-  std::string place = fmt::format("layer {}", layer_.index);
+  std::string position = fmt::format("layer {}", layer_.index);
   if (ahead || sweeping_) {
-    place += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
+    position += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
     if (reading_ != INT64_MIN) {
-      place += fmt::format(", step {}", reading_);
+      position += fmt::format(", step {}", reading_);
     } else {
-      place += stepped_ && !ahead ? fmt::format(", step {}", step_) : ", before its first step";
+      position += stepped_ && !ahead ? fmt::format(", step {}", step_) : ", before its first step";
     }
   } else {
-    place += ", before its first swath";
+    position += ", before its first swath";
   }
-  fail(fmt::format("{}: {}", place, what));
+  fail(fmt::format("{}: {}", position, what));
 }
 
 void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<std::uint32_t> of) {
@@ -66,7 +66,7 @@ void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<st
   fired_here_ = false;
   ++count.sweeps;
   host_spread_ = true;
-  if (of) tells_sweep(*of);
+  if (of) state_sweep(*of);
   check_spread();
 }
 
@@ -86,8 +86,8 @@ void Printing::go_across(double carriage_mm) {
 
 double Printing::position_of(double step) const {
   const auto& mount = profile().mounting;
-  double um = 0.5 * machine_.place_um_ + step * machine_.step_um_;
-  if (mount.scan_from == Side::kRight || mount.scan_from == Side::kBack) um = machine_.places_ * machine_.place_um_ - um;
+  double um = 0.5 * machine_.position_um_ + step * machine_.step_um_;
+  if (mount.scan_from == Side::kRight || mount.scan_from == Side::kBack) um = machine_.positions_ * machine_.position_um_ - um;
   return um / 1000 + mount.offset_mm[mount.scan_axis == ScanAxis::kX ? 0 : 1];
 }
 
@@ -113,11 +113,11 @@ void Printing::at_step(std::int64_t step) {
   ++count.vectors;
 }
 
-bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const {
-  if (line < 0 || place < 0 || line >= machine_.lines_ || place >= machine_.places_) return false;
+bool Printing::pixel(std::int64_t line, std::int64_t position, std::uint32_t& column, std::uint32_t& row) const {
+  if (line < 0 || position < 0 || line >= machine_.lines_ || position >= machine_.positions_) return false;
   const auto& mount = profile().mounting;
   const bool x = mount.scan_axis == ScanAxis::kX;
-  const auto from_left = x ? place : line, from_back = x ? line : place;
+  const auto from_left = x ? position : line, from_back = x ? line : position;
   const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
   column = static_cast<std::uint32_t>(has(Side::kRight) ? machine_.columns_ - 1 - from_left : from_left);
   row = static_cast<std::uint32_t>(has(Side::kFront) ? machine_.rows_ - 1 - from_back : from_back);
@@ -125,8 +125,8 @@ bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& colum
 }
 
 void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops) {
-  const double hertz = drops * mm_s * 1000 / machine_.place_um_;
-  const double rounded = drops * kHalfMmPerMinute * 1000 / machine_.place_um_;  // speeds are written so
+  const double hertz = drops * mm_s * 1000 / machine_.position_um_;
+  const double rounded = drops * kHalfMmPerMinute * 1000 / machine_.position_um_;  // speeds are written so
   if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4) + rounded) {
     return fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
                              profile().head.highest_frequency_hz));
@@ -136,10 +136,10 @@ void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t d
   const double way = std::abs(mm), a = profile().motion.acceleration_mm_s2;
   takes(a == 0 ? way / mm_s : way < mm_s * mm_s / a ? 2 * std::sqrt(way / a) : way / mm_s + mm_s / a);
   if (!scanning) return;
-  const auto& care = profile().care;
-  if (care.spits()) check_care("fired off the bed", care.spit_layers, care.spit_seconds, spat_s_);
-  if (care.wipes()) check_care("wiped", care.wipe_layers, care.wipe_seconds, wiped_s_);
-  if (care.spits() && wiped_s_ > spat_s_) fault("scans behind the wiper before the head is fired off the bed");
+  const auto& maintenance = profile().maintenance;
+  if (maintenance.spits()) check_maintenance("fired off the bed", maintenance.spit_layers, maintenance.spit_seconds, spat_s_);
+  if (maintenance.wipes()) check_maintenance("wiped", maintenance.wipe_layers, maintenance.wipe_seconds, wiped_s_);
+  if (maintenance.spits() && wiped_s_ > spat_s_) fault("scans behind the wiper before the head is fired off the bed");
   if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
@@ -151,16 +151,16 @@ void Printing::check_speed(double mm_s, bool scanning) {
     if (std::abs(mm_s - motion.scan_speed_mm_s) < 1.01 * kHalfMmPerMinute) return;
     return fault(fmt::format("scans at {:g} mm/s where {:g} have to be", mm_s, motion.scan_speed_mm_s));
   }
-  const double wipe = profile().care.wipes() ? profile().care.wipe_speed_mm_s : 0;
+  const double wipe = profile().maintenance.wipes() ? profile().maintenance.wipe_speed_mm_s : 0;
   const double roller = roller_on_gantry() ? profile().powder.roller_speed_mm_s : 0;
-  const double most = std::max({motion.travel_speed_mm_s, motion.scan_speed_mm_s, wipe, roller});
-  if (mm_s > most + 1.01 * kHalfMmPerMinute)
-    fault(fmt::format("the head travels at {:g} mm/s, the profile's fastest is {:g}", mm_s, most));
+  const double maximum = std::max({motion.travel_speed_mm_s, motion.scan_speed_mm_s, wipe, roller});
+  if (mm_s > maximum + 1.01 * kHalfMmPerMinute)
+    fault(fmt::format("the head travels at {:g} mm/s, the profile's fastest is {:g}", mm_s, maximum));
 }
 
-bool Printing::has_ramps(double before_mm, double behind_mm, double beside_mm) {
+bool Printing::has_ramps(double before_mm, double behind_mm, double adjacent_mm) {
   const double ramp = profile().motion.ramp_mm;
-  if (std::min(before_mm, behind_mm) > ramp - beside_mm) return true;
+  if (std::min(before_mm, behind_mm) > ramp - adjacent_mm) return true;
   fault(fmt::format("{:g} mm before the first drops and {:g} behind the last are left, where ramps of {:g} have to be",
                     before_mm, behind_mm, ramp));
   return false;
@@ -175,11 +175,11 @@ const Count& Printing::finish() {
                             2 * std::abs(powder.roller_mm[1] - powder.roller_mm[0]) / powder.roller_speed_mm_s;
     takes(powder.spread_s > 0 ? powder.spread_s : by_moves);
   };
-  if (!tells_powder_) {
+  if (!moves_powder_) {
     for (std::uint32_t below = 0; below < base_layers(); ++below) spread(powder.base_layer_mm);
     spread(mm(layer_.thickness));
   }
-  count.microseconds = std::llround((seconds_ < kMostSeconds ? seconds_ : kMostSeconds) * 1e6);
+  count.microseconds = std::llround((seconds_ < kMaxSeconds ? seconds_ : kMaxSeconds) * 1e6);
   return count;
 }
 
@@ -197,9 +197,9 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
   if (late < 0 || late % machine_.ticks_ != 0 || !pixel(first_line_ + nozzle.line, late / machine_.ticks_, column, row)) {
     return fault(fmt::format("nozzle {} fires where there is no pixel", number));
   }
-  if (drops > profile().head.most_drops) {
+  if (drops > profile().head.max_drops) {
     return fault(
-        fmt::format("nozzle {} fires {} drops at a place, the head has at most {}", number, drops, profile().head.most_drops));
+        fmt::format("nozzle {} fires {} drops at a place, the head has at most {}", number, drops, profile().head.max_drops));
   }
   std::uint64_t* const fired = &fired_[(std::size_t{row} * row_words_ + column / 64) * times_bits_];
   const unsigned bit = column % 64;
@@ -214,8 +214,8 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
   }
   fires_row_[row] = 1;
   count.drops += drops;
-  sweep_most_ = std::max(sweep_most_, drops);
-  count.most_at_place = std::max(count.most_at_place, drops);
+  sweep_max_ = std::max(sweep_max_, drops);
+  count.max_per_position = std::max(count.max_per_position, drops);
   count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
   count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
   for (std::uint32_t k = 0; watch_ != nullptr && k < drops; ++k) {
@@ -233,28 +233,28 @@ std::uint64_t Printing::fired_more(std::uint32_t times, std::size_t word) const 
   return more;
 }
 
-std::uint32_t Printing::sweeps_a_place() const {
+std::uint32_t Printing::sweeps_per_position() const {
   const auto& head = profile().head;
-  const double hertz = profile().motion.scan_speed_mm_s * 1000 / machine_.place_um_;
-  const double fits = std::clamp(std::floor(head.highest_frequency_hz / hertz + 1e-9), 1.0, double(head.most_drops));
+  const double hertz = profile().motion.scan_speed_mm_s * 1000 / machine_.position_um_;
+  const double fits = std::clamp(std::floor(head.highest_frequency_hz / hertz + 1e-9), 1.0, double(head.max_drops));
   return static_cast<std::uint32_t>(std::ceil(planes_ / fits));
 }
 
 void Printing::leave_sweep() {
-  if (sweep_most_ == 0 || profile().head.most_drops < 2) return;
-  const std::uint32_t number = sweep_ / sweeps_a_place();
-  if (number != place_.number) place_ = {};
-  place_.number = number;
-  const std::uint32_t most = profile().head.most_drops;
-  const auto needed = [&] { return (place_.drops + most - 1) / most; };  // sweeps, for the drops so far
+  if (sweep_max_ == 0 || profile().head.max_drops < 2) return;
+  const std::uint32_t number = sweep_ / sweeps_per_position();
+  if (number != position_.number) position_ = {};
+  position_.number = number;
+  const std::uint32_t maximum = profile().head.max_drops;
+  const auto needed = [&] { return (position_.drops + maximum - 1) / maximum; };  // sweeps, for the drops so far
   const std::uint32_t before = needed();
-  place_.drops += sweep_most_;
+  position_.drops += sweep_max_;
   if (needed() == before) added_.insert(sweep_);
   count.added = static_cast<std::uint32_t>(added_.size());
-  sweep_most_ = 0;
+  sweep_max_ = 0;
 }
 
-std::uint32_t Printing::drop_bits() const { return replay::drop_bits(profile().head.most_drops); }
+std::uint32_t Printing::drop_bits() const { return replay::drop_bits(profile().head.max_drops); }
 
 void Printing::fire_words(std::span<const std::uint64_t> words) {
   if (purpose_ == Purpose::kTime) return;
@@ -269,12 +269,12 @@ void Printing::fire_words(std::span<const std::uint64_t> words) {
 
 // What a program says of its layer and of its sweeps, against the layer and where the sweeps are.
 
-void Printing::tells_layers(std::uint32_t layers) {
+void Printing::state_layers(std::uint32_t layers) {
   if (machine_.layers_ == 0 || layers == machine_.layers_) return;
   fault(fmt::format("the program is of {} layers, the job has {}", layers, machine_.layers_));
 }
 
-void Printing::tells_heights(std::optional<double> bottom_mm, double thickness_mm) {
+void Printing::state_heights(std::optional<double> bottom_mm, double thickness_mm) {
   const double bottom = mm(layer_.bottom), thickness = mm(layer_.thickness);
   if (std::abs(thickness_mm - thickness) > 1e-4) {
     wrong_powder(fmt::format("it is told to be {:g} mm thick where {:g} have to be", thickness_mm, thickness));
@@ -283,10 +283,10 @@ void Printing::tells_heights(std::optional<double> bottom_mm, double thickness_m
   }
 }
 
-void Printing::tells_sweep(std::uint32_t of) {
+void Printing::state_sweep(std::uint32_t of) {
   if (backward_ && !profile().motion.both_directions) fault("runs back, and the profile's head fires on the way there alone");
-  if (told_of_ && *told_of_ != of) fault(fmt::format("is one of {} swaths, those before of {}", of, *told_of_));
-  told_of_ = of;
+  if (swaths_stated_ && *swaths_stated_ != of) fault(fmt::format("is one of {} swaths, those before of {}", of, *swaths_stated_));
+  swaths_stated_ = of;
 }
 
 // The first line of the layer that has something; the last one if none has.
@@ -301,17 +301,17 @@ std::int64_t Printing::first_of_layer(const RunsView& image) const {
 
 // Numbers follow from where sweeps begin: a swath after the other, of each its passes, of each the sweeps for its drops.
 void Printing::check_numbers(std::span<const RunsView> planes) {
-  if (!told_of_) return;
+  if (!swaths_stated_) return;
   const auto& mount = profile().mounting;
   const std::int64_t lines = std::int64_t{nozzles()} * mount.passes, stride = lines - mount.overlap_lines;
   std::int64_t first = mount.first_swath == FirstSwath::kLayer ? first_of_layer(planes[0]) : 0;
   first -= static_cast<std::int64_t>(layer_.index) * mount.joint_shift_lines % stride;
   const std::int64_t left = machine_.lines_ - first;
   const std::int64_t swaths = left <= lines ? 1 : 1 + (left - lines + stride - 1) / stride;
-  const std::int64_t a_place = sweeps_a_place(), of = swaths * mount.passes * a_place;
-  if (*told_of_ != of)
+  const std::int64_t per_position = sweeps_per_position(), of = swaths * mount.passes * per_position;
+  if (*swaths_stated_ != of)
     return fail(
-        fmt::format("layer {}, before its first swath: is told to have {} swaths, and has {}", layer_.index, *told_of_, of));
+        fmt::format("layer {}, before its first swath: is told to have {} swaths, and has {}", layer_.index, *swaths_stated_, of));
   const bool further = profile().head.blocked_rule == BlockedRule::kSecondPass && !profile().head.blocked.empty();
   for (const Sweep& sweep : sweeps_) {
     if (sweep.number >= of) {
@@ -319,7 +319,7 @@ void Printing::check_numbers(std::span<const RunsView> planes) {
       return fail(fmt::format("layer {}, swath {}, before its first step: is beyond the {} that the layer has", layer_.index,
                               sweep.number, of));
     }
-    const std::int64_t place = sweep.number / a_place, at = first + place / mount.passes * stride + place % mount.passes;
+    const std::int64_t position = sweep.number / per_position, at = first + position / mount.passes * stride + position % mount.passes;
     if (sweep.first_line == at) continue;
     return fail(
         fmt::format("layer {}, swath {}, before its first step: begins at line {}, and the swath of that number at line {}",
@@ -337,21 +337,21 @@ std::int64_t Printing::line_of(std::uint32_t column, std::uint32_t row) const {
 }
 
 // Where the nozzle is that has to see to a pixel.
-std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
+std::string Printing::describe_position(std::uint32_t column, std::uint32_t row) const {
   const auto& mount = profile().mounting;
   const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
   const std::int64_t from_left = has(Side::kRight) ? machine_.columns_ - 1 - column : column;
   const std::int64_t from_back = has(Side::kFront) ? machine_.rows_ - 1 - row : row;
   const bool x = mount.scan_axis == ScanAxis::kX;
-  const std::int64_t line = x ? from_back : from_left, place = x ? from_left : from_back;
+  const std::int64_t line = x ? from_back : from_left, position = x ? from_left : from_back;
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
       if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
       return fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number,
-                         place * machine_.ticks_ + nozzle.step_offset);
+                         position * machine_.ticks_ + nozzle.step_offset);
     }
   }
-  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, place);
+  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, position);
 }
 
 // Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
@@ -405,9 +405,9 @@ void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::ui
             !extra ? moved + lost > 0 && may_be_lost(column, row)
                    : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
                                      : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
-        if (differ.first_of_all.empty()) differ.first_of_all = place_of(column, row);
+        if (differ.first_of_all.empty()) differ.first_of_all = describe_position(column, row);
         if (differ.first.empty() && !explained) {
-          differ.first = fmt::format("{}: column {}, row {} is {}{}", place_of(column, row), column, row,
+          differ.first = fmt::format("{}: column {}, row {} is {}{}", describe_position(column, row), column, row,
                                      extra ? "fired and not set in the image" : "set in the image and not fired",
                                      planes_ == 1 ? "" : fmt::format(", drop {}", plane + 1));
         }
@@ -434,8 +434,8 @@ void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, st
   }
   if (added != moved || missing != moved + lost) {
     // The manifest alone may speak of such pixels.
-    const std::string place = first_of_all.empty() ? fmt::format("layer {}", layer_.index) : first_of_all;
-    fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", place, missing, added,
+    const std::string position = first_of_all.empty() ? fmt::format("layer {}", layer_.index) : first_of_all;
+    fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", position, missing, added,
                      moved + lost, moved));
   }
 }
@@ -449,10 +449,10 @@ void Printing::leaves_wiper(std::string_view what) {
 }
 
 // A wipe is a G1 as fast as the profile has it: travels may have the same ends.
-void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
-  const auto& care = profile().care;
+void Printing::head_is_at(double x_mm, double y_mm, double works_mm_s) {
+  const auto& maintenance = profile().maintenance;
   leaves_wiper("the head goes on");
-  leaves_place();
+  leaves_position();
   if (lamp_on_) {
     fault(fmt::format("the head moves before '{}', which ends the pause to dry", profile().powder.dry_off_lines.front()));
   }
@@ -460,8 +460,8 @@ void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
     fault(fmt::format("the head goes to {:g}, {:g} mm behind the pause to fill vats, not to its safe place", x_mm, y_mm));
   }
   filled_ = false;
-  const bool slow = std::abs(works_mm_s - care.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
-  if (const auto& wiper = care.wipe_mm; wiper && slow) {
+  const bool slow = std::abs(works_mm_s - maintenance.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
+  if (const auto& wiper = maintenance.wipe_mm; wiper && slow) {
     const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
     if (std::hypot(x - (*wiper)[0], y - (*wiper)[1]) + std::hypot(x_mm - (*wiper)[2], y_mm - (*wiper)[3]) < 1e-3) {
       at_wiper_ = true;
@@ -472,22 +472,22 @@ void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
   head_mm_ = {x_mm, y_mm};
 }
 
-void Printing::leaves_place() {
-  const std::uint32_t drops = profile().care.spit_drops;
+void Printing::leaves_position() {
+  const std::uint32_t drops = profile().maintenance.spit_drops;
   if (spat_here_ % std::max(1u, drops) != 0) {
     fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, drops));
   }
   spat_here_ = 0;
 }
 
-void Printing::check_care(std::string_view what, std::uint32_t every, double limit_s, double done_s) {
+void Printing::check_maintenance(std::string_view what, std::uint32_t every, double limit_s, double done_s) {
   const bool due = limit_s > 0 || (every > 0 && layer_.index % every == 0);
   if (done_s < 0 && due) return fault(fmt::format("scans before the head is {}, as it has to be in this layer", what));
   if (limit_s == 0 || seconds_ - done_s <= limit_s) return;
   fault(fmt::format("a sweep ends {:.2f} s after the head was {} where {:g} may pass", seconds_ - done_s, what, limit_s));
 }
 
-void Printing::beside_bed(double x_mm, double y_mm) {
+void Printing::outside_bed(double x_mm, double y_mm) {
   const auto& mount = profile().mounting;
   const bool x = mount.scan_axis == ScanAxis::kX;
   double um = ((x ? y_mm : x_mm) - mount.offset_mm[x ? 1 : 0]) * 1000;
@@ -505,34 +505,34 @@ void Printing::beside_bed(double x_mm, double y_mm) {
 }
 
 void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double seconds) {
-  const auto& care = profile().care;
-  if (!care.spits() || !care.spit_mm) return fault("fires off the bed, and the profile has no place for it");
-  if (std::hypot(x_mm - (*care.spit_mm)[0], y_mm - (*care.spit_mm)[1]) > 1e-3) {
-    return fault(fmt::format("fires off the bed at {:g}, {:g} mm, not at {:g}, {:g}", x_mm, y_mm, (*care.spit_mm)[0],
-                             (*care.spit_mm)[1]));
+  const auto& maintenance = profile().maintenance;
+  if (!maintenance.spits() || !maintenance.spit_mm) return fault("fires off the bed, and the profile has no place for it");
+  if (std::hypot(x_mm - (*maintenance.spit_mm)[0], y_mm - (*maintenance.spit_mm)[1]) > 1e-3) {
+    return fault(fmt::format("fires off the bed at {:g}, {:g} mm, not at {:g}, {:g}", x_mm, y_mm, (*maintenance.spit_mm)[0],
+                             (*maintenance.spit_mm)[1]));
   }
-  beside_bed(x_mm, y_mm);
+  outside_bed(x_mm, y_mm);
   for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) count.spat += nozzle.blocked ? 0 : drops;
   leaves_wiper("nozzles fire off the bed");
   takes(seconds);
   spat_here_ += drops;
-  if (spat_here_ > care.spit_drops) {
-    return fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, care.spit_drops));
+  if (spat_here_ > maintenance.spit_drops) {
+    return fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, maintenance.spit_drops));
   }
-  if (spat_here_ < care.spit_drops) return;
+  if (spat_here_ < maintenance.spit_drops) return;
   spat_s_ = seconds_;
   ++count.spits;
 }
 
 // Where the profile has the head wait in pauses.
 bool Printing::capped() const {
-  const auto at = profile().care.cap_mm.value_or(profile().motion.safe_mm);
+  const auto at = profile().maintenance.cap_mm.value_or(profile().motion.safe_mm);
   const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
   return std::hypot(x - at[0], y - at[1]) < 1e-3;
 }
 
 void Printing::waits_capped(std::string_view what) {
-  const auto& cap = profile().care.cap_mm;
+  const auto& cap = profile().maintenance.cap_mm;
   const auto at = cap.value_or(profile().motion.safe_mm);
   if (capped()) return;
   fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe place", at[0], at[1]));
@@ -541,7 +541,7 @@ void Printing::waits_capped(std::string_view what) {
 void Printing::refills() {
   if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
   waits_capped("the vats are filled");
-  filled_ = profile().care.cap_mm.has_value();
+  filled_ = profile().maintenance.cap_mm.has_value();
   if (++count.refills > 1) fault("waits for the vats to be filled a second time");
 }
 
@@ -555,7 +555,7 @@ void Printing::dwells(double seconds) {
 bool Printing::takes_own(std::string_view line) {
   const auto& powder = profile().powder;
   // The block that may come now.
-  const auto& lines = at_wiper_ ? profile().care.wipe_lines : dwelt_s_ > 0 ? powder.dry_off_lines : powder.dry_on_lines;
+  const auto& lines = at_wiper_ ? profile().maintenance.wipe_lines : dwelt_s_ > 0 ? powder.dry_off_lines : powder.dry_on_lines;
   if (own_ < lines.size() && lines[own_] == line) {
     if (under_way_) fault(fmt::format("'{}' comes while the head may still move; G4 P0 waits for it", line));
     if (!at_wiper_) waits_capped(fmt::format("'{}' of the pause to dry comes", line));
@@ -572,7 +572,7 @@ bool Printing::takes_own(std::string_view line) {
 
 void Printing::roller_turns(double rpm) { rpm_ = rpm; }
 
-void Printing::tells_host(std::string_view record, bool of_powder) {
+void Printing::state_host(std::string_view record, bool of_powder) {
   if (of_powder && host_spread_) return fault(fmt::format("{} stands behind the layer's powder", record));
   if (of_powder && record != "FILL" && !head_at_safe()) {
     return fault(fmt::format("{} stands where the head is not at its safe place, and the powder is spread", record));
@@ -580,7 +580,7 @@ void Printing::tells_host(std::string_view record, bool of_powder) {
   host_spread_ = host_spread_ || !of_powder;
 }
 
-void Printing::tells_base(std::uint32_t layers, double layer_mm) {
+void Printing::state_base(std::uint32_t layers, double layer_mm) {
   if (based_) return fault("tells a base of powder a second time");
   based_ = true;
   if (layers == base_layers() && std::abs(layer_mm - profile().powder.base_layer_mm) < 1e-6) return;
@@ -594,14 +594,14 @@ void Printing::check_pauses() {
     wrong_cycle(fmt::format("the layer dries for {:g} s where {:g} have to be", dwelt_s_, powder.dry_s));
   }
   const std::uint32_t lamps = (powder.dry_on_lines.empty() ? 0 : 1) + (powder.dry_off_lines.empty() ? 0 : 1);
-  const std::uint32_t wipers = profile().care.wipe_lines.empty() ? 0 : count.wipes;
+  const std::uint32_t wipers = profile().maintenance.wipe_lines.empty() ? 0 : count.wipes;
   if (lamp_blocks_ == lamps && wiper_blocks_ == wipers) return;
   wrong_cycle(
       fmt::format("the machine's own lines stand {} times where {} have to", lamp_blocks_ + wiper_blocks_, lamps + wipers));
 }
 
 // Of a program that moves no powder.
-void Printing::check_told() {
+void Printing::check_stated() {
   check_pauses();
   if (base_layers() > 0 && !based_) wrong_cycle(fmt::format("its base of {} layers is not told", base_layers()));
   if (const double rpm = profile().powder.roller_rpm; std::abs(rpm_ - rpm) > 1e-3) {
@@ -667,22 +667,22 @@ void Printing::check_spread() {
 void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
   count.fed_mm[vat] += mm;
   if (mm > 0) count.vats |= 1u << vat;
-  tells_powder_ = true;
+  moves_powder_ = true;
   takes(std::abs(mm) / mm_s);
 }
 
-void Printing::build_vat_stands_at(double mm) {
-  count.moves = tells_powder_ = true;
+void Printing::build_vat_is_at(double mm) {
+  count.moves = moves_powder_ = true;
   count.build_mm = mm * profile().powder.build_sign;
 }
 
 void Printing::build_vat_goes_down(double mm) {
-  count.moves = tells_powder_ = true;
+  count.moves = moves_powder_ = true;
   lowered_mm_ = mm;
 }
 
-void Printing::roller_stands_at(double mm, bool may_spread) {
-  tells_powder_ = true;
+void Printing::roller_is_at(double mm, bool may_spread) {
+  moves_powder_ = true;
   const double far = profile().powder.roller_mm[1];
   const bool comes = std::abs(roller_mm_ - far) >= 1e-3 || std::abs(profile().powder.roller_mm[0] - far) < 1e-3;
   if (may_spread && std::abs(mm - far) < 1e-3 && comes)
@@ -742,14 +742,14 @@ void Printing::check_cycle() {
   const auto& powder = profile().powder;
   const Layer& layer = layer_;
   const auto wrong = [&](const std::string& what) { wrong_cycle(what); };
-  if (const Standing next = standing(); head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
+  if (const AxisPositions next = axis_positions(); head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
     wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
                       (*head_mm_)[1], next.x_mm, next.y_mm));
   }
   if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
   if (profile().dialect == "raw" || profile().dialect == "planes") {  // the head alone
     if (!spread_wrong_.empty()) wrong(spread_wrong_);
-    return check_told();
+    return check_stated();
   }
   if (!count.moves) return wrong("the build vat does not move");
   if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));

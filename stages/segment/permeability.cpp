@@ -14,7 +14,7 @@ Result<std::vector<FlowPoint>> expanded(std::span<const FlowPoint> points, doubl
       return Error{Fault::kInput, fmt::format("a drop of {:.4g} Pa from an outlet at {:.6g} Pa leaves no pressure at the inlet",
                                               drop, pressures.outlet_pa)};
     }
-    point.gradient_pa_m *= (inlet + pressures.outlet_pa) / (2 * pressures.told_pa);
+    point.gradient_pa_m *= (inlet + pressures.outlet_pa) / (2 * pressures.reference_pa);
   }
   return gas;
 }

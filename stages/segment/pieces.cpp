@@ -27,7 +27,7 @@ TestPiece lines_to_measure(std::string name, std::string task, std::array<double
 }
 
 /// Such lines of one thin stretch between two thick ones.
-TestPiece thin_stretches(std::string name, std::string task, std::array<double, 3> size_mm) {
+TestPiece thin_intervals(std::string name, std::string task, std::array<double, 3> size_mm) {
   TestPiece piece = lines_to_measure(std::move(name), std::move(task), size_mm);
   piece.thick_mm = 10;
   piece.thin_mm = 30;
@@ -54,7 +54,7 @@ void add_flow_and_level(const PieceRequest& request, std::vector<TestPiece>& pie
 
 void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
   const std::vector<double>&speeds = request.thin_speeds, &extrusions = request.thin_extrusions;
-  TestPiece speed = thin_stretches(
+  TestPiece speed = thin_intervals(
       "4-speed",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
@@ -63,7 +63,7 @@ void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
           speeds.size(), number_text(speeds.front()), number_text(speeds.back())),
       {width_for(speeds.size(), request.width_mm), 50, request.height_mm});
   speed.thin_speed_sweep = speeds;
-  TestPiece extrusion = thin_stretches(
+  TestPiece extrusion = thin_intervals(
       "4-extrusion",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin with {} to {} % of the extrusion from right to left; measure the narrowest place (thin_mm)",

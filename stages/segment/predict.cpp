@@ -46,12 +46,12 @@ Status check(const Segmentation& s, double bead_width_mm) {
   }
   if (s.continuous < 1) return wrong("continuous_lines", "0; give 1 or more, lines between two segmented ones");
   // A bead that is squeezed more than this has no room: its neighbour's centre lies inside of it.
-  const double least = (s.thin_width_mm + s.continuous_width_mm) / 2;
-  if (!positive(s.spacing_sc_mm) || s.spacing_sc_mm < least - 1e-9) {
+  const double minimum = (s.thin_width_mm + s.continuous_width_mm) / 2;
+  if (!positive(s.spacing_sc_mm) || s.spacing_sc_mm < minimum - 1e-9) {
     return wrong("spacing_sc_mm",
                  fmt::format("{} mm is below the {:.3f} mm at which even thin stretches touch their neighbours and "
                              "no pore is left; give more",
-                             s.spacing_sc_mm, least));
+                             s.spacing_sc_mm, minimum));
   }
   if (s.continuous > 1 && (!positive(s.spacing_cc_mm) || s.spacing_cc_mm < bead_width_mm / 2)) {
     return wrong("spacing_cc_mm",

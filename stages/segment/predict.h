@@ -15,7 +15,7 @@ namespace lamina::segment {
 struct Segmentation {
   CutRule rule = CutRule::kAligned;
   double thick_mm = 1.5, thin_mm = 1.5;
-  double least_end_mm = 0.75;
+  double min_end_mm = 0.75;
   std::uint32_t continuous = 1;
   double spacing_sc_mm = 0.43, spacing_cc_mm = 0.40;  // centre to centre
   double thick_extrusion = 100, thin_extrusion = 100;

@@ -45,7 +45,7 @@ std::string set_cell(std::string_view column, const std::string& text, Measured&
 }  // namespace
 
 Result<std::vector<Measured>> read_widths(const std::string& path) {
-  auto file = FileReader::open(path, {.fault = Fault::kInput, .most_bytes = kMostTableBytes, .streams = true});
+  auto file = FileReader::open(path, {.fault = Fault::kInput, .max_bytes = kMaxTableBytes, .streams = true});
   return file ? read_widths(*file) : Result<std::vector<Measured>>(file.error());
 }
 

@@ -89,18 +89,18 @@ class PlaneFinder {
     if (planes.empty()) return;
     const auto range = static_cast<std::uint64_t>(planes.back() - planes.front());
     while ((range >> shift_) > 4 * planes.size()) ++shift_;
-    place_.resize(static_cast<std::size_t>(range >> shift_) + 1);
+    position_.resize(static_cast<std::size_t>(range >> shift_) + 1);
     std::uint32_t plane = 0;
-    for (std::size_t cell = 0; cell < place_.size(); ++cell) {
+    for (std::size_t cell = 0; cell < position_.size(); ++cell) {
       while (planes[plane] < planes.front() + static_cast<std::int64_t>(cell << shift_)) ++plane;
-      place_[cell] = plane;
+      position_[cell] = plane;
     }
   }
 
   std::uint32_t operator()(std::int64_t z) const {
     if (planes_.empty() || z <= planes_.front()) return 0;
     if (z > planes_.back()) return static_cast<std::uint32_t>(planes_.size());
-    std::uint32_t plane = place_[static_cast<std::size_t>(static_cast<std::uint64_t>(z - planes_.front()) >> shift_)];
+    std::uint32_t plane = position_[static_cast<std::size_t>(static_cast<std::uint64_t>(z - planes_.front()) >> shift_)];
     while (planes_[plane] < z) ++plane;
     return plane;
   }
@@ -108,7 +108,7 @@ class PlaneFinder {
  private:
   std::span<const std::int64_t> planes_;
   std::uint32_t shift_ = 0;
-  Buffer<std::uint32_t> place_;
+  Buffer<std::uint32_t> position_;
 };
 
 }  // namespace

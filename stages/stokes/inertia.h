@@ -14,7 +14,7 @@ namespace lamina::stokes {
 
 struct InertiaOptions {
   double tolerance = 1e-4;         // of the velocities: what a creeping flow would change, relative
-  std::uint32_t most_rounds = 40;  // where it does not settle, the flow may have no steady state
+  std::uint32_t max_rounds = 40;  // where it does not settle, the flow may have no steady state
   std::function<bool(std::uint32_t round, double change)> progress;  // false ends the work; may be empty
 };
 
@@ -58,7 +58,7 @@ struct SweepPoint {
 /// returns  fewer points where a flow does not settle: it is the last one then
 /// errors   kInterrupted: by options.progress
 /// cost     of a creeping flow and `count` times solve_with_inertia()
-Result<std::vector<SweepPoint>> sweep(const Grid& grid, int axis, double most, std::uint32_t count,
+Result<std::vector<SweepPoint>> sweep(const Grid& grid, int axis, double maximum, std::uint32_t count,
                                       const InertiaOptions& options);
 
 /// The velocity up to which inertia takes more than velocity^2.5: weak inertia, where the excess force goes with the cube.

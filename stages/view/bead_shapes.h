@@ -40,9 +40,9 @@ Status add_paths(const ToolpathsView& paths, LayerShapes& shapes);
 /// types   names of the bead types as written by any slicer; they decide the ink; "" if unknown
 /// errors  kInternal if Clipper refuses them
 /// cost    O(beads * types) and the union of the beads
-Status add_beads(std::span<const LaidBead> beads, std::span<const std::string> types, LayerShapes& shapes);
+Status add_beads(std::span<const DepositedBead> beads, std::span<const std::string> types, LayerShapes& shapes);
 
 /// Total length of all beads, mm.
-double length_mm(std::span<const LaidBead> beads);
+double length_mm(std::span<const DepositedBead> beads);
 
 }  // namespace lamina::view

@@ -9,7 +9,7 @@ namespace {
 
 class Squeeze {
  public:
-  Squeeze(std::span<const BesideBead> beads, double height, double period, Buffer<SqueezedBead>& out)
+  Squeeze(std::span<const AdjacentBead> beads, double height, double period, Buffer<SqueezedBead>& out)
       : beads_(beads), out_(out), height_(height), period_(period), size_(beads.size()) {
     out_.resize(size_);
     for (std::size_t i = 0; i < size_; ++i) {
@@ -37,11 +37,11 @@ class Squeeze {
 
  private:
   bool has_right(std::size_t i) const { return i % size_ + 1 < size_ || period_ > 0; }
-  const BesideBead& bead(std::size_t i) const { return beads_[i % size_]; }
+  const AdjacentBead& bead(std::size_t i) const { return beads_[i % size_]; }
   double turns(std::size_t i) const { return i < size_ ? 0 : period_; }
   double distance(std::size_t i) const { return bead(i + 1).centre_mm + turns(i % size_ + 1) - bead(i).centre_mm; }
   /// Room that stays between the centres of a bead and its right neighbour; below 0: more than all.
-  double room(std::size_t i) const { return height_ * distance(i) - (bead(i).area_mm2 + bead(i + 1).area_mm2) / 2; }
+  double clearance(std::size_t i) const { return height_ * distance(i) - (bead(i).area_mm2 + bead(i + 1).area_mm2) / 2; }
 
   bool join() {
     bool joined = false;
@@ -59,18 +59,18 @@ class Squeeze {
     SqueezedBead& right = out_[(i + 1) % size_];
     // Both give way by the shares of their widths.
     const double widths = bead(i).width_mm + bead(i + 1).width_mm;
-    const double place = widths > 0 ? distance(i) * bead(i).width_mm / widths : distance(i) / 2;
-    left.right_mm = bead(i).centre_mm + place;
+    const double position = widths > 0 ? distance(i) * bead(i).width_mm / widths : distance(i) / 2;
+    left.right_mm = bead(i).centre_mm + position;
     right.left_mm = left.right_mm - turns(i % size_ + 1);
-    left.cusps_mm2 = std::max(room(i), 0.0) * (1 - filled);
+    left.cusps_mm2 = std::max(clearance(i), 0.0) * (1 - filled);
   }
 
   /// What has no room between the beads first..last, and what room there is.
   void sum(std::size_t first, std::size_t last, double& over, double& free) const {
     over = free = 0;
     for (std::size_t i = first; i < last; ++i) {
-      over += std::max(-room(i), 0.0);
-      free += std::max(room(i), 0.0);
+      over += std::max(-clearance(i), 0.0);
+      free += std::max(clearance(i), 0.0);
     }
   }
 
@@ -96,7 +96,7 @@ class Squeeze {
     }
   }
 
-  std::span<const BesideBead> beads_;
+  std::span<const AdjacentBead> beads_;
   Buffer<SqueezedBead>& out_;
   double height_, period_;
   std::size_t size_;
@@ -104,7 +104,7 @@ class Squeeze {
 
 }  // namespace
 
-void squeeze(std::span<const BesideBead> beads, double height_mm, double period_mm, Buffer<SqueezedBead>& out) {
+void squeeze(std::span<const AdjacentBead> beads, double height_mm, double period_mm, Buffer<SqueezedBead>& out) {
   if (beads.empty()) return out.clear();
   Squeeze(beads, height_mm, period_mm, out).run();
 }

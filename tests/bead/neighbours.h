@@ -13,7 +13,7 @@
 
 namespace lamina::bead {
 
-struct BesideBead {
+struct AdjacentBead {
   double centre_mm;  // across the lines, increasing
   double area_mm2;
   double width_mm;  // alone (section.h)
@@ -31,6 +31,6 @@ struct SqueezedBead {
 /// out        one for each bead
 /// period_mm  > 0: the beads repeat so far to the right, the last one touches the first of the next period
 /// cost       O(beads) for each bead that is reached only because others were pushed outwards; usually O(beads)
-void squeeze(std::span<const BesideBead> beads, double height_mm, double period_mm, Buffer<SqueezedBead>& out);
+void squeeze(std::span<const AdjacentBead> beads, double height_mm, double period_mm, Buffer<SqueezedBead>& out);
 
 }  // namespace lamina::bead

@@ -22,12 +22,12 @@ Volume random_volume(std::uint32_t seed, double share) {
 
 /// Sizes of bodies by flooding voxels, largest first.
 std::vector<std::uint64_t> flood(const Volume& volume, bool diagonal) {
-  std::vector<std::uint8_t> seen(volume.set.size(), 0);
+  std::vector<std::uint8_t> detected(volume.set.size(), 0);
   std::vector<std::uint64_t> sizes;
-  for (std::size_t start = 0; start < seen.size(); ++start) {
-    if (seen[start] != 0 || volume.set[start] == 0) continue;
+  for (std::size_t start = 0; start < detected.size(); ++start) {
+    if (detected[start] != 0 || volume.set[start] == 0) continue;
     std::vector<std::size_t> open{start};
-    seen[start] = 1;
+    detected[start] = 1;
     std::uint64_t size = 0;
     while (!open.empty()) {
       const std::size_t at = open.back();
@@ -43,8 +43,8 @@ std::vector<std::uint64_t> flood(const Volume& volume, bool diagonal) {
             if (dl != 0 ? steps != 0 : steps > (diagonal ? 2 : 1)) continue;
             if (!volume.at(c + dc, r + dr, l + dl)) continue;
             const auto next = static_cast<std::size_t>(((l + dl) * volume.rows + r + dr) * volume.columns + c + dc);
-            if (seen[next] != 0) continue;
-            seen[next] = 1;
+            if (detected[next] != 0) continue;
+            detected[next] = 1;
             open.push_back(next);
           }
         }

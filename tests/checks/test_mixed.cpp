@@ -7,7 +7,7 @@
 #include "pipeline/report/image_text.h"
 #include "stages/checks/mixed.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 namespace {
 
 std::vector<Nm> planes_of(std::uint32_t layers) {
@@ -32,8 +32,8 @@ TEST(MixedLayers, AsCountedLayerByLayer) {
   std::mt19937 random(7);
   const std::vector<Nm> planes = planes_of(40);
   for (int round = 0; round < 200; ++round) {
-    std::vector<PowderStretch> stretches(1 + random() % 8);
-    for (PowderStretch& one : stretches) {
+    std::vector<PowderInterval> intervals(1 + random() % 8);
+    for (PowderInterval& one : intervals) {
       one.from = static_cast<std::int64_t>(random() % 4000);
       one.to = one.from + static_cast<std::int64_t>(random() % 1500);
       one.material = static_cast<std::uint32_t>(random() % 3);
@@ -41,12 +41,12 @@ TEST(MixedLayers, AsCountedLayerByLayer) {
     std::set<std::uint32_t> counted, found;
     for (std::uint32_t i = 0; i < planes.size(); ++i) {
       std::set<std::uint32_t> powders;
-      for (const auto& [from, to, material] : stretches) {
+      for (const auto& [from, to, material] : intervals) {
         if (planes[i] >= from && planes[i] < to) powders.insert(material);
       }
       if (powders.size() > 1) counted.insert(i);
     }
-    for (const auto& [first, last] : mixed_layers(stretches, 3, planes)) {
+    for (const auto& [first, last] : mixed_layers(intervals, 3, planes)) {
       for (std::uint32_t i = first; i <= last; ++i) found.insert(i);
     }
     EXPECT_EQ(found, counted) << round;

@@ -5,7 +5,7 @@
 
 #include "stages/checks/tally.h"
 
-namespace lamina::sanity {
+namespace lamina::checks {
 namespace {
 
 constexpr std::int64_t kPixel = 100'000;  // nm
@@ -61,7 +61,7 @@ TEST(Tally, CountsEveryPixelOfLowSolids) {
                                               static_cast<std::uint32_t>(top), static_cast<std::uint32_t>(bottom)};
     Tally tally({{box_of(grid, static_cast<Nm>(left), static_cast<Nm>(right), static_cast<Nm>(top), static_cast<Nm>(bottom),
                          1'000'000)}});
-    tally.look_through(grid);
+    tally.inspect_layers(grid);
     std::uint64_t set = 0;
     for (std::uint32_t i = 0; i < 4; ++i) {
       const Layer layer{i, static_cast<Nm>(i) * 250'000, 250'000};
@@ -71,7 +71,7 @@ TEST(Tally, CountsEveryPixelOfLowSolids) {
     }
     EXPECT_NEAR(tally.planned_mm3(0), static_cast<double>(set) * 0.1 * 0.1 * 0.25, 1e-5);
     EXPECT_DOUBLE_EQ(tally.left_mm3(0), tally.planned_mm3(0));
-    EXPECT_EQ(tally.seen(0), set > 0);
+    EXPECT_EQ(tally.detected(0), set > 0);
   }
 }
 
@@ -80,7 +80,7 @@ TEST(Tally, EstimatesHighSolidsFromSomeRows) {
   const PixelGrid grid = grid_of(60, 200);
   const std::array<std::uint32_t, 4> window{10, 50, 20, 180};
   Tally tally({{box_of(grid, 10, 50, 20, 180, 100'000'000)}});
-  tally.look_through(grid);
+  tally.inspect_layers(grid);
   std::uint64_t set = 0;
   for (std::uint32_t i = 0; i < 100; ++i) {
     tally.add_image({i, static_cast<Nm>(i) * 1'000'000, 1'000'000}, random_image(random, grid, window, set));
@@ -88,32 +88,32 @@ TEST(Tally, EstimatesHighSolidsFromSomeRows) {
   EXPECT_NEAR(tally.planned_mm3(0) / (static_cast<double>(set) * 0.1 * 0.1), 1, 0.02);
 }
 
-TEST(Tally, TellsSolidsApart) {
+TEST(Tally, DistinguishesSolids) {
   const PixelGrid grid = grid_of(40, 30);
   Tally tally({{box_of(grid, 2, 8, 5, 9, 1'000'000), 0, 0, 3}, {box_of(grid, 20, 28, 5, 9, 1'000'000), 1, 1, -5}});
-  tally.look_through(grid);
+  tally.inspect_layers(grid);
   Runs image;
   image.columns = 40;
   image.row_offset.assign(31, 0);
   image.change = {3, 5};  // row 6
   for (std::uint32_t row = 7; row <= 30; ++row) image.row_offset[row] = 2;
   tally.add_image({0, 0, 500'000}, image);
-  EXPECT_TRUE(tally.seen(0));
-  EXPECT_FALSE(tally.seen(1));
+  EXPECT_TRUE(tally.detected(0));
+  EXPECT_FALSE(tally.detected(1));
   EXPECT_NEAR(tally.planned_mm3(0), 2 * 0.1 * 0.1 * 0.5, 1e-6);
   EXPECT_EQ(tally.planned_mm3(1), 0);
-  EXPECT_EQ(tally.groups()[1].most_mm3, 5);  // inside out is solid too
+  EXPECT_EQ(tally.groups()[1].max_mm3, 5);  // inside out is solid too
 }
 
 TEST(Tally, SumsAreasOfContours) {
   Tally tally({{Box{{0, 0, 0}, {1, 1, 1}}, 0, 0, 1}, {Box{{0, 0, 0}, {2, 1, 1}}, 0, 0, 2}});
-  EXPECT_FALSE(tally.seen(0));
+  EXPECT_FALSE(tally.detected(0));
   tally.add_area(0, {0, 0, 200'000}, 12.5);
   tally.add_area(0, {1, 200'000, 100'000}, 5);
   EXPECT_NEAR(tally.planned_mm3(0), 3.0, 1e-6);
-  EXPECT_TRUE(tally.seen(0) && tally.seen(1));
-  EXPECT_EQ(tally.groups()[0].least_mm3, 2);
-  EXPECT_EQ(tally.groups()[0].most_mm3, 3);
+  EXPECT_TRUE(tally.detected(0) && tally.detected(1));
+  EXPECT_EQ(tally.groups()[0].min_mm3, 2);
+  EXPECT_EQ(tally.groups()[0].max_mm3, 3);
 }
 
 }  // namespace

@@ -98,18 +98,18 @@ std::vector<std::set<Pixel>> pieces_of(std::set<Pixel> pixels) {
 }
 
 /// By the words of the page: for any width, pieces of more than two squares of it.
-std::set<Pixel> told_of(const Volume& image, const Stencils& stencils) {
-  std::set<Pixel> told;
+std::set<Pixel> reported_of(const Volume& image, const Stencils& stencils) {
+  std::set<Pixel> reported;
   for (std::uint32_t k = 1; k < stencils.count(); ++k) {
     const Stencil stencil = stencils.at(k);
     for (const auto& piece : pieces_of(thin_for(image, pixels_of(stencil)))) {
-      if (piece.size() > 2 * stencil.columns * stencil.rows.size()) told.insert(piece.begin(), piece.end());
+      if (piece.size() > 2 * stencil.columns * stencil.rows.size()) reported.insert(piece.begin(), piece.end());
     }
   }
-  return told;
+  return reported;
 }
 
-TEST(Stencils, AreAsWideAsAskedAndMadeOfThoseBeforeThem) {
+TEST(Stencils, AreAsWideAsRequestedAndMadeOfThoseBeforeThem) {
   const std::pair<int, int> dpi[] = {{254, 254}, {600, 300}, {300, 600}, {600, 400}, {600, 599}, {1200, 360}};
   for (const auto& [x, y] : dpi) {
     const PixelGrid grid = grid_of(x, y);
@@ -161,7 +161,7 @@ TEST(Stencils, AreRoundWherePixelsAreSquare) {
   }
 }
 
-TEST(ThinPlaces, AreThosePixelsThatAStencilCoversNowhere) {
+TEST(ThinRegions, AreThosePixelsThatAStencilCoversNowhere) {
   std::mt19937 random(7);
   ThinScratch scratch;
   for (const auto& [x, y] : {std::pair{254, 254}, {600, 300}, {600, 400}}) {
@@ -170,60 +170,60 @@ TEST(ThinPlaces, AreThosePixelsThatAStencilCoversNowhere) {
       const Volume image = random_image(random, turn % 3 == 0 ? 0 : 0.2 * (turn % 5));
       for (const std::int64_t wide : {2, 3, 5, 9}) {
         const Stencils stencils = stencils_of(grid, wide);
-        const std::set<Pixel> told = told_of(image, stencils);
-        const ThinPlaces places = thin_places(image.layer(0), stencils, scratch);
-        ASSERT_EQ(places.pixels, told.size()) << x << " " << y << " " << turn << " " << wide;
+        const std::set<Pixel> reported = reported_of(image, stencils);
+        const ThinRegions locations = thin_regions(image.layer(0), stencils, scratch);
+        ASSERT_EQ(locations.pixels, reported.size()) << x << " " << y << " " << turn << " " << wide;
         std::vector<std::uint64_t> sizes, found;
-        for (const auto& piece : pieces_of(told)) sizes.push_back(piece.size());
+        for (const auto& piece : pieces_of(reported)) sizes.push_back(piece.size());
         std::ranges::sort(sizes, std::greater());
-        ASSERT_EQ(places.count, sizes.size());
-        sizes.resize(std::min(sizes.size(), ThinPlaces::kMost));
-        for (const ThinPlace& place : places.largest) found.push_back(place.pixels);
+        ASSERT_EQ(locations.count, sizes.size());
+        sizes.resize(std::min(sizes.size(), ThinRegions::kMax));
+        for (const ThinRegion& position : locations.largest) found.push_back(position.pixels);
         ASSERT_EQ(found, sizes);
       }
     }
   }
 }
 
-TEST(ThinPlaces, AreFoundByEveryWiderLeast) {
+TEST(ThinRegions, AreFoundByEveryWiderMinimum) {
   std::mt19937 random(11);
   ThinScratch scratch;
   for (int turn = 0; turn < 200; ++turn) {
     const Volume image = random_image(random, turn % 2 == 0 ? 0 : 0.004 * turn);
-    ThinPlaces before;
+    ThinRegions before;
     for (std::int64_t wide = 1; wide < 30; ++wide) {
-      const ThinPlaces places = thin_places(image.layer(0), stencils_of(grid_of(254, 254), wide), scratch);
-      ASSERT_GE(places.pixels, before.pixels) << turn << " " << wide;
-      for (const ThinPlace& one : before.largest) {
-        ASSERT_TRUE(std::ranges::any_of(places.largest,
-                                        [&](const ThinPlace& other) {
+      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(grid_of(254, 254), wide), scratch);
+      ASSERT_GE(locations.pixels, before.pixels) << turn << " " << wide;
+      for (const ThinRegion& one : before.largest) {
+        ASSERT_TRUE(std::ranges::any_of(locations.largest,
+                                        [&](const ThinRegion& other) {
                                           return other.pixels >= one.pixels && other.box.left <= one.box.left &&
                                                  other.box.right >= one.box.right && other.box.top <= one.box.top &&
                                                  other.box.bottom >= one.box.bottom;
                                         }))
             << turn << " " << wide;
       }
-      before = places;
+      before = locations;
     }
   }
 }
 
-TEST(ThinPlaces, WallsAreToldFromTheWidthOnThatIsMore) {
+TEST(ThinRegions, WallsAreReportedFromTheWidthOnThatIsMore) {
   ThinScratch scratch;
   for (std::uint32_t wall = 1; wall < 16; ++wall) {
     Volume image = image_of(90, 90);
     fill(image, 10, 10, 40, 40);
     fill(image, 50, 20, 40, wall);  // a fin to the right
-    for (std::uint32_t least = 1; least <= 32; ++least) {
-      const ThinPlaces places = thin_places(image.layer(0), stencils_of(grid_of(254, 254), least), scratch);
-      EXPECT_EQ(places.count, least > wall ? 1u : 0u) << wall << " " << least;
-      for (const ThinPlace& place : places.largest) EXPECT_EQ(place.box.right, 90u);
+    for (std::uint32_t minimum = 1; minimum <= 32; ++minimum) {
+      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(grid_of(254, 254), minimum), scratch);
+      EXPECT_EQ(locations.count, minimum > wall ? 1u : 0u) << wall << " " << minimum;
+      for (const ThinRegion& position : locations.largest) EXPECT_EQ(position.box.right, 90u);
     }
   }
 }
 
 // At any angle: of a block turned about, corners are no thin places, and its fin is where it is thinner than a least wall.
-TEST(ThinPlaces, OfTurnedBodiesAreTheirFins) {
+TEST(ThinRegions, OfTurnedBodiesAreTheirFins) {
   const PixelGrid grid = grid_of(508, 508);  // pixels of 50 um
   ThinScratch scratch;
   for (int degree = 0; degree < 90; degree += 5) {
@@ -236,9 +236,9 @@ TEST(ThinPlaces, OfTurnedBodiesAreTheirFins) {
         image.set[static_cast<std::size_t>(r * 200 + c)] = block || fin ? 1 : 0;
       }
     }
-    for (const std::int64_t least : {2, 4, 6, 8, 12, 16, 24, 32}) {
-      const ThinPlaces places = thin_places(image.layer(0), stencils_of(grid, least), scratch);
-      EXPECT_EQ(places.count, least > 10 ? 1u : 0u) << degree << " " << least;
+    for (const std::int64_t minimum : {2, 4, 6, 8, 12, 16, 24, 32}) {
+      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(grid, minimum), scratch);
+      EXPECT_EQ(locations.count, minimum > 10 ? 1u : 0u) << degree << " " << minimum;
     }
   }
 }

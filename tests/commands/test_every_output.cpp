@@ -273,7 +273,7 @@ TEST_F(EveryOutput, LinksThatLeadNowhereOrRoundStayLinks) {
   }
 }
 
-TEST_F(EveryOutput, NeitherAPipeNorADirectoryInItsPlaceIsReplaced) {
+TEST_F(EveryOutput, NeitherAPipeNorADirectoryThereInsteadIsReplaced) {
   for (const Row& row : kRows) {
     const std::string target = target_of(row, "x");
     if (!row.directory) {

@@ -134,13 +134,13 @@ TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
   const double pixel_mm2 = head["pixel_mm"][0].get<double>() * head["pixel_mm"][1].get<double>();
   // Beads 0.4 mm wide and 0.3 mm high have round sides; seen from above they cover their width.
   const double section = 0.4 * 0.3, rounded = section - (1 - std::numbers::pi / 4) * 0.3 * 0.3;
-  double all_covered = 0, all_laid = 0;
+  double all_covered = 0, all_deposited = 0;
   for (std::size_t i = 0; i < layers; ++i) {
     const double covered =
         head["layers"]["set"][i].get<double>() * pixel_mm2 * head["layers"]["thickness"][i].get<double>() * 1e-6;
     const double volume = head["layers"]["volume"][i];
     all_covered += covered;
-    all_laid += volume;
+    all_deposited += volume;
     if (volume == 0) {
       EXPECT_EQ(covered, 0) << i;  // nothing fits into the highest layer
       continue;
@@ -148,7 +148,7 @@ TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
     EXPECT_NEAR(covered / volume, section / rounded, 0.08) << i;  // ends of beads are round, too
     EXPECT_GT(head["layers"]["seconds"][i], 0) << i;
   }
-  EXPECT_NEAR(all_covered / all_laid, section / rounded, 0.03);
+  EXPECT_NEAR(all_covered / all_deposited, section / rounded, 0.03);
   const auto drawn = unpack_runs(piece(page, "r3"), head["columns"], head["rows"]);
   ASSERT_TRUE(drawn.ok());
   EXPECT_GT(drawn->change.size(), 100u);
@@ -176,7 +176,7 @@ TEST_F(JobsReported, EveryLayerOfThePageIsItsFile) {
   ASSERT_EQ(lamina({"report", "out", "-o", "again.html", "--quiet"}).code, 0);
   EXPECT_EQ(page, read_text(directory_ / "again.html"));
 
-  ASSERT_EQ(lamina({"report", "out", "-o", "small.html", "--most-bytes", "165K"}).code, 0);
+  ASSERT_EQ(lamina({"report", "out", "-o", "small.html", "--max-bytes", "165K"}).code, 0);
   const std::string small = read_text(directory_ / "small.html");
   EXPECT_LT(small.size(), 165u << 10);
   EXPECT_NE(small, page);
@@ -297,14 +297,14 @@ TEST_F(JobsReported, TimesOfLayersAddUpToThatOfTheReplayedProgram) {
   EXPECT_EQ(seconds.size(), 10u);
   EXPECT_NEAR(sum, Json::parse(verified.out)["replay"]["seconds"].get<double>(), 1e-9 * sum);
   const std::vector<std::string> words = {"jet", "part.stl", "--machine", "nuferbj", "--layer", "0.1", "--dry-run"};
-  const auto told = [&](const std::vector<std::string>& more) {
+  const auto reported = [&](const std::vector<std::string>& more) {
     std::vector<std::string> call = words;
     call.insert(call.end(), more.begin(), more.end());
     return lamina(call);
   };
-  EXPECT_NEAR(sum, Json::parse(told({"--json", "--quiet"}).out)["print_seconds"].get<double>(), 1e-9 * sum);
+  EXPECT_NEAR(sum, Json::parse(reported({"--json", "--quiet"}).out)["print_seconds"].get<double>(), 1e-9 * sum);
   const std::string text = fmt::format("({:.1f} s) on nuferbj", sum);
-  for (const Outcome& outcome : {told({}), lamina({"verify", "out"})}) {
+  for (const Outcome& outcome : {reported({}), lamina({"verify", "out"})}) {
     EXPECT_NE((outcome.out + outcome.err).find(text), std::string::npos) << outcome.out << outcome.err;
   }
   EXPECT_GT(sum, 1);
@@ -370,7 +370,7 @@ TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
   EXPECT_GT(step["wheel"]["scale"], step["drag"]["scale"]);
   EXPECT_NEAR(step["plot"]["layer"].get<int>(), layers / 2, 3);
   EXPECT_EQ(said["file_rows"], layers + 1);
-  for (const Json& stretched : said["stretched"]) EXPECT_NEAR(stretched.get<double>(), 1, 0.02) << said["stretched"];
+  for (const Json& scaled : said["scaled"]) EXPECT_NEAR(scaled.get<double>(), 1, 0.02) << said["scaled"];
   for (const char* label : {"the parts from above", "the parts from the front", "the parts from the right",
                             "area against height", "thickness against height"}) {
     EXPECT_NE(std::ranges::find(said["labels"], Json(label)), said["labels"].end()) << label;

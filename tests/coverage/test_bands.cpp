@@ -16,7 +16,7 @@ const PixelGrid kWide{{254, 103'700'000}, {254, 1'900'000}};  // 1037 x 19 voxel
 
 struct BandLayer {
   Levels image;
-  cover::LayerReport report;
+  cover::CoverageReport report;
 };
 
 BandLayer band_layer(const Triangles& triangles, std::uint32_t levels, Isa isa = Isa::kAuto) {
@@ -24,7 +24,7 @@ BandLayer band_layer(const Triangles& triangles, std::uint32_t levels, Isa isa =
   const Instance instance{0, {0, 0, 0}};
   auto coverage = cover::Coverage::build({&mesh, 1}, {&instance, 1}, kWide, FillRule::kNonzero, levels, isa);
   EXPECT_TRUE(coverage.ok());
-  cover::LayerScratch scratch;
+  cover::CoverageScratch scratch;
   BandLayer made;
   // A layer before it: what it leaves behind must not show.
   coverage->layer({0, -40'000, 100'000}, scratch, made.image);
@@ -89,7 +89,7 @@ TEST(CoverageBands, AHollowOfThreeNanometresBreaksATie) {
   EXPECT_EQ(level_of(made.image, 501, 8), 1);
 }
 
-TEST(CoverageBands, AnyInstructionsTellTheSame) {
+TEST(CoverageBands, AnyInstructionsGiveTheSame) {
   std::mt19937 random(5);
   const auto anywhere = [&](Nm from, Nm to) { return from + static_cast<Nm>(random() % static_cast<unsigned>(to - from)); };
   for (int turn = 0; turn < 8; ++turn) {

@@ -30,7 +30,7 @@ inline double filament_for(double length_mm, double width_mm, double height_mm, 
 
 /// A G-code file that a slicer wrote and that cannot be kept in this repository: in corpus/gcode beside the folder that
 /// LAMINA_MODELS names; empty if it is not there.
-inline std::string foreign_gcode(const std::string& name) {
+inline std::string third_party_gcode(const std::string& name) {
   const char* models = std::getenv("LAMINA_MODELS");
   if (models == nullptr) return {};
   const auto path = std::filesystem::path(models) / ".." / "corpus" / "gcode" / name;

@@ -33,7 +33,7 @@ std::vector<double> shares_by_pixels(const Runs& runs, const PixelWindow& window
   return shares;
 }
 
-TEST(Coverage, IsTheShareOfTheAreaWhateverTheScale) {
+TEST(Coverage, IsTheShareOfTheAreaRegardlessOfTheScale) {
   std::mt19937 random(3);
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
     const std::uint32_t columns = 1 + testing::below(random, 40), rows = 1 + testing::below(random, 25);

@@ -68,7 +68,7 @@ void expect_on_circle(const PlantedArc& arc, const read::GcodeLayer& layer) {
   EXPECT_LE(static_cast<double>(layer.beads.size()), std::abs(arc.sweep) / std::min(widest, kPi / 2) * 1.01 + 2);
 }
 
-TEST(GcodeArcs, ChordsOfPlantedCirclesDeviateByFiveMicrometresAtMost) {
+TEST(GcodeArcs, ChordsOfPlantedCirclesDeviateByFiveMicrometresNoMoreThan) {
   const Directory directory;
   std::size_t checked = 0;
   for (const double radius : {0.05, 5.0, 37.5, 900.0}) {
@@ -173,16 +173,16 @@ TEST(GcodeArcs, WhatNoBedHoldsIsRefusedWithinNoTimeAndMemory) {
       {"M83\nG2 X20 I1e100 E1\n", "line 2: a bead at"},
       {"M83\nG2 X20 I1e6 J1e6 E1\n", "line 2: a bead at"},
   };
-  for (const auto& [text, told] : files) {
+  for (const auto& [text, reported] : files) {
     const auto file = gcode_file(directory, text);
-    ASSERT_FALSE(file) << told;
+    ASSERT_FALSE(file) << reported;
     EXPECT_EQ(file.error().fault, Fault::kUsage);
-    EXPECT_NE(file.error().message.find(told), std::string::npos) << file.error().message;
+    EXPECT_NE(file.error().message.find(reported), std::string::npos) << file.error().message;
   }
   // A line of a dozen bytes is up to a few thousand chords: layers have a bound, which is checked before memory is taken.
   std::string many = "M83\n";
   for (int i = 0; i < 30; ++i) many += "G3 I1000 E1\n";
-  const auto bounded = gcode_file(directory, many, {.most_beads = 20'000});
+  const auto bounded = gcode_file(directory, many, {.max_beads = 20'000});
   ASSERT_FALSE(bounded);
   EXPECT_NE(bounded.error().message.find("a layer of more than 20000 beads"), std::string::npos) << bounded.error().message;
   EXPECT_TRUE(gcode_file(directory, many));

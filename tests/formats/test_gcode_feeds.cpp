@@ -11,7 +11,7 @@ using test::gcode_file;
 
 constexpr double kUnit = test::kPi / 4 * 1.75 * 1.75;  // mm3 of a mm of filament
 
-TEST(GcodeFeeds, VolumeSpeedAndJointsAreThoseOfTheCommands) {
+TEST(GcodeFeeds, VolumeSpeedAndCornersAreThoseOfTheCommands) {
   const Directory directory;
   const auto file = gcode_file(directory,
                                "; machine: Some Printer\nG21\nG90\nM83\n;LAYER_CHANGE\nG1 Z0.2 F600\n"

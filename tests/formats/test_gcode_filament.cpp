@@ -22,7 +22,7 @@ std::string line_of(double diameter_mm) {
   return fmt::format("M83\nG1 Z0.2\nG1 X10 E{:.9f}\n", filament_for(10, 0.4, 0.2, diameter_mm));
 }
 
-TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsTold) {
+TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsReported) {
   const Directory directory;
   const double area = 1.75 * 1.75 * test::kPi / 4;
   // Beads alone count: no start code before the first layer, no retraction, no priming.
@@ -35,7 +35,7 @@ TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsTold) {
   EXPECT_NEAR(gcode_file(directory, beads + "; filament_diameter = 2.85\n")->fed_mm3(), 2.5 * 2.85 * 2.85 * test::kPi / 4,
               1e-9);
   EXPECT_NEAR(gcode_file(directory, "M200 D1.75\n" + beads)->fed_mm3(), 2.5, 1e-9);
-  const std::vector<std::pair<std::string, double>> told = {
+  const std::vector<std::pair<std::string, double>> reported = {
       {"; filament_density = 1.27,1.24\n", 1.27},
       {"; filament_density: 1.04\n", 1.04},
       {"; filament used [cm3] = 2.00\n; filament used [g] = 2.48\n", 1.24},
@@ -43,11 +43,11 @@ TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsTold) {
       {"; filament used [cm3] = 0.20\n; filament used [g] = 0.26\n; filament_density = 1.24\n", 1.24},
       {"; filament used [cm3] = 0.01\n; filament used [g] = 0.02\n", 0},  // two digits say nothing of so little
       {"; filament_density = 0\n", 0}};
-  for (const auto& [text, density] : told)
+  for (const auto& [text, density] : reported)
     EXPECT_NEAR(gcode_file(directory, beads + text)->density_g_cm3(), density, 1e-9) << text;
 }
 
-TEST(GcodeFilament, EverySlicerTellsItsDiameter) {
+TEST(GcodeFilament, EverySlicerStatesItsDiameter) {
   const Directory directory;
   // Made with Python:
   // base64.b64encode(zlib.compress(b"layer_height=0.1\x08...not_filament_diameter=9\x08filament_diameter=2.85...
@@ -83,7 +83,7 @@ TEST(GcodeFilament, EverySlicerTellsItsDiameter) {
   }
 }
 
-TEST(GcodeFilament, WhatTellsNothingIsTakenForNothing) {
+TEST(GcodeFilament, WhatStatesNothingIsTakenForNothing) {
   const Directory directory;
   for (const std::string comment :
        {"; filament_diameter = nil", "; filament_diameter = 0", "; filament_diameter = -3", "; filament_diameter = 1e9",
@@ -103,7 +103,7 @@ TEST(GcodeFilament, AProfileThatInflatesWithoutEndIsCutOff) {
   EXPECT_EQ(read::cura_profile_number(zeros, "filament_diameter"), 0);
 }
 
-TEST(GcodeFilament, ThinBeadsAreToldAndAGivenDiameterWins) {
+TEST(GcodeFilament, ThinBeadsAreReportedAndAGivenDiameterWins) {
   const Directory directory;
   const std::string text = "M83\n;LAYER:0\nG1 Z0.2\n;TYPE:WALL-OUTER\n" + line_of(2.85);
   const auto thin = gcode_file(directory, text);
@@ -170,8 +170,8 @@ std::map<std::string, BeadsOfType> measured(const read::GcodeFile& file, std::ui
   return types;
 }
 
-TEST(ForeignGcode, CuraFor285mmHasBeadsAsWideAsItsNozzle) {
-  const std::string path = test::foreign_gcode("cura14_filament_2.85.gcode");
+TEST(ThirdPartyGcode, CuraFor285mmHasBeadsAsWideAsItsNozzle) {
+  const std::string path = test::third_party_gcode("cura14_filament_2.85.gcode");
   if (path.empty()) GTEST_SKIP() << "LAMINA_MODELS is not set: no file of Cura 14 was read";
   const auto file = read::GcodeFile::open(path);
   ASSERT_TRUE(file) << file.error().message;
@@ -200,13 +200,13 @@ std::string arcs_alone(const std::string& text, bool no_widths) {
 
 // PrusaSlicer feeds for a rectangle with half circles as wide as its ;WIDTH: tags say: without the tags, what is fed over the
 // length of the chords of each arc must lead to the same widths.
-TEST(ForeignGcode, ArcsOfPrusaSlicerAreAsLongAsWhatIsFedForThem) {
-  const std::string path = test::foreign_gcode("prusaslicer_arcs.gcode");
+TEST(ThirdPartyGcode, ArcsOfPrusaSlicerAreAsLongAsWhatIsFedForThem) {
+  const std::string path = test::third_party_gcode("prusaslicer_arcs.gcode");
   if (path.empty()) GTEST_SKIP() << "LAMINA_MODELS is not set: no file of PrusaSlicer was read";
   const auto whole = read::GcodeFile::open(path);
   ASSERT_TRUE(whole) << whole.error().message;
   EXPECT_TRUE(whole->notes().empty());
-  EXPECT_TRUE(whole->tells_widths());
+  EXPECT_TRUE(whole->states_widths());
   EXPECT_EQ(whole->count(), 174u);
   const Directory directory;
   const std::string text = test::read_text(path);
@@ -214,7 +214,7 @@ TEST(ForeignGcode, ArcsOfPrusaSlicerAreAsLongAsWhatIsFedForThem) {
   const auto tagged = read::GcodeFile::open(directory / "tagged.gcode");
   const auto fed = gcode_file(directory, arcs_alone(text, true));
   ASSERT_TRUE(tagged && fed);
-  EXPECT_FALSE(fed->tells_widths());
+  EXPECT_FALSE(fed->states_widths());
   ASSERT_EQ(fed->count(), tagged->count());
   std::size_t chords = 0, equal = 0;
   for (std::uint32_t k = 0; k < fed->count(); ++k) {

@@ -39,7 +39,7 @@ TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
     ASSERT_EQ(expected.error, "");
     const auto file = read::GcodeFile::open(directory / "part.gcode");
     ASSERT_TRUE(file) << file.error().message;
-    EXPECT_TRUE(file->tells_widths());
+    EXPECT_TRUE(file->states_widths());
     ASSERT_EQ(file->count(), expected.layers.size());
     std::size_t beads = 0;
     for (std::uint32_t k = 0; k < file->count(); ++k) {
@@ -68,7 +68,7 @@ TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
 // What CuraEngine writes has no widths: 10 mm of a bead 0.4 mm wide and 0.2 mm high hold this much filament of 1.75 mm.
 constexpr double kFed = 10 * (0.2 * 0.2 + std::numbers::pi * 0.01) / (std::numbers::pi * 1.75 * 1.75 / 4);
 
-TEST(GcodeLayers, WidthsFollowFromWhatIsFedWhereNoTagTellsThem) {
+TEST(GcodeLayers, WidthsFollowFromWhatIsFedWhereNoTagStatesThem) {
   const Directory directory;
   const std::string fed = std::to_string(kFed), twice = std::to_string(2 * kFed);
   const auto file = file_of(directory,
@@ -77,7 +77,7 @@ TEST(GcodeLayers, WidthsFollowFromWhatIsFedWhereNoTagTellsThem) {
                                 fed + "\nG1 F1200 E-2\nG0 X50 Y50 Z1\nG0 Z0.2\nG1 E" + fed +
                                 "\n;LAYER:1\nG1 Z.4\nG1 X50 Y60 E" + twice + "\n;LAYER:2\n");
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_FALSE(file->tells_widths());
+  EXPECT_FALSE(file->states_widths());
   ASSERT_EQ(file->count(), 3u);
   const auto first = file->layer(0), second = file->layer(1), empty = file->layer(2);
   ASSERT_TRUE(first && second && empty);
@@ -91,7 +91,7 @@ TEST(GcodeLayers, WidthsFollowFromWhatIsFedWhereNoTagTellsThem) {
   EXPECT_EQ(file->box().lo.x, 9'800'000) << "the line in front of the first layer belongs to none";
 }
 
-TEST(GcodeLayers, TheDiameterOfTheFilamentIsReadWhereItIsTold) {
+TEST(GcodeLayers, TheDiameterOfTheFilamentIsReadWhereItIsStated) {
   const Directory directory;
   const std::string fed = std::to_string(kFed * 1.75 * 1.75 / 9);
   const auto file = file_of(directory, "M83\nG1 Z0.2\nG1 X10 E" + fed + "\n; filament_diameter = 3\n");
@@ -99,7 +99,7 @@ TEST(GcodeLayers, TheDiameterOfTheFilamentIsReadWhereItIsTold) {
   EXPECT_EQ(file->layer(0)->beads[0].width, 400'000);
 }
 
-TEST(GcodeLayers, WithoutTagsLayersAreHeightsAtWhichSomethingIsLaid) {
+TEST(GcodeLayers, WithoutTagsLayersAreHeightsAtWhichSomethingIsDeposited) {
   const Directory directory;
   const auto file = file_of(directory,
                             "G20 ; inches\nM83\nG91\nG1 Z0.01\nG1 X1 E.1\nG0 Z0.1\nG1 X1\nG1 Z-0.1\nG1 Y1 E0.1\nG90\n"
@@ -113,7 +113,7 @@ TEST(GcodeLayers, WithoutTagsLayersAreHeightsAtWhichSomethingIsLaid) {
   EXPECT_EQ(second->beads[0].to, (Point2{63'500'000, 0}));
 }
 
-TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePlace) {
+TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePosition) {
   const Directory directory;
   const std::vector<std::pair<std::string, std::string>> files = {
       {"", "no move in it lays filament"},
@@ -126,10 +126,10 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePlace) {
       {"G1 X1e9 E1\n", "line 1: a bead at 1e+09 mm; beds are at most 2000 mm wide"},
       {";WIDTH:wide\nG1 X1 E1\n", "line 1: 'wide' is not a length"},
   };
-  for (const auto& [text, told] : files) {
+  for (const auto& [text, reported] : files) {
     const auto file = file_of(directory, text);
-    ASSERT_FALSE(file) << told;
-    EXPECT_NE(file.error().message.find(told), std::string::npos) << file.error().message;
+    ASSERT_FALSE(file) << reported;
+    EXPECT_NE(file.error().message.find(reported), std::string::npos) << file.error().message;
     EXPECT_EQ(file.error().message.find('\n'), std::string::npos);
   }
   EXPECT_FALSE(read::GcodeFile::open(directory / "none.gcode"));
@@ -140,11 +140,11 @@ TEST(GcodeLayers, TagsWithoutEndAreRefusedWithTheLine) {
   std::string text = "M83\n";
   for (int i = 0; i < 6; ++i) text += ";LAYER:0\nG1 X" + std::to_string(i + 1) + " E1\n";
   test::write_text(directory.path() / "part.gcode", text + "M107\n");
-  for (const std::uint32_t most : {5u, 6u}) {
+  for (const std::uint32_t maximum : {5u, 6u}) {
     read::GcodeOptions options;
-    options.most_layers = most;
+    options.max_layers = maximum;
     const auto file = read::GcodeFile::open(directory / "part.gcode", options);
-    EXPECT_EQ(file.ok(), most == 6u);
+    EXPECT_EQ(file.ok(), maximum == 6u);
     if (file) continue;
     EXPECT_NE(file.error().message.find("line 12: more than 5 layers"), std::string::npos) << file.error().message;
   }

@@ -22,13 +22,13 @@ struct SpiralPoint {
 
 /// Points at `steps` places a turn, each 1/steps of `pitch` above the one before, as FullControl writes them; a bead 0.4 mm
 /// wide.
-std::string spiral(double turns, int steps, double pitch, double from_z, const std::function<SpiralPoint(double)>& place) {
+std::string spiral(double turns, int steps, double pitch, double from_z, const std::function<SpiralPoint(double)>& position) {
   std::string text = "M83\n";
-  SpiralPoint last = place(0);
+  SpiralPoint last = position(0);
   text += fmt::format("G0 X{:.3f} Y{:.3f} Z{:.3f}\n", last.x, last.y, from_z);
   const int count = static_cast<int>(std::lround(turns * steps));
   for (int i = 1; i <= count; ++i) {
-    const SpiralPoint at = place(2 * kPi * i / steps);
+    const SpiralPoint at = position(2 * kPi * i / steps);
     const double fed = filament_for(std::hypot(at.x - last.x, at.y - last.y), 0.4, pitch);
     text += fmt::format("G1 X{:.3f} Y{:.3f} Z{:.4f} E{:.6f}\n", at.x, at.y, from_z + pitch * i / steps, fed);
     last = at;
@@ -47,12 +47,12 @@ TEST(GcodeSpirals, EachTurnIsALayerOfItsWidth) {
   const auto square = [](double a) { return SpiralPoint{100 + 20 * std::cos(a + 0.1), 90 - 20 * std::sin(a + 0.1)}; };
   const auto cone = [](double a) { return SpiralPoint{100 + (40 - a / 10) * std::cos(a), 100 + (30 - a / 10) * std::sin(a)}; };
   struct Case {
-    std::function<SpiralPoint(double)> place;
+    std::function<SpiralPoint(double)> position;
     int steps;
     double pitch;
   };
   for (const Case& it : {Case{circle, 64, 0.2}, {circle, 400, 0.1}, {wavy, 300, 0.35}, {square, 4, 0.3}, {cone, 90, 0.3}}) {
-    const auto file = gcode_file(directory, spiral(40, it.steps, it.pitch, 0.2, it.place));
+    const auto file = gcode_file(directory, spiral(40, it.steps, it.pitch, 0.2, it.position));
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_NEAR(file->count(), 40, 1) << it.steps;
     ASSERT_EQ(file->notes().size(), 1u);

@@ -210,7 +210,7 @@ TEST(GreyImages, OfOneBitAreFullOrEmpty) {
   }
 }
 
-TEST(GreyImages, ArePlacedAndUnitedPixelByPixel) {
+TEST(GreyImages, ArePlacedAndMergedPixelByPixel) {
   std::mt19937 random(5);
   const auto picture = [&](std::uint32_t columns, std::uint32_t rows) {
     Pixels pixels(rows, std::vector<unsigned>(columns));
@@ -221,25 +221,25 @@ TEST(GreyImages, ArePlacedAndUnitedPixelByPixel) {
   };
   for (int trial = 0; trial < 200; ++trial) {
     const Pixels a = picture(17, 5), b = picture(17, 5);
-    Pixels most = a;
+    Pixels maximum = a;
     std::uint64_t within = 0;
     for (std::size_t r = 0; r < 5; ++r)
-      for (std::size_t c = 0; c < 17; ++c) most[r][c] = std::max(a[r][c], b[r][c]), within += b[r][c] > 0 ? a[r][c] : 0;
+      for (std::size_t c = 0; c < 17; ++c) maximum[r][c] = std::max(a[r][c], b[r][c]), within += b[r][c] > 0 ? a[r][c] : 0;
     const Levels first = levels_from(a), second = levels_from(b);
     Levels out;
     larger(first, second, out);
-    EXPECT_EQ(pixels_of(out.view()), most);
+    EXPECT_EQ(pixels_of(out.view()), maximum);
     for (std::size_t i = 1; i < out.level.size(); ++i)  // joined where they touch
       EXPECT_FALSE(out.change[2 * i] == out.change[2 * i - 1] && out.level[i] == out.level[i - 1] && out.change[2 * i] > 0);
     Runs mask;
-    at_least(second, 1, mask);
+    lower_bound(second, 1, mask);
     EXPECT_EQ(sum_of_levels(first, mask), within);
   }
   const Pixels image = picture(31, 23);
   for (const auto& [own, dots] : {std::pair{600, 600}, {300, 600}, {600, 250}}) {
     const PixelGrid grid{PixelAxis(dots, 2'000'000), PixelAxis(dots, 1'000'000)};
     Levels out;
-    place(levels_from(image), placement_of(31, 23, own, own, grid, 4, 2), out);
+    position(levels_from(image), placement_of(31, 23, own, own, grid, 4, 2), out);
     Pixels expected(grid.rows(), std::vector<unsigned>(grid.columns()));
     for (std::int64_t r = 0; r < grid.rows(); ++r)
       for (std::int64_t c = 0; c < grid.columns(); ++c) {
@@ -298,7 +298,7 @@ TEST(Stacks, OfOddFoldersAreReadRightOrRefusedInALine) {
 TEST(Stacks, ExpectAboutAsManyChangesAsImagesHave) {
   for (const char* kind : {"stripes", "empty", "blank"}) {
     test::Directory folder;
-    std::uint64_t most = 0;
+    std::uint64_t maximum = 0;
     for (int i = 1; i <= 9; ++i) {
       Pixels pixels(400, std::vector<unsigned>(800, 255));
       for (auto& row : pixels)
@@ -307,25 +307,25 @@ TEST(Stacks, ExpectAboutAsManyChangesAsImagesHave) {
       if (kind[0] == 'e' && i == 5) pixels[7][9] = 0;
       write_pgm(folder / ("a" + std::to_string(i) + ".pgm"), pixels);
     }
-    const auto stack = LayerImages::open(folder.path().string(), {.looks = 5});
+    const auto stack = LayerImages::open(folder.path().string(), {.inspections = 5});
     ASSERT_TRUE(stack.ok()) << stack.error().message;
     for (std::uint32_t l = 0; l < 9; ++l) {
       const std::uint64_t changes = stack->read(l)->change.size();
       EXPECT_GE(stack->expected_changes(l), changes) << kind << l;
-      most = std::max(most, changes);
+      maximum = std::max(maximum, changes);
     }
-    for (std::uint32_t l = 0; l < 9; ++l) EXPECT_LE(stack->expected_changes(l), 2 * most + 2) << kind << l;
+    for (std::uint32_t l = 0; l < 9; ++l) EXPECT_LE(stack->expected_changes(l), 2 * maximum + 2) << kind << l;
   }
 }
 
-TEST(StackInfo, TellsWhatAFolderHolds) {
+TEST(StackInfo, ReportsWhatAFolderHolds) {
   test::Directory folder;
   write_tiff(folder / "a3.tif", {{0, 0, 255, 128}}, 8, true);
   write_tiff(folder / "a4.tif", {{255, 255, 255, 255}}, 8, true);
   write_tiff(folder / "a8.tif", {{0, 255, 255, 255}}, 8, true);
   write_tiff(folder / "a9.tif", {{0, 255, 255}}, 8, true);
   test::write_text(folder / "a12.tif", "II*");
-  const auto info = look_at_stack(folder.path().string(), 129);
+  const auto info = inspect_stack(folder.path().string(), 129);
   ASSERT_TRUE(info.ok()) << info.error().message;
   EXPECT_EQ(info->images, 5u);
   EXPECT_EQ(info->first_number, 3u);

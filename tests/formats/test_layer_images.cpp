@@ -83,7 +83,7 @@ TEST_F(LayerImagesTest, NamesWhatIsMissingOrOfAnotherSize) {
 }
 
 // What is read is what was hashed when the job was planned.
-TEST_F(LayerImagesTest, FilesThatChangeAfterTheyWereLookedAtAreRefused) {
+TEST_F(LayerImagesTest, FilesThatChangeAfterTheyWereInspectedAreRefused) {
   save("a1.tif", square(20, 5), "tiff-g4");
   save("a2.tif", square(20, 5), "tiff-g4");
   const auto stack = LayerImages::open(folder_.string(), {});
@@ -143,7 +143,7 @@ TEST(PlacedImage, TakesThePixelThatTheCentreLiesIn) {
       image.row_offset.push_back(static_cast<std::uint32_t>(image.change.size()));
     }
     Runs out;
-    place(image, placement_of(31, 23, own, own, grid, 4, 2), out);
+    position(image, placement_of(31, 23, own, own, grid, 4, 2), out);
     ASSERT_EQ(out.row_offset.size(), grid.rows() + 1u);
     for (std::uint32_t r = 0; r < grid.rows(); ++r) {
       std::vector<bool> got(grid.columns());

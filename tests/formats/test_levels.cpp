@@ -51,7 +51,7 @@ TEST_P(LevelFiles, GiveTheLevelsBack) {
       ++seed;
       const Levels image = random_levels(seed, columns, 40, full, seed % 2 == 0 ? 3 : 700);
       ASSERT_TRUE(encoder->encode(image, full, 600, 300, file).ok());
-      EXPECT_LE(file.size(), format().most_bytes(columns, 40, image.change.size()));
+      EXPECT_LE(file.size(), format().max_bytes(columns, 40, image.change.size()));
       testing::save(path(), file);
       Levels back;
       const auto read = read::levels(path(), full, back);
@@ -60,14 +60,14 @@ TEST_P(LevelFiles, GiveTheLevelsBack) {
       EXPECT_NEAR(read->dpi_y, 300, 0.01);
       EXPECT_TRUE(back.change == image.change && back.level == image.level && back.row_offset == image.row_offset);
       Runs any;
-      at_least(image, 1, any);
+      lower_bound(image, 1, any);
       EXPECT_TRUE(read->runs.change == any.change);
     }
   }
 }
 
 // What lamina's own reader of images of others makes of them by the threshold of 128: voxels half full or more.
-TEST_P(LevelFiles, AreHalvesToWhoeverTakesTheDarkPixels) {
+TEST_P(LevelFiles, AreHalvesToAReaderThatTakesTheDarkPixels) {
   if (format().id == "tiff-4") return;  // read::dark_pixels takes 1, 8 and 16 bits
   const auto encoder = format().make_encoder();
   Bytes file;
@@ -78,7 +78,7 @@ TEST_P(LevelFiles, AreHalvesToWhoeverTakesTheDarkPixels) {
     const auto read = read::dark_pixels(path(), 128);
     ASSERT_TRUE(read.ok()) << read.error().message;
     Runs half;
-    at_least(image, static_cast<std::uint8_t>((full + 1) / 2), half);
+    lower_bound(image, static_cast<std::uint8_t>((full + 1) / 2), half);
     EXPECT_TRUE(read->runs.change == half.change);
   }
 }

@@ -85,7 +85,7 @@ struct LayerTagsRead {
   }
 };
 
-TEST(TiffTags, TellJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
+TEST(TiffTags, ReportJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
   const testing::Folder folder;
   const std::string path = folder / "tags.tif";
   for (const char* id : {"tiff-g4", "tiff-packbits", "tiff-none"}) {
@@ -101,11 +101,11 @@ TEST(TiffTags, TellJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
     EXPECT_EQ(bare.description, "");
     EXPECT_EQ(bare.page, -1);
     encoder->tag({"order 4711", {}, {}, 11, 120, 550'000, 600'000});
-    const LayerTagsRead told = read();
-    EXPECT_EQ(told.description, "order 4711, layer 12 of 120, z 0.55 to 0.6 mm");
-    EXPECT_EQ(told.page, 11);
-    EXPECT_EQ(told.pages, 120);
-    EXPECT_EQ(told.strip, bare.strip);
+    const LayerTagsRead reported = read();
+    EXPECT_EQ(reported.description, "order 4711, layer 12 of 120, z 0.55 to 0.6 mm");
+    EXPECT_EQ(reported.page, 11);
+    EXPECT_EQ(reported.pages, 120);
+    EXPECT_EQ(reported.strip, bare.strip);
     encoder->tag({"K\xc3\xb6rper\n" + std::string(500, 'x'), "steel", "xy", 69'999, 70'000, 0, 1});
     const LayerTagsRead odd = read();
     EXPECT_TRUE(odd.description.starts_with("K??rper?x")) << odd.description;
@@ -116,7 +116,7 @@ TEST(TiffTags, TellJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
   }
 }
 
-TEST(TiffStrips, HoldAtMostAQuarterMegabyteUnlessARowIsLonger) {
+TEST(TiffStrips, HoldNoMoreThanAQuarterMegabyteUnlessARowIsLonger) {
   const testing::Folder folder;
   const std::string path = folder / "strips.tif";
   for (const std::uint32_t columns : {8000u, 18898u, 2'100'000u}) {

@@ -85,7 +85,7 @@ TEST(PngData, RandomRowsOfManyWidthsAndDensitiesComeBack) {
   }
 }
 
-TEST(PngData, AWallOfEveryThicknessAtEveryPlaceComesBack) {
+TEST(PngData, AWallOfEveryThicknessAtEveryPositionComesBack) {
   // Zeros of every number up to two rows: literals, matches, words of zeros alone and with an edge behind them.
   std::vector<Row> rows;
   constexpr std::uint32_t kColumns = 9'700;
@@ -98,7 +98,7 @@ TEST(PngData, AWallOfEveryThicknessAtEveryPlaceComesBack) {
 }
 
 TEST(PngData, TheWidestRowsComeBack) {
-  for (const std::uint32_t columns : {262'136u, 262'137u, 262'144u, 262'145u, kMostPixelsASide}) {
+  for (const std::uint32_t columns : {262'136u, 262'137u, 262'144u, 262'145u, kMaxPixelsASide}) {
     const Row full{0, columns}, dots{7, 8, 70'000, 70'001, columns - 1, columns}, none;
     EXPECT_TRUE(holds(testing::image_of(columns, {full, full, none, none, dots, dots, full, dots, none}))) << columns;
     EXPECT_TRUE(holds(testing::image_of(columns, {none}))) << columns;

@@ -32,11 +32,11 @@ TEST(ImageFormats, NoFileIsLargerThanItsBound) {
         const Runs runs = random_runs(columns, 300, density, columns);
         write::Bytes file;
         ASSERT_TRUE(encoder->encode(runs, 600, 600, file).ok());
-        const std::uint64_t most = format.most_bytes(columns, 300, runs.change.size());
-        EXPECT_LE(file.size(), most) << format.id << ", " << columns << " columns, density " << density;
+        const std::uint64_t maximum = format.max_bytes(columns, 300, runs.change.size());
+        EXPECT_LE(file.size(), maximum) << format.id << ", " << columns << " columns, density " << density;
         // What is allocated for it counts; formats that compress hardly ever come near their bound.
         if (format.id == "tiff-none" || format.id == "pbm") {
-          EXPECT_LE(file.capacity(), most) << format.id;
+          EXPECT_LE(file.capacity(), maximum) << format.id;
         }
       }
     }

@@ -96,8 +96,8 @@ std::vector<std::string> split_at(const std::string& text, char separator) {
 
 TEST(Decimal, MillimetresAreExactAndHaveNoMoreDigitsThanTheyNeed) {
   const auto text = [](std::int64_t nm) {
-    char room[kMostDecimal];
-    return std::string(room, put_mm(nm, room));
+    char capacity[kMaxDecimal];
+    return std::string(capacity, put_mm(nm, capacity));
   };
   EXPECT_EQ(text(0), "0");
   EXPECT_EQ(text(-1), "-0.000001");
@@ -273,7 +273,7 @@ std::string zip_member(const std::string& path, const char* name) {
   return text;
 }
 
-TEST(Write3mfSlices, ADateThatIsNoneIsToldBeforeAnythingIsMade) {
+TEST(Write3mfSlices, ADateThatIsNoneIsReportedBeforeAnythingIsMade) {
   ::setenv("SOURCE_DATE_EPOCH", "yesterday", 1);
   const bool made = Slice3mfWriter::make(Job().head).ok();
   ::unsetenv("SOURCE_DATE_EPOCH");

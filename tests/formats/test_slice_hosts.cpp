@@ -354,7 +354,7 @@ TEST(Cli16, UnitsReachTheFarthestPointAndNoFarther) {
   }
 }
 
-TEST(Cli16, FillingsBecomeCommandsOfAtMost65535Lines) {
+TEST(Cli16, FillingsBecomeCommandsOfNoMoreThan65535Lines) {
   Slices slices;
   Toolpaths paths;
   for (int i = 0; i < 70'001; ++i)

@@ -18,9 +18,9 @@ TEST(Sml, PdLinesFollowTheThicknessOfTheLayerAndTheUseOfThePath) {
   for (const Layer& layer : {Layer{0, 0, 254'000}, Layer{1, 254'000, 178'000}}) {
     ASSERT_TRUE(format->check(layer).ok());
     const auto moves = format->layer(layer, 2, out);
-    moves->lay({{25'400'000, 0}, {50'800'000, 0}, PathKind::kOuter, true, 508'000, 0.1, 20});
-    moves->lay({{50'800'000, 0}, {50'800'000, 25'400'000}, PathKind::kOuter, false, 508'000, 0.1, 20});
-    moves->lay({{30'000'000, 5'080'000}, {40'000'000, 5'080'000}, PathKind::kRaster, true, 508'000, 0.1, 20});
+    moves->deposit({{25'400'000, 0}, {50'800'000, 0}, PathKind::kOuter, true, 508'000, 0.1, 20});
+    moves->deposit({{50'800'000, 0}, {50'800'000, 25'400'000}, PathKind::kOuter, false, 508'000, 0.1, 20});
+    moves->deposit({{30'000'000, 5'080'000}, {40'000'000, 5'080'000}, PathKind::kRaster, true, 508'000, 0.1, 20});
     EXPECT_NEAR(moves->finish().bead_mm, 25.4 + 25.4 + 10, 1e-9);
   }
   EXPECT_EQ(std::string(out.begin(), out.end()),

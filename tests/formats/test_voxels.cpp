@@ -57,7 +57,7 @@ struct Surface {
   }
 };
 
-Surface surface_of(const VoxelView& box, Side side) {
+Surface surface_of(const VoxelView& box, VoxelPhase side) {
   test::Directory folder;
   Surface surface;
   const std::string bytes = written(folder / "a.stl", [&](File& file) {
@@ -78,7 +78,7 @@ constexpr std::array<Nm, 3> kEdges{10'000, 12'000, 25'000};
 constexpr double kVoxel = 0.010 * 0.012 * 0.025;  // mm3
 
 TEST(VoxelSurface, OfOneVoxelIsTwelveFacetsAroundIt) {
-  const Surface one = surface_of(stack_of(Voxels(1, 1, 1, 1), {}, kEdges), Side::kSolid);
+  const Surface one = surface_of(stack_of(Voxels(1, 1, 1, 1), {}, kEdges), VoxelPhase::kSolid);
   EXPECT_EQ(one.facets.size(), 12u);
   EXPECT_EQ(one.bad_edges(), 0u);
   EXPECT_NEAR(one.volume() / kVoxel, 1, 1e-6);
@@ -88,7 +88,7 @@ TEST(VoxelSurface, OfOneVoxelIsTwelveFacetsAroundIt) {
 TEST(VoxelSurface, IsClosedAndHasTheVolumeOfTheVoxelsHoweverEightMeet) {
   for (unsigned pattern = 1; pattern < 256; ++pattern) {
     const Voxels box = Voxels(2, 2, 2).fill([&](auto x, auto y, auto z) { return pattern >> (x + 2 * y + 4 * z) & 1; });
-    const Surface surface = surface_of(stack_of(box, {}, kEdges), Side::kSolid);
+    const Surface surface = surface_of(stack_of(box, {}, kEdges), VoxelPhase::kSolid);
     EXPECT_EQ(surface.bad_edges(), 0u) << pattern;
     EXPECT_NEAR(surface.volume() / kVoxel, std::popcount(pattern), 1e-5) << pattern;
   }
@@ -99,7 +99,7 @@ TEST(VoxelSurface, OfNoiseIsClosedForSolidAndVoidWhichFillTheBoxTogether) {
     const Voxels box = pores::testing::random_box(seed, 8);
     if (std::ranges::count(box.solid, box.solid.front()) == static_cast<std::ptrdiff_t>(box.solid.size())) continue;
     const VoxelStack stack = stack_of(box, {true, false, true}, kEdges);
-    const Surface solid = surface_of(stack, Side::kSolid), empty = surface_of(stack, Side::kVoid);
+    const Surface solid = surface_of(stack, VoxelPhase::kSolid), empty = surface_of(stack, VoxelPhase::kVoid);
     EXPECT_EQ(solid.bad_edges(), 0u) << seed;
     EXPECT_EQ(empty.bad_edges(), 0u) << seed;
     const double set = std::accumulate(box.solid.begin(), box.solid.end(), 0.0), all = static_cast<double>(box.solid.size());
@@ -110,7 +110,7 @@ TEST(VoxelSurface, OfNoiseIsClosedForSolidAndVoidWhichFillTheBoxTogether) {
 
 TEST(VoxelSurface, PartsTwoVoxelsThatMeetInAnEdgeAlone) {
   const Voxels pair = Voxels(2, 2, 1).fill([](auto x, auto y, auto) { return x == y; });
-  const Surface surface = surface_of(stack_of(pair, {}, kEdges), Side::kSolid);
+  const Surface surface = surface_of(stack_of(pair, {}, kEdges), VoxelPhase::kSolid);
   EXPECT_EQ(surface.counts.parted_edges, 1u);
   std::set<Corner> corners;
   for (const auto& facet : surface.facets) corners.insert(facet.begin(), facet.end());
@@ -122,12 +122,12 @@ TEST(VoxelImages, SayTheirSizeAndHoldAByteAVoxelWithXFastest) {
   const Voxels box = Voxels(3, 2, 2).fill([](auto x, auto y, auto z) { return x + 2 * y + z == 2; });
   const VoxelStack stack = stack_of(box, {}, kEdges);
   test::Directory folder;
-  const auto image = [&](const std::string& name, Side side) {
+  const auto image = [&](const std::string& name, VoxelPhase side) {
     return written(folder / name, [&](File& file) { return write_image(file, stack, side, *image_kind(name), "1.2.3"); });
   };
   const std::string voxels(box.solid.begin(), box.solid.end());
-  const std::string nrrd = image("a.NRRD", Side::kSolid), mha = image("a.mha", Side::kSolid),
-                    vti = image("a.vti", Side::kSolid);
+  const std::string nrrd = image("a.NRRD", VoxelPhase::kSolid), mha = image("a.mha", VoxelPhase::kSolid),
+                    vti = image("a.vti", VoxelPhase::kSolid);
   EXPECT_TRUE(nrrd.starts_with("NRRD0005\n# written by lamina 1.2.3\n"));
   EXPECT_NE(nrrd.find("\nsizes: 3 2 2\nspace directions: (0.01,0,0) (0,0.012,0) (0,0,0.025)\n"), std::string::npos) << nrrd;
   EXPECT_NE(nrrd.find("\nspace origin: (0.005,0.006,0.0125)\nencoding: raw\n\n"), std::string::npos) << nrrd;
@@ -138,7 +138,7 @@ TEST(VoxelImages, SayTheirSizeAndHoldAByteAVoxelWithXFastest) {
   EXPECT_EQ(vti.substr(vti.find("\n_") + 2, 8 + voxels.size()), std::string("\x0c\0\0\0\0\0\0\0", 8) + voxels);
   std::string others = voxels;
   for (char& one : others) one = static_cast<char>(1 - one);
-  const std::string empty = image("b.nrrd", Side::kVoid);
+  const std::string empty = image("b.nrrd", VoxelPhase::kVoid);
   EXPECT_EQ(empty.substr(empty.find("\n\n") + 2), others);
   EXPECT_FALSE(image_kind("a.png").has_value());
 }
@@ -147,7 +147,7 @@ TEST(VoxelSurface, OfNothingIsAnErrorAndNoFile) {
   test::Directory folder;
   auto file = File::open(folder / "a.stl");
   ASSERT_TRUE(file.ok());
-  const auto counts = write_surface(*file, stack_of(Voxels(2, 2, 2), {}, kEdges), Side::kSolid, "1.2.3");
+  const auto counts = write_surface(*file, stack_of(Voxels(2, 2, 2), {}, kEdges), VoxelPhase::kSolid, "1.2.3");
   ASSERT_FALSE(counts.ok());
   EXPECT_EQ(counts.error().fault, Fault::kInput);
   EXPECT_EQ(file->size(), 0u);

@@ -44,12 +44,12 @@ bool set_keys(std::string_view lines) {
     at = end + 1;
   }
   if (!any || Dice(lines).below(8) != 0) return all;  // a hundred times as long as setting a key
-  const auto place = [](std::string& path) {          // a job file means paths from its folder
+  const auto position = [](std::string& path) {          // a job file means paths from its folder
     if (!path.empty()) path = "/parts/" + path;
   };
-  for (pipeline::PartRequest& part : job.parts) place(part.path);
-  for (std::string& preset : job.machine.presets) place(preset);
-  place(job.machine.profile), place(job.output);
+  for (pipeline::PartRequest& part : job.parts) position(part.path);
+  for (std::string& preset : job.machine.presets) position(preset);
+  position(job.machine.profile), position(job.output);
   check_round_trip(job);
   return all;
 }

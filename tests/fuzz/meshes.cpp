@@ -82,8 +82,8 @@ std::vector<std::string> obj_seeds() {
 std::vector<std::string> gzip_seeds() { return {test::gzip(binary_seeds()[0]), test::gzip(ascii_seeds()[0])}; }
 
 /// Whole facets and their count, corners that meet, and coordinates that people use.
-std::size_t mutate_binary(std::uint8_t* bytes, std::size_t size, std::size_t most, std::uint32_t seed) {
-  const std::size_t facets = size < 134 ? 0 : (std::min(size, most) - 84) / 50;
+std::size_t mutate_binary(std::uint8_t* bytes, std::size_t size, std::size_t maximum, std::uint32_t seed) {
+  const std::size_t facets = size < 134 ? 0 : (std::min(size, maximum) - 84) / 50;
   if (facets == 0) return size;
   Dice dice({reinterpret_cast<const char*>(bytes), size});
   dice.below(seed | 1);

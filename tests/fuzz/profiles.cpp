@@ -34,7 +34,7 @@ bool read_changes(std::string_view text) {
   const std::string written = read::changes_text(changes);
   const auto tree = read_toml("set = " + (written.empty() ? "{}" : written), "set");
   law(tree.ok(), tree.ok() ? "" : tree.error().message.c_str());
-  Place at;
+  TextPosition at;
   read::ProfileChanges again;
   const std::string what = read::read_changes(*tree->find("set"), again, at);
   law(what.empty(), what.c_str());

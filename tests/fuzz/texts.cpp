@@ -2,7 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stages/heights/ladder.h"
+#include "stages/heights/candidate_heights.h"
 #include "stages/infill/spacing.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/number_text.h"
@@ -49,7 +49,7 @@ void read_numbers(std::string_view text) {
 bool read_texts(std::string_view text) {
   read_numbers(text);
   if (const auto set = heights::read_thicknesses(text)) {
-    law(set->size() > 0 && set->least() > 0, "no thickness");
+    law(set->size() > 0 && set->minimum() > 0, "no thickness");
     law(std::ranges::adjacent_find(set->values, std::greater_equal{}) == set->values.end(), "thicknesses do not rise");
   }
   if (const auto words = split_words(text)) {

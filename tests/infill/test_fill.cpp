@@ -27,8 +27,8 @@ bool stays_inside(const ContoursView& region, Point2 a, Point2 b, double slack) 
   return true;
 }
 
-TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
-  std::size_t stretches = 0;
+TEST(Fill, NoBeadCentreLeavesItsRegionForAnyOutlinePatternAngleAndGap) {
+  std::size_t intervals = 0;
   for (const Outline& outline : outlines()) {
     for (const Pattern pattern :
          {Pattern::kRaster, Pattern::kContour, Pattern::kContourRaster, Pattern::kHoneycomb, Pattern::kQuatrefoil}) {
@@ -58,9 +58,9 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
             const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(region);
             // Looking is slow: some hundred stretches of each filling, others each time.
             const auto step = static_cast<std::uint32_t>(1 + paths.point.size() * within.point.size() / 10'000);
-            for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(stretches % step); i + 1 < paths.offset[p + 1];
+            for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(intervals % step); i + 1 < paths.offset[p + 1];
                  i += step) {
-              ++stretches;
+              ++intervals;
               ASSERT_TRUE(stays_inside(within, paths.point[i], paths.point[i + 1], 3))
                   << outline.name << ", pattern " << static_cast<int>(pattern) << ", angle " << angle << ", gap " << gap
                   << ", path " << p << ", stretch " << i - paths.offset[p];
@@ -70,8 +70,8 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
       }
     }
   }
-  EXPECT_GT(stretches, 20'000u);
-  std::cout << stretches << " stretches looked at\n";
+  EXPECT_GT(intervals, 20'000u);
+  std::cout << intervals << " stretches looked at\n";
 }
 
 TEST(Fill, LengthTimesDistanceTendsToTheArea) {
@@ -138,7 +138,7 @@ TEST(Fill, AFormulaHasToHoldWithinThePartOnly) {
   EXPECT_EQ(paths.point[0].y - context_of(square).part.lo.y, parameters.width / 2 + 300'000);
 }
 
-TEST(Fill, WhatCannotBeLaidIsOneClearLine) {
+TEST(Fill, WhatCannotBeDepositedIsOneClearLine) {
   const Contours& square = outline("square");
   const auto message = [&](const FillParameters& parameters) {
     Toolpaths paths;

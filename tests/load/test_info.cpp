@@ -49,7 +49,7 @@ TEST(Info, ABrokenPartSaysWhereAndWhatWillBeDone) {
   EXPECT_CONTAINS(text_of(corpus("broken/cube_missing_corner.stl"), options), "since repair is off");
 }
 
-TEST(Info, TellsTheVolumeThatIsPlannedAndWhatHangsOnCaps) {
+TEST(Info, ReportsTheVolumeThatIsPlannedAndWhatHangsOnCaps) {
   EXPECT_CONTAINS(text_of(corpus("nist_am_test_artifact_v3b.stl")), "planned volume       100981 mm3\n");
   std::vector<FloatTriangle> open = unit_box();
   open.resize(10);  // without the face at x = 10, 600 of 2200 mm2
@@ -156,7 +156,7 @@ TEST(Info, ManyShellsThatOverlapTakeBoundedWork) {
           load::planned_volumes(std::span(&mesh, 1), std::span(&alone, 1), std::span(&found, 1), counting, effort);
       ASSERT_TRUE(volumes.ok());
       EXPECT_EQ(volumes->all.known, load::Known::kAbout);
-      EXPECT_LE(crossed, effort.most_crossed);
+      EXPECT_LE(crossed, effort.max_crossed);
       EXPECT_GE(static_cast<double>(count), effort.fewest_planes);
       const double height_mm = 20 + (boxes - 1) * 1e-3;
       EXPECT_NEAR(volumes->all.mm3, boxes * 8000.0 - 400 * height_mm, 1e-3) << "the weights add up to the height";

@@ -121,10 +121,10 @@ void check_part(const fs::path& file, const std::string& name, Checked& checked)
   ++checked.parts;
 }
 
-void check_folder(const fs::path& folder, std::uint32_t least_parts) {
+void check_folder(const fs::path& folder, std::uint32_t min_parts) {
   Checked checked;
   for (const fs::path& file : part_files(folder)) check_part(file, fs::relative(file, folder).string(), checked);
-  EXPECT_GE(checked.parts, least_parts) << "too few parts in " << folder;
+  EXPECT_GE(checked.parts, min_parts) << "too few parts in " << folder;
   EXPECT_LE(checked.too_large, 1u) << "parts of more than a metre are not compared";
   EXPECT_GT(checked.pixels, 0u);
   std::cout << "compared bit for bit with the contract: " << checked.parts << " parts, " << checked.layers

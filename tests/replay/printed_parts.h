@@ -33,18 +33,18 @@ inline Program program_of(const pipeline::ResolvedMachine& resolved, const RunsV
   cycle.thickness_nm = kLayer.thickness;
   write::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
-  writer->care_of_layer(cycle, bytes);
+  writer->maintenance_of_layer(cycle, bytes);
   program::CompileScratch scratch;
   const auto count = program::compile(
       resolved.grid, image, scratch,
       [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        writer->care_before(sweep, vectors, bytes);
+        writer->maintenance_before(sweep, vectors, bytes);
         writer->sweep(sweep, vectors, bytes);
         return {};
       },
       kLayer.index);
   EXPECT_TRUE(count.ok());
-  writer->care_behind(bytes);
+  writer->maintenance_after(bytes);
   writer->end_layer(cycle, bytes);
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
 }

@@ -97,7 +97,7 @@ TEST(M578, SweepsWithoutARampAreFiredEitherWay) {
   }
 }
 
-TEST(M578, ProgramsTellTheFirmwareThatTheyAreFor) {
+TEST(M578, ProgramsStateTheFirmwareThatTheyAreFor) {
   const auto resolved = printed_parts::shipped("reprap-inkjet", [](Machine&) {});
   write::ProgramBytes bytes;
   write::find_dialect("m578")->make_writer(resolved.machine, resolved.grid)->start(9, bytes);

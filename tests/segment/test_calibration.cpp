@@ -105,7 +105,7 @@ TEST(Prediction, PoresOfTable16) {
   }
 }
 
-TEST(Prediction, AThinStretchLongerThanTheStabilisationDistanceIsWarnedOf) {
+TEST(Prediction, AThinIntervalLongerThanTheStabilisationDistanceIsWarnedOf) {
   Segmentation s = of_configuration(4.4, 100, 1, 0.43);
   const Calibration& anet = anet_a8_calibration();
   EXPECT_TRUE(warnings(s, anet).empty());

@@ -252,7 +252,7 @@ TEST(Claim, OfManyThatBeginAtOnceOneHoldsADirectory) {
   const testing::Folder folder;
   const std::string path = folder / "manifest.json";
   for (int round = 0; round < 20; ++round) {
-    std::atomic<int> held{0}, most{0}, taken{0};
+    std::atomic<int> held{0}, maximum{0}, taken{0};
     std::vector<std::thread> runs;
     for (int t = 0; t < 8; ++t) {
       runs.emplace_back([&] {
@@ -260,7 +260,7 @@ TEST(Claim, OfManyThatBeginAtOnceOneHoldsADirectory) {
           const auto claim = Claim::take(path, "out");
           if (!claim) continue;
           ++taken;
-          most = std::max(most.load(), ++held);
+          maximum = std::max(maximum.load(), ++held);
           std::this_thread::yield();
           --held;
         }
@@ -268,12 +268,12 @@ TEST(Claim, OfManyThatBeginAtOnceOneHoldsADirectory) {
     }
     for (std::thread& run : runs) run.join();
     EXPECT_GT(taken, 0);
-    EXPECT_EQ(most, 1);
+    EXPECT_EQ(maximum, 1);
     EXPECT_EQ(folder.files(), 0u);
   }
 }
 
-TEST(Claim, StaysWithTheFileThatTakesItsPlace) {
+TEST(Claim, StaysWithTheFileThatReplacesIt) {
   const testing::Folder folder;
   const std::string path = folder / "manifest.json";
   {

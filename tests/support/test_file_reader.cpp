@@ -60,7 +60,7 @@ TEST_F(FileReaders, LinesAreThoseOfTheTextWhereverPiecesEnd) {
   }
 }
 
-TEST_F(FileReaders, BoundsAreToldWithTheLine) {
+TEST_F(FileReaders, BoundsAreReportedWithTheLine) {
   EXPECT_EQ(read("a\n" + std::string(64, 'x'), {.longest_line = 64}).error, "");
   const Lines line = read("a\n" + std::string(65, 'x'), {.no_text = "is no list", .longest_line = 64});
   EXPECT_EQ(line.lines.size(), 1u);
@@ -68,7 +68,7 @@ TEST_F(FileReaders, BoundsAreToldWithTheLine) {
   EXPECT_TRUE(read({"a\nb\0c\n", 6}).error.ends_with("file:2: is no text file"));
   EXPECT_EQ(read({"a\nb\0c\n", 6}, {.any_bytes = true}).lines.size(), 2u);
   test::write_text(directory_ / "large", std::string(2048, 'x'));
-  const auto large = FileReader::open(directory_ / "large", {.fault = Fault::kInput, .most_bytes = 1024});
+  const auto large = FileReader::open(directory_ / "large", {.fault = Fault::kInput, .max_bytes = 1024});
   ASSERT_FALSE(large);
   EXPECT_EQ(large.error().fault, Fault::kInput);
   EXPECT_TRUE(large.error().message.ends_with("large: holds more than 1 KiB, the most for such a file"));
@@ -101,14 +101,14 @@ TEST_F(FileReaders, AStreamEndsAtItsBound) {
   ASSERT_EQ(::pipe(ends), 0);
   ASSERT_EQ(::write(ends[1], "a\nb\n", 4), 4);
   ::close(ends[1]);
-  auto stream = FileReader::open("/dev/fd/" + std::to_string(ends[0]), {.most_bytes = 3, .streams = true});
+  auto stream = FileReader::open("/dev/fd/" + std::to_string(ends[0]), {.max_bytes = 3, .streams = true});
   ASSERT_TRUE(stream.ok());
   EXPECT_FALSE(stream->text());
   EXPECT_FALSE(stream->status());
   ::close(ends[0]);
 }
 
-TEST_F(FileReaders, PlacesAndStretches) {
+TEST_F(FileReaders, PositionsAndIntervals) {
   test::write_text(directory_ / "file", "one\ntwo\nthree\n");
   auto file = FileReader::open(directory_ / "file", {});
   ASSERT_TRUE(file.ok());

@@ -14,7 +14,7 @@ std::vector<std::string> lines_of(write::Journal& journal) {
   return lines;
 }
 
-TEST(Journal, LinesAreThereAgainAndATornOneStandsAlone) {
+TEST(Journal, LinesAreThereAgainAndATornOneIsAlone) {
   const Directory directory;
   const std::string path = directory / "journal";
   {
@@ -35,7 +35,7 @@ TEST(Journal, LinesAreThereAgainAndATornOneStandsAlone) {
   EXPECT_TRUE(journal->empty());
 }
 
-TEST(Journal, OneProcessHoldsItAndTheOtherIsTold) {
+TEST(Journal, OneProcessHoldsItAndTheOtherIsReported) {
   const Directory directory;
   const auto first = write::Journal::open(directory / "journal", "is held");
   ASSERT_TRUE(first.ok());

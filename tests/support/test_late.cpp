@@ -16,7 +16,7 @@ TEST(Late, FunctionsOfALibraryAreFoundByName) {
   EXPECT_EQ(reinterpret_cast<double (*)(double)>(found)(0), 1);
 }
 
-TEST(Late, WhatIsMissingIsToldInALine) {
+TEST(Late, WhatIsMissingIsReportedInALine) {
   for (const Status& status :
        {load_library("liblamina_nowhere.so.1", {}), load_library("libm.so.6", std::span(&kMissing, 1))}) {
     ASSERT_FALSE(status.ok());

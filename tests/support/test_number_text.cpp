@@ -23,7 +23,7 @@ TEST(NumberText, OnlyWholeFiniteTextsAreNumbers) {
   }
 }
 
-TEST(NumberText, LimitsAreInclusiveAndTold) {
+TEST(NumberText, LimitsAreInclusiveAndReported) {
   double value = 0;
   EXPECT_EQ(read_number("2", 2, 3, " mm", value), "");
   EXPECT_EQ(read_number("3", 2, 3, " mm", value), "");

@@ -5,7 +5,7 @@
 namespace lamina {
 namespace {
 
-TEST(Terminal, BarsFitBesideTheirText) {
+TEST(Terminal, BarsFitNextToTheirText) {
   EXPECT_EQ(progress_bar(0.5, "half", 18), "[#####.....] half");
   EXPECT_EQ(progress_bar(0, "", 80), "[" + std::string(40, '.') + "] ");
   EXPECT_EQ(progress_bar(1, "", 80), "[" + std::string(40, '#') + "] ");

@@ -27,7 +27,7 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::uint64_t kLeastBatchBytes = 48ull << 20;  // the layers of one job, and what it holds beside them
+constexpr std::uint64_t kMinBatchBytes = 48ull << 20;  // the layers of one job, and what it holds beside them
 
 CommandSpec batch_spec() {
   CommandSpec spec;
@@ -203,9 +203,9 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
         arguments.read("--time-limit", {0.001, 1e9, " s"}, options.time_limit_seconds)}) {
     if (!status) return status.error();
   }
-  if (options.memory_bytes < kLeastBatchBytes) {
+  if (options.memory_bytes < kMinBatchBytes) {
     return at_option("--memory", fmt::format("{} is less than any job takes; give {}M or more", arguments.text("--memory"),
-                                             kLeastBatchBytes >> 20))
+                                             kMinBatchBytes >> 20))
         .error();
   }
   if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));

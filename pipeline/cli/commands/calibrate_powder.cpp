@@ -67,15 +67,15 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
   const std::string chart =
       write::is_file(arguments.text("--chart")) ? arguments.text("--chart") : arguments.text("--chart") + "/chart.json";
   const auto text = read_file(chart, {.fault = Fault::kInput, .missing = "no such chart; lamina calibrate -o DIR writes one"});
-  const auto laid = text ? read_chart(*text, chart) : text.error();
-  if (!laid) return laid.error();
-  if (laid->machine != machine->name)
-    return at_option("--chart", fmt::format("{} is of {}, not of {}", chart, one_line(laid->machine), machine->name));
-  const auto seen = scanned(
+  const auto deposited = text ? read_chart(*text, chart) : text.error();
+  if (!deposited) return deposited.error();
+  if (deposited->machine != machine->name)
+    return at_option("--chart", fmt::format("{} is of {}, not of {}", chart, one_line(deposited->machine), machine->name));
+  const auto detected = scanned(
       "chart", {{"photo", arguments.text("--scan")}, {"chart", parse_json(*text)}, {"picture", arguments.has("--overlay")}},
       arguments.text("--overlay"));
-  if (!seen) return seen.error();
-  const auto lines = take_over(*seen, *laid, *machine);
+  if (!detected) return detected.error();
+  const auto lines = take_over(*detected, *deposited, *machine);
   if (!lines) return lines.error();
   const auto profile = measured_profile(*machine);
   if (!profile) return profile.error();
@@ -85,7 +85,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
     context.say("profile   " + request.directory);
   }
   if (!arguments.has("--json")) return {};
-  return context.give({{"command", "calibrate"}, {"profile", request.directory}, {"reading", parse_json(*seen)}});
+  return context.give({{"command", "calibrate"}, {"profile", request.directory}, {"reading", parse_json(*detected)}});
 }
 
 }  // namespace

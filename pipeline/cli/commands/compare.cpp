@@ -37,7 +37,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   if (!layer) return layer.error();
   if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
     return Error{Fault::kInput, fmt::format("{}: tells no resolution; give an image that lamina wrote", arguments.operands[0])};
-  const auto told = scanned("compare",
+  const auto reported = scanned("compare",
                             {{"photo", arguments.operands[1]},
                              {"photo_um", photo_um},
                              {"scan_along_x", machine->mounting.scan_axis == ScanAxis::kX},
@@ -46,8 +46,8 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
                              {"row_offset", layer->runs.row_offset},
                              {"change", layer->runs.change}},
                             "");
-  if (!told) return told.error();
-  Json json = parse_json(*told);
+  if (!reported) return reported.error();
+  Json json = parse_json(*reported);
   const auto number = [](const Json& value) { return value.get<double>(); };
   const char* axis = machine->mounting.scan_axis == ScanAxis::kX ? "from the back" : "from the left";
   Answer answer(arguments, context);
@@ -56,7 +56,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
                            number(band["to_mm"]), axis));
   for (const Json& body : json["bodies"])
     answer.say(fmt::format("area      {:.2f} of {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back",
-                           number(body["seen_mm2"]), number(body["expected_mm2"]), number(body["x_mm"]), number(body["y_mm"])));
+                           number(body["detected_mm2"]), number(body["expected_mm2"]), number(body["x_mm"]), number(body["y_mm"])));
   for (const Json& ink : json["extra"])
     answer.say(
         fmt::format("extra     {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back, where the layer has no ink",

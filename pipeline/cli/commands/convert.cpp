@@ -107,7 +107,7 @@ Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) 
 }
 
 /// errors  kUsage: what is there would be replaced
-Status check_place(const Conversion& all, const std::string& stack) {
+Status check_output(const Conversion& all, const std::string& stack) {
   std::error_code error;
   const fs::path in = fs::weakly_canonical(stack, error), out = fs::weakly_canonical(all.output, error);
   if (out == in || (fs::is_regular_file(in, error) && in.parent_path() == out))
@@ -204,9 +204,9 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  const auto told = images_on_record(stack);
-  if (!told) return told.error();
-  auto images = read::LayerImages::open(told->path, *request);
+  const auto reported = images_on_record(stack);
+  if (!reported) return reported.error();
+  auto images = read::LayerImages::open(reported->path, *request);
   if (!images) return images.error();
   std::array<double, 2>& dpi = all.dpi;
   dpi = {images->dpi_x(), images->dpi_y()};
@@ -218,7 +218,7 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   all.first_number = images->first_number();
   all.images = std::move(*images);
-  if (Status status = check_place(all, stack); !status) return status;
+  if (Status status = check_output(all, stack); !status) return status;
   const auto claim = write::Claim::take(output + "/manifest.json", output);
   if (!claim) return claim.error();
   Converted sum;

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const KeyChoice kExportKeys = {"bed.size_mm", "place", "load", "run.output", "part"};
+const KeyChoice kExportKeys = {"bed.size_mm", "placement", "load", "run.output", "part"};
 
 CommandSpec export_spec() {
   CommandSpec spec;
@@ -121,7 +121,7 @@ Json json_of(const Scene& scene, const Exported& exported, const std::string& ou
                {"files", 1},
                {"bytes_written", exported.file.bytes},
                {"meshes", scene.meshes.size()},
-               {"places", scene.instances.size()},
+               {"instances", scene.instances.size()},
                {"triangles", exported.triangles},
                {"left_out", exported.left_out},
                {"volume_mm3", exported.volume_mm3},

@@ -11,7 +11,7 @@
 #include "pipeline/cli/pore_print.h"
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
-#include "pipeline/pores/laid_look.h"
+#include "pipeline/pores/pore_analysis.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
@@ -59,7 +59,7 @@ CommandSpec permeability_spec() {
        "spread: as the printer's melt lags and spreads; laid: no spread along lines; told: by the file; default: spread by known printers",
        "",
        "Toolpaths",
-       {"laid", "spread", "told"}},
+       {"deposited", "spread", "stated"}},
       {"--machine", "NAME|FILE", "printer that lays them, or of a job; default: the one that the file names", "", "Toolpaths"},
       {"--set", "KEY=VALUE", "of a job file: set any key, as in --set fill.width_mm=0.5", "", "Job"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
@@ -96,9 +96,9 @@ Status read_pressures(const Arguments& arguments, segment::DropsSettings& settin
   if (!settings.gas) return {};
   segment::GasPressures& gas = *settings.gas;
   if (Status status = arguments.read("--outlet-pressure", {1, 1e9}, gas.outlet_pa); !status) return status;
-  gas.told_pa = gas.outlet_pa;
-  if (Status status = arguments.read("--flow-pressure", {1, 1e9}, gas.told_pa); !status) return status;
-  if (!arguments.has("--density") && !arguments.has("--convention")) settings.fluid.density_kg_m3 *= gas.told_pa / 101325;
+  gas.reference_pa = gas.outlet_pa;
+  if (Status status = arguments.read("--flow-pressure", {1, 1e9}, gas.reference_pa); !status) return status;
+  if (!arguments.has("--density") && !arguments.has("--convention")) settings.fluid.density_kg_m3 *= gas.reference_pa / 101325;
   return {};
 }
 
@@ -182,7 +182,7 @@ Status refuse(const Arguments& arguments, std::span<const std::string_view> flag
 }
 
 /// What can be told of one file or folder. part  as predict_print() takes it
-Outcome look_at_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
+Outcome analyse_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   if (arguments.operands.size() != 1)
     return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
   const std::string& operand = arguments.operands.front();
@@ -206,10 +206,10 @@ Outcome look_at_file(const Arguments& arguments, Context& context, const std::op
 
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (!arguments.operands.empty() && names_job(arguments.operands.front()))
-    return predict_job(arguments, context, look_at_file);
+    return predict_job(arguments, context, analyse_file);
   if (const Status fits = refuse(arguments, std::array<std::string_view, 1>{"--set"}, "job files, as in job.toml"); !fits)
     return fits;
-  return look_at_file(arguments, context, std::nullopt);
+  return analyse_file(arguments, context, std::nullopt);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/job/job.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/pores/laid_look.h"
+#include "pipeline/pores/pore_analysis.h"
 #include "pipeline/run/run_resolved.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
@@ -116,7 +116,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (auto done = file->finish(); !done) kept = done.error();
     file.reset();
   };
-  const bool tells_pores =
+  const bool reports_pores =
       row.product == Product::kMoves && resolved->job.segment.any() && !job->dry_run && (!job->quiet || job->json);
   const auto progress = [&](const ProgressEvent& event) {
     if (event.stage == ProgressEvent::Stage::kLayers) keep_job();
@@ -126,7 +126,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (!summary) return summary.error();
   keep_job();
   if (!kept) return kept.error();
-  if (tells_pores) add_pores(summary->output, *summary);
+  if (reports_pores) add_pores(summary->output, *summary);
   if (Status status = write_quote(arguments, summary->quote); !status) return status.error();
   if (!job->quiet) {
     for (const std::string& note : left) context.say("note: " + note);
@@ -144,7 +144,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
 // --- lamina jet
 
 // clang-format off
-const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "machine", "dose", "fill", "segment.fill", "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "placement", "image", "machine", "dose", "fill", "segment.fill", "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
                             "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
                             "segment.thin_width_mm", "load", "run", "part"};
 // clang-format on
@@ -199,7 +199,7 @@ PlanCommand jet_row() {
 
 // --- lamina slice
 
-const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "place",        "image.fill", "load",
+const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "placement",        "image.fill", "load",
                               "run.output",      "run.threads", "run.memory", "run.sync",     "run.layers", "run.strict",
                               "run.allow_empty", "slice",       "fill",       "segment.fill", "part"};
 
@@ -213,9 +213,9 @@ const OptionSpec kSliceWords[] = {{"--tolerance", "", "", "0", ""}};
 Status complete_slice(const Arguments& arguments, Job& job) {
   if (arguments.text("--fill") == "segmented")
     return at_option("--fill", "segmented lines are of lamina extrude and lamina jet");
-  const InputFile asked = {arguments.text("--job"), "the job file"};
+  const InputFile requested = {arguments.text("--job"), "the job file"};
   const std::string kept = job.output + "/job.toml";
-  return check_outputs({&asked, 1}, {&kept, 1});
+  return check_outputs({&requested, 1}, {&kept, 1});
 }
 
 std::string slice_closing() {
@@ -245,7 +245,7 @@ PlanCommand slice_row() {
 
 const KeyChoice kExtrudeKeys = {"layers",
                                 "heights",
-                                "place",
+                                "placement",
                                 "machine.profile",
                                 "fill",
                                 "image.fill",

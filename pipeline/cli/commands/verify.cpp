@@ -85,9 +85,9 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
         for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
         for (const auto& [name, what] : report->use.results)
           answer.say(fmt::format("{:<10}{}", name == "material" ? "used" : name, what));
-        std::vector<Warning> doubts;
-        for (const UnfedPowder& powder : report->unfed) sanity::warn_of_unfed(powder, doubts);
-        for (const Warning& doubt : doubts) answer.say("warning   " + one_line(doubt.text));
+        std::vector<Warning> warnings;
+        for (const UnfedPowder& powder : report->unfed) checks::warn_of_unfed(powder, warnings);
+        for (const Warning& warning : warnings) answer.say("warning   " + one_line(warning.text));
       }
       if (Status status = answer.status(); !status) return status;
     }

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <deque>
 
-#include "pipeline/cli/terminal/foreign_words.h"
+#include "pipeline/cli/terminal/slicer_aliases.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/names.h"
 #include "stages/support/text/number_text.h"
@@ -87,7 +87,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
       if (name == flag) return wrong(fmt::format("{}: {}", flag, why));
     }
     if (!extra.starts_with('-')) return wrong(fmt::format("'{}': not expected here", extra));
-    const std::string hint = foreign_word(name, spec);
+    const std::string hint = slicer_alias(name, spec);
     return wrong(fmt::format("{}: no such option{}", name, hint.empty() ? suggest(name, known) : hint));
   }
   for (std::size_t i = 0; i < options.size(); ++i) {

@@ -191,10 +191,10 @@ end
   for (const CommandSpec& command : commands) {
     script +=
         fmt::format("complete -c lamina -n __fish_use_subcommand -f -a {} -d {}\n", command.name, fish_word(command.brief));
-    const std::string seen = fmt::format("complete -c lamina -n '__fish_seen_subcommand_from {}'", command.name);
-    script += seen + fish_values(command.operand_words, find(kByValue, command.operand)) + "\n";
+    const std::string detected = fmt::format("complete -c lamina -n '__fish_seen_subcommand_from {}'", command.name);
+    script += detected + fish_values(command.operand_words, find(kByValue, command.operand)) + "\n";
     for (const OptionSpec& option : command.options) {
-      script += seen;
+      script += detected;
       for (const std::string_view flag : split(option.flag, ",")) {
         script += flag.starts_with("--") ? fmt::format(" -l {}", flag.substr(2)) : fmt::format(" -s {}", flag.substr(1));
       }

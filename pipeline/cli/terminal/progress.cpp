@@ -24,7 +24,7 @@ std::string Progress::draw(std::string_view what, double share) {
 
 std::string Progress::begin(std::string_view what) { return style_ == Style::kBar ? draw(what, 0) : ""; }
 
-std::string Progress::tell(std::uint32_t done, std::uint32_t total) {
+std::string Progress::report(std::uint32_t done, std::uint32_t total) {
   using namespace std::chrono_literals;
   if (style_ == Style::kSilent) return {};
   const Clock::time_point now = Clock::now();
@@ -32,15 +32,15 @@ std::string Progress::tell(std::uint32_t done, std::uint32_t total) {
   const auto tenths = total > 0 ? static_cast<std::uint32_t>(10ull * done / total) : 10;
   if (!counting_) {
     counting_ = true;
-    started_ = told_ = now;
+    started_ = reports_ = now;
     before_ = done;
-    tenths_told_ = total > 0 ? tenths : 0;
+    tenths_reported_ = total > 0 ? tenths : 0;
     return {};
   }
-  const auto silent = now - told_;
-  if (bar ? silent < 100ms : silent < 5s && (tenths <= tenths_told_ || silent < 1s)) return {};
-  told_ = now;
-  tenths_told_ = tenths;
+  const auto silent = now - reports_;
+  if (bar ? silent < 100ms : silent < 5s && (tenths <= tenths_reported_ || silent < 1s)) return {};
+  reports_ = now;
+  tenths_reported_ = tenths;
   const std::string text = rate(done, total, before_, std::chrono::duration<double>(now - started_).count());
   return bar ? draw(text, total > 0 ? static_cast<double>(done) / total : 1) : text + "\n";
 }

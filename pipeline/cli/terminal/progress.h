@@ -21,7 +21,7 @@ class Progress {
   /// Starts a phase without numbers: "loading parts".
   std::string begin(std::string_view what);
   /// Sets the number of finished layers; the first call sets the number kept from before.
-  std::string tell(std::uint32_t done, std::uint32_t total);
+  std::string report(std::uint32_t done, std::uint32_t total);
   /// The text that erases the bar before another line.
   std::string clear() { return line_.clear(); }
 
@@ -37,8 +37,8 @@ class Progress {
   bool counting_ = false;
   StatusLine line_;
   std::uint32_t before_ = 0;
-  std::uint32_t tenths_told_ = 0;
-  Clock::time_point started_ = Clock::now(), told_ = started_;
+  std::uint32_t tenths_reported_ = 0;
+  Clock::time_point started_ = Clock::now(), reports_ = started_;
 };
 
 }  // namespace lamina::terminal

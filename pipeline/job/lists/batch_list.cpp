@@ -31,7 +31,7 @@ std::string name_of(const fs::path& path) {
 
 /// The command that a saved job names in its leading comments, "jet" if none does. Reading the job tells what is wrong with it.
 std::string command_of(const fs::path& path) {
-  auto file = FileReader::open(path.string(), {.fault = Fault::kUsage, .most_bytes = kMostTomlBytes, .longest_line = 1 << 16});
+  auto file = FileReader::open(path.string(), {.fault = Fault::kUsage, .max_bytes = kMaxTomlBytes, .longest_line = 1 << 16});
   if (!file) return "jet";
   for (std::string_view line; file->next(line) && (line.empty() || line.starts_with('#') || line == "\r");) {
     if (const std::string_view command = command_in(line); !command.empty()) return std::string(command);
@@ -81,7 +81,7 @@ std::string name_of_words(const std::vector<std::string>& words, const IsPart& i
 Status read_list(const std::string& path, const IsPart& is_part, std::vector<BatchEntry>& entries) {
   auto file = FileReader::open(path, {.fault = Fault::kUsage,
                                       .no_text = "not a text; a list has one command line a line",
-                                      .most_bytes = kMostListBytes,
+                                      .max_bytes = kMaxListBytes,
                                       .longest_line = 1 << 20,
                                       .streams = true});
   if (!file) return file.error();

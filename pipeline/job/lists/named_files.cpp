@@ -52,7 +52,7 @@ class Profiles {
     missing_.emplace_back(value.text,
                           fmt::format("{}machine.{}: {}: no such machine profile; correct it (a relative path begins "
                                       "beside the job file{})",
-                                      value.place.text(file_), key, one_line(value.text),
+                                      value.position.text(file_), key, one_line(value.text),
                                       here ? ", not where lamina runs, where " + one_line(said) + " is" : ""));
   }
 
@@ -61,13 +61,13 @@ class Profiles {
     const auto text = flat_text(presets);
     std::vector<std::string> names;
     if (!text || !read_presets(*text, names).empty()) return {};  // the reader of the key tells it
-    TomlValue list{TomlValue::Kind::kList, {}, {}, {}, presets.place};
+    TomlValue list{TomlValue::Kind::kList, {}, {}, {}, presets.position};
     for (std::size_t i = 0; i < names.size(); ++i) {
-      const Place place = names.size() == presets.value.size() ? presets.value[i].place : presets.place;
-      TomlValue& preset = list.value.emplace_back(TomlValue{TomlValue::Kind::kText, std::move(names[i]), {}, {}, place});
+      const TextPosition position = names.size() == presets.value.size() ? presets.value[i].position : presets.position;
+      TomlValue& preset = list.value.emplace_back(TomlValue{TomlValue::Kind::kText, std::move(names[i]), {}, {}, position});
       replace(preset, "presets");
       if (preset.text.find(',') == std::string::npos) continue;
-      return Error{Fault::kUsage, fmt::format("{}machine.presets: {}", place.text(file_), divided(preset.text))};
+      return Error{Fault::kUsage, fmt::format("{}machine.presets: {}", position.text(file_), divided(preset.text))};
     }
     presets = std::move(list);
     return {};

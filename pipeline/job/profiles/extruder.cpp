@@ -50,11 +50,11 @@ std::string lines_text(const std::vector<std::string>& entries) {
 
 /// Rows of so many numbers: { percent, thin_mm, ... } of a calibration.
 template <class Row, double Row::*... Columns>
-std::string read_rows(const TomlValue& list, std::vector<Row>& rows, Place& at) {
+std::string read_rows(const TomlValue& list, std::vector<Row>& rows, TextPosition& at) {
   if (!list.is_list()) return "is a list of rows, as in [[100, 0.4], [50, 0.3]]";
   std::vector<Row> read;
   for (const TomlValue& cells : list.value) {
-    at = cells.place;
+    at = cells.position;
     if (cells.value.size() != sizeof...(Columns)) {
       return fmt::format("row {} holds {} numbers; give {}", read.size() + 1, cells.value.size(), sizeof...(Columns));
     }
@@ -83,15 +83,15 @@ constexpr Key<Profile> table(Text name) {
 }
 
 /// "THICKNESS_MM USE COMMAND" a line.
-std::string read_commands(const TomlValue& list, std::vector<Extruder::Sml::Pd>& commands, Place& at) {
+std::string read_commands(const TomlValue& list, std::vector<Extruder::Sml::Pd>& commands, TextPosition& at) {
   if (!list.is_list()) return "is a list of \"THICKNESS_MM USE COMMAND\"";
   std::vector<Extruder::Sml::Pd> read;
   for (const TomlValue& line : list.value) {
-    at = line.place;
+    at = line.position;
     const auto words = split(line.text, " ");
     Extruder::Sml::Pd& command = read.emplace_back();
     if (words.size() != 3) return fmt::format("'{}' is not \"THICKNESS_MM USE COMMAND\"", one_line(line.text));
-    if (auto wrong = read_number(words[0], kLeastMm, 10, " mm", command.thickness_mm); !wrong.empty()) return wrong;
+    if (auto wrong = read_number(words[0], kMinMm, 10, " mm", command.thickness_mm); !wrong.empty()) return wrong;
     if (std::ranges::find(kUses, words[1]) == std::end(kUses)) return not_one_of(one_line(words[1]), kUses);
     command.use = words[1];
     command.line = words[2];
@@ -130,9 +130,9 @@ constexpr Key<Profile> kKeys[] = {
     custom<Profile, read_line, same_text, kMachine, &Extruder::description>({"machine", "description"}, Form::kString),
     text<check_format, kMachine, &Extruder::format>({"machine", "format"}),
 
-    field<kMachine, &Extruder::bed, &Bed::size_mm>({"bed", "size_mm"}, {1, kMostMm, " mm"}),
-    field<kMachine, &Extruder::bed, &Bed::build_height_mm>({"bed", "build_height_mm"}, {1, kMostMm, " mm"}),
-    field<kMachine, &Extruder::bed, &Bed::corner_mm>({"bed", "corner_mm"}, {-kMostMm, kMostMm, " mm"}),
+    field<kMachine, &Extruder::bed, &Bed::size_mm>({"bed", "size_mm"}, {1, kMaxMm, " mm"}),
+    field<kMachine, &Extruder::bed, &Bed::build_height_mm>({"bed", "build_height_mm"}, {1, kMaxMm, " mm"}),
+    field<kMachine, &Extruder::bed, &Bed::corner_mm>({"bed", "corner_mm"}, {-kMaxMm, kMaxMm, " mm"}),
 
     field<kMachine, &Extruder::material, &Material::nozzle_mm>({"material", "nozzle_mm"}, {0.01, 20, " mm"}),
     field<kMachine, &Extruder::material, &Material::filament_mm>({"material", "filament_mm"}, {0.1, 20, " mm"}),
@@ -158,11 +158,11 @@ constexpr Key<Profile> kKeys[] = {
 
     field<kMachine, &Extruder::retraction, &Retraction::length_mm>({"retraction", "length_mm"}, {0, 50, " mm"}),
     field<kMachine, &Extruder::retraction, &Retraction::speed_mm_s>({"retraction", "speed_mm_s"}, {0.1, 1000, " mm/s"}),
-    field<kMachine, &Extruder::retraction, &Retraction::least_travel_mm>({"retraction", "least_travel_mm"}, {0, 1000, " mm"}),
+    field<kMachine, &Extruder::retraction, &Retraction::min_travel_mm>({"retraction", "min_travel_mm"}, {0, 1000, " mm"}),
 
     field<kMachine, &Extruder::skirt, &Skirt::loops>({"skirt", "loops"}, {0, 100}),
     field<kMachine, &Extruder::skirt, &Skirt::distance_mm>({"skirt", "distance_mm"}, {0, 100, " mm"}),
-    field<kMachine, &Extruder::skirt, &Skirt::least_mm>({"skirt", "least_mm"}, {0, 10'000, " mm"}),
+    field<kMachine, &Extruder::skirt, &Skirt::min_mm>({"skirt", "min_mm"}, {0, 10'000, " mm"}),
 
     field<kMachine, &Extruder::fan, &Fan::percent>({"fan", "percent"}, {0, 100, " %"}),
     field<kMachine, &Extruder::fan, &Fan::from_layer>({"fan", "from_layer"}, {0, 1'000'000}),
@@ -241,14 +241,14 @@ bool is_name(std::string_view name) {
 
 }  // namespace
 
-std::string read_changes(const TomlValue& table, ProfileChanges& changes, Place& at) {
+std::string read_changes(const TomlValue& table, ProfileChanges& changes, TextPosition& at) {
   if (!table.is_table()) return "is a table of keys of the machine's profile, as in fan.from_layer = 2";
   ProfileChanges read;
   for (std::size_t s = 0; s < table.value.size(); ++s) {
-    at = table.value[s].place;
+    at = table.value[s].position;
     if (!table.value[s].is_table()) return fmt::format("{}: is not section.key, as in fan.from_layer = 2", table.name[s]);
     for (std::size_t i = 0; i < table.value[s].value.size(); ++i) {
-      at = table.value[s].value[i].place;
+      at = table.value[s].value[i].position;
       const std::string name = fmt::format("{}.{}", table.name[s], table.value[s].name[i]);
       if (!is_name(name)) return fmt::format("'{}' is not section.key, as in fan.from_layer", name);
       const auto text = flat_text(table.value[s].value[i]);
@@ -262,7 +262,7 @@ std::string read_changes(const TomlValue& table, ProfileChanges& changes, Place&
 
 std::string read_changes(std::string_view text, ProfileChanges& changes) {
   if (text.starts_with('{')) {
-    Place unused;
+    TextPosition unused;
     const auto table = read_toml_value(text);
     return table ? read_changes(*table, changes, unused) : "is no table";
   }

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kDeepest = 16, kMostFiles = 64;
+constexpr std::size_t kDeepest = 16, kMaxFiles = 64;
 constexpr std::string_view kInherits = "inherits";
 
 /// The names that a file inherits from. returns "" or what is wrong
@@ -35,7 +35,7 @@ std::string source_of(const ProfileFiles& files, std::string_view section, std::
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
     const TomlValue* table = file->keys.find(section);
     const TomlValue* value = table == nullptr ? nullptr : table->find(name);
-    if (value != nullptr) return fmt::format("{}:{}", file->where, value->place.line);
+    if (value != nullptr) return fmt::format("{}:{}", file->where, value->position.line);
   }
   return "default";
 }
@@ -124,7 +124,7 @@ bool Library::is_own(std::string_view name) const {
 }
 
 Result<Library::Found> Library::find(const std::string& name, const std::string& folder) const {
-  ReadRules rules{.fault = Fault::kUsage, .missing = "no such machine profile", .most_bytes = kMostTomlBytes};
+  ReadRules rules{.fault = Fault::kUsage, .missing = "no such machine profile", .max_bytes = kMaxTomlBytes};
   std::string path = name;
   if (!is_profile_path(name)) {
     const auto shipped = std::ranges::find(shipped_, name, &ShippedProfile::name);
@@ -162,12 +162,12 @@ Status Library::add(const std::string& name, const std::string& folder, Chain& c
   chain.where.push_back(one_line(found->where));
   if (again) return wrong(fmt::format("goes round in a circle: {}", fmt::join(chain.where, " > ")));
   if (chain.id.size() > kDeepest) return wrong(fmt::format("is more than {} files deep", kDeepest));
-  if (files.size() >= kMostFiles) return wrong(fmt::format("comes to more than {} files", kMostFiles));
+  if (files.size() >= kMaxFiles) return wrong(fmt::format("comes to more than {} files", kMaxFiles));
   if (std::ranges::find(files, found->id, &ProfileFile::id) == files.end()) {
     auto keys = read_toml(found->text, found->where);
     if (!keys) return keys.error();
     if (const TomlValue* inherits = keys->find(kInherits); inherits != nullptr) {
-      const std::string at = fmt::format("{}{}: ", inherits->place.text(found->where), kInherits);
+      const std::string at = fmt::format("{}{}: ", inherits->position.text(found->where), kInherits);
       std::vector<std::string> bases;
       if (const std::string what = read_bases(*inherits, bases); !what.empty()) return wrong(at + what);
       for (const std::string& base : bases) {

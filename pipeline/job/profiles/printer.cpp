@@ -40,13 +40,13 @@ using Head = decltype(Machine::head);
 using Mounting = decltype(Machine::mounting);
 using Motion = decltype(Machine::motion);
 using Powder = decltype(Machine::powder);
-constexpr auto kCare = &Machine::care;
-using Care = decltype(Machine::care);
+constexpr auto kMaintenance = &Machine::maintenance;
+using Maintenance = decltype(Machine::maintenance);
 constexpr auto kCost = &Machine::cost;
 using Cost = decltype(Machine::cost);
 
-constexpr double kMost = 1e9;
-constexpr Limits kAny{-kMost, kMost}, kDpi{0, 25'400}, kLength{kLeastMm, kMostMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"},
+constexpr double kMax = 1e9;
+constexpr Limits kAny{-kMax, kMax}, kDpi{0, 25'400}, kLength{kMinMm, kMaxMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"},
     kPrice{0, 1e6};
 
 constexpr std::size_t kLongestMaterial = 40;
@@ -103,19 +103,19 @@ std::string read_axes(Text text, std::vector<std::string>& axes) {
 }
 /// Commands of a machine's own: M and a number, and words of a letter and a number, with one blank between.
 std::string read_own_lines(Text text, std::vector<std::string>& lines) {
-  constexpr std::size_t kLongest = 60, kMostLines = 20;
+  constexpr std::size_t kLongest = 60, kMaxLines = 20;
   std::vector<std::string> read;
   for (const Text line : text.empty() ? std::vector<Text>() : split(text, ",")) {
     const auto words = split(line, " ");
     const bool good = line.size() <= kLongest && line.starts_with('M') && std::ranges::all_of(words, [](Text word) {
                         double value = 0;
                         return word.size() > 1 && word[0] >= 'A' && word[0] <= 'Z' &&
-                               read_number(word.substr(1), -kMost, kMost, "", value).empty();
+                               read_number(word.substr(1), -kMax, kMax, "", value).empty();
                       });
     if (!good) return fmt::format("'{}' is no command such as M42 P4 S1, of up to {} characters", line, kLongest);
     read.emplace_back(line);
   }
-  if (read.size() > kMostLines) return fmt::format("{} lines; give up to {}", read.size(), kMostLines);
+  if (read.size() > kMaxLines) return fmt::format("{} lines; give up to {}", read.size(), kMaxLines);
   lines = std::move(read);
   return {};
 }
@@ -134,10 +134,10 @@ constexpr Key<Machine> kKeys[] = {
     field<kHead, &Head::nozzles>({"head", "nozzles"}, {1, 65'535}),
     field<kHead, &Head::pitch_um>({"head", "pitch_um"}, {0, 1e6, " um"}),
     field<kHead, &Head::row_offset_um>({"head", "row_offset_um"}, {-1e6, 1e6, " um", false, 1}),
-    field<kHead, &Head::highest_frequency_hz>({"head", "highest_frequency_hz"}, {1e-3, kMost, " Hz"}),
-    field<kHead, &Head::drop_pl>({"head", "drop_pl"}, {0, kMost, " pl"}),
-    field<kHead, &Head::most_drops>({"head", "most_drops"}, {1, 15}).unsaid_at("1"),
-    field<kHead, &Head::most_drop_sweeps>({"head", "most_drop_sweeps"}, {0, 64}).unsaid_at("0"),
+    field<kHead, &Head::highest_frequency_hz>({"head", "highest_frequency_hz"}, {1e-3, kMax, " Hz"}),
+    field<kHead, &Head::drop_pl>({"head", "drop_pl"}, {0, kMax, " pl"}),
+    field<kHead, &Head::max_drops>({"head", "max_drops"}, {1, 15}).unsaid_at("1"),
+    field<kHead, &Head::max_drop_sweeps>({"head", "max_drop_sweeps"}, {0, 64}).unsaid_at("0"),
     field<kHead, &Head::blocked>({"head", "blocked"}, {0, 65'534}),
     word<kBlocked, kHead, &Head::blocked_rule>({"head", "blocked_rule"}),
     field<kHead, &Head::dot_gain_um>({"head", "dot_gain_um"}, {-1e3, 1e4, " um"}).unsaid_at("0,0"),
@@ -184,9 +184,9 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 0.99}),
     field<kPowder, &Powder::evaporates_percent>({"powder", "evaporates_percent"}, {0, 99.9, " %"}).unsaid_at("0"),
-    field<kPowder, &Powder::least_saturation_percent>({"powder", "least_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
+    field<kPowder, &Powder::min_saturation_percent>({"powder", "min_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
 
-    field<kPowder, &Powder::vat_depth_mm>({"powder", "vat_depth_mm"}, {0, kMostMm, " mm"}).unsaid_at("0,0"),
+    field<kPowder, &Powder::vat_depth_mm>({"powder", "vat_depth_mm"}, {0, kMaxMm, " mm"}).unsaid_at("0,0"),
     field<kPowder, &Powder::vat_area_mm2>({"powder", "vat_area_mm2"}, {0, 1e7, " mm2"}).unsaid_at("0"),
     word<kRefills, kPowder, &Powder::refill>({"powder", "refill"}).unsaid_at("refuse"),
     field<kPowder, &Powder::base_layers>({"powder", "base_layers"}, {0, 10'000}).unsaid_at("0"),
@@ -198,16 +198,16 @@ constexpr Key<Machine> kKeys[] = {
         .unsaid_at(""),
     field<kPowder, &Powder::roller_rpm>({"powder", "roller_rpm"}, {0, 1e5, " rpm"}).unsaid_at("0"),
 
-    field<kCare, &Care::spit_layers>({"care", "spit_layers"}, {0, 1e6}).unsaid_at("0"),
-    field<kCare, &Care::spit_seconds>({"care", "spit_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
-    field<kCare, &Care::spit_drops>({"care", "spit_drops"}, {1, 65'535}).unsaid_at("100"),
-    field<kCare, &Care::spit_mm>({"care", "spit_mm"}, kAny).unsaid_at(""),
-    field<kCare, &Care::wipe_layers>({"care", "wipe_layers"}, {0, 1e6}).unsaid_at("0"),
-    field<kCare, &Care::wipe_seconds>({"care", "wipe_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
-    field<kCare, &Care::wipe_mm>({"care", "wipe_mm"}, kAny).unsaid_at(""),
-    field<kCare, &Care::wipe_speed_mm_s>({"care", "wipe_speed_mm_s"}, kSpeed).unsaid_at("50"),
-    custom<Machine, read_own_lines, join, kCare, &Care::wipe_lines>({"care", "wipe_lines"}, Form::kStrings).unsaid_at(""),
-    field<kCare, &Care::cap_mm>({"care", "cap_mm"}, kAny).unsaid_at(""),
+    field<kMaintenance, &Maintenance::spit_layers>({"maintenance", "spit_layers"}, {0, 1e6}).unsaid_at("0"),
+    field<kMaintenance, &Maintenance::spit_seconds>({"maintenance", "spit_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
+    field<kMaintenance, &Maintenance::spit_drops>({"maintenance", "spit_drops"}, {1, 65'535}).unsaid_at("100"),
+    field<kMaintenance, &Maintenance::spit_mm>({"maintenance", "spit_mm"}, kAny).unsaid_at(""),
+    field<kMaintenance, &Maintenance::wipe_layers>({"maintenance", "wipe_layers"}, {0, 1e6}).unsaid_at("0"),
+    field<kMaintenance, &Maintenance::wipe_seconds>({"maintenance", "wipe_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
+    field<kMaintenance, &Maintenance::wipe_mm>({"maintenance", "wipe_mm"}, kAny).unsaid_at(""),
+    field<kMaintenance, &Maintenance::wipe_speed_mm_s>({"maintenance", "wipe_speed_mm_s"}, kSpeed).unsaid_at("50"),
+    custom<Machine, read_own_lines, join, kMaintenance, &Maintenance::wipe_lines>({"maintenance", "wipe_lines"}, Form::kStrings).unsaid_at(""),
+    field<kMaintenance, &Maintenance::cap_mm>({"maintenance", "cap_mm"}, kAny).unsaid_at(""),
 
     text<check_currency, kCost, &Cost::currency>({"cost", "currency"}).unsaid_at("EUR"),
     field<kCost, &Cost::hour_price>({"cost", "hour_price"}, kPrice).unsaid_at("0"),
@@ -221,7 +221,7 @@ constexpr Key<Machine> kKeys[] = {
 
 /// Whether a profile may say nothing of it: names of vats, places of a head's care, lines of its own.
 bool may_be_absent(const KeyName& key) {
-  return key.name == "materials" || key.name.ends_with("_lines") || (key.section == "care" && key.unsaid == "");
+  return key.name == "materials" || key.name.ends_with("_lines") || (key.section == "maintenance" && key.unsaid == "");
 }
 
 }  // namespace
@@ -256,7 +256,7 @@ Result<Machine> read_machine(const ProfileFiles& files, std::span<const std::str
   for (const ProfileFile& file : files) {
     const TomlValue* section = file.keys.find("machine");
     const TomlValue* named = section == nullptr ? nullptr : section->find("dialect");
-    if (named != nullptr) at = named->place.text(file.where);
+    if (named != nullptr) at = named->position.text(file.where);
   }
   return Error{Fault::kUsage, fmt::format("{}machine.dialect: {}", at, not_one_of(machine.dialect, dialects))};
 }

@@ -79,7 +79,7 @@ Runs draw(const Chart& chart) {
   for (const ChartDash& dash : chart.dashes) add_box(dash.box, runs);
   for (const ChartBar& bar : chart.bars) add_box(bar.box, runs);
   for (const ChartWedge& wedge : chart.wedges) add_wedge(wedge, runs);
-  for (const ChartBox& joint : chart.joints) add_box(joint, runs);
+  for (const ChartBox& joint : chart.stitches) add_box(joint, runs);
   for (const ChartVernier& vernier : chart.verniers) {
     for (const ChartBox& tick : vernier.before) add_box(tick, runs);
     for (const ChartBox& tick : vernier.after) add_box(tick, runs);
@@ -87,8 +87,8 @@ Runs draw(const Chart& chart) {
   return image_of(runs, chart.columns, chart.rows);
 }
 
-Result<DropLayers> lay_out_drops(const Machine& machine, const HeadGrid& grid, std::uint64_t drops) {
-  constexpr std::uint32_t kMostLayers = 1000;
+Result<DropLayers> layout_drops(const Machine& machine, const HeadGrid& grid, std::uint64_t drops) {
+  constexpr std::uint32_t kMaxLayers = 1000;
   const bool along_x = grid.scan_axis == ScanAxis::kX;
   const auto side = [&](std::uint32_t count) {
     const double lost = machine.bed.shape == BedShape::kRound ? count * (1 - std::numbers::sqrt2 / 2) / 2 + 1 : 0;
@@ -96,25 +96,25 @@ Result<DropLayers> lay_out_drops(const Machine& machine, const HeadGrid& grid, s
     return std::pair(margin, count > 2 * margin ? count - margin : margin);
   };
   auto [line, line_end] = side(grid.lines);
-  const auto [place, place_end] = side(grid.places);
+  const auto [position, position_end] = side(grid.positions);
   // From a swath's first line, if a whole swath fits behind it.
   const std::uint32_t swath = grid.swath_lines(), first = (line + swath - 1) / swath * swath;
   if (grid.first_swath == FirstSwath::kBed && first + swath <= line_end) line = first;
   if (line + swath <= line_end) line_end = line + (line_end - line) / swath * swath;
-  DropLayers wanted{.drops = drops, .a_layer = std::uint64_t{line_end - line} * (place_end - place), .layers = 0, .box = {}};
+  DropLayers wanted{.drops = drops, .a_layer = std::uint64_t{line_end - line} * (position_end - position), .layers = 0, .box = {}};
   if (wanted.a_layer == 0)
     return Error{Fault::kUsage, fmt::format("bed.size_mm: the bed of {} has no room for drops", machine.name)};
   const std::uint64_t layers = (drops + wanted.a_layer - 1) / wanted.a_layer;
-  if (layers > kMostLayers)
+  if (layers > kMaxLayers)
     return Error{Fault::kUsage,
                  fmt::format("--drops {}: a layer takes {}, and {} layers are too many; ask for {} drops or fewer", drops,
-                             wanted.a_layer, layers, wanted.a_layer * kMostLayers)};
+                             wanted.a_layer, layers, wanted.a_layer * kMaxLayers)};
   wanted.layers = static_cast<std::uint32_t>(layers);
   const auto turned = [](std::uint32_t begin, std::uint32_t end, std::uint32_t count, bool from_end) {
     return from_end ? std::pair(count - end, count - begin) : std::pair(begin, end);
   };
   const auto across = turned(line, line_end, grid.lines, grid.lines_from_end);
-  const auto along = turned(place, place_end, grid.places, along_x == grid.places_from_end);
+  const auto along = turned(position, position_end, grid.positions, along_x == grid.positions_from_end);
   const auto x = along_x ? along : across, y = along_x ? across : along;
   wanted.box = {x.first, y.first, x.second, y.second};
   return wanted;

@@ -24,7 +24,7 @@ struct DropLayers {
 
 /// drops   at least 1
 /// errors  kUsage: no room on the bed, or more than a thousand layers
-Result<DropLayers> lay_out_drops(const Machine& machine, const HeadGrid& grid, std::uint64_t drops);
+Result<DropLayers> layout_drops(const Machine& machine, const HeadGrid& grid, std::uint64_t drops);
 
 /// Layer `layer` of them: full from its first row on, its last row as far as the drops go.
 Runs draw_drops(const DropLayers& wanted, const HeadGrid& grid, std::uint32_t layer);

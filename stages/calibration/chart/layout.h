@@ -19,6 +19,6 @@ Machine chart_machine(Machine machine, bool drops = false);
 
 /// Lays the chart out for chart_machine() and its grid. Swaths are those of the print program: chart and nozzles belong
 /// together. returns  its boxes, all of them on the bed errors   kUsage: the bed is too small for a chart of this head
-Result<Chart> lay_out(const Machine& machine, const HeadGrid& grid);
+Result<Chart> layout_chart(const Machine& machine, const HeadGrid& grid);
 
 }  // namespace lamina::chart

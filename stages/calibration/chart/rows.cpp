@@ -16,9 +16,9 @@ double middle_of(std::vector<double> values) {
 std::optional<Located> mean_of(const std::vector<Located>& row) {
   constexpr double kFar = 4;  // standard errors
   if (row.empty()) return std::nullopt;
-  std::vector<double> places, distances, errors;
-  for (const Located& one : row) places.push_back(one.um);
-  const double middle = middle_of(places);
+  std::vector<double> positions, distances, errors;
+  for (const Located& one : row) positions.push_back(one.um);
+  const double middle = middle_of(positions);
   for (const Located& one : row) {
     distances.push_back(std::abs(one.um - middle));
     errors.push_back(one.error_um);
@@ -46,17 +46,17 @@ std::vector<std::optional<Located>> rows_of(const std::vector<std::optional<Loca
   for (std::size_t n = 0; n < nozzles.size(); ++n) {
     if (nozzles[n]) of_row[n % rows].push_back(*nozzles[n]);
   }
-  std::vector<std::optional<Located>> told(rows);
+  std::vector<std::optional<Located>> reported(rows);
   const auto first = mean_of(of_row[0]);
-  if (!first) return told;
-  told[0] = Located{};
+  if (!first) return reported;
+  reported[0] = Located{};
   for (std::uint32_t r = 1; r < rows; ++r) {
     const auto mean = mean_of(of_row[r]);
     if (mean)
-      told[r] = Located{mean->um - first->um, std::hypot(mean->error_um, first->error_um),
+      reported[r] = Located{mean->um - first->um, std::hypot(mean->error_um, first->error_um),
                         std::hypot(mean->within_um, first->within_um)};
   }
-  return told;
+  return reported;
 }
 
 }  // namespace lamina::chart

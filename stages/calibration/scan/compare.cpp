@@ -13,21 +13,21 @@
 namespace lamina::scan {
 namespace {
 
-constexpr double kMostTurnDeg = 6;
-constexpr double kLeastMissingMm = 0.2;
-constexpr double kAwayMm = 0.5, kLeastMm2 = 1, kLeastShare = 0.5;  // of extra ink; the last of full ink
-constexpr double kMostCells = 2000;                                // along an axis of the image, where it is looked for
+constexpr double kMaxTurnDeg = 6;
+constexpr double kMinMissingMm = 0.2;
+constexpr double kAwayMm = 0.5, kMinMm2 = 1, kMinShare = 0.5;  // of extra ink; the last of full ink
+constexpr double kMaxCells = 2000;                                // along an axis of the image, where it is looked for
 
 /// The layer in cells as large as pixels of the photograph: the share of each that is set.
-struct Cells {
+struct LayerCells {
   cv::Mat share;             // CV_32F
   double left = 0, top = 0;  // mm
   double side = 0;           // mm
   Spot middle(int x, int y) const { return {left + (x + 0.5) * side, top + (y + 0.5) * side}; }
 };
 
-Cells cells_of(const ExpectedLayer& layer) {
-  Cells cells;
+LayerCells cells_of(const ExpectedLayer& layer) {
+  LayerCells cells;
   const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6, margin = 2;
   std::uint32_t left = UINT32_MAX, right = 0, top = UINT32_MAX, bottom = 0;
   for (std::uint32_t r = 0; r < layer.image.rows(); ++r) {
@@ -72,12 +72,12 @@ cv::Mat without_shade(const cv::Mat& image, double wide) {
 }
 
 /// The best place of a picture in a larger one, and how alike they are there, by correlation.
-struct Match {
+struct PictureMatch {
   double likeness = -1, turn_deg = 0, scale = 1;
   cv::Point2d at;  // of the middle of the cells, pixels of the photograph
 };
 
-Match best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<double>& turns,
+PictureMatch best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<double>& turns,
                  const std::vector<double>& scales) {
   const int side =
       cv::getOptimalDFTSize(std::max({photo.cols, photo.rows, cells.cols, cells.rows}) + std::max(cells.cols, cells.rows) / 2);
@@ -85,7 +85,7 @@ Match best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<d
   photo.copyTo(padded(cv::Rect(0, 0, photo.cols, photo.rows)));
   cv::dft(padded, photo_waves);
   const double photo_energy = cv::norm(photo);
-  Match best;
+  PictureMatch best;
   for (const double turn : turns) {
     for (const double scale : scales) {
       cv::Mat to = cv::getRotationMatrix2D(
@@ -98,10 +98,10 @@ Match best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<d
       cv::dft(turned, waves);
       cv::mulSpectrums(photo_waves, waves, product, 0, true);
       cv::idft(product, product, cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-      double most = 0;
+      double maximum = 0;
       cv::Point at;
-      cv::minMaxLoc(product, nullptr, &most, nullptr, &at);
-      const double likeness = most / std::max(photo_energy * energy, 1e-9);
+      cv::minMaxLoc(product, nullptr, &maximum, nullptr, &at);
+      const double likeness = maximum / std::max(photo_energy * energy, 1e-9);
       if (likeness <= best.likeness) continue;
       const auto wrapped = [&](int shift) { return shift > side / 2 ? shift - side : shift; };
       best = {likeness, turn, scale, {wrapped(at.x) + 0.5 * (side - 1), wrapped(at.y) + 0.5 * (side - 1)}};
@@ -111,14 +111,14 @@ Match best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<d
 }
 
 /// Turns and scales from coarse to fine, on small copies.
-View first_view(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, double& likeness) {
+View first_view(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer, double& likeness) {
   const double small = std::min(1.0, 220.0 / std::max({photo.cols, photo.rows, cells.cols, cells.rows}));
   cv::Mat few, little;
   cv::resize(photo, few, {}, small, small, cv::INTER_AREA);
   cv::resize(cells, little, {}, small, small, cv::INTER_AREA);
   std::vector<double> turns, scales;
-  for (double turn = -kMostTurnDeg; turn <= kMostTurnDeg; turn += 1) turns.push_back(turn);
-  Match match = best_match(few, little, turns, {0.97, 1.0, 1.03});
+  for (double turn = -kMaxTurnDeg; turn <= kMaxTurnDeg; turn += 1) turns.push_back(turn);
+  PictureMatch match = best_match(few, little, turns, {0.97, 1.0, 1.03});
   turns.clear();
   for (double turn = -0.75; turn <= 0.75; turn += 0.25) turns.push_back(match.turn_deg + turn);
   match = best_match(few, little, turns, {match.scale - 0.015, match.scale, match.scale + 0.015});
@@ -137,9 +137,9 @@ View first_view(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, 
 }
 
 /// Moves the view until edges lie on edges: least squares of photo(view(place)) - gain * layer(place), by Gauss and Newton.
-void refine(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, View& view) {
+void refine(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer, View& view) {
   struct Sample {
-    Spot place;
+    Spot position;
     double value;
   };
   cv::Mat dx, dy, slope_x, slope_y;
@@ -163,13 +163,13 @@ void refine(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, View
     LeastSquares linear(9);
     double vv = 1e-9, pv = 0;
     for (std::size_t i = 0; i < samples.size(); i += step) {
-      const Spot p = view.at(samples[i].place.x, samples[i].place.y);
+      const Spot p = view.at(samples[i].position.x, samples[i].position.y);
       pv += darkness_at(photo, p.x, p.y) * samples[i].value;
       vv += samples[i].value * samples[i].value;
     }
     const double gain = pv / vv;
     for (std::size_t i = 0; i < samples.size(); i += step) {
-      const Spot& m = samples[i].place;
+      const Spot& m = samples[i].position;
       const Spot p = view.at(m.x, m.y);
       if (p.x < 1 || p.y < 1 || p.x > photo.cols - 2 || p.y > photo.rows - 2) continue;
       const double gx = darkness_at(slope_x, p.x, p.y), gy = darkness_at(slope_y, p.x, p.y);
@@ -189,21 +189,21 @@ void refine(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, View
 }
 
 /// The photograph in the cells of the layer.
-cv::Mat in_cells(const cv::Mat& image, const Cells& layer, const View& view) {
-  cv::Mat seen(layer.share.size(), CV_32F);
-  for (int y = 0; y < seen.rows; ++y) {
-    for (int x = 0; x < seen.cols; ++x) {
+cv::Mat in_cells(const cv::Mat& image, const LayerCells& layer, const View& view) {
+  cv::Mat detected(layer.share.size(), CV_32F);
+  for (int y = 0; y < detected.rows; ++y) {
+    for (int x = 0; x < detected.cols; ++x) {
       const Spot m = layer.middle(x, y), p = view.at(m.x, m.y);
       const bool inside = p.x >= 0 && p.y >= 0 && p.x < image.cols - 1 && p.y < image.rows - 1;
-      seen.at<float>(y, x) = inside ? static_cast<float>(darkness_at(image, p.x, p.y)) : -1.0f;
+      detected.at<float>(y, x) = inside ? static_cast<float>(darkness_at(image, p.x, p.y)) : -1.0f;
     }
   }
-  return seen;
+  return detected;
 }
 
 /// Darkness against the light of blank cells, to which a surface of second degree is fitted. In further rounds those that are
 /// darker by it than `most` are left out. light  CV_32F, below 0 where it is not known: dark is 0 there
-cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, double most) {
+cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, double maximum) {
   const auto terms = [&](int x, int y) {
     const double u = 2.0 * x / light.cols - 1, v = 2.0 * y / light.rows - 1;
     return std::array{1.0, u, v, u * u, u * v, v * v};
@@ -214,7 +214,7 @@ cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, doub
     for (int y = 0; y < light.rows; y += 2) {
       for (int x = 0; x < light.cols; x += 2) {
         const double value = static_cast<double>(light.at<float>(y, x));
-        if (value < 0 || blank.at<std::uint8_t>(y, x) == 0 || static_cast<double>(dark.at<float>(y, x)) > most) continue;
+        if (value < 0 || blank.at<std::uint8_t>(y, x) == 0 || static_cast<double>(dark.at<float>(y, x)) > maximum) continue;
         linear.add(terms(x, y), value);
       }
     }
@@ -234,8 +234,8 @@ cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, doub
 }
 
 /// Stripes of cells along the scan that are much brighter than ink. full  cells that are to be printed, away from edges
-std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full, const Cells& layer, bool along_x, double ink) {
-  constexpr int kLeastCells = 15;
+std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full, const LayerCells& layer, bool along_x, double ink) {
+  constexpr int kMinCells = 15;
   const int count = along_x ? dark.rows : dark.cols, length = along_x ? dark.cols : dark.rows;
   std::vector<double> ratio(static_cast<std::size_t>(count), 1);
   for (int i = 0; i < count; ++i) {
@@ -247,7 +247,7 @@ std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full,
       sum += static_cast<double>(dark.at<float>(y, x));
       ++cells;
     }
-    if (cells >= kLeastCells) ratio[static_cast<std::size_t>(i)] = sum / cells / ink;
+    if (cells >= kMinCells) ratio[static_cast<std::size_t>(i)] = sum / cells / ink;
   }
   std::vector<MissingBand> bands;
   const double start = along_x ? layer.top : layer.left;
@@ -258,16 +258,16 @@ std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full,
     while (last + 1 < count && ratio[static_cast<std::size_t>(last + 1)] < 0.93) ++last;
     double missing = 0;
     for (int k = first; k <= last; ++k) missing += (1 - ratio[static_cast<std::size_t>(k)]) * layer.side;
-    if (missing >= kLeastMissingMm) bands.push_back({start + first * layer.side, start + (last + 1) * layer.side, missing});
+    if (missing >= kMinMissingMm) bands.push_back({start + first * layer.side, start + (last + 1) * layer.side, missing});
     i = last;
   }
   return bands;
 }
 
-std::vector<BodySeen> bodies_of(const cv::Mat& dark, const Cells& layer, double ink) {
+std::vector<BodyReading> bodies_of(const cv::Mat& dark, const LayerCells& layer, double ink) {
   cv::Mat labels, near, grown = layer.share > 0.5;
   const int count = cv::connectedComponents(grown, labels, 8);
-  std::vector<BodySeen> bodies(static_cast<std::size_t>(std::max(count - 1, 0)));
+  std::vector<BodyReading> bodies(static_cast<std::size_t>(std::max(count - 1, 0)));
   std::vector<double> cells(bodies.size(), 0);
   // Each body with what lies up to three cells around it and nearer to no other one.
   for (int round = 0; round < 3; ++round) {
@@ -286,11 +286,11 @@ std::vector<BodySeen> bodies_of(const cv::Mat& dark, const Cells& layer, double 
     for (int x = 0; x < labels.cols; ++x) {
       const int label = labels.at<int>(y, x);
       if (label == 0) continue;
-      BodySeen& body = bodies[static_cast<std::size_t>(label - 1)];
+      BodyReading& body = bodies[static_cast<std::size_t>(label - 1)];
       const double area = layer.side * layer.side, share = static_cast<double>(layer.share.at<float>(y, x));
       const Spot m = layer.middle(x, y);
       body.expected_mm2 += area * share;
-      body.seen_mm2 += area * std::clamp(static_cast<double>(dark.at<float>(y, x)) / ink, 0.0, 1.0);
+      body.detected_mm2 += area * std::clamp(static_cast<double>(dark.at<float>(y, x)) / ink, 0.0, 1.0);
       body.x_mm += m.x;
       body.y_mm += m.y;
       ++cells[static_cast<std::size_t>(label - 1)];
@@ -304,7 +304,7 @@ std::vector<BodySeen> bodies_of(const cv::Mat& dark, const Cells& layer, double 
 }
 
 /// How alike the layer is when it is seen in a mirror, at its best.
-double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer) {
+double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer) {
   double best = -1;
   for (const int axis : {0, 1}) {
     cv::Mat mirrored;
@@ -332,7 +332,7 @@ Field field_of(const Photo& photo, const ExpectedLayer& layer, const View& view)
   const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6;
   const double wide = layer.image.columns * px, deep = layer.image.rows() * py;
   Field field;
-  field.side = std::max(layer.photo_um * 1e-3, std::max(wide, deep) / kMostCells);
+  field.side = std::max(layer.photo_um * 1e-3, std::max(wide, deep) / kMaxCells);
   const int columns = static_cast<int>(wide / field.side) + 1, rows = static_cast<int>(deep / field.side) + 1;
   field.wanted = cv::Mat::zeros(rows, columns, CV_8U);
   for (std::uint32_t r = 0; r < layer.image.rows(); ++r) {
@@ -367,7 +367,7 @@ std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, 
   const cv::Mat dark = darkness_of(field.light, field.wanted == 0, 8, 0.3 * ink);
   cv::Mat soft, found, labels, stats, middles;
   cv::GaussianBlur(dark, soft, {}, 1);
-  cv::bitwise_and(soft > kLeastShare * ink, field.wanted == 0, found);
+  cv::bitwise_and(soft > kMinShare * ink, field.wanted == 0, found);
   cv::morphologyEx(found, found, cv::MORPH_OPEN, disc_of(kAwayMm / field.side));
   const int count = cv::connectedComponentsWithStats(found, labels, stats, middles, 8);
   std::vector<ExtraInk> extra;
@@ -376,7 +376,7 @@ std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, 
     const bool at_edge = left == 0 || top == 0 || left + stats.at<int>(i, cv::CC_STAT_WIDTH) == dark.cols ||
                          top + stats.at<int>(i, cv::CC_STAT_HEIGHT) == dark.rows;
     const double mm2 = field.side * field.side * stats.at<int>(i, cv::CC_STAT_AREA);
-    if (at_edge || mm2 < kLeastMm2) continue;
+    if (at_edge || mm2 < kMinMm2) continue;
     extra.push_back({(middles.at<double>(i, 0) + 0.5) * field.side, (middles.at<double>(i, 1) + 0.5) * field.side, mm2});
   }
   return extra;
@@ -385,27 +385,27 @@ std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, 
 }  // namespace
 
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
-  constexpr double kLeastLikeness = 0.25, kClearly = 0.05;
-  const Cells cells = cells_of(layer);
+  constexpr double kMinLikeness = 0.25, kClearly = 0.05;
+  const LayerCells cells = cells_of(layer);
   if (cells.share.empty())
     return Error{Fault::kInput,
                  "cannot be compared: the layer is empty, or too large for pixels of the size that --pixel says"};
   const double wide = std::max(8.0, 0.08 * std::max(cells.share.cols, cells.share.rows));
-  const cv::Mat seen = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
+  const cv::Mat detected = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
   Comparison comparison;
-  comparison.view = first_view(seen, wanted, cells, comparison.likeness);
-  if (const double mirrored = mirrored_likeness(seen, wanted, cells);
-      mirrored >= kLeastLikeness && mirrored > comparison.likeness + kClearly)
+  comparison.view = first_view(detected, wanted, cells, comparison.likeness);
+  if (const double mirrored = mirrored_likeness(detected, wanted, cells);
+      mirrored >= kMinLikeness && mirrored > comparison.likeness + kClearly)
     return Error{Fault::kInput,
                  "is mirrored: the layer lies in it as in a mirror; turn the picture over, or photograph the layer "
                  "from above"};
-  if (comparison.likeness < kLeastLikeness)
+  if (comparison.likeness < kMinLikeness)
     return Error{Fault::kInput,
                  "does not show the layer: it has to lie upright, turned by at most 6 degrees, with pixels of about "
                  "the size that --pixel says"};
   for (const double blur : {4.0, 2.0, 1.0}) {
     cv::Mat soft, soft_cells;
-    cv::GaussianBlur(seen, soft, {}, blur);
+    cv::GaussianBlur(detected, soft, {}, blur);
     cv::GaussianBlur(wanted, soft_cells, {}, blur);
     refine(soft, soft_cells, cells, comparison.view);
   }

@@ -25,8 +25,8 @@ struct MissingBand {
 };
 
 /// A connected part of the layer.
-struct BodySeen {
-  double x_mm = 0, y_mm = 0, expected_mm2 = 0, seen_mm2 = 0;  // the place is its middle
+struct BodyReading {
+  double x_mm = 0, y_mm = 0, expected_mm2 = 0, detected_mm2 = 0;  // the place is its middle
 };
 
 /// Ink where the layer has none. The place is its middle.
@@ -38,7 +38,7 @@ struct Comparison {
   View view;
   double likeness = 0;  // correlation of layer and photograph, 1 at most
   std::vector<MissingBand> bands;
-  std::vector<BodySeen> bodies;
+  std::vector<BodyReading> bodies;
   std::vector<ExtraInk> extra;
 };
 

@@ -15,7 +15,7 @@ Shape::Shape(double reach, double step)
 
 void Shape::add(const Profile& profile, double middle, double ground) {
   for (std::size_t i = 0; i < profile.value.size(); ++i) {
-    const double at = std::abs(profile.place(i) - middle) / step_;
+    const double at = std::abs(profile.position(i) - middle) / step_;
     const auto cell = static_cast<std::size_t>(at);
     if (cell + 1 >= sum_.size()) continue;
     const double share = at - static_cast<double>(cell), value = profile.value[i] - ground;
@@ -43,14 +43,14 @@ double Shape::at(double x) const {
 
 double Shape::slope_at(double x) const { return (at(x + step_) - at(x - step_)) / (2 * step_); }
 
-ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, double reach, double most) {
+ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, double reach, double maximum) {
   ShapeFit fit{.middle = middle};
   for (int step = 0; step < 5; ++step) {
     // First ground and height, then the middle too.
     LeastSquares linear(3);
     double squares = 0, count = 0;
     for (std::size_t i = 0; i < profile.value.size(); ++i) {
-      const double at = profile.place(i) - fit.middle;
+      const double at = profile.position(i) - fit.middle;
       if (std::abs(at) > reach) continue;
       const std::array<double, 3> slope{1, shape.at(at), step == 0 ? 0 : -fit.height * shape.slope_at(at)};
       const double left = profile.value[i] - fit.ground - fit.height * slope[1];
@@ -65,7 +65,7 @@ ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, do
     if (!linear.solve(change)) return fit;
     fit.ground += change[0];
     fit.height += change[1];
-    if (step > 0) fit.middle = std::clamp(fit.middle + change[2], middle - most, middle + most);
+    if (step > 0) fit.middle = std::clamp(fit.middle + change[2], middle - maximum, middle + maximum);
   }
   return fit;
 }
@@ -75,7 +75,7 @@ namespace {
 constexpr double kSamplesAPixel = 2;
 
 /// Samples of a dash's surroundings in its own frame: rows across, columns along.
-struct Window {
+struct DashWindow {
   int across = 0, along = 0;               // samples each
   double step_across = 0, step_along = 0;  // mm
   std::vector<double> dark;
@@ -85,8 +85,8 @@ struct Window {
 };
 
 /// Local, linear: a window is a millimetre wide.
-bool look(const Photo& photo, const View& view, const Spot& middle, bool along_x, double half_along, double half_across,
-          Window& w) {
+bool inspection(const Photo& photo, const View& view, const Spot& middle, bool along_x, double half_along, double half_across,
+          DashWindow& w) {
   const double e = 0.05;
   const Spot c = view.at(middle.x, middle.y), x = view.at(middle.x + e, middle.y), y = view.at(middle.x, middle.y + e);
   const Spot dx{(x.x - c.x) / e, (x.y - c.y) / e}, dy{(y.x - c.x) / e, (y.y - c.y) / e};
@@ -155,29 +155,29 @@ double middle_of_ends(const std::vector<double>& profile, double step, double gr
 }
 
 /// What looks at one dash after the other.
-class Look {
+class Inspect {
  public:
-  Look(const Photo& photo, const Chart& chart, const View& view, const std::optional<DashShapes>& shapes)
+  Inspect(const Photo& photo, const Chart& chart, const View& view, const std::optional<DashShapes>& shapes)
       : photo_(photo), chart_(chart), view_(view), shapes_(shapes) {
     for (const ChartDash& dash : chart.dashes) longest_ = std::max(longest_, length_of(dash));
     gathered_.emplace(DashShapes{Shape(chart.between_mm, 0.01), Shape(longest_, 0.01)});
   }
 
-  DashSeen see(const ChartDash& dash, const Spot& place) {
+  DashReading see(const ChartDash& dash, const Spot& position) {
     const double length = length_of(dash), half_across = chart_.between_mm / 2, half_along = (length + chart_.gap_mm) / 2;
-    DashSeen seen{.place = place};
-    if (!look(photo_, view_, place, chart_.scan_along_x, half_along, half_across, w_)) {
-      seen.hidden = true;
-      return seen;
+    DashReading detected{.position = position};
+    if (!inspection(photo_, view_, position, chart_.scan_along_x, half_along, half_across, w_)) {
+      detected.hidden = true;
+      return detected;
     }
-    sum_across(length, half_across, seen);
-    const double v = place_across(half_across, seen);
+    sum_across(length, half_across, detected);
+    const double v = positions_across(half_across, detected);
     sum_along(half_across, v);
-    const double u = place_along(length, half_along, seen);
-    seen.place = chart_.scan_along_x ? Spot{place.x + u, place.y + v} : Spot{place.x + v, place.y + u};
-    gathered_->across.add(across_, v, seen.ground);
-    gathered_->along.add(along_, u, seen.ground);
-    return seen;
+    const double u = position_along(length, half_along, detected);
+    detected.position = chart_.scan_along_x ? Spot{position.x + u, position.y + v} : Spot{position.x + v, position.y + u};
+    gathered_->across.add(across_, v, detected.ground);
+    gathered_->along.add(along_, u, detected.ground);
+    return detected;
   }
 
   /// The shapes of all that were seen.
@@ -193,7 +193,7 @@ class Look {
                                : (dash.box.bottom - dash.box.top) * 1e-6 * chart_.pixel_y_nm;
   }
 
-  void sum_across(double length, double half_across, DashSeen& seen) {
+  void sum_across(double length, double half_across, DashReading& detected) {
     across_.value.assign(static_cast<std::size_t>(w_.across), 0);
     across_.step = w_.step_across;
     edge_.clear();
@@ -208,20 +208,20 @@ class Look {
       }
       across_.value[static_cast<std::size_t>(v)] = sum / std::max(count, 1);
     }
-    seen.ground = edge_.empty() ? 0 : middle_value(edge_);
+    detected.ground = edge_.empty() ? 0 : middle_value(edge_);
     for (int v = 0; v < w_.across; ++v) {
       if (std::abs(w_.v_of(v)) <= 0.7 * half_across)
-        seen.mass += (across_.value[static_cast<std::size_t>(v)] - seen.ground) * w_.step_across;
+        detected.mass += (across_.value[static_cast<std::size_t>(v)] - detected.ground) * w_.step_across;
     }
   }
 
-  double place_across(double half_across, DashSeen& seen) const {
+  double positions_across(double half_across, DashReading& detected) const {
     double v = 0;
     for (const double reach : {0.8, 0.55, 0.45, 0.45, 0.45})
-      v = centre(across_.value, w_.step_across, seen.ground, v, reach * half_across);
+      v = centre(across_.value, w_.step_across, detected.ground, v, reach * half_across);
     if (!shapes_) return v;
     const ShapeFit fit = fit_shape(across_, shapes_->across, v, 0.75 * half_across, 0.25 * half_across);
-    seen.misfit = std::max(seen.misfit, fit.misfit / std::max(fit.height, 1e-3));
+    detected.misfit = std::max(detected.misfit, fit.misfit / std::max(fit.height, 1e-3));
     return fit.middle;
   }
 
@@ -244,11 +244,11 @@ class Look {
     }
   }
 
-  double place_along(double length, double half_along, DashSeen& seen) const {
-    const double u = middle_of_ends(along_.value, w_.step_along, seen.ground, length / 2, 0.4 * chart_.gap_mm);
+  double position_along(double length, double half_along, DashReading& detected) const {
+    const double u = middle_of_ends(along_.value, w_.step_along, detected.ground, length / 2, 0.4 * chart_.gap_mm);
     if (!shapes_) return u;
     const ShapeFit fit = fit_shape(along_, shapes_->along, u, half_along - 0.1 * chart_.gap_mm, 0.25 * chart_.gap_mm);
-    seen.misfit = std::max(seen.misfit, fit.misfit / std::max(fit.height, 1e-3));
+    detected.misfit = std::max(detected.misfit, fit.misfit / std::max(fit.height, 1e-3));
     return fit.middle;
   }
 
@@ -258,17 +258,17 @@ class Look {
   const std::optional<DashShapes>& shapes_;
   std::optional<DashShapes> gathered_;
   double longest_ = 0;
-  Window w_;
+  DashWindow w_;
   Profile across_, along_;
   std::vector<double> edge_, weights_;
 };
 
 /// Tells what is there, by what usual dashes have.
-void judge_dashes(const Photo& photo, const Chart& chart, std::vector<DashSeen>& seen) {
-  constexpr double kThere = 0.5, kMost = 2.5, kMarred = 3;  // shares of a usual dash
+void check_dashes(const Photo& photo, const Chart& chart, std::vector<DashReading>& detected) {
+  constexpr double kThere = 0.5, kMax = 2.5, kMarred = 3;  // shares of a usual dash
   // A usual dash: three quarters of all have less. Where most are missing, half of what full ink of its width has.
   std::vector<double> masses, misfits;
-  for (const DashSeen& one : seen) {
+  for (const DashReading& one : detected) {
     if (!one.hidden) masses.push_back(one.mass);
   }
   if (masses.empty()) return;
@@ -276,25 +276,25 @@ void judge_dashes(const Photo& photo, const Chart& chart, std::vector<DashSeen>&
   std::nth_element(masses.begin(), rank, masses.end());
   const double pitch = 1e-6 * (chart.scan_along_x ? chart.pixel_y_nm : chart.pixel_x_nm);
   const double usual = std::max(*rank, 0.5 * photo.ink * pitch);
-  for (DashSeen& one : seen) {
+  for (DashReading& one : detected) {
     one.there = !one.hidden && one.mass > kThere * usual;
-    one.hidden = one.hidden || one.mass > kMost * usual || one.ground > 0.35 * photo.ink;
+    one.hidden = one.hidden || one.mass > kMax * usual || one.ground > 0.35 * photo.ink;
     if (one.there && !one.hidden) misfits.push_back(one.misfit);
   }
   if (misfits.empty()) return;
-  const double most = kMarred * middle_value(misfits);
-  for (DashSeen& one : seen) one.marred = one.misfit > most;
+  const double maximum = kMarred * middle_value(misfits);
+  for (DashReading& one : detected) one.marred = one.misfit > maximum;
 }
 
 }  // namespace
 
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
+std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
                                  std::optional<DashShapes>& shapes) {
   constexpr double kStray = 0.2;  // of the way to the next dash: how far a nozzle's own offset is followed
-  std::vector<DashSeen> seen;
-  seen.reserve(chart.dashes.size());
-  Look look(photo, chart, fit.view, shapes);
-  const double most = kStray * chart.between_mm;
+  std::vector<DashReading> detected;
+  detected.reserve(chart.dashes.size());
+  Inspect inspection(photo, chart, fit.view, shapes);
+  const double maximum = kStray * chart.between_mm;
   const Spot sheet = middle_of({0, 0, chart.columns, chart.rows}, chart);
   const double sample = 1 / (kSamplesAPixel * fit.view.pixels_a_mm(sheet.x, sheet.y));
   std::minstd_rand random;
@@ -306,18 +306,18 @@ std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const S
     // Strewn over a sample: of windows that all lie about where their dashes were seen before, the common shape knows some
     // places alone, and keeps each dash there. By chance, as a nozzle's dashes come at even distances.
     const double dx = strewn(), dy = strewn();
-    seen.push_back(look.see(dash, {m.x + shift.x + std::clamp(offset.x, -most, most) + dx,
-                                   m.y + shift.y + std::clamp(offset.y, -most, most) + dy}));
+    detected.push_back(inspection.see(dash, {m.x + shift.x + std::clamp(offset.x, -maximum, maximum) + dx,
+                                   m.y + shift.y + std::clamp(offset.y, -maximum, maximum) + dy}));
   }
-  judge_dashes(photo, chart, seen);
-  shapes = look.shapes();
-  return seen;
+  check_dashes(photo, chart, detected);
+  shapes = inspection.shapes();
+  return detected;
 }
 
 std::vector<double> stripe(const Photo& photo, const View& view, const Spot& middle, bool along_x, double reach, double half) {
-  Window w;
+  DashWindow w;
   std::vector<double> line;
-  if (!look(photo, view, middle, along_x, reach, half, w)) return line;
+  if (!inspection(photo, view, middle, along_x, reach, half, w)) return line;
   for (int u = 0; u < w.along; ++u) {
     double sum = 0;
     for (int v = 0; v < w.across; ++v) sum += w.at(v, u);

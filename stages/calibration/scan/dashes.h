@@ -17,7 +17,7 @@ namespace lamina::scan {
 struct Profile {
   std::vector<double> value;
   double step = 1;
-  double place(std::size_t i) const { return (static_cast<double>(i) - 0.5 * static_cast<double>(value.size() - 1)) * step; }
+  double position(std::size_t i) const { return (static_cast<double>(i) - 0.5 * static_cast<double>(value.size() - 1)) * step; }
 };
 
 /// The mean of many profiles, each about its own middle, folded there: even, so that nothing draws a fit to one side.
@@ -43,15 +43,15 @@ struct ShapeFit {
 };
 
 /// middle  where it begins; it moves by at most `most`
-ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, double reach, double most);
+ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, double reach, double maximum);
 
 // ---
 
 /// Lengths in mm of the sheet, in the directions of x and y of its image.
-struct DashSeen {
+struct DashReading {
   double mass = 0;      // darkness across the dash, summed: mm of full black
   double ground = 0;    // darkness beside it
-  Spot place;           // of its middle; meaningful if it is there
+  Spot position;           // of its middle; meaningful if it is there
   bool there = false;   // it was printed
   bool hidden = false;  // too dark for a dash, or out of the picture: nothing can be told
   double misfit = 0;    // from the common shape, as a share of its height
@@ -67,7 +67,7 @@ struct DashShapes {
 /// shapes   by which dashes are placed if there are any, else by centres and ends; replaced by those that were seen
 /// returns  one for each dash of the chart
 /// cost     some thousand samples a dash
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
+std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
                                  std::optional<DashShapes>& shapes);
 
 /// Darkness along a line, averaged over a stripe about it: from -reach to reach, evenly; empty if it leaves the picture.

@@ -12,14 +12,14 @@ namespace lamina::scan {
 namespace {
 
 /// What is known of each line of the image from the dash on it.
-struct LineSeen {
+struct LineReading {
   bool known = false, there = false;
   std::uint32_t swath = 0;
   double shift_mm = 0;  // across the scan, on the image
 };
 
-std::vector<LineSeen> lines_seen(const Chart& chart, const HeadReading& head) {
-  std::vector<LineSeen> lines(chart.scan_along_x ? chart.rows : chart.columns);
+std::vector<LineReading> line_readings(const Chart& chart, const HeadReading& head) {
+  std::vector<LineReading> lines(chart.scan_along_x ? chart.rows : chart.columns);
   for (const ChartDash& dash : chart.dashes) {
     const bool there = head.nozzle[dash.nozzle].has_value();
     const double across = there ? head.nozzle[dash.nozzle]->across.um * 1e-3 * chart.across_sign : 0;
@@ -30,29 +30,29 @@ std::vector<LineSeen> lines_seen(const Chart& chart, const HeadReading& head) {
 
 /// How much wider the lines of a bar across the scan lie than they should; nothing if one is missing or strays by `most` mm, or
 /// swaths meet in it.
-std::optional<double> spread_of(const std::vector<LineSeen>& lines, std::uint32_t begin, std::uint32_t end, double most) {
-  const LineSeen* last = nullptr;
+std::optional<double> spread_of(const std::vector<LineReading>& lines, std::uint32_t begin, std::uint32_t end, double maximum) {
+  const LineReading* last = nullptr;
   double first_shift = 0;
   for (std::uint32_t i = begin; i < end; ++i) {
-    const LineSeen& line = lines[i];
+    const LineReading& line = lines[i];
     if (!line.known) continue;  // of another pass
     if (!line.there || (last != nullptr && last->swath != line.swath)) return std::nullopt;
-    if (last != nullptr && std::abs(line.shift_mm - last->shift_mm) > most) return std::nullopt;
+    if (last != nullptr && std::abs(line.shift_mm - last->shift_mm) > maximum) return std::nullopt;
     if (last == nullptr) first_shift = line.shift_mm;
     last = &line;
   }
   return last == nullptr ? 0 : last->shift_mm - first_shift;
 }
 
-struct BarSeen {
+struct BarReading {
   double wide = 0, reach = 0;  // mm; wide as it would be printed without gain
   std::vector<double> profile;
 };
 
-std::vector<BarSeen> see_bars(const Photo& photo, const Chart& chart, const View& view, const std::vector<LineSeen>& lines,
+std::vector<BarReading> see_bars(const Photo& photo, const Chart& chart, const View& view, const std::vector<LineReading>& lines,
                               bool along) {
   const bool axis_x = along == chart.scan_along_x;  // of the width
-  std::vector<BarSeen> bars;
+  std::vector<BarReading> bars;
   for (const ChartBar& bar : chart.bars) {
     if (bar.along != along) continue;
     const double x = (bar.box.right - bar.box.left) * 1e-6 * chart.pixel_x_nm,
@@ -70,19 +70,19 @@ std::vector<BarSeen> see_bars(const Photo& photo, const Chart& chart, const View
 
 void measure_bars(const Photo& photo, const Chart& chart, const View& view, const HeadReading& head, InkReading& reading) {
   constexpr double kWideEnough = 0.4;  // mm: the middle is free of blur
-  const std::vector<LineSeen> lines = lines_seen(chart, head);
+  const std::vector<LineReading> lines = line_readings(chart, head);
   double& full = reading.full;
   for (const bool along : {true, false}) {
-    const std::vector<BarSeen> bars = see_bars(photo, chart, view, lines, along);
-    if (along) reading.bars_seen = static_cast<std::uint32_t>(bars.size());
+    const std::vector<BarReading> bars = see_bars(photo, chart, view, lines, along);
+    if (along) reading.bars_detected = static_cast<std::uint32_t>(bars.size());
     std::vector<double> gains;
-    for (const BarSeen& bar : bars) {
+    for (const BarReading& bar : bars) {
       // Full ink is what bars along the scan show, of which many nozzles have a part.
       if (along)
         full = std::max(full, median_of({bar.profile.begin() + static_cast<std::ptrdiff_t>(bar.profile.size() * 2 / 5),
                                          bar.profile.begin() + static_cast<std::ptrdiff_t>(bar.profile.size() * 3 / 5 + 1)}));
     }
-    for (const BarSeen& bar : bars) {
+    for (const BarReading& bar : bars) {
       const double gain = full > 0 ? 1000 * (width_of(bar.profile, bar.reach, full) - bar.wide) / 2 : 1000;
       if (bar.wide > kWideEnough && std::abs(gain) < 400) gains.push_back(gain);
     }

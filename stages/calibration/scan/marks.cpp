@@ -38,13 +38,13 @@ double contrast_of(const Photo& photo, const Chart& chart, const View& view) {
 
 /// The view that has the marks at four pixels, unless they do not follow each other clockwise.
 bool view_of_corners(const Photo& photo, const Chart& chart, const std::array<Spot, 4>& pixels, View& view) {
-  std::array<Spot, 4> places;
+  std::array<Spot, 4> positions;
   for (std::size_t i = 0; i < 4; ++i) {
-    places[i] = middle_of(chart.marks[i], chart);
+    positions[i] = middle_of(chart.marks[i], chart);
     const Spot a = pixels[i], b = pixels[(i + 1) % 4], c = pixels[(i + 2) % 4];
     if ((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) <= 0) return false;
   }
-  return view_of(places, pixels, photo.grey.cols, photo.grey.rows, view);
+  return view_of(positions, pixels, photo.grey.cols, photo.grey.rows, view);
 }
 
 /// The view of a ring and three discs; false if their sizes do not agree with it.
@@ -59,11 +59,11 @@ bool view_of_marks(const Photo& photo, const Chart& chart, const Patch& ring, st
   std::ranges::sort(discs, [&](const Patch& a, const Patch& b) { return turn(a) < turn(b); });
   if (!view_of_corners(photo, chart, {ring.middle, discs[0].middle, discs[1].middle, discs[2].middle}, view)) return false;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Spot place = middle_of(chart.marks[i], chart);
-    const double radius = view.pixels_a_mm(place.x, place.y) * chart.mark_mm;
+    const Spot position = middle_of(chart.marks[i], chart);
+    const double radius = view.pixels_a_mm(position.x, position.y) * chart.mark_mm;
     const double area = std::numbers::pi * radius * radius * (i == 0 ? kRingShare : 1),
-                 seen = i == 0 ? ring.area : discs[i - 1].area;
-    if (!(seen > 0.5 * area && seen < 2 * area)) return false;
+                 detected = i == 0 ? ring.area : discs[i - 1].area;
+    if (!(detected > 0.5 * area && detected < 2 * area)) return false;
   }
   return true;
 }
@@ -86,8 +86,8 @@ std::array<Spot, 4> without_lens(const Photo& photo, const std::array<Spot, 4>& 
 void try_lenses(const Photo& photo, const Chart& chart, const View& view, Best& best) {
   std::array<Spot, 4> pixels;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Spot place = middle_of(chart.marks[i], chart);
-    pixels[i] = view.at(place.x, place.y);
+    const Spot position = middle_of(chart.marks[i], chart);
+    pixels[i] = view.at(position.x, position.y);
   }
   for (const double lens : {0.0, -0.005, 0.005, -0.01, 0.01}) {
     View through;
@@ -120,8 +120,8 @@ struct Guess {
 };
 
 /// seen  of the marks but the missing one, in their order
-void add_guess(const Chart& chart, std::size_t missing, const std::array<const Patch*, 3>& seen, std::vector<Guess>& guesses) {
-  constexpr double kMostStretch = 1.35, kMostSize = 1.8;
+void add_guess(const Chart& chart, std::size_t missing, const std::array<const Patch*, 3>& detected, std::vector<Guess>& guesses) {
+  constexpr double kMaxAspect = 1.35, kMaxSize = 1.8;
   std::array<std::size_t, 3> marks{};
   for (std::size_t i = 0, m = 0; m < 4; ++m) {
     if (m != missing) marks[i++] = m;
@@ -130,22 +130,22 @@ void add_guess(const Chart& chart, std::size_t missing, const std::array<const P
              b = middle_of(chart.marks[marks[2]], chart), last = middle_of(chart.marks[missing], chart);
   const double ax = a.x - o.x, ay = a.y - o.y, bx = b.x - o.x, by = b.y - o.y, whole = ax * by - ay * bx;
   if (std::abs(whole) < 1e-6) return;
-  const Spot p = seen[0]->middle, q = seen[1]->middle, r = seen[2]->middle;
+  const Spot p = detected[0]->middle, q = detected[1]->middle, r = detected[2]->middle;
   const double qx = q.x - p.x, qy = q.y - p.y, rx = r.x - p.x, ry = r.y - p.y;
   // Pixels of a mm of x and of y.
   const Spot x{(qx * by - rx * ay) / whole, (qy * by - ry * ay) / whole},
       y{(rx * ax - qx * bx) / whole, (ry * ax - qy * bx) / whole};
   const double det = x.x * y.y - x.y * y.x, sum = x.x * x.x + x.y * x.y + y.x * y.x + y.y * y.y;
   if (det <= 0) return;
-  const double stretch = sum / (2 * det) + std::sqrt(std::max(sum * sum / (4 * det * det) - 1, 0.0));  // of the axes
-  if (stretch > kMostStretch) return;
-  Guess guess{{}, missing, std::log(stretch)};
+  const double axis_ratio = sum / (2 * det) + std::sqrt(std::max(sum * sum / (4 * det * det) - 1, 0.0));  // of the axes
+  if (axis_ratio > kMaxAspect) return;
+  Guess guess{{}, missing, std::log(axis_ratio)};
   for (std::size_t i = 0; i < 3; ++i) {
     const double area = std::numbers::pi * chart.mark_mm * chart.mark_mm * det * (marks[i] == 0 ? kRingShare : 1);
-    const double off = std::abs(std::log(seen[i]->area / area));
-    if (off > std::log(kMostSize)) return;
+    const double off = std::abs(std::log(detected[i]->area / area));
+    if (off > std::log(kMaxSize)) return;
     guess.misfit += off;
-    guess.pixels[marks[i]] = seen[i]->middle;
+    guess.pixels[marks[i]] = detected[i]->middle;
   }
   const double dx = last.x - o.x, dy = last.y - o.y;
   guess.pixels[missing] = {p.x + dx * x.x + dy * y.x, p.y + dx * x.y + dy * y.y};
@@ -203,9 +203,9 @@ Best search_fourth(const Photo& photo, const Chart& chart, Guess guess) {
 }  // namespace
 
 Result<View> find_marks(const Photo& photo, const Chart& chart) {
-  constexpr double kLeastOfFour = 0.3, kClear = 0.8, kLeastOfThree = 0.65;  // shares of dashes
+  constexpr double kMinOfFour = 0.3, kClear = 0.8, kMinOfThree = 0.65;  // shares of dashes
   constexpr double kFaintest = 0.04;                                        // darkness
-  constexpr std::size_t kMostGuesses = 60;
+  constexpr std::size_t kMaxGuesses = 60;
   if (photo.ink < kFaintest)
     return Error{Fault::kInput, "shows nothing dark: photograph the chart on a sheet that its ink darkens"};
   Best best;
@@ -219,14 +219,14 @@ Result<View> find_marks(const Photo& photo, const Chart& chart) {
     if (best.contrast > kClear) return best.view;
   }
   // Four marks tell which way the sheet lies; three discs alone may not.
-  if (best.contrast > kLeastOfFour) return best.view;
+  if (best.contrast > kMinOfFour) return best.view;
   std::vector<Guess> guesses = guesses_of(chart, all);
-  if (guesses.size() > kMostGuesses) guesses.resize(kMostGuesses);
+  if (guesses.size() > kMaxGuesses) guesses.resize(kMaxGuesses);
   Best three;
   for (const Guess& guess : guesses) {
     if (const Best found = search_fourth(photo, chart, guess); found.contrast > three.contrast) three = found;
   }
-  if (three.contrast > kLeastOfThree) return three.view;
+  if (three.contrast > kMinOfThree) return three.view;
   return Error{Fault::kInput,
                "the chart is not found: three of its ring and discs have to be whole in the photograph, which is not mirrored, "
                "and sharp enough to tell its dashes apart"};
@@ -234,7 +234,7 @@ Result<View> find_marks(const Photo& photo, const Chart& chart) {
 
 namespace {
 
-constexpr std::size_t kMostDiscs = 14, kMostRings = 6;
+constexpr std::size_t kMaxDiscs = 14, kMaxRings = 6;
 
 struct Moments {
   double xx = 0, xy = 0, yy = 0;
@@ -258,10 +258,10 @@ std::vector<Moments> moments_of(const cv::Mat& labels, const cv::Mat& middles, c
 }
 
 /// Large ones of the right shape: squares, of 0.955, come after discs.
-void keep_likely(std::vector<Patch>& patches, std::size_t most, double fullness) {
+void keep_likely(std::vector<Patch>& patches, std::size_t maximum, double fullness) {
   const auto likely = [&](const Patch& p) { return p.area * std::exp(-std::abs(p.fullness - fullness) / 0.02); };
   std::ranges::stable_sort(patches, [&](const Patch& a, const Patch& b) { return likely(a) > likely(b); });
-  if (patches.size() > most) patches.resize(most);
+  if (patches.size() > maximum) patches.resize(maximum);
 }
 
 void add_others(const std::vector<Patch>& more, std::vector<Patch>& patches) {
@@ -282,13 +282,13 @@ Patches find_patches(const Photo& photo, double level, int close) {
   if (close > 1) cv::morphologyEx(dark, mask, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {close, close}));
   const int count = cv::connectedComponentsWithStats(mask, labels, stats, middles, 8);
   std::vector<char> fits(static_cast<std::size_t>(count), 0);
-  const double most = 0.05 * static_cast<double>(dark.total());
+  const double maximum = 0.05 * static_cast<double>(dark.total());
   for (int i = 1; i < count; ++i) {
     const int *s = stats.ptr<int>(i), w = s[cv::CC_STAT_WIDTH], h = s[cv::CC_STAT_HEIGHT];
     const bool inside = s[cv::CC_STAT_LEFT] > 0 && s[cv::CC_STAT_TOP] > 0 && s[cv::CC_STAT_LEFT] + w < dark.cols &&
                         s[cv::CC_STAT_TOP] + h < dark.rows;
     fits[static_cast<std::size_t>(i)] =
-        inside && s[cv::CC_STAT_AREA] >= 60 && s[cv::CC_STAT_AREA] <= most && 3 * w > h && 3 * h > w;
+        inside && s[cv::CC_STAT_AREA] >= 60 && s[cv::CC_STAT_AREA] <= maximum && 3 * w > h && 3 * h > w;
   }
   const std::vector<Moments> moments = moments_of(labels, middles, fits);
   Patches patches;
@@ -302,8 +302,8 @@ Patches find_patches(const Photo& photo, double level, int close) {
     if (!hollow && patch.fullness > 0.9 && patch.fullness < 1.1) patches.discs.push_back(patch);
     if (hollow && patch.fullness > 0.4 && patch.fullness < 0.8) patches.rings.push_back(patch);
   }
-  keep_likely(patches.discs, kMostDiscs, 1);
-  keep_likely(patches.rings, kMostRings, 0.6);
+  keep_likely(patches.discs, kMaxDiscs, 1);
+  keep_likely(patches.rings, kMaxRings, 0.6);
   return patches;
 }
 

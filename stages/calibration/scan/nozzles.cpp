@@ -13,7 +13,7 @@
 namespace lamina::scan {
 namespace {
 
-constexpr double kToldPixels = 0.1, kErrors = 4;
+constexpr double kReportedPixels = 0.1, kErrors = 4;
 
 /// In um, along the scan and across it.
 using Axes = std::array<double, 2>;
@@ -24,7 +24,7 @@ Axes axes_of(const Chart& chart, const Spot& mm) {
 }
 
 Measure measured(double um, double error_um, double freedom, double pitch_nm) {
-  return {um, error_um, errors_of_99(freedom) * error_um, kErrors * error_um <= kToldPixels * 1e-3 * pitch_nm};
+  return {um, error_um, errors_of_99(freedom) * error_um, kErrors * error_um <= kReportedPixels * 1e-3 * pitch_nm};
 }
 
 /// freedom  degrees of it that the errors have
@@ -35,34 +35,34 @@ Offset offset_of(const Chart& chart, const Axes& um, const Axes& error_um, const
 }
 
 /// What was seen of the dashes of a nozzle. um  how far each lies from where its swath has it, along and across
-struct Tally {
-  std::uint32_t there = 0, absent = 0, laid = 0;
+struct NozzleTally {
+  std::uint32_t there = 0, absent = 0, deposited = 0;
   std::array<std::vector<double>, 2> um;
 };
 
-std::vector<Tally> tallies_of(const Chart& chart, const std::vector<DashSeen>& seen, const std::vector<bool>& printed,
+std::vector<NozzleTally> tallies_of(const Chart& chart, const std::vector<DashReading>& detected, const std::vector<bool>& printed,
                               const SheetFit& fit) {
-  std::vector<Tally> tallies(chart.nozzles);
-  for (std::size_t d = 0; d < seen.size(); ++d) {
+  std::vector<NozzleTally> tallies(chart.nozzles);
+  for (std::size_t d = 0; d < detected.size(); ++d) {
     const ChartDash& dash = chart.dashes[d];
-    Tally& tally = tallies[dash.nozzle];
-    ++tally.laid;
-    if (seen[d].hidden || !printed[dash.swath]) continue;
-    ++(seen[d].there ? tally.there : tally.absent);
-    if (!seen[d].there || seen[d].marred) continue;
+    NozzleTally& tally = tallies[dash.nozzle];
+    ++tally.deposited;
+    if (detected[d].hidden || !printed[dash.swath]) continue;
+    ++(detected[d].there ? tally.there : tally.absent);
+    if (!detected[d].there || detected[d].marred) continue;
     const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath];
-    const Axes um = axes_of(chart, {seen[d].place.x - m.x - shift.x, seen[d].place.y - m.y - shift.y});
+    const Axes um = axes_of(chart, {detected[d].position.x - m.x - shift.x, detected[d].position.y - m.y - shift.y});
     for (std::size_t axis = 0; axis < 2; ++axis) tally.um[axis].push_back(um[axis]);
   }
   return tallies;
 }
 
 /// The scatter of dashes about their nozzles' medians.
-Axes scatter_of_dashes(const std::vector<Tally>& tallies) {
+Axes scatter_of_dashes(const std::vector<NozzleTally>& tallies) {
   Axes scatter{};
   for (std::size_t axis = 0; axis < 2; ++axis) {
     std::vector<double> off;
-    for (const Tally& tally : tallies) {
+    for (const NozzleTally& tally : tallies) {
       const double middle = median_of(tally.um[axis]), n = static_cast<double>(tally.um[axis].size());
       if (n < 2) continue;
       for (const double um : tally.um[axis]) off.push_back((um - middle) * std::sqrt(n / (n - 1)));
@@ -111,10 +111,10 @@ std::vector<Axes> line_errors(const std::vector<std::optional<Axes>>& nozzles, c
 }
 
 /// Shifts of swaths against the first one, along the head's line, by a fit. told  which nozzles make the line
-std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::vector<bool>& told, std::uint32_t first) {
+std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::vector<bool>& reported, std::uint32_t first) {
   std::vector<std::optional<Axes>> nozzles(chart.nozzles);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
-    if (told[n]) nozzles[n] = axes_of(chart, fit.offset[n]);
+    if (reported[n]) nozzles[n] = axes_of(chart, fit.offset[n]);
   }
   const std::array<HeadLine, 2> lines = lines_of(nozzles);
   std::vector<Axes> swaths;
@@ -131,7 +131,7 @@ constexpr std::uint32_t kGroups = 9;  // by combs, and thirds of the nozzles
 
 /// Standard errors of swaths_of(), with kGroups - 1 degrees of freedom.
 std::vector<Axes> swath_errors(const Chart& chart, const std::vector<Sighting>& all, const SheetFit& fit,
-                               const std::vector<bool>& told, std::uint32_t first, bool lens) {
+                               const std::vector<bool>& reported, std::uint32_t first, bool lens) {
   std::vector<std::vector<Axes>> without;
   for (std::uint32_t g = 0; g < kGroups; ++g) {
     std::vector<Sighting> rest;
@@ -140,7 +140,7 @@ std::vector<Axes> swath_errors(const Chart& chart, const std::vector<Sighting>& 
     }
     SheetFit other = fit;
     fit_sheet(rest, first, lens, other);
-    without.push_back(swaths_of(chart, other, told, first));
+    without.push_back(swaths_of(chart, other, reported, first));
   }
   std::vector<Axes> errors(chart.swaths);
   for (std::uint32_t s = 0; s < chart.swaths; ++s) {
@@ -156,52 +156,52 @@ std::vector<Axes> swath_errors(const Chart& chart, const std::vector<Sighting>& 
 
 }  // namespace
 
-std::vector<bool> printed_swaths(const Chart& chart, const std::vector<DashSeen>& seen) {
+std::vector<bool> printed_swaths(const Chart& chart, const std::vector<DashReading>& detected) {
   std::vector<std::uint32_t> all(chart.swaths, 0), there(chart.swaths, 0);
-  for (std::size_t d = 0; d < seen.size(); ++d) {
-    if (seen[d].hidden) continue;
+  for (std::size_t d = 0; d < detected.size(); ++d) {
+    if (detected[d].hidden) continue;
     ++all[chart.dashes[d].swath];
-    there[chart.dashes[d].swath] += seen[d].there;
+    there[chart.dashes[d].swath] += detected[d].there;
   }
   std::vector<bool> printed(chart.swaths);
   for (std::uint32_t s = 0; s < chart.swaths; ++s) printed[s] = there[s] * 5 > all[s];
   return printed;
 }
 
-std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSeen>& seen, const View& view,
+std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashReading>& detected, const View& view,
                                    const std::vector<bool>& printed) {
   std::vector<Sighting> sightings;
-  for (std::size_t d = 0; d < seen.size(); ++d) {
+  for (std::size_t d = 0; d < detected.size(); ++d) {
     const ChartDash& dash = chart.dashes[d];
-    if (!seen[d].there || seen[d].hidden || seen[d].marred || !printed[dash.swath]) continue;
+    if (!detected[d].there || detected[d].hidden || detected[d].marred || !printed[dash.swath]) continue;
     sightings.push_back(
-        {middle_of(dash.box, chart), view.at(seen[d].place.x, seen[d].place.y), dash.swath, dash.nozzle, dash.repeat});
+        {middle_of(dash.box, chart), view.at(detected[d].position.x, detected[d].position.y), dash.swath, dash.nozzle, dash.repeat});
   }
   return sightings;
 }
 
-HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, const std::vector<bool>& printed,
+HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detected, const std::vector<bool>& printed,
                        const SheetFit& fit, bool lens) {
   HeadReading head;
   head.nozzle.assign(chart.nozzles, std::nullopt);
-  const std::vector<Tally> tallies = tallies_of(chart, seen, printed, fit);
+  const std::vector<NozzleTally> tallies = tallies_of(chart, detected, printed, fit);
   const Axes scatter = scatter_of_dashes(tallies);
-  std::vector<bool> told(chart.nozzles, false);
+  std::vector<bool> reported(chart.nozzles, false);
   std::vector<std::optional<Axes>> offsets(chart.nozzles), errors(chart.nozzles);
   std::vector<Axes> freedom(chart.nozzles);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
-    const Tally& tally = tallies[n];
-    const std::uint32_t looked = tally.there + tally.absent;
-    if (tally.laid == 0) continue;
-    if (looked == 0) {
-      head.untold.push_back(n);
-    } else if (3 * tally.there <= looked) {  // of three, one may be a speck of dust
+    const NozzleTally& tally = tallies[n];
+    const std::uint32_t inspected = tally.there + tally.absent;
+    if (tally.deposited == 0) continue;
+    if (inspected == 0) {
+      head.unreadable.push_back(n);
+    } else if (3 * tally.there <= inspected) {  // of three, one may be a speck of dust
       head.blocked.push_back(n);
     } else {
-      if (tally.absent * 3 > looked) head.weak.push_back(n);
+      if (tally.absent * 3 > inspected) head.weak.push_back(n);
       head.nozzle[n] = Offset{};
       if (tally.um[0].empty()) continue;  // all of them marred
-      told[n] = true;
+      reported[n] = true;
       offsets[n] = errors[n] = Axes{};
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const SettledMean settled = settled_mean(tally.um[axis], scatter[axis]);
@@ -214,7 +214,7 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
   const std::array<HeadLine, 2> lines = lines_of(offsets);
   const std::vector<Axes> line_error = line_errors(offsets, errors);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
-    if (!told[n]) continue;
+    if (!reported[n]) continue;
     Axes um = *offsets[n], error = *errors[n];
     for (std::size_t axis = 0; axis < 2; ++axis) {
       um[axis] -= lines[axis].at(n);
@@ -223,9 +223,9 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
     head.nozzle[n] = offset_of(chart, um, error, freedom[n]);
   }
   const auto first = static_cast<std::uint32_t>(std::ranges::find(printed, true) - printed.begin());
-  const std::vector<Sighting> all = sightings_of(chart, seen, fit.view, printed);
-  const std::vector<Axes> swaths = swaths_of(chart, fit, told, first);
-  const std::vector<Axes> swath_error = swath_errors(chart, all, fit, told, first, lens);
+  const std::vector<Sighting> all = sightings_of(chart, detected, fit.view, printed);
+  const std::vector<Axes> swaths = swaths_of(chart, fit, reported, first);
+  const std::vector<Axes> swath_error = swath_errors(chart, all, fit, reported, first, lens);
   head.swath.assign(chart.swaths, std::nullopt);
   for (std::uint32_t s = 0; s < chart.swaths; ++s) {
     if (printed[s]) head.swath[s] = offset_of(chart, swaths[s], swath_error[s], {kGroups - 1, kGroups - 1});

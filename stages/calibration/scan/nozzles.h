@@ -15,7 +15,7 @@ namespace lamina::scan {
 /// told  four standard errors are at most a tenth of a pixel of the layer
 struct Measure {
   double um = 0, error_um = 0, within_um = 0;
-  bool told = false;
+  bool reported = false;
 };
 
 /// A shift: along the scan, positive where places rise; across it, positive where lines rise.
@@ -25,16 +25,16 @@ struct Offset {
 
 struct HeadReading {
   std::vector<std::uint32_t> blocked, weak;   // nozzles: never seen, seen by times
-  std::vector<std::uint32_t> untold;          // nozzles whose dashes are all hidden
+  std::vector<std::uint32_t> unreadable;          // nozzles whose dashes are all hidden
   std::vector<std::optional<Offset>> nozzle;  // against the head's line, of those that were seen
   std::vector<std::optional<Offset>> swath;   // against the first one, along the head's line; absent: not printed
 };
 
 /// Whether a swath was printed at all: a fifth of its dashes are there.
-std::vector<bool> printed_swaths(const Chart& chart, const std::vector<DashSeen>& seen);
+std::vector<bool> printed_swaths(const Chart& chart, const std::vector<DashReading>& detected);
 
 /// Dashes that are there, of swaths that were printed, where `view` has them.
-std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSeen>& seen, const View& view,
+std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashReading>& detected, const View& view,
                                    const std::vector<bool>& printed);
 
 /// Decides each nozzle by all of its dashes in the swaths that were printed, and measures nozzles and swaths.
@@ -43,7 +43,7 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSee
 /// photograph. Errors of swaths follow from leaving out a ninth of all dashes at a time (jackknife). Those of nozzles are of
 /// two parts: the scatter of dashes, and the line's own error, which the middle nozzle brings to all: found by moving nozzles
 /// by their errors. fit      of these dashes printed  as printed_swaths() has it, one at least
-HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, const std::vector<bool>& printed,
+HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detected, const std::vector<bool>& printed,
                        const SheetFit& fit, bool lens);
 
 }  // namespace lamina::scan

@@ -14,7 +14,7 @@
 namespace lamina::scan {
 namespace {
 
-constexpr std::int64_t kMostPixels = 1 << 27;
+constexpr std::int64_t kMaxPixels = 1 << 27;
 
 /// Light of sRGB values (IEC 61966-2-1).
 std::array<float, 256> light_table() {
@@ -81,16 +81,16 @@ Photo photo_of(cv::Mat grey) {
   return photo;
 }
 
-Result<Photo> read_photo(const std::string& path, int least) {
+Result<Photo> read_photo(const std::string& path, int minimum) {
   const auto refused = [&](const std::string& why) {
     return Error{Fault::kInput, fmt::format("{}: {}", one_line(path), one_line(why))};
   };
   const auto file = OIIO::ImageInput::open(path);
   if (!file) return refused("is no photograph that can be read: " + OIIO::geterror());
   const OIIO::ImageSpec& spec = file->spec();
-  if (std::int64_t{spec.width} * spec.height > kMostPixels) return refused("has more than 2^27 pixels; give a smaller one");
-  if (std::min(spec.width, spec.height) < least)
-    return refused(fmt::format("has {} x {} pixels; {} and more a side are needed", spec.width, spec.height, least));
+  if (std::int64_t{spec.width} * spec.height > kMaxPixels) return refused("has more than 2^27 pixels; give a smaller one");
+  if (std::min(spec.width, spec.height) < minimum)
+    return refused(fmt::format("has {} x {} pixels; {} and more a side are needed", spec.width, spec.height, minimum));
   const int channels = spec.nchannels, turn = spec.get_int_attribute("Orientation", 1);
   if (channels < 1 || channels > 4) return refused(fmt::format("has {} channels; give a grey or a colour picture", channels));
   std::vector<std::uint8_t> row(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(channels));
@@ -104,8 +104,8 @@ Result<Photo> read_photo(const std::string& path, int least) {
     const std::uint8_t* from = all.data() + static_cast<std::size_t>(y) * row.size();
     auto* to = grey.ptr<std::uint8_t>(y);
     for (int x = 0; x < spec.width; ++x, from += channels) {
-      const int seen = channels < 3 ? from[0] : (54 * from[0] + 183 * from[1] + 19 * from[2] + 128) >> 8;  // Rec. 709
-      to[x] = static_cast<std::uint8_t>(std::min(255, alpha < 0 ? seen : seen + 255 - from[alpha]));
+      const int detected = channels < 3 ? from[0] : (54 * from[0] + 183 * from[1] + 19 * from[2] + 128) >> 8;  // Rec. 709
+      to[x] = static_cast<std::uint8_t>(std::min(255, alpha < 0 ? detected : detected + 255 - from[alpha]));
     }
   }
   return photo_of(upright(std::move(grey), turn));
@@ -121,7 +121,7 @@ Result<std::string> png_of(const cv::Mat& bgr) {
   cv::Mat rgb;
   cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
   output->set_ioproxy(&memory);
-  if (!output->open("seen.png", spec) || !output->write_image(OIIO::TypeDesc::UINT8, rgb.ptr()) || !output->close())
+  if (!output->open("detected.png", spec) || !output->write_image(OIIO::TypeDesc::UINT8, rgb.ptr()) || !output->close())
     return Error{Fault::kOutput, "the picture of what was seen: " + output->geterror()};
   return std::string(file.begin(), file.end());
 }

@@ -24,7 +24,7 @@ struct Photo {
 /// least   pixels of the shorter side
 /// errors  kInput: no such image, smaller, or more than 2^27 pixels
 /// cost    reads the image; 13 bytes a pixel
-Result<Photo> read_photo(const std::string& path, int least);
+Result<Photo> read_photo(const std::string& path, int minimum);
 
 /// The same of grey values in memory.
 Photo photo_of(cv::Mat grey);

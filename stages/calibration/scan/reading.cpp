@@ -50,21 +50,21 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   reading.fit = {*view, std::vector<Spot>(chart.swaths), std::vector<Spot>(chart.nozzles)};
   const bool settled = settle(photo, chart, reading);
   const auto there =
-      static_cast<std::size_t>(std::ranges::count_if(reading.dashes, [](const DashSeen& one) { return one.there; }));
+      static_cast<std::size_t>(std::ranges::count_if(reading.dashes, [](const DashReading& one) { return one.there; }));
   if (!settled || there < kFewest || there * 10 < chart.dashes.size())
     return Error{Fault::kInput,
                  "the chart is found, but fewer than a tenth of its dashes: photograph it sharper, or from nearer"};
   const std::vector<bool> printed = printed_swaths(chart, reading.dashes);
   reading.pixels_a_mm = reading.fit.view.pixels_a_mm(m.x, m.y);
   reading.scatter_um = 1000 * reading.fit.scatter_pixels / reading.pixels_a_mm;
-  reading.head = judge_head(chart, reading.dashes, printed, reading.fit, there >= kEnoughForLens);
+  reading.head = read_head(chart, reading.dashes, printed, reading.fit, there >= kEnoughForLens);
   reading.inks = read_inks(photo, chart, reading.fit, reading.head);
-  if (reading.inks.bars_seen > 0 && reading.inks.full < kFaintBar * photo.ink)
+  if (reading.inks.bars_detected > 0 && reading.inks.full < kFaintBar * photo.ink)
     return Error{
         Fault::kInput,
         "the chart is found, but its bars are not where they should be: photograph it with all four marks, and nothing "
         "beside it"};
-  reading.joints = read_joints(photo, chart, reading.fit, reading.head, reading.inks);
+  reading.stitches = read_stitches(photo, chart, reading.fit, reading.head, reading.inks);
   return reading;
 }
 
@@ -77,13 +77,13 @@ cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& r
   };
   const cv::Scalar green(60, 170, 40), red(40, 40, 220), orange(20, 140, 240), blue(200, 120, 30);
   for (std::size_t d = 0; d < reading.dashes.size(); ++d) {
-    const DashSeen& seen = reading.dashes[d];
+    const DashReading& detected = reading.dashes[d];
     const ChartBox& box = chart.dashes[d].box;
     const Spot m = middle_of(box, chart), a{box.left * 1e-6 * chart.pixel_x_nm - m.x, box.top * 1e-6 * chart.pixel_y_nm - m.y};
     const Spot half = chart.scan_along_x ? Spot{a.x, 0} : Spot{0, a.y};
-    const cv::Scalar& colour = seen.hidden ? orange : seen.there ? green : red;
-    cv::line(picture, at({seen.place.x + half.x, seen.place.y + half.y}), at({seen.place.x - half.x, seen.place.y - half.y}),
-             colour, seen.there ? 1 : 2, cv::LINE_AA);
+    const cv::Scalar& colour = detected.hidden ? orange : detected.there ? green : red;
+    cv::line(picture, at({detected.position.x + half.x, detected.position.y + half.y}), at({detected.position.x - half.x, detected.position.y - half.y}),
+             colour, detected.there ? 1 : 2, cv::LINE_AA);
   }
   for (const ChartBox& mark : chart.marks) {
     const Spot m = middle_of(mark, chart);

@@ -6,7 +6,7 @@
 
 #include "stages/calibration/scan/dashes.h"
 #include "stages/calibration/scan/inks.h"
-#include "stages/calibration/scan/joints.h"
+#include "stages/calibration/scan/stitches.h"
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/chart.h"
@@ -16,12 +16,12 @@ namespace lamina::scan {
 
 struct ChartReading {
   SheetFit fit;
-  std::vector<DashSeen> dashes;  // in the order of the chart
+  std::vector<DashReading> dashes;  // in the order of the chart
   double pixels_a_mm = 0;        // of the photograph
   double scatter_um = 0;         // median distance of dashes from where the fit puts them
   HeadReading head;
   InkReading inks;
-  std::vector<JointReading> joints;
+  std::vector<JointReading> stitches;
 };
 
 /// Reads a chart.

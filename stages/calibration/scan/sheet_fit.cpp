@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kViewUnknowns = 9;
 constexpr double kSmall = 1e-6;   // step of slopes
 constexpr double kKeptSmall = 1;  // pixels^2 / mm^2: an offset of 50 um weighs as much as a twentieth of a pixel of one dash
-constexpr double kLeastScale = 0.02;  // pixels
+constexpr double kMinScale = 0.02;  // pixels
 
 double& unknown(View& view, std::size_t i) { return i < 8 ? view.h[i] : view.lens; }
 
@@ -24,9 +24,9 @@ struct Slopes {
   Spot x, y;
 };
 
-Slopes slopes_at(const View& view, const Spot& at, const Spot& seen) {
+Slopes slopes_at(const View& view, const Spot& at, const Spot& detected) {
   const Spot x = view.at(at.x + kSmall, at.y), y = view.at(at.x, at.y + kSmall);
-  return {{(x.x - seen.x) / kSmall, (x.y - seen.y) / kSmall}, {(y.x - seen.x) / kSmall, (y.y - seen.y) / kSmall}};
+  return {{(x.x - detected.x) / kSmall, (x.y - detected.y) / kSmall}, {(y.x - detected.x) / kSmall, (y.y - detected.y) / kSmall}};
 }
 
 class Fitter {
@@ -38,39 +38,39 @@ class Fitter {
 
   void run() {
     for (int step = 0; step < 12; ++step) {
-      place_swaths();
-      place_nozzles();
+      locate_swaths();
+      locate_nozzles();
       if (take_step() < 1e-9) break;
     }
     fit_.scatter_pixels = scatter();
   }
 
  private:
-  Spot place_of(const Sighting& one) const {
+  Spot position_of(const Sighting& one) const {
     const Spot shift = fit_.shift[one.swath], offset = fit_.offset[one.nozzle];
-    return {one.place.x + shift.x + offset.x, one.place.y + shift.y + offset.y};
+    return {one.position.x + shift.x + offset.x, one.position.y + shift.y + offset.y};
   }
 
   double scatter() const {
     std::vector<double> distances;
     distances.reserve(sightings_.size());
     for (const Sighting& one : sightings_) {
-      const Spot at = place_of(one), p = fit_.view.at(at.x, at.y);
-      distances.push_back(std::hypot(p.x - one.seen.x, p.y - one.seen.y));
+      const Spot at = position_of(one), p = fit_.view.at(at.x, at.y);
+      distances.push_back(std::hypot(p.x - one.detected.x, p.y - one.detected.y));
     }
     return upper_median_of(distances);
   }
 
   /// How far a dash lies from where it should, in mm of the sheet.
   Spot off_by(const Sighting& one) const {
-    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y), off{one.seen.x - p.x, one.seen.y - p.y};
+    const Spot at = position_of(one), p = fit_.view.at(at.x, at.y), off{one.detected.x - p.x, one.detected.y - p.y};
     const auto [x, y] = slopes_at(fit_.view, at, p);
     const double area = x.x * y.y - y.x * x.y;
     return {(y.y * off.x - y.x * off.y) / area, (x.x * off.y - x.y * off.x) / area};
   }
 
   /// Shifts as the medians of their dashes have them, so that a swath that lies far from the others is no outlier.
-  void place_swaths() {
+  void locate_swaths() {
     std::vector<std::vector<double>> x(fit_.shift.size()), y(fit_.shift.size());
     for (const Sighting& one : sightings_) {
       const Spot off = off_by(one);
@@ -85,7 +85,7 @@ class Fitter {
   }
 
   /// Offsets as the medians of their dashes have them, so that a stray nozzle is no outlier.
-  void place_nozzles() {
+  void locate_nozzles() {
     std::vector<std::vector<double>> x(nozzles_), y(nozzles_);
     for (const Sighting& one : sightings_) {
       const Spot off = off_by(one);
@@ -103,7 +103,7 @@ class Fitter {
   }
 
   void add(const Sighting& one, const std::array<View, kViewUnknowns>& moved, double reach, GroupedLeastSquares& linear) const {
-    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y), error{one.seen.x - p.x, one.seen.y - p.y};
+    const Spot at = position_of(one), p = fit_.view.at(at.x, at.y), error{one.detected.x - p.x, one.detected.y - p.y};
     const double share = std::hypot(error.x, error.y) / reach;
     if (share >= 1) return;
     const double weight = (1 - share * share) * (1 - share * share);
@@ -128,7 +128,7 @@ class Fitter {
 
   /// returns the largest change of view and shifts
   double take_step() {
-    const double reach = 4.7 * std::max(1.4826 * scatter(), kLeastScale);
+    const double reach = 4.7 * std::max(1.4826 * scatter(), kMinScale);
     GroupedLeastSquares linear(unknowns_, nozzles_, 2);
     for (std::size_t n = 0; n < nozzles_; ++n) {
       linear.add({}, n, std::array{1.0, 0.0}, -fit_.offset[n].x, kKeptSmall);
@@ -150,9 +150,9 @@ class Fitter {
     }
     for (std::size_t n = 0; n < nozzles_; ++n)
       fit_.offset[n] = {fit_.offset[n].x + offset[2 * n], fit_.offset[n].y + offset[2 * n + 1]};
-    double most = 0;
-    for (const double one : change) most = std::max(most, std::abs(one));
-    return most;
+    double maximum = 0;
+    for (const double one : change) maximum = std::max(maximum, std::abs(one));
+    return maximum;
   }
 
   const std::vector<Sighting>& sightings_;
@@ -170,8 +170,8 @@ void fit_sheet(const std::vector<Sighting>& sightings, std::uint32_t first, bool
 }
 
 HeadLine line_of(const std::vector<std::pair<double, double>>& values) {
-  constexpr std::size_t kMost = 500;
-  const std::size_t step = values.size() / kMost + 1;
+  constexpr std::size_t kMax = 500;
+  const std::size_t step = values.size() / kMax + 1;
   std::vector<double> slopes, rest;
   for (std::size_t i = 0; i < values.size(); i += step) {
     for (std::size_t j = i + step; j < values.size(); j += step)

@@ -12,7 +12,7 @@ namespace lamina::scan {
 
 /// A dash: where it should lie on the sheet in mm, and where the photograph has it, in pixels.
 struct Sighting {
-  Spot place, seen;
+  Spot position, detected;
   std::uint32_t swath = 0, nozzle = 0, repeat = 0;
 };
 

@@ -34,6 +34,6 @@ struct View {
 };
 
 /// The view, without a lens, that takes four places to four pixels. False if three of either lie on a line.
-bool view_of(const std::array<Spot, 4>& places, const std::array<Spot, 4>& pixels, double width, double height, View& view);
+bool view_of(const std::array<Spot, 4>& positions, const std::array<Spot, 4>& pixels, double width, double height, View& view);
 
 }  // namespace lamina::scan

@@ -15,13 +15,13 @@ namespace lamina::cover {
 /// nm, from the lowest corner of the facet's box.
 struct Trapezoid {
   /// An edge: a point of it, and what a step along y adds.
-  struct Side {
+  struct TrapezoidSide {
     double y, x, z, dx, dz;
   };
-  Side on, back;                      // in the order of the facet's corners downwards, and against it
+  TrapezoidSide on, back;                      // in the order of the facet's corners downwards, and against it
   double low, high;                   // y at its ends
   double left, right;                 // x that it reaches
-  double slope_room;                  // by which x of a chord may be off
+  double slope_margin;                  // by which x of a chord may be off
   double from_x, from_y;              // the lowest corner, on the bed
   double size;                        // of the facet
   std::uint32_t facet;                // its index in the layer

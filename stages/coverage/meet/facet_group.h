@@ -27,7 +27,7 @@ struct alignas(64) FacetGroup {
   Nm corner[3][3][kGroupSize];  // [corner][axis][lane]
   BoxLanes box;
   float normal[4][3][kGroupSize];  // own, edges 0-1, 1-2, 2-0
-  float room[4][kGroupSize];
+  float slack[4][kGroupSize];
   float offset[kGroupSize],
       reach[kGroupSize];  // of edge 1-2: its value at corner 0 with the sign turned, |corner 1 - corner 0|
   std::uint32_t number[kGroupSize];
@@ -40,17 +40,17 @@ struct alignas(64) FacetGroup {
 
 /// Pairs of facets of two groups whose boxes touch: what has to be known or decided of them.
 struct FoundPairs {
-  struct Edge {
+  struct FacetEdges {
     std::uint8_t a, b, edge_a, edge_b;  // lanes; edges from those corners to the next, walked opposite ways
   };
   struct Pair {
     std::uint8_t a, b;
   };
-  static constexpr std::size_t kMost = kGroupSize * kGroupSize;
-  std::array<Edge, 9 * kMost> edge;
-  std::array<Pair, kMost> doubtful;   // may meet beyond what they share
-  std::array<Pair, 9 * kMost> alike;  // walk an edge the same way
-  std::uint32_t edges = 0, doubts = 0, alikes = 0;
+  static constexpr std::size_t kMax = kGroupSize * kGroupSize;
+  std::array<FacetEdges, 9 * kMax> edge;
+  std::array<Pair, kMax> uncertain;   // may meet beyond what they share
+  std::array<Pair, 9 * kMax> alike;  // walk an edge the same way
+  std::uint32_t edges = 0, uncertain_count = 0, alikes = 0;
 };
 
 /// The same numbers with each instruction set.

@@ -23,7 +23,7 @@ Floats plus(Floats a, Floats b) { return a + b; }
 Floats less(Floats a, Floats b) { return a - b; }
 Floats times(Floats a, Floats b) { return a * b; }
 Floats absolute(Floats a) { return std::abs(a); }
-std::uint32_t at_most(Ints a, Ints b) { return a <= b ? 1 : 0; }
+std::uint32_t not_above(Ints a, Ints b) { return a <= b ? 1 : 0; }
 std::uint32_t equal(Ints a, Ints b) { return a == b ? 1 : 0; }
 std::uint32_t above(Floats a, Floats b) { return a > b ? 1 : 0; }
 

@@ -28,7 +28,7 @@ std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>(std::lro
 class BmpEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (runs.columns == 0 || runs.rows() == 0 || runs.columns > kMostPixelsASide || runs.rows() > kMostPixelsASide) {
+    if (runs.columns == 0 || runs.rows() == 0 || runs.columns > kMaxPixelsASide || runs.rows() > kMaxPixelsASide) {
       return Error{Fault::kOutput, fmt::format("bmp holds no {} x {} pixels", runs.columns, runs.rows())};
     }
     const std::size_t used = row_bytes(runs.columns), stride = (used + 3) / 4 * 4;
@@ -108,7 +108,7 @@ Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int th
   if (bits != 1 && !grey) return failure(threshold > 0 ? "neither of 1 bit nor of 8 bits" : "not a 1-bit image");
   if (compression != 0) return failure("it is compressed");
   const std::int64_t tall = std::abs(std::int64_t{height});
-  if (width <= 0 || tall == 0 || width > std::int64_t{kMostPixelsASide} || tall > std::int64_t{kMostPixelsASide})
+  if (width <= 0 || tall == 0 || width > std::int64_t{kMaxPixelsASide} || tall > std::int64_t{kMaxPixelsASide})
     return failure(fmt::format("{} x {} pixels", width, tall));
   const auto columns = static_cast<std::uint32_t>(width), rows = static_cast<std::uint32_t>(tall);
   const std::uint32_t named = number(head, 46), colours = named == 0 ? 1u << bits : named;

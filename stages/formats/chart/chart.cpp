@@ -80,8 +80,8 @@ Chart chart_of(const Json& json) {
     if (!(one.percent > 0 && one.percent <= 100)) throw std::out_of_range("a wedge has no share of pixels");
     chart.wedges.push_back(one);
   }
-  for (const Json& joint : json.at("joints")) chart.joints.push_back(box_of(joint, chart));
-  if (chart.joints.size() >= std::max(chart.swaths, 1u)) throw std::out_of_range("it has more joints than swaths");
+  for (const Json& joint : json.at("stitches")) chart.stitches.push_back(box_of(joint, chart));
+  if (chart.stitches.size() >= std::max(chart.swaths, 1u)) throw std::out_of_range("it has more joints than swaths");
   if (!json.contains("verniers")) return chart;
   for (const Json& one : json.at("verniers")) chart.verniers.push_back(vernier_of(one, chart));
   return chart;
@@ -105,13 +105,13 @@ std::string chart_text(const Chart& chart) {
                {"gap_mm", chart.gap_mm},
                {"mark_mm", chart.mark_mm},
                {"layer_mm", chart.layer_mm}};
-  for (const char* list : {"marks", "dashes", "bars", "wedges", "joints", "verniers"}) json[list] = Json::array();
+  for (const char* list : {"marks", "dashes", "bars", "wedges", "stitches", "verniers"}) json[list] = Json::array();
   for (const ChartBox& box : chart.marks) json["marks"].push_back(box_json(box));
   for (const ChartDash& dash : chart.dashes)
     json["dashes"].push_back(Json::array({dash.swath, dash.nozzle, dash.repeat, box_json(dash.box)}));
   for (const ChartBar& bar : chart.bars) json["bars"].push_back(Json::array({bar.along, box_json(bar.box)}));
   for (const ChartWedge& wedge : chart.wedges) json["wedges"].push_back(Json::array({wedge.percent, box_json(wedge.box)}));
-  for (const ChartBox& box : chart.joints) json["joints"].push_back(box_json(box));
+  for (const ChartBox& box : chart.stitches) json["stitches"].push_back(box_json(box));
   for (const ChartVernier& vernier : chart.verniers) {
     Json before = Json::array(), after = Json::array();
     for (const ChartBox& tick : vernier.before) before.push_back(box_json(tick));

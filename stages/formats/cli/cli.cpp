@@ -21,7 +21,7 @@ std::string label_of(std::string_view name) {
 }
 
 /// What of a path is a hatch (a straight line of a raster on its own) is told apart from polylines.
-bool is_hatch(const ToolpathsView& paths, std::uint32_t stretch) { return paths.kind[stretch] == PathKind::kRaster; }
+bool is_hatch(const ToolpathsView& paths, std::uint32_t interval) { return paths.kind[interval] == PathKind::kRaster; }
 
 // Text; commands of 32 bits with floats; commands of 16 bits with whole units.
 enum class CliForm { kText, kLong, kShort };
@@ -30,15 +30,15 @@ struct CommandCodes {
   std::uint16_t layer, polyline, hatches;
 };
 constexpr CommandCodes kLongCodes{127, 130, 132}, kShortCodes{128, 129, 131};
-constexpr std::int64_t kMostShort = 65535;
+constexpr std::int64_t kMaxShort = 65535;
 
 /// nm of a unit: of 1, 2 and 5 times a power of ten, in which heights of layers come out even, the least of which 16 bits
 /// reach every coordinate.
 std::int64_t short_unit(const SliceHead& head) {
-  const std::int64_t most = std::max<std::int64_t>({head.bounds.hi.x, head.bounds.hi.y, head.bounds.hi.z, head.top, 1});
+  const std::int64_t maximum = std::max<std::int64_t>({head.bounds.hi.x, head.bounds.hi.y, head.bounds.hi.z, head.top, 1});
   for (std::int64_t decade = 1;; decade *= 10) {
     for (const std::int64_t unit : {decade, 2 * decade, 5 * decade}) {
-      if (ceil_div(most, unit) <= kMostShort) return unit;
+      if (ceil_div(maximum, unit) <= kMaxShort) return unit;
     }
   }
 }
@@ -131,7 +131,7 @@ class CliEncoder : public SliceEncoder {
         }
         return;
       }
-      append_written(out, points.size() * (2 * kMostDecimal + 2), [&](char* text) {
+      append_written(out, points.size() * (2 * kMaxDecimal + 2), [&](char* text) {
         for (const Point2 p : points) {
           *text++ = ',';
           text = put_mm(p.x, text);
@@ -170,7 +170,7 @@ class CliEncoder : public SliceEncoder {
       const std::size_t first = out.size();
       std::uint32_t count = 0;
       std::size_t i = 0;
-      for (Point2 last; i < line.size() && count < kMostShort; ++i) {
+      for (Point2 last; i < line.size() && count < kMaxShort; ++i) {
         if (count > 0 && same(line[i], last)) continue;
         last = line[i];
         points({&last, 1});
@@ -191,7 +191,7 @@ class CliEncoder : public SliceEncoder {
       while (begin < last) {
         const bool hatch = is_hatch(paths, begin);
         std::uint32_t end = begin + 1;
-        while (end < last && is_hatch(paths, end) == hatch && !(hatch && end - begin == kMostShort)) ++end;
+        while (end < last && is_hatch(paths, end) == hatch && !(hatch && end - begin == kMaxShort)) ++end;
         if (!hatch) {
           polyline(id, kOpen, paths.point.subspan(begin, end - begin + 1), false);
         } else {
@@ -220,7 +220,7 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
   const auto refuse = [&](const std::string& what) {
     return Error{Fault::kUsage, fmt::format("layer {}: --format cli-16: {}, or choose cli-binary", layer.layer.index, what)};
   };
-  if (head.parts.size() > kMostShort) return refuse("16 bits count up to 65535 bodies; give fewer parts");
+  if (head.parts.size() > kMaxShort) return refuse("16 bits count up to 65535 bodies; give fewer parts");
   const std::int64_t bottom = layer.layer.bottom, top = bottom + layer.layer.thickness;
   if (in_units(bottom, unit) == in_units(top, unit)) {
     return refuse(
@@ -230,7 +230,7 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
   }
   const auto outside = [&](Point2 p) {
     const std::int64_t low = std::min(p.x, p.y), high = std::max(p.x, p.y);
-    return low < 0 || in_units(high, unit) > kMostShort;
+    return low < 0 || in_units(high, unit) > kMaxShort;
   };
   for (const std::span<const Point2> points : {layer.contours.point, layer.paths.point}) {
     const auto found = std::ranges::find_if(points, outside);
@@ -241,7 +241,7 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
                     mm(found->x), mm(found->y), mm(unit)));
   }
   for (std::uint32_t c = 0; c < layer.contours.size(); ++c) {
-    if (layer.contours[c].size() < kMostShort) continue;
+    if (layer.contours[c].size() < kMaxShort) continue;
     return refuse(fmt::format("a contour has {} points, and 16 bits count up to 65535; drop some with --tolerance",
                               layer.contours[c].size()));
   }

@@ -85,15 +85,15 @@ std::uint64_t window(const std::byte* coded, std::uint64_t at) {
 }
 
 /// Moves `at` behind a run's words; more than `most` if the run is longer or is none.
-std::uint32_t take_run(const std::byte* coded, std::uint64_t& at, std::uint64_t end, std::uint32_t black, std::uint32_t most) {
+std::uint32_t take_run(const std::byte* coded, std::uint64_t& at, std::uint64_t end, std::uint32_t black, std::uint32_t maximum) {
   const auto& words = run_words(black);
   std::uint32_t length = 0;
   for (;;) {
     const Word word = words[window(coded, at) >> (64 - kRunBits)];
     at += word.length;
-    if (word.length == 0 || at > end) return most + 1;
+    if (word.length == 0 || at > end) return maximum + 1;
     length += word.value;
-    if (length > most || word.ends) return length;
+    if (length > maximum || word.ends) return length;
   }
 }
 

@@ -11,7 +11,7 @@ namespace lamina::read {
 
 /// How a strip of a TIFF is coded.
 struct G4Strip {
-  std::uint32_t columns = 0;   // 1 .. kMostPixelsASide
+  std::uint32_t columns = 0;   // 1 .. kMaxPixelsASide
   std::uint32_t rows = 0;      // of this strip
   bool low_bit_first = false;  // FillOrder 2
   bool white_is_set = false;   // runs are the white ones

@@ -44,7 +44,7 @@ std::uint64_t changes_to_code(std::span<const std::uint32_t> row, std::uint32_t 
 }
 
 /// No row takes more bytes: at most 53 bits for two changes, 4 bits for two changes above, 12 bits for 2560 columns.
-std::size_t most_bytes(std::size_t changes, std::size_t changes_above, std::uint32_t columns) {
+std::size_t max_bytes(std::size_t changes, std::size_t changes_above, std::uint32_t columns) {
   return 4 * changes + changes_above + columns / 1024 + 64;
 }
 
@@ -119,7 +119,7 @@ inline std::uint32_t put_in_step(BitWriter& writer, const std::uint32_t* a, cons
 }
 
 /// Changes that go the way of all rows between two looks at whether eight keep step: the least, and after looks in vain.
-constexpr std::uint32_t kLeastBetween = 4, kMostBetween = 64;
+constexpr std::uint32_t kMinBetween = 4, kMaxBetween = 64;
 constexpr std::array<Code, 8> kVerticalOrPass = {kVertical[0], kVertical[1], kVertical[2], kVertical[3],
                                                  kVertical[4], kVertical[5], kVertical[6], kPass};
 
@@ -132,13 +132,13 @@ BitWriter put_row(BitWriter writer, const std::uint32_t* a, const std::uint32_t*
   const std::uint32_t* const a_start = a;
   a += done;
   b += done;
-  std::uint32_t a0 = a[-1], between = kLeastBetween;
+  std::uint32_t a0 = a[-1], between = kMinBetween;
   for (;;) {
     const std::uint32_t in_step = put_in_step(writer, a, b, columns);
     a += in_step;
     b += in_step;
     if (in_step != 0) a0 = a[-1];
-    between = in_step >= 8 ? kLeastBetween : std::min(2 * between, kMostBetween);
+    between = in_step >= 8 ? kMinBetween : std::min(2 * between, kMaxBetween);
     // The way of all rows: it ends a row, and takes a few changes where four do not keep step. Whether one is passed over or
     // coded, and which is the next b1, is chosen without a branch: rows of dithered images are too irregular to foresee it.
     for (const std::uint32_t* const a_enough = a + between; a < a_enough;) {
@@ -222,25 +222,25 @@ std::uint32_t put_few_rows(BitWriter& writer, const RunsView& runs, std::uint32_
 
 /// Rows from `r` on that have as many changes as that one, as many as need little room.
 SteadyRows steady_rows(const RunsView& runs, std::uint32_t r) {
-  constexpr std::size_t kRoom = 8192;
+  constexpr std::size_t kCapacity = 8192;
   const std::uint32_t* const offset = runs.row_offset.data();
   const std::uint32_t changes = offset[r + 1] - offset[r];
-  const auto most =
-      static_cast<std::uint32_t>(std::min<std::size_t>(kRoom / most_bytes(changes, changes, runs.columns), runs.rows() - r));
+  const auto maximum =
+      static_cast<std::uint32_t>(std::min<std::size_t>(kCapacity / max_bytes(changes, changes, runs.columns), runs.rows() - r));
   std::uint32_t end = r + 1;
-  while (end < r + most && offset[end + 1] - offset[end] == changes) ++end;
+  while (end < r + maximum && offset[end + 1] - offset[end] == changes) ++end;
   return {runs.change.data() + offset[r], changes, end - r, runs.columns};
 }
 
 }  // namespace
 
-Encoder::Encoder(Isa isa) : body_(steps_body(isa_at_most(isa))) {}
+Encoder::Encoder(Isa isa) : body_(steps_body(limited_isa(isa))) {}
 
 std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::size_t start) {
   const std::uint32_t columns = runs.columns, rows = runs.rows();
   if (file.size() < start + 64) file.resize(std::max(start + 64, file.capacity()));
   BitWriter writer(file.data() + start);
-  const auto make_room = [&](std::size_t bytes) {
+  const auto ensure_capacity = [&](std::size_t bytes) {
     const std::size_t used = static_cast<std::size_t>(writer.next() - file.data());
     if (file.size() - used >= bytes) return;
     file.resize(std::max(used + bytes, file.size() * 2));
@@ -256,7 +256,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     const bool same = row.size() > kFewChanges && is_same(row, above);
     if (body_ != nullptr && row.size() == above.size() && !row.empty() && !same) {
       const SteadyRows steady = steady_rows(runs, r);
-      make_room(steady.rows * most_bytes(row.size(), row.size(), columns));
+      ensure_capacity(steady.rows * max_bytes(row.size(), row.size(), columns));
       const std::uint32_t done = put_steady_rows(writer, steady, *body_);
       const std::uint32_t whole = done / steady.changes;
       coded = done - whole * steady.changes;
@@ -268,7 +268,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
         row = runs.row(r);
       }
     } else if (row.size() == above.size() && row.size() - 1 < kFewChanges) {
-      make_room(kFewRowsBytes);
+      ensure_capacity(kFewRowsBytes);
       const std::uint32_t next = put_few_rows(writer, runs, r);
       if (next != r) {
         copied = false;
@@ -280,12 +280,12 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     if (coded == 0 && (same || is_same(row, above))) {
       const std::uint32_t next = row.empty() ? end_of_empty_rows(runs.row_offset, r) : r + 1;
       const std::uint64_t ones = changes_to_code(row, columns) * (next - r);
-      make_room(ones / 8 + 64);
+      ensure_capacity(ones / 8 + 64);
       writer.put_ones(ones);
       r = next;
       continue;
     }
-    make_room(most_bytes(row.size(), above.size(), columns));
+    ensure_capacity(max_bytes(row.size(), above.size(), columns));
     if (!copied) copy_row(above, columns, reference_);
     copied = true;
     copy_row(row, columns, coding_);
@@ -294,7 +294,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     above = row;
     ++r;
   }
-  make_room(64);
+  ensure_capacity(64);
   writer.put(kEndOfFacsimileBlock);
   return static_cast<std::size_t>(writer.finish() - file.data());
 }

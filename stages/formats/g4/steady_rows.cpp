@@ -14,7 +14,7 @@ std::uint32_t put_horizontals(BitWriter& writer, const StepsTask& task, const St
   const std::uint32_t usable = steps.keeps & steps.far, ends = task.ends.bits();
   while (at < count && (usable >> at & 1) != 0) {
     const std::uint32_t* const change = task.change + at;
-    const bool first = at == 0 ? task.ends.place() == 0 : (ends >> (at - 1) & 1) != 0;
+    const bool first = at == 0 ? task.ends.position() == 0 : (ends >> (at - 1) & 1) != 0;
     const std::uint32_t before = first ? 0 : change[-1];
     if ((ends >> at & 1) != 0) {  // the other run reaches the end of the row; rows have pairs of changes, so it is white
       put_horizontal(writer, 1, change[0] - before, task.columns - change[0]);
@@ -22,7 +22,7 @@ std::uint32_t put_horizontals(BitWriter& writer, const StepsTask& task, const St
       continue;
     }
     if ((steps.keeps >> (at + 1) & 1) == 0) break;
-    put_horizontal(writer, (task.ends.place() + at) & 1, change[0] - before, change[1] - change[0]);
+    put_horizontal(writer, (task.ends.position() + at) & 1, change[0] - before, change[1] - change[0]);
     if ((ends >> (at + 1) & 1) != 0) writer.put(kVertical[3]);
     at += 2;
   }

@@ -17,24 +17,24 @@ class RowEnds {
   }
   /// Bit i: change i from here, i < 16.
   std::uint32_t bits() const {
-    if (changes_ <= 48) return static_cast<std::uint32_t>(pattern_ >> place_) & 0xFFFF;
-    const std::uint32_t left = changes_ - 1 - place_;
+    if (changes_ <= 48) return static_cast<std::uint32_t>(pattern_ >> position_) & 0xFFFF;
+    const std::uint32_t left = changes_ - 1 - position_;
     return left < 16 ? 1u << left : 0;
   }
   void advance(std::uint32_t count) {
-    place_ += count;
-    if (place_ >= changes_) place_ %= changes_;
+    position_ += count;
+    if (position_ >= changes_) position_ %= changes_;
   }
   /// By as many as a body has lanes: nothing here waits for what it finds.
   void advance_all() {
-    place_ += step_;
-    place_ -= place_ >= changes_ ? changes_ : 0;
+    position_ += step_;
+    position_ -= position_ >= changes_ ? changes_ : 0;
   }
   /// Of the next change in its row.
-  std::uint32_t place() const { return place_; }
+  std::uint32_t position() const { return position_; }
 
  private:
-  std::uint32_t changes_, step_, place_ = 0;
+  std::uint32_t changes_, step_, position_ = 0;
   std::uint64_t pattern_ = 0;
 };
 

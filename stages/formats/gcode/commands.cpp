@@ -16,7 +16,7 @@
 namespace lamina::read {
 namespace {
 
-constexpr std::size_t kMostProfile = 64 << 10;  // bytes of settings; Cura's are some 5 kB
+constexpr std::size_t kMaxProfile = 64 << 10;  // bytes of settings; Cura's are some 5 kB
 
 /// The number at the beginning of a text, blanks passed over; 0 if there is none.
 double leading_number(std::string_view text) {
@@ -75,12 +75,12 @@ std::string decode_base64(std::string_view text) {
   return bytes;
 }
 
-/// What a zlib stream begins with, kMostProfile bytes at most; empty if it is none.
+/// What a zlib stream begins with, kMaxProfile bytes at most; empty if it is none.
 std::string inflated(std::string& bytes) {
   z_stream stream{};
   if (inflateInit(&stream) != Z_OK) return {};
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
-  std::string text(kMostProfile, '\0');
+  std::string text(kMaxProfile, '\0');
   stream.next_in = reinterpret_cast<Bytef*>(bytes.data());
   stream.avail_in = static_cast<uInt>(bytes.size());
   stream.next_out = reinterpret_cast<Bytef*>(text.data());
@@ -104,20 +104,20 @@ double cura_profile_number(std::string_view base64, std::string_view setting) {
   return 0;
 }
 
-void SlicerFacts::tell_filament(double diameter_mm, Source source) {
+void SlicerFacts::state_filament(double diameter_mm, Source source) {
   if (!(diameter_mm > 0.1 && diameter_mm < 20) || source <= source_) return;
   filament_mm = diameter_mm;
   source_ = source;
 }
 
-void SlicerFacts::tell_density(double g_cm3) {
+void SlicerFacts::state_density(double g_cm3) {
   if (density_g_cm3 == 0 && g_cm3 > 0.1 && g_cm3 < 25) density_g_cm3 = g_cm3;
 }
 
 void SlicerFacts::read_flavor(std::string_view flavor) {
   // Cura: gcodeExport.cpp, GCodeExport::setFlavor(): these two count E in mm3.
   if (flavor.starts_with("UltiGCode") || flavor.starts_with("Marlin(Volumetric)")) volumetric = true;
-  if (flavor.starts_with("Griffin")) tell_filament(2.85, Source::kFlavor);
+  if (flavor.starts_with("Griffin")) state_filament(2.85, Source::kFlavor);
 }
 
 void SlicerFacts::read_weight(std::string_view used) {
@@ -127,15 +127,15 @@ void SlicerFacts::read_weight(std::string_view used) {
   if (!(metres > 0 && grams > 0)) return;
   // Plastics for filament weigh 0.9 to 1.4 g/cm3: 2.2 to 3.4 g a metre of 1.75 mm, 5.7 to 8.9 g of 2.85 mm.
   const double weight = grams / metres;
-  if (weight > 2 && weight < 4) tell_filament(1.75, Source::kWeight);
-  if (weight > 5 && weight < 10) tell_filament(2.85, Source::kWeight);
+  if (weight > 2 && weight < 4) state_filament(1.75, Source::kWeight);
+  if (weight > 5 && weight < 10) state_filament(2.85, Source::kWeight);
 }
 
 void SlicerFacts::read_setting(std::string_view comment) {
   const SettingLine line(comment);
   const std::string_view name = line.name();
   if (name == "filamentdiameter" || name == "filamentdiameters" || name == "fiberdiamm" || name == "materialdiameter") {
-    tell_filament(leading_number(line.value), Source::kSetting);
+    state_filament(leading_number(line.value), Source::kSetting);
   }
   if (name == "nozzlediameter" || name == "extruderdiameter" || name == "extrudertrainnozzlediameter") {
     const double diameter = leading_number(line.value);
@@ -143,12 +143,12 @@ void SlicerFacts::read_setting(std::string_view comment) {
   }
   if (name == "filamentdensity" && !density_set_) {
     density_g_cm3 = 0;  // what is set goes before what was weighed
-    tell_density(leading_number(line.value));
+    state_density(leading_number(line.value));
     density_set_ = density_g_cm3 > 0;
   }
   if (name == "filamentusedcm") used_cm3_ = leading_number(line.value);
   if (name == "filamentusedg" && used_cm3_ >= 0.2)  // told to 0.01
-    tell_density(leading_number(line.value) / used_cm3_);
+    state_density(leading_number(line.value) / used_cm3_);
   if (name == "usevolumetrice" && leading_number(line.value) == 1) volumetric = true;
 }
 
@@ -159,7 +159,7 @@ void SlicerFacts::read(std::string_view comment) {
   if (comment.starts_with(kProfile)) {
     if (source_ < Source::kProfile) {
       const std::string_view profile = comment.substr(kProfile.size());
-      tell_filament(cura_profile_number(profile, "filament_diameter"), Source::kProfile);
+      state_filament(cura_profile_number(profile, "filament_diameter"), Source::kProfile);
     }
   } else if (comment.starts_with(kFlavor)) {
     read_flavor(comment.substr(kFlavor.size()));
@@ -169,7 +169,7 @@ void SlicerFacts::read(std::string_view comment) {
     if (machine.empty()) machine = comment.substr(kMachine.size(), 100);
   } else if (comment.starts_with(kCuraSettings)) {
     const std::size_t at = comment.find(kMaterial);
-    if (at != std::string_view::npos) tell_filament(leading_number(comment.substr(at + kMaterial.size())), Source::kProfile);
+    if (at != std::string_view::npos) state_filament(leading_number(comment.substr(at + kMaterial.size())), Source::kProfile);
   } else {
     for (const std::string_view sign : {"iameter", "IAMETER", "fiber_dia", "volumetric_e", "_density", "ment used ["}) {
       if (comment.find(sign) != std::string_view::npos) return read_setting(comment);
@@ -183,11 +183,11 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kNear = 1e-6;                         // mm or radians: NEAR() and NEAR_ZERO() of Marlin
 constexpr double kDeviation = Arc::kTolerance - 1e-5;  // leaves room for ends on whole nanometres
 constexpr double kLongest = 1e150;                     // mm: a radius that can be squared
-constexpr double kMostChords = 1e9;                    // of an arc that leaves every bed with its first one
+constexpr double kMaxChords = 1e9;                    // of an arc that leaves every bed with its first one
 
 }  // namespace
 
-bool Arc::plan(Place from, Place to, const ArcWords& words) {
+bool Arc::plan(FilePosition from, FilePosition to, const ArcWords& words) {
   from_ = from;
   to_ = to;
   short_radius_ = false;
@@ -219,11 +219,11 @@ bool Arc::plan(Place from, Place to, const ArcWords& words) {
 
   miss_ = std::abs(2 * along + dx * dx + dy * dy) / (std::hypot(spoke_.x + dx, spoke_.y + dy) + radius);
   const double step = std::min(4 * std::asin(std::sqrt(std::min(1.0, kDeviation / (2 * radius)))), kTurn / 4);
-  chords_ = static_cast<std::uint64_t>(std::clamp(std::ceil(std::abs(travel_) / step), 1.0, kMostChords));
+  chords_ = static_cast<std::uint64_t>(std::clamp(std::ceil(std::abs(travel_) / step), 1.0, kMaxChords));
   return true;
 }
 
-Arc::Place Arc::end_of(std::uint64_t chord) const {
+Arc::ArcPoint Arc::end_of(std::uint64_t chord) const {
   if (chord >= chords_) return to_;
   const double angle = travel_ * static_cast<double>(chord) / static_cast<double>(chords_);
   const double half = std::sin(angle / 2), sine = std::sin(angle), fall = -2 * half * half;  // cos - 1
@@ -245,7 +245,7 @@ std::optional<std::string_view> behind_tag(std::string_view line, std::string_vi
 /// CuraEngine's words: gcodeExport.cpp, GCodeExport::flavorToString().
 GcodeFile::Firmware firmware_of(std::string_view flavor) {
   if (flavor.starts_with("Marlin")) return GcodeFile::Firmware::kMarlin;
-  return flavor.starts_with("RepRap") ? GcodeFile::Firmware::kRepRap : GcodeFile::Firmware::kUntold;
+  return flavor.starts_with("RepRap") ? GcodeFile::Firmware::kRepRap : GcodeFile::Firmware::kUnknown;
 }
 
 }  // namespace
@@ -268,10 +268,10 @@ bool GcodeCommands::next(std::optional<RawBead>& bead) {
 }
 
 bool GcodeCommands::read_line() {
-  before_ = place_;
+  before_ = position_;
   const bool read = file_.next(text_);
-  place_.line += read || !file_.status() ? 1 : 0;
-  place_.byte = file_.offset();
+  position_.line += read || !file_.status() ? 1 : 0;
+  position_.byte = file_.offset();
   if (!file_.status()) return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
   if (!read) return false;
   while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t')) text_.remove_prefix(1);
@@ -279,7 +279,7 @@ bool GcodeCommands::read_line() {
   return true;
 }
 
-void GcodeCommands::fail(std::string_view what) { fault = fmt::format("{}: line {}: {}", path_, place_.line, what); }
+void GcodeCommands::fail(std::string_view what) { fault = fmt::format("{}: line {}: {}", path_, position_.line, what); }
 
 double GcodeCommands::tag_length(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
@@ -295,9 +295,9 @@ double GcodeCommands::tag_length(std::string_view text) {
 void GcodeCommands::name_type(std::string_view text) {
   const std::string name = one_line(text.substr(0, 40));
   const auto known = std::ranges::find(types_, name);
-  place_.type = static_cast<std::uint32_t>(known - types_.begin());
+  position_.type = static_cast<std::uint32_t>(known - types_.begin());
   if (known == types_.end() && types_.size() < 100) types_.push_back(name);
-  place_.type = std::min<std::uint32_t>(place_.type, static_cast<std::uint32_t>(types_.size() - 1));
+  position_.type = std::min<std::uint32_t>(position_.type, static_cast<std::uint32_t>(types_.size() - 1));
 }
 
 bool GcodeCommands::read_tag() {
@@ -305,13 +305,13 @@ bool GcodeCommands::read_tag() {
     if (text_.starts_with(tag)) return layer_tag = true;
   }
   if (const auto width = behind_tag(text_, ";WIDTH:", "; LINE_WIDTH:")) {
-    place_.width = tag_length(*width);
+    position_.width = tag_length(*width);
   } else if (const auto height = behind_tag(text_, ";HEIGHT:", "; LAYER_HEIGHT:")) {
-    place_.height = tag_length(*height);
+    position_.height = tag_length(*height);
   } else if (const auto type = behind_tag(text_, ";TYPE:", "; FEATURE: ")) {
     name_type(*type);
   } else {
-    if (text_.starts_with(";FLAVOR:")) place_.firmware = firmware_of(text_.substr(8));
+    if (text_.starts_with(";FLAVOR:")) position_.firmware = firmware_of(text_.substr(8));
     facts.read(text_);
   }
   return false;
@@ -348,31 +348,31 @@ bool GcodeCommands::read_words(std::string_view left, Words& words) {
 
 /// Marlin's G90 and G91 replace what M82 and M83 said (MarlinFirmware/Marlin, GcodeSuite::set_relative_mode()).
 void GcodeCommands::set_relative(bool relative) {
-  place_.relative = relative;
-  if (place_.firmware == GcodeFile::Firmware::kMarlin) place_.relative_feed = relative;
+  position_.relative = relative;
+  if (position_.firmware == GcodeFile::Firmware::kMarlin) position_.relative_feed = relative;
 }
 
 /// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
 /// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
 bool GcodeCommands::feeds_relative() const {
-  return place_.relative_feed || (place_.relative && place_.firmware == GcodeFile::Firmware::kUntold);
+  return position_.relative_feed || (position_.relative && position_.firmware == GcodeFile::Firmware::kUnknown);
 }
 
 /// Whether the line is no move.
 bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
   if (letter == 'M') {
-    if (code == 82) place_.relative_feed = false;
-    if (code == 83) place_.relative_feed = true;
+    if (code == 82) position_.relative_feed = false;
+    if (code == 83) position_.relative_feed = true;
     Words words;
     if (code == 200 && read_words(left, words)) {  // Marlin: M200 D1.75 counts E in mm3, M200 D0 or S0 does not
-      if (words.has('D')) place_.volumetric = words['D'] > 0;
-      if (words.has('S')) place_.volumetric = words['S'] != 0;
+      if (words.has('D')) position_.volumetric = words['D'] > 0;
+      if (words.has('S')) position_.volumetric = words['S'] != 0;
     }
     return true;
   }
-  if (code == 17 || code == 18 || code == 19) place_.plane = static_cast<std::uint8_t>(code);
-  if (code == 20) place_.unit = 25.4;
-  if (code == 21) place_.unit = 1;
+  if (code == 17 || code == 18 || code == 19) position_.plane = static_cast<std::uint8_t>(code);
+  if (code == 20) position_.unit = 25.4;
+  if (code == 21) position_.unit = 1;
   if (code == 90 || code == 91) set_relative(code == 91);
   if (code == 90.1) fail("G90.1: firmwares of printers take centres of arcs from the start; export them so");
   if (code == 5) fail("splines (G5) are not drawn; export lines or arcs");
@@ -406,58 +406,58 @@ bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>
   constexpr char kAxes[] = {'X', 'Y', 'Z', 'E'};
   double to[4];
   for (std::size_t k = 0; k < 4; ++k) {
-    const bool relative = code != 92 && (k == 3 ? feeds_relative() : place_.relative);
-    to[k] = place_.at[k];
-    if (words.has(kAxes[k])) to[k] = (relative ? place_.at[k] : 0) + words[kAxes[k]] * place_.unit;
+    const bool relative = code != 92 && (k == 3 ? feeds_relative() : position_.relative);
+    to[k] = position_.at[k];
+    if (words.has(kAxes[k])) to[k] = (relative ? position_.at[k] : 0) + words[kAxes[k]] * position_.unit;
   }
-  const double fed = code != 92 ? to[3] - place_.at[3] : 0;
-  if (code != 92 && words.has('F')) place_.speed = std::max(words['F'] * place_.unit / 60, 0.0);
-  const bool joined = place_.lays;
-  if (code != 92) place_.lays = place_.lays && std::equal(std::begin(to), std::end(to), place_.at);
+  const double fed = code != 92 ? to[3] - position_.at[3] : 0;
+  if (code != 92 && words.has('F')) position_.speed = std::max(words['F'] * position_.unit / 60, 0.0);
+  const bool joined = position_.deposits;
+  if (code != 92) position_.deposits = position_.deposits && std::equal(std::begin(to), std::end(to), position_.at);
   if (code == 2 || code == 3) {
     if (!begin_arc(code == 2, words, to, fed)) return false;
     whole_.joined = joined;
-    whole_.primed = place_.primed;
-    place_.lays = chord_ > 0;
-    place_.primed = chord_ > 0 ? 0 : place_.primed + fed;
-  } else if (fed > 0 && (to[0] != place_.at[0] || to[1] != place_.at[1])) {
-    const double* at = place_.at;
+    whole_.primed = position_.primed;
+    position_.deposits = chord_ > 0;
+    position_.primed = chord_ > 0 ? 0 : position_.primed + fed;
+  } else if (fed > 0 && (to[0] != position_.at[0] || to[1] != position_.at[1])) {
+    const double* at = position_.at;
     bead = RawBead{
-        {at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, joined, place_.primed, true};
+        {at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, position_.volumetric, position_.speed, joined, position_.primed, true};
     if (!within_reach(*bead)) return false;
-    place_.lays = true;
-    place_.primed = 0;
+    position_.deposits = true;
+    position_.primed = 0;
   } else {
-    place_.primed += fed;
+    position_.primed += fed;
   }
-  std::copy(std::begin(to), std::end(to), place_.at);
+  std::copy(std::begin(to), std::end(to), position_.at);
   return bead.has_value() || (chord_ > 0 && next_chord(bead));
 }
 
 /// False if the printer does not move.
 bool GcodeCommands::begin_arc(bool clockwise, const Words& words, const double (&to)[4], double fed) {
-  const double* at = place_.at;
-  ArcWords given{clockwise, words['I'] * place_.unit, words['J'] * place_.unit, {}};
-  if (words.has('R')) given.radius = words['R'] * place_.unit;
-  const bool lays = fed > 0;
-  if (place_.plane != 17) {
+  const double* at = position_.at;
+  ArcWords given{clockwise, words['I'] * position_.unit, words['J'] * position_.unit, {}};
+  if (words.has('R')) given.radius = words['R'] * position_.unit;
+  const bool deposits = fed > 0;
+  if (position_.plane != 17) {
     // G18 leads Z to X in RepRapFirmware (GCodes::DoArcMove) and Marlin, X to Z in Klipper: the other way round.
-    if (lays)
-      fail(fmt::format("an arc in the plane of G{}: firmwares differ; export arcs in that of the bed (G17)", place_.plane));
-    return !lays;
+    if (deposits)
+      fail(fmt::format("an arc in the plane of G{}: firmwares differ; export arcs in that of the bed (G17)", position_.plane));
+    return !deposits;
   }
   if (!arc_.plan({at[0], at[1]}, {to[0], to[1]}, given)) {
-    left_out.add(place_.line);
+    left_out.add(position_.line);
     return false;
   }
-  if (!lays) return true;
+  if (!deposits) return true;
   if (words['P'] != 0) {
     fail("an arc of several turns (P), which firmwares read by request only; export each turn");
     return false;
   }
-  if (arc_.miss() > 0.05) off_circle.add(place_.line);
-  if (arc_.radius_short()) short_radius.add(place_.line);
-  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, false, 0, true};
+  if (arc_.miss() > 0.05) off_circle.add(position_.line);
+  if (arc_.radius_short()) short_radius.add(position_.line);
+  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, position_.volumetric, position_.speed, false, 0, true};
   chord_ = 1;
   return true;
 }
@@ -468,8 +468,8 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
     const double share = static_cast<double>(chord) / static_cast<double>(arc_.chords());
     return chord == arc_.chords() ? whole_.to[2] : whole_.from[2] + share * (whole_.to[2] - whole_.from[2]);
   };
-  const Arc::Place from = chord_ == 1 ? Arc::Place{whole_.from[0], whole_.from[1]} : arc_.end_of(chord_ - 1);
-  const Arc::Place to = arc_.end_of(chord_);
+  const Arc::ArcPoint from = chord_ == 1 ? Arc::ArcPoint{whole_.from[0], whole_.from[1]} : arc_.end_of(chord_ - 1);
+  const Arc::ArcPoint to = arc_.end_of(chord_);
   const double fed = whole_.fed / static_cast<double>(arc_.chords());
   RawBead piece{{from.x, from.y, z_of(chord_ - 1)},
                 {to.x, to.y, z_of(chord_)},

@@ -42,8 +42,8 @@ struct SlicerFacts {
   Source source_ = Source::kNone;
   double used_cm3_ = 0;
   bool density_set_ = false;
-  void tell_density(double g_cm3);
-  void tell_filament(double diameter_mm, Source source);
+  void state_density(double g_cm3);
+  void state_filament(double diameter_mm, Source source);
   void read_flavor(std::string_view flavor);
   void read_weight(std::string_view used);
   void read_setting(std::string_view comment);
@@ -72,23 +72,23 @@ struct ArcWords {
 class Arc {
  public:
   static constexpr double kTolerance = 0.005;
-  struct Place {
+  struct FilePosition {
     double x = 0, y = 0;
   };
 
   /// False where Marlin prints an error and stays where it is (Klipper and RepRapFirmware end the print): neither R nor I and
   /// J; R with an end at the start; or, without a word of Marlin, an end in the direction of the start, counter-clockwise.
   /// Also of radii beyond all numbers of a firmware.
-  bool plan(Place from, Place to, const ArcWords& words);
+  bool plan(FilePosition from, FilePosition to, const ArcWords& words);
   /// At least 1. The chords within a bed of some metres are a few thousand, whatever the radius.
   std::uint64_t chords() const { return chords_; }
   /// The end of a chord, 1 .. chords(); that of the last one is the arc's.
-  Place end_of(std::uint64_t chord) const;
+  FilePosition end_of(std::uint64_t chord) const;
   double miss() const { return miss_; }                // of the end, off the circle
   bool radius_short() const { return short_radius_; }  // R is more than 1 % too short, which RepRapFirmware refuses
 
  private:
-  Place from_, to_, spoke_;  // spoke: from the centre to the start
+  FilePosition from_, to_, spoke_;  // spoke: from the centre to the start
   double travel_ = 0;        // radians, counter-clockwise
   double miss_ = 0;
   bool short_radius_ = false;
@@ -115,17 +115,17 @@ struct OddArcs {
 
 class GcodeCommands {
  public:
-  using Place = GcodeFile::Place;
+  using FilePosition = GcodeFile::FilePosition;
 
   GcodeCommands(FileReader& file, std::vector<std::string>& types) : path_(file.path()), types_(types), file_(file) {}
 
-  void go_to(const Place& place) {
-    place_ = place;
-    file_.go_to(place.byte, place.line);
+  void go_to(const FilePosition& position) {
+    position_ = position;
+    file_.go_to(position.byte, position.line);
     chord_ = 0;
   }
-  const Place& place() const { return place_; }    // behind the line that next() returned for
-  const Place& before() const { return before_; }  // in front of it
+  const FilePosition& position() const { return position_; }    // behind the line that next() returned for
+  const FilePosition& before() const { return before_; }  // in front of it
   std::optional<std::string> fault;
   bool layer_tag = false;  // the line begins a layer
   SlicerFacts facts;       // of the lines so far
@@ -161,7 +161,7 @@ class GcodeCommands {
   std::vector<std::string>& types_;
   FileReader& file_;
   std::string_view text_;
-  Place place_, before_;
+  FilePosition position_, before_;
   Arc arc_;                  // under way
   std::uint64_t chord_ = 0;  // the last one that was given; 0 if no arc is under way
   RawBead whole_{};          // the arc from its start to its end

@@ -18,25 +18,25 @@ class LayerCutter {
  public:
   explicit LayerCutter(double layer_height_mm) : step_(layer_height_mm) {}
 
-  struct Layer {
-    GcodeFile::LayerPlace place;
+  struct CutLayer {
+    GcodeFile::LayerPosition position;
     double low = 0, top = 0;                       // of the beads; top: of the highest end
     double length = 0, sloped = 0;                 // mm, all beads and those that climb or fall
     double untagged_length = 0, untagged_fed = 0;  // of beads without ;WIDTH:
     double turn = 0;                               // rad: of the direction of beads that climb
-    double least_rise = 0;                         // mm between heights of flat beads, 0 if there is one height
+    double min_rise = 0;                         // mm between heights of flat beads, 0 if there is one height
     double tag_height = 0;                         // ;HEIGHT: of the last bead
     bool volumetric = false;                       // of the last bead
     bool turned = false;                           // ends with a turn
   };
 
-  void tag(const GcodeFile::Place& before);
+  void tag(const GcodeFile::FilePosition& before);
   /// before  in front of the bead's line; now  behind it, for tags
-  void add(const RawBead& bead, const GcodeFile::Place& before, const GcodeFile::Place& now);
+  void add(const RawBead& bead, const GcodeFile::FilePosition& before, const GcodeFile::FilePosition& now);
   /// Decides the heights of spirals. At least one bead must have been added.
   void finish();
 
-  const std::vector<Layer>& layers() const { return layers_; }
+  const std::vector<CutLayer>& layers() const { return layers_; }
   bool tagged() const { return tagged_; }
   std::size_t turns() const { return turns_; }        // layers that end with a turn
   std::size_t turnless() const { return turnless_; }  // layers that end after a climb without one
@@ -48,11 +48,11 @@ class LayerCutter {
   bool begins_step(const RawBead& bead);
   bool ends_turn(const RawBead& bead);
   void start_turn(const RawBead& bead);
-  void begin(const GcodeFile::Place& before, bool climb_goes_on);
+  void begin(const GcodeFile::FilePosition& before, bool climb_goes_on);
   void follow(const RawBead& bead);
 
   const double step_;
-  std::vector<Layer> layers_;
+  std::vector<CutLayer> layers_;
   bool tagged_ = false;
   std::size_t turns_ = 0, turnless_ = 0;
   // The bead before, and the climb that it belongs to.
@@ -75,7 +75,7 @@ inline double volume_of_unit(bool volumetric, double filament_mm) {
   return volumetric ? 1 : std::numbers::pi * filament_mm * filament_mm / 4;
 }
 
-/// The height of a bead, mm. layer_height, below  of GcodeFile::LayerPlace
+/// The height of a bead, mm. layer_height, below  of GcodeFile::LayerPosition
 inline double height_of(const RawBead& bead, double tag, double layer_height, double below) {
   if (tag > 0) return tag;
   if (layer_height > 0) return layer_height;

@@ -72,12 +72,12 @@ class GcodeSurvey {
 };
 
 void GcodeSurvey::add_to_box(const RawBead& raw) {
-  const GcodeFile::Place& place = walk_.place();
+  const GcodeFile::FilePosition& position = walk_.position();
   const bool slope = raw.from[2] != raw.to[2];  // the pitch of a climb is not known yet
-  const double below = slope ? raw.to[2] : cutter_.layers().back().place.below;
-  const double height = height_of(raw, place.height, 0, below);
+  const double below = slope ? raw.to[2] : cutter_.layers().back().position.below;
+  const double height = height_of(raw, position.height, 0, below);
   const double unit = volume_of_unit(raw.volumetric, file_.filament_mm_);
-  const GcodeBead bead = bead_of(raw, place.width > 0 ? place.width : width_of(raw, height, unit), place.type);
+  const GcodeBead bead = bead_of(raw, position.width > 0 ? position.width : width_of(raw, height, unit), position.type);
   const Nm half = bead.width / 2, top = static_cast<Nm>(nm_of(raw.to[2]));
   for (const Point2 end : {bead.from, bead.to}) {
     file_.box_.add(Point3{end.x - half, end.y - half, top});
@@ -87,14 +87,14 @@ void GcodeSurvey::add_to_box(const RawBead& raw) {
 
 Status GcodeSurvey::check_limits() const {
   const std::vector<LayerCutter::Layer>& layers = cutter_.layers();
-  if (layers.size() > options_.most_layers) {
+  if (layers.size() > options_.max_layers) {
     return Error{Fault::kUsage, fmt::format("{}: line {}: more than {} layers; --layer-height MM cuts thicker ones",
-                                            file_.path_, walk_.place().line, options_.most_layers)};
+                                            file_.path_, walk_.position().line, options_.max_layers)};
   }
-  if (!layers.empty() && layers.back().place.beads > options_.most_beads) {
+  if (!layers.empty() && layers.back().position.beads > options_.max_beads) {
     return Error{Fault::kUsage,
                  fmt::format("{}: line {}: a layer of more than {} beads; --layer-height MM makes thinner layers", file_.path_,
-                             walk_.place().line, options_.most_beads)};
+                             walk_.position().line, options_.max_beads)};
   }
   return {};
 }
@@ -106,8 +106,8 @@ Status GcodeSurvey::read_all() {
       if (!cutter_.tagged()) file_.box_ = Box(), fed_ = {};  // what start code lays belongs to no layer
       cutter_.tag(walk_.before());
     } else {
-      cutter_.add(*raw, walk_.before(), walk_.place());
-      file_.tells_widths_ |= walk_.place().width > 0;
+      cutter_.add(*raw, walk_.before(), walk_.position());
+      file_.states_widths_ |= walk_.position().width > 0;
       add_to_box(*raw);
       fed_[raw->volumetric ? 1 : 0] += raw->fed;
     }
@@ -123,7 +123,7 @@ Status GcodeSurvey::read_all() {
 
 void GcodeSurvey::take_filament() {
   const SlicerFacts& facts = walk_.facts;
-  file_.tells_filament_ = facts.filament_mm > 0;
+  file_.states_filament_ = facts.filament_mm > 0;
   if (facts.filament_mm > 0) file_.filament_mm_ = facts.filament_mm;
   if (options_.filament_mm > 0) file_.filament_mm_ = options_.filament_mm;
   file_.volumetric_ = facts.volumetric;
@@ -136,7 +136,7 @@ void GcodeSurvey::take_filament() {
 double GcodeSurvey::mean_width() const {
   double area = 0, length = 0;
   for (const LayerCutter::Layer& layer : cutter_.layers()) {
-    const auto& [start, below, height, beads] = layer.place;
+    const auto& [start, below, height, beads] = layer.position;
     const double own = layer.top > below ? layer.top - below : kUsualHeight;
     const double h = layer.tag_height > 0 ? layer.tag_height : height > 0 ? height : own;
     const double unit = volume_of_unit(layer.volumetric || file_.volumetric_, file_.filament_mm_);
@@ -147,12 +147,12 @@ double GcodeSurvey::mean_width() const {
 }
 
 void GcodeSurvey::note_widths() {
-  const double width = mean_width(), told = walk_.facts.nozzle_mm, nozzle = told > 0 ? told : kUsualNozzle;
+  const double width = mean_width(), reported = walk_.facts.nozzle_mm, nozzle = reported > 0 ? reported : kUsualNozzle;
   if (width == 0 || width >= nozzle / 2) return;
   const bool given = options_.filament_mm > 0;
   file_.notes_.push_back(
       fmt::format("beads are {:.2f} mm wide on average by filament of {:g} mm{}, less than half of a nozzle of {:g} mm; {}",
-                  width, file_.filament_mm_, given || file_.tells_filament_ ? "" : ", of which the file says nothing", nozzle,
+                  width, file_.filament_mm_, given || file_.states_filament_ ? "" : ", of which the file says nothing", nozzle,
                   given ? "check --filament" : "if the filament is another, name it by --filament MM, as 2.85"));
 }
 
@@ -187,7 +187,7 @@ Result<GcodeFile> GcodeSurvey::run() {
   if (Status status = read_all(); !status) return status.error();
   cutter_.finish();
   take_filament();
-  for (const LayerCutter::Layer& layer : cutter_.layers()) file_.layers_.push_back(layer.place);
+  for (const LayerCutter::Layer& layer : cutter_.layers()) file_.layers_.push_back(layer.position);
   note_widths();
   note_climbs();
   note_arcs();
@@ -212,24 +212,24 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const 
   const Error changed{Fault::kUsage, fmt::format("{}: has changed while it was drawn; draw it again", path_)};
   auto reader = FileReader::open(path_, kRules);
   if (!reader) return changed;
-  const LayerPlace& place = layers_[index];
+  const LayerPosition& position = layers_[index];
   GcodeCommands walk(*reader, types);
-  walk.go_to(place.start);
+  walk.go_to(position.start);
   GcodeLayer layer;
-  layer.beads.reserve(place.beads);
+  layer.beads.reserve(position.beads);
   std::optional<RawBead> raw;
-  while (layer.beads.size() < place.beads && walk.next(raw)) {
+  while (layer.beads.size() < position.beads && walk.next(raw)) {
     if (walk.layer_tag) continue;
     if (layer.beads.empty()) layer.z = nm_of(raw->to[2]);
-    const Place& now = walk.place();
+    const Place& now = walk.position();
     const double unit = volume_of_unit(raw->volumetric || volumetric_, filament_mm_);
-    const double width = width_of(*raw, height_of(*raw, now.height, place.height, place.below), unit);
+    const double width = width_of(*raw, height_of(*raw, now.height, position.height, position.below), unit);
     layer.beads.push_back(bead_of(*raw, now.width > 0 ? now.width : width, now.type));
     if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined, raw->primed * unit});
   }
-  if (walk.fault || types.size() != types_.size() || layer.beads.size() != place.beads) return changed;
+  if (walk.fault || types.size() != types_.size() || layer.beads.size() != position.beads) return changed;
   // A layer in which nothing is laid is where the nozzle is at its end.
-  if (layer.beads.empty()) layer.z = nm_of(index + 1 < count() ? layers_[index + 1].start.at[2] : place.below);
+  if (layer.beads.empty()) layer.z = nm_of(index + 1 < count() ? layers_[index + 1].start.at[2] : position.below);
   return layer;
 }
 

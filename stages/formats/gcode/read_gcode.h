@@ -19,7 +19,7 @@ class FileReader;
 namespace lamina::read {
 
 /// One straight move that lays filament; its type is one of GcodeFile::types.
-using GcodeBead = LaidBead;
+using GcodeBead = DepositedBead;
 
 struct GcodeLayer {
   std::int64_t z = 0;  // nm, of the nozzle at the first bead; without beads about there
@@ -30,8 +30,8 @@ struct GcodeLayer {
 struct GcodeOptions {
   double filament_mm = 0;                 // diameter; 0: what the file tells, else 1.75
   double layer_height_mm = 0;             // begins layers at its multiples; 0: at tags, heights or turns
-  std::uint32_t most_beads = 10'000'000;  // of a layer, 24 bytes each
-  std::uint32_t most_layers = 400'000;    // a bed's height in steps of 5 um, some 400 bytes each
+  std::uint32_t max_beads = 10'000'000;  // of a layer, 24 bytes each
+  std::uint32_t max_layers = 400'000;    // a bed's height in steps of 5 um, some 400 bytes each
 };
 
 /// A file of Marlin, Klipper or RepRapFirmware, by lamina or another slicer. Layers begin
@@ -48,7 +48,7 @@ struct GcodeOptions {
 class GcodeFile {
  public:
   /// Reads the file once. errors  kUsage: cannot be read, is no text of G-code, lays nothing, does what is not drawn (arcs
-  /// out of the bed's plane, splines), lays more than most_beads in a layer, or has more than most_layers; with the line
+  /// out of the bed's plane, splines), lays more than max_beads in a layer, or has more than max_layers; with the line
   /// cost    O(bytes + chords)
   static Result<GcodeFile> open(const std::string& path, const GcodeOptions& options = {});
   /// The same of an open file.
@@ -57,7 +57,7 @@ class GcodeFile {
   const Box& box() const { return box_; }  // of all beads, with about their widths
   /// What the tags ;TYPE: call the beads; "" where they are silent.
   const std::vector<std::string>& types() const { return types_; }
-  bool tells_widths() const { return tells_widths_; }
+  bool states_widths() const { return states_widths_; }
   double filament_mm() const { return filament_mm_; }  // diameter
   /// The printer's name, as lamina's files tell it; "" of others.
   const std::string& machine() const { return machine_; }
@@ -71,7 +71,7 @@ class GcodeFile {
   Result<GcodeLayer> layer(std::uint32_t index, bool with_feeds = false) const;
 
   /// Decides what G90 and G91 mean for E.
-  enum class Firmware : std::uint8_t { kUntold, kMarlin, kRepRap };
+  enum class Firmware : std::uint8_t { kUnknown, kMarlin, kRepRap };
   /// Where the printer stands in front of a line.
   struct Place {
     std::uint64_t byte = 0, line = 0;
@@ -79,16 +79,16 @@ class GcodeFile {
     double unit = 1;                               // mm
     double speed = 0;                              // mm/s; 0 until a line tells it
     bool relative = false, relative_feed = false;  // G91, M83
-    Firmware firmware = Firmware::kUntold;         // of the tag ;FLAVOR:
+    Firmware firmware = Firmware::kUnknown;         // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
     std::uint8_t plane = 17;                       // of arcs: G17, G18, G19
     double width = 0, height = 0;                  // mm: tags, 0 without
     std::uint32_t type = 0;
-    bool lays = false;  // the last move laid a bead
+    bool deposits = false;  // the last move laid a bead
     double primed = 0;  // fed since then: mm, or mm3
   };
   /// Where a layer begins, and how high its beads are where no tag tells it.
-  struct LayerPlace {
+  struct LayerPosition {
     Place start;
     double below = 0, height = 0;  // mm: the top of the layer before; of all beads, 0: what they lie above `below`
     std::uint32_t beads = 0;
@@ -97,11 +97,11 @@ class GcodeFile {
  private:
   friend class GcodeSurvey;
   std::string path_;
-  std::vector<LayerPlace> layers_;
+  std::vector<LayerPosition> layers_;
   std::vector<std::string> types_{""}, notes_;
   std::string machine_;
   Box box_;
-  bool tells_widths_ = false, tells_filament_ = false, volumetric_ = false;
+  bool states_widths_ = false, states_filament_ = false, volumetric_ = false;
   double filament_mm_ = 1.75, fed_mm3_ = 0, density_g_cm3_ = 0;
 };
 

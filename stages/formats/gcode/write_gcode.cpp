@@ -12,7 +12,7 @@
 namespace lamina::write::gcode {
 namespace {
 
-constexpr std::size_t kMostLine = 160;  // bytes; five numbers with their letters need less
+constexpr std::size_t kMaxLine = 160;  // bytes; five numbers with their letters need less
 
 std::int64_t micrometres(std::int64_t nm) { return floor_div<std::int64_t>(nm + 500, 1000); }
 
@@ -50,7 +50,7 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
   append_mm(out_, layer.thickness);
   append(out_, "\n");
   if (!machine.code.relative_extrusion) append(out_, "G92 E0\n");
-  append_written(out_, kMostLine, [&](char* text) {
+  append_written(out_, kMaxLine, [&](char* text) {
     text = put_fixed<3>(micrometres(top), put(text, "G1 Z"));
     text = put_fixed<0>(nearest(machine_.speed.lift_mm_s * 60), put(text, " F"));
     *text++ = '\n';
@@ -86,7 +86,7 @@ void LayerWriter::tags(const BeadMove& move) {
   }
   if (move.width != width_) {
     width_ = move.width;
-    append_written(out_, kMostLine, [&](char* text) {
+    append_written(out_, kMaxLine, [&](char* text) {
       text = put_fixed<3>(micrometres(move.width), put(text, ";WIDTH:"));
       text = put_fixed<3>(micrometres(height_), put(text, "\n; tool H"));
       text = put_fixed<3>(micrometres(move.width), put(text, " W"));
@@ -119,8 +119,8 @@ void LayerWriter::travel(Point2 to) {
   const double dx = mm(std::int64_t{to.x} - at_.x), dy = mm(std::int64_t{to.y} - at_.y);
   const double length = placed_ ? std::hypot(dx, dy) : 0;
   const auto& retraction = machine_.retraction;
-  const bool draws_back = !retracted_ && retraction.length_mm > 0 && placed_ && length >= retraction.least_travel_mm;
-  append_written(out_, kMostLine * 2, [&](char* text) {
+  const bool draws_back = !retracted_ && retraction.length_mm > 0 && placed_ && length >= retraction.min_travel_mm;
+  append_written(out_, kMaxLine * 2, [&](char* text) {
     if (draws_back) {
       retracted_ = true;
       ++totals_.retractions;
@@ -148,10 +148,10 @@ void LayerWriter::travel(Point2 to) {
   placed_ = true;
 }
 
-double LayerWriter::lay(const BeadMove& move) {
+double LayerWriter::deposit(const BeadMove& move) {
   if (!placed_ || move.from != at_) travel(move.from);
   if (retracted_) {
-    append_written(out_, kMostLine, [&](char* text) {
+    append_written(out_, kMaxLine, [&](char* text) {
       const std::int64_t forth = nearest(machine_.retraction.length_mm * 1e5);
       // Absolute counting starts a layer at 0 with the filament drawn back.
       if (machine_.code.relative_extrusion) {
@@ -176,7 +176,7 @@ double LayerWriter::lay(const BeadMove& move) {
   const double dx = mm(std::int64_t{move.to.x} - move.from.x), dy = mm(std::int64_t{move.to.y} - move.from.y);
   const double length = std::sqrt(dx * dx + dy * dy);
   const double volume = length * move.area_mm2;
-  append_written(out_, kMostLine, [&](char* text) {
+  append_written(out_, kMaxLine, [&](char* text) {
     text = put_fixed<3>(micrometres(move.to.x + corner_x_), put(text, "G1 X"));
     text = put_fixed<3>(micrometres(move.to.y + corner_y_), put(text, " Y"));
     extrude_to(volume * feed_per_volume_, text);
@@ -185,7 +185,7 @@ double LayerWriter::lay(const BeadMove& move) {
     *text++ = '\n';
     return text;
   });
-  totals_.lay(move, length, feed_per_volume_);
+  totals_.deposit(move, length, feed_per_volume_);
   if (length > 0) time(length, move.speed_mm_s, dx / length, dy / length);
   at_ = move.to;
   return length;
@@ -193,7 +193,7 @@ double LayerWriter::lay(const BeadMove& move) {
 
 const MoveTotals& LayerWriter::finish() {
   if (!retracted_ && machine_.retraction.length_mm > 0) {
-    append_written(out_, kMostLine, [&](char* text) {
+    append_written(out_, kMaxLine, [&](char* text) {
       const std::int64_t back = nearest(machine_.retraction.length_mm * 1e5);
       text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
       text = put_fixed<0>(nearest(machine_.retraction.speed_mm_s * 60), put(text, " F"));

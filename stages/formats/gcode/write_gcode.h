@@ -21,7 +21,7 @@ class LayerWriter final : public LayerMoves {
   /// out  appended to
   LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out,
               const Switches& switches = {});
-  double lay(const BeadMove& move) override;
+  double deposit(const BeadMove& move) override;
   const MoveTotals& finish() override;
 
  private:

@@ -22,7 +22,7 @@ struct LayerImagesRequest {
   int threshold = 128;         // 1 .. 255: grey below it is set
   bool invert = false;         // bright pixels are set
   bool missing_empty = false;  // missing numbers are empty layers
-  std::uint32_t looks = 1;     // images that are decoded at first, spread over the stack, for expected_changes()
+  std::uint32_t inspections = 1;     // images that are decoded at first, spread over the stack, for expected_changes()
 };
 
 /// Images of one size and one resolution; const, readable from any thread.
@@ -56,7 +56,7 @@ class LayerImages {
  private:
   struct Page {
     std::uint32_t file = UINT32_MAX;  // of files_; UINT32_MAX: missing
-    std::uint64_t place = 0;          // of pages_of()
+    std::uint64_t position = 0;          // of pages_of()
     std::uint64_t bytes = 0;          // its share of the file
   };
   /// What tells that a file is another one than when it was hashed.
@@ -69,7 +69,7 @@ class LayerImages {
   /// errors  kInput: the file is another one than at open(), or the image differs from the first
   Status check(std::uint32_t layer, const Image& image, std::uint32_t columns, std::uint32_t rows) const;
   Status check_stamp(std::uint32_t file) const;
-  Status look_at_others(std::uint64_t changes_of_first);
+  Status inspect_others(std::uint64_t changes_of_first);
 
   std::vector<std::string> files_;
   std::vector<Stamp> stamps_;  // of each of them

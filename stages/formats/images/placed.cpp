@@ -6,9 +6,9 @@ namespace lamina::read {
 namespace {
 
 /// The image's pixel that holds the centre of the pixel `place` behind the corner, at dots of the image in the bed's span.
-std::int64_t source_of(std::int64_t place, std::int64_t dots, const PixelAxis& axis) {
-  if (dots == axis.dots) return place;
-  return (2 * place + 1) * dots / (2 * axis.dots);
+std::int64_t source_of(std::int64_t position, std::int64_t dots, const PixelAxis& axis) {
+  if (dots == axis.dots) return position;
+  return (2 * position + 1) * dots / (2 * axis.dots);
 }
 
 }  // namespace
@@ -20,8 +20,8 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t d
   placement.rows = grid.rows();
   for (std::uint32_t boundary = 0; boundary <= columns; ++boundary) {
     // The first place whose source is not before the boundary.
-    const std::int64_t place = ceil_div(std::int64_t{boundary} * 2 * grid.x.dots - dots_x, 2 * dots_x);
-    placement.column.push_back(static_cast<std::uint32_t>(std::clamp<std::int64_t>(at_column + place, 0, grid.columns())));
+    const std::int64_t position = ceil_div(std::int64_t{boundary} * 2 * grid.x.dots - dots_x, 2 * dots_x);
+    placement.column.push_back(static_cast<std::uint32_t>(std::clamp<std::int64_t>(at_column + position, 0, grid.columns())));
   }
   for (std::uint32_t r = 0; r < grid.rows(); ++r) {
     const std::int64_t behind = std::int64_t{grid.rows()} - 1 - r - at_row;  // rows from the image's front
@@ -35,7 +35,7 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t d
   return placement;
 }
 
-void place(const RunsView& image, const Placement& placement, Runs& out) {
+void position(const RunsView& image, const Placement& placement, Runs& out) {
   out.columns = placement.columns;
   out.change.clear();
   out.row_offset.assign(std::size_t{placement.rows} + 1, 0);
@@ -59,7 +59,7 @@ void place(const RunsView& image, const Placement& placement, Runs& out) {
             static_cast<std::uint32_t>(out.change.size()));
 }
 
-void place(const LevelsView& image, const Placement& placement, Levels& out) {
+void position(const LevelsView& image, const Placement& placement, Levels& out) {
   out.start(placement.columns);
   const auto held = static_cast<std::uint32_t>(placement.row.size());
   for (std::uint32_t r = 0; r < placement.rows; ++r) {

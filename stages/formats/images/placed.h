@@ -25,7 +25,7 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t d
                        const PixelGrid& grid, std::int64_t at_column, std::int64_t at_row);
 
 /// The image on the bed; `out` is another one. cost  O(changes + rows of the bed)
-void place(const RunsView& image, const Placement& placement, Runs& out);
-void place(const LevelsView& image, const Placement& placement, Levels& out);
+void position(const RunsView& image, const Placement& placement, Runs& out);
+void position(const LevelsView& image, const Placement& placement, Levels& out);
 
 }  // namespace lamina::read

@@ -23,16 +23,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostWrong = 20;  // lines
+constexpr std::size_t kMaxWrong = 20;  // lines
 
-struct ImagePlace {
+struct ImageFile {
   const std::string* path;
   std::uint64_t page;
   std::string name() const { return page == 0 ? one_line(*path) : fmt::format("{}: page at byte {}", one_line(*path), page); }
 };
 
 /// One image.
-struct ImageLook {
+struct ImageInspection {
   std::string wrong;  // why it cannot be read
   ImageKind kind;
   std::uint32_t columns = 0, rows = 0;
@@ -40,69 +40,69 @@ struct ImageLook {
   std::uint64_t set = 0, grey = 0, light = 0;  // light: sum of darkness, of 255
 };
 
-ImageLook look_at_image(const ImagePlace& place, int threshold) {
-  ImageLook look;
-  const auto refuse = [&](const Error& error) { return look.wrong = one_line(error.message), look; };
-  auto kind = kind_of(*place.path, place.page);
+ImageInspection inspect_image(const ImageFile& position, int threshold) {
+  ImageInspection inspection;
+  const auto refuse = [&](const Error& error) { return inspection.wrong = one_line(error.message), inspection; };
+  auto kind = kind_of(*position.path, position.page);
   if (!kind) return refuse(kind.error());
-  const auto image = dark_pixels(*place.path, threshold, place.page);
+  const auto image = dark_pixels(*position.path, threshold, position.page);
   if (!image) return refuse(image.error());
-  look.kind = std::move(*kind);
-  look.columns = image->runs.columns;
-  look.rows = image->runs.view().rows();
-  look.dpi_x = image->dpi_x;
-  look.dpi_y = image->dpi_y;
-  look.set = set_pixels(image->runs);
-  look.light = 255 * look.set;
-  if (look.kind.bits == 1) return look;
+  inspection.kind = std::move(*kind);
+  inspection.columns = image->runs.columns;
+  inspection.rows = image->runs.view().rows();
+  inspection.dpi_x = image->dpi_x;
+  inspection.dpi_y = image->dpi_y;
+  inspection.set = set_pixels(image->runs);
+  inspection.light = 255 * inspection.set;
+  if (inspection.kind.bits == 1) return inspection;
   Levels levels;
-  if (const auto grey = nearest_levels(*place.path, {255, false, place.page}, levels); !grey) return refuse(grey.error());
-  look.light = sum_of_levels(levels);
+  if (const auto grey = nearest_levels(*position.path, {255, false, position.page}, levels); !grey) return refuse(grey.error());
+  inspection.light = sum_of_levels(levels);
   for (std::size_t i = 0; i < levels.level.size(); ++i) {
-    if (levels.level[i] < 255) look.grey += levels.change[2 * i + 1] - levels.change[2 * i];
+    if (levels.level[i] < 255) inspection.grey += levels.change[2 * i + 1] - levels.change[2 * i];
   }
-  return look;
+  return inspection;
 }
 
 /// What keeps an image from being a layer beside the first one.
-std::string differs(const ImageLook& look, const StackInfo& first) {
-  if (look.columns != first.columns || look.rows != first.rows)
-    return fmt::format("{} x {} pixels, the first image has {} x {}", look.columns, look.rows, first.columns, first.rows);
-  if (std::abs(look.dpi_x - first.dpi_x) > 0.05 || std::abs(look.dpi_y - first.dpi_y) > 0.05)
-    return fmt::format("{:g} x {:g} dpi, the first image has {:g} x {:g}", look.dpi_x, look.dpi_y, first.dpi_x, first.dpi_y);
+std::string differs(const ImageInspection& inspection, const StackInfo& first) {
+  if (inspection.columns != first.columns || inspection.rows != first.rows)
+    return fmt::format("{} x {} pixels, the first image has {} x {}", inspection.columns, inspection.rows, first.columns, first.rows);
+  if (std::abs(inspection.dpi_x - first.dpi_x) > 0.05 || std::abs(inspection.dpi_y - first.dpi_y) > 0.05)
+    return fmt::format("{:g} x {:g} dpi, the first image has {:g} x {:g}", inspection.dpi_x, inspection.dpi_y, first.dpi_x, first.dpi_y);
   return {};
 }
 
-void add_look(const ImagePlace& place, const ImageLook& look, StackInfo& info) {
-  std::string wrong = look.wrong;
+void add_image(const ImageFile& position, const ImageInspection& inspection, StackInfo& info) {
+  std::string wrong = inspection.wrong;
   if (!wrong.empty()) {
     ++info.unreadable;
-  } else if (wrong = differs(look, info); !wrong.empty()) {
+  } else if (wrong = differs(inspection, info); !wrong.empty()) {
     ++info.differing;
-    wrong = fmt::format("{}: {}", place.name(), wrong);
+    wrong = fmt::format("{}: {}", position.name(), wrong);
   }
-  if (!wrong.empty() && info.wrong.size() < kMostWrong) info.wrong.push_back(std::move(wrong));
-  if (!look.wrong.empty()) return;
-  info.set += look.set;
-  info.grey += look.grey;
-  info.filled += static_cast<double>(look.light) / 255;
-  info.empty += look.set == 0;
-  info.least_set = std::min(info.least_set, look.set);
-  info.most_set = std::max(info.most_set, look.set);
+  if (!wrong.empty() && info.wrong.size() < kMaxWrong) info.wrong.push_back(std::move(wrong));
+  if (!inspection.wrong.empty()) return;
+  info.set += inspection.set;
+  info.grey += inspection.grey;
+  info.filled += static_cast<double>(inspection.light) / 255;
+  info.empty += inspection.set == 0;
+  info.min_set = std::min(info.min_set, inspection.set);
+  info.max_set = std::max(info.max_set, inspection.set);
   // As long as all are of one kind it is told.
-  if (look.kind.format != info.kind.format) info.kind.format = "several formats";
-  if (look.kind.light != info.kind.light) info.kind.light = "0 is white in some";
-  if (look.kind.coding != info.kind.coding) info.kind.coding = "several codings";
-  info.kind.bits = std::max(info.kind.bits, look.kind.bits);
+  if (inspection.kind.format != info.kind.format) info.kind.format = "several formats";
+  if (inspection.kind.light != info.kind.light) info.kind.light = "0 is white in some";
+  if (inspection.kind.coding != info.kind.coding) info.kind.coding = "several codings";
+  info.kind.bits = std::max(info.kind.bits, inspection.kind.bits);
 }
 
 std::string ranges_text(const StackInfo& info) {
   std::string text;
-  for (std::size_t i = 0; i < std::min(info.missing.size(), kMostWrong); ++i) {
+  for (std::size_t i = 0; i < std::min(info.missing.size(), kMaxWrong); ++i) {
     const auto [from, to] = info.missing[i];
     text += fmt::format("{}{}", i == 0 ? "" : ", ", from == to ? fmt::format("{}", from) : fmt::format("{} to {}", from, to));
   }
-  return text + (info.missing.size() > kMostWrong ? ", ..." : "");
+  return text + (info.missing.size() > kMaxWrong ? ", ..." : "");
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ std::uint64_t StackInfo::missing_numbers() const {
   return sum;
 }
 
-Result<StackInfo> look_at_stack(const std::string& path, int threshold) {
+Result<StackInfo> inspect_stack(const std::string& path, int threshold) {
   StackInfo info;
   info.path = path;
   std::error_code ignored;
@@ -130,31 +130,31 @@ Result<StackInfo> look_at_stack(const std::string& path, int threshold) {
     }
   }
   info.files = files.size();
-  std::vector<ImagePlace> places;
+  std::vector<ImageFile> positions;
   for (const Numbered& file : files) {
     const auto pages = pages_of(file.path);
     if (!pages && info.files == 1) return pages.error();
     if (!pages) {
-      places.push_back({&file.path, 0});  // says what is wrong when it is read
+      positions.push_back({&file.path, 0});  // says what is wrong when it is read
       continue;
     }
-    for (const std::uint64_t page : *pages) places.push_back({&file.path, page});
+    for (const std::uint64_t page : *pages) positions.push_back({&file.path, page});
     if (info.folder && pages->size() > 1)
       info.wrong.push_back(fmt::format("{}: holds {} images; name the file itself, or write one image a file",
                                        one_line(file.path), pages->size()));
   }
-  info.images = places.size();
-  std::vector<ImageLook> looks(places.size());
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) { looks[i] = look_at_image(places[i], threshold); });
-  const auto first = std::ranges::find_if(looks, [](const ImageLook& look) { return look.wrong.empty(); });
-  if (first == looks.end()) return Error{Fault::kInput, looks.front().wrong};
+  info.images = positions.size();
+  std::vector<ImageInspection> inspections(positions.size());
+  tbb::parallel_for(std::size_t{0}, positions.size(), [&](std::size_t i) { inspections[i] = inspect_image(positions[i], threshold); });
+  const auto first = std::ranges::find_if(inspections, [](const ImageInspection& inspection) { return inspection.wrong.empty(); });
+  if (first == inspections.end()) return Error{Fault::kInput, inspections.front().wrong};
   info.kind = first->kind;
   info.columns = first->columns;
   info.rows = first->rows;
   info.dpi_x = first->dpi_x;
   info.dpi_y = first->dpi_y;
-  info.least_set = UINT64_MAX;
-  for (std::size_t i = 0; i < looks.size(); ++i) add_look(places[i], looks[i], info);
+  info.min_set = UINT64_MAX;
+  for (std::size_t i = 0; i < inspections.size(); ++i) add_image(positions[i], inspections[i], info);
   return info;
 }
 
@@ -169,13 +169,13 @@ std::string as_text(const StackInfo& info) {
          fmt::format("{} to {}{}", info.first_number, info.last_number,
                      info.missing.empty() ? "" : fmt::format("; {} missing: {}", info.missing_numbers(), ranges_text(info))));
   }
-  const bool told = info.dpi_x > 0 && info.dpi_y > 0;
+  const bool reported = info.dpi_x > 0 && info.dpi_y > 0;
   line("size", fmt::format("{} x {} pixels{}", info.columns, info.rows,
-                           told ? fmt::format(" of {:.6g} x {:.6g} dpi: {:.3f} x {:.3f} mm", info.dpi_x, info.dpi_y,
+                           reported ? fmt::format(" of {:.6g} x {:.6g} dpi: {:.3f} x {:.3f} mm", info.dpi_x, info.dpi_y,
                                               info.columns * 25.4 / info.dpi_x, info.rows * 25.4 / info.dpi_y)
                                 : "; the files tell no resolution"));
-  line("set", fmt::format("{} pixels, {} to {} an image{}", readable_count(info.set), readable_count(info.least_set),
-                          readable_count(info.most_set), info.empty > 0 ? fmt::format("; {} of them empty", info.empty) : ""));
+  line("set", fmt::format("{} pixels, {} to {} an image{}", readable_count(info.set), readable_count(info.min_set),
+                          readable_count(info.max_set), info.empty > 0 ? fmt::format("; {} of them empty", info.empty) : ""));
   if (info.kind.bits > 1)
     line("grey", fmt::format("{} pixels between white and black; all come to {} full ones", readable_count(info.grey),
                              readable_count(static_cast<std::uint64_t>(std::llround(info.filled)))));
@@ -198,8 +198,8 @@ Json as_json(const StackInfo& info) {
                {"rows", info.rows},
                {"dpi", nullptr},
                {"set_pixels", info.set},
-               {"least_set_pixels", info.least_set},
-               {"most_set_pixels", info.most_set},
+               {"min_set_pixels", info.min_set},
+               {"max_set_pixels", info.max_set},
                {"empty_images", info.empty},
                {"grey_pixels", info.grey},
                {"filled_pixels", info.filled},

@@ -32,7 +32,7 @@ struct StackInfo {
   ImageKind kind;                                     // of the first image, as the next ones
   std::uint32_t columns = 0, rows = 0;
   double dpi_x = 0, dpi_y = 0;                         // 0: not told
-  std::uint64_t set = 0, least_set = 0, most_set = 0;  // dark pixels, of all images and of one
+  std::uint64_t set = 0, min_set = 0, max_set = 0;  // dark pixels, of all images and of one
   std::uint64_t empty = 0;                             // images without any
   std::uint64_t grey = 0;                              // pixels between white and black
   double filled = 0;                                   // pixels, each by its darkness
@@ -45,7 +45,7 @@ struct StackInfo {
 /// Reads all images of a folder or a file, side by side, one a thread in memory.
 /// threshold  1 .. 255: grey below it is dark
 /// errors     kInput: no images, two of one number, no number in a name; the first image cannot be read
-Result<StackInfo> look_at_stack(const std::string& path, int threshold);
+Result<StackInfo> inspect_stack(const std::string& path, int threshold);
 
 std::string as_text(const StackInfo& info);
 Json as_json(const StackInfo& info);

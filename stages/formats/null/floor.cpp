@@ -145,16 +145,16 @@ Result<double> touch_all(std::uint64_t crossings, const std::atomic<bool>& cance
 
 }  // namespace
 
-Status measure_floor(const std::vector<std::string>& parts, const std::string& beside, const std::atomic<bool>& cancel,
+Status measure_floor(const std::vector<std::string>& parts, const std::string& neighbour, const std::atomic<bool>& cancel,
                      Floor& floor) {
   std::vector<std::byte> block(1 << 18, std::byte{'x'});
   const Result<double> read = middle_seconds([&] { return read_files(parts, cancel, block, floor.bytes_read); });
   if (!read) return read.error();
   floor.read = *read;
   if (floor.files > 0) {
-    const Result<FileTarget> target = find_target(beside);
+    const Result<FileTarget> target = find_target(neighbour);
     if (!target) return target.error();
-    if (target->file.empty()) return Error{Fault::kOutput, beside + ": is no file; the limit is measured beside one"};
+    if (target->file.empty()) return Error{Fault::kOutput, neighbour + ": is no file; the limit is measured beside one"};
     const Names names(target->file);
     const Result<double> written = middle_seconds([&] { return write_files(names, cancel, block, floor); });
     if (!written) return written.error();

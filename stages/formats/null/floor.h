@@ -22,7 +22,7 @@ struct Floor {
 /// are gone afterwards and at a signal; what a killed run leaves, the next one that writes `beside` removes.
 /// Reading and writing count with the middle of three times, where once takes less than 0.1 s. At most 128 MiB of memory.
 /// errors  kInput; kOutput: `beside` is a stream, or the system's reason; kInterrupted: `cancel` was set
-Status measure_floor(const std::vector<std::string>& parts, const std::string& beside, const std::atomic<bool>& cancel,
+Status measure_floor(const std::vector<std::string>& parts, const std::string& neighbour, const std::atomic<bool>& cancel,
                      Floor& floor);
 
 }  // namespace lamina::write

@@ -39,11 +39,11 @@ namespace lamina::read {
 namespace {
 
 // More than any header of ours, and than any sensible comment of others.
-constexpr std::size_t kMostHeadBytes = 4096;
+constexpr std::size_t kMaxHeadBytes = 4096;
 
 bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-struct Head {
+struct PbmHeader {
   std::uint64_t columns = 0, rows = 0;
   std::uint64_t brightest = 0;  // of a PGM
   bool grey = false;
@@ -52,10 +52,10 @@ struct Head {
 };
 
 /// The header of a P4 or P5 file: two or three numbers amid white space and comments, then one white space.
-std::optional<Head> parse_head(std::string_view text) {
+std::optional<PbmHeader> parse_head(std::string_view text) {
   const bool grey = text.substr(0, 2) == "P5";
   if (!grey && text.substr(0, 2) != "P4") return std::nullopt;
-  Head head;
+  PbmHeader head;
   head.grey = grey;
   std::uint64_t* const numbers[] = {&head.columns, &head.rows, &head.brightest};
   std::size_t at = 2;
@@ -105,11 +105,11 @@ Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int th
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4) or PGM: {}; plan the layer again", path, why)};
   };
-  Buffer<std::byte> buffer(std::min<std::uint64_t>(bytes, kMostHeadBytes));
+  Buffer<std::byte> buffer(std::min<std::uint64_t>(bytes, kMaxHeadBytes));
   if (!read_all_at(file, buffer, 0)) return failure("cannot read");
   const auto head = parse_head({reinterpret_cast<const char*>(buffer.data()), buffer.size()});
   if (!head) return failure("its header is not one");
-  if (head->columns == 0 || head->rows == 0 || head->columns > kMostPixelsASide || head->rows > kMostPixelsASide) {
+  if (head->columns == 0 || head->rows == 0 || head->columns > kMaxPixelsASide || head->rows > kMaxPixelsASide) {
     return failure(fmt::format("{} x {} pixels", head->columns, head->rows));
   }
   const auto columns = static_cast<std::uint32_t>(head->columns), rows = static_cast<std::uint32_t>(head->rows);

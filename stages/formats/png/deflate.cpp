@@ -26,7 +26,7 @@ constexpr Table kDenseTable = table_of(kDense), kBusyTable = table_of(kBusy), kS
 
 /// Zeros and the byte or two that follow them are written as one word.
 constexpr bool fits(const Table& table) {
-  return longest(table.codes.zeros) + 2 * longest(table.codes.byte) <= BitWriter::kMostBits;
+  return longest(table.codes.zeros) + 2 * longest(table.codes.byte) <= BitWriter::kMaxBits;
 }
 static_assert(fits(kDenseTable) && fits(kBusyTable) && fits(kSparseTable));
 

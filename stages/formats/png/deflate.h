@@ -87,8 +87,8 @@ class BitWriter {
  public:
   explicit BitWriter(std::byte* start) : next_(start) {}
 
-  /// length <= kMostBits; bits < 2^length.
-  static constexpr std::uint32_t kMostBits = 56;
+  /// length <= kMaxBits; bits < 2^length.
+  static constexpr std::uint32_t kMaxBits = 56;
   void put(std::uint64_t bits, std::uint32_t length) {
     word_ |= bits << pending_;
     pending_ += length;
@@ -152,7 +152,7 @@ struct Edge {
   std::uint8_t first = 0, second = 0;
 };
 
-inline constexpr std::int32_t kMostShift = 7;
+inline constexpr std::int32_t kMaxShift = 7;
 
 /// above: column modulo 8; shift: -7 .. 7
 constexpr Edge edge_of(bool begins, std::int32_t above, std::int32_t shift) {
@@ -181,8 +181,8 @@ constexpr std::size_t edge_index(bool begins, std::uint32_t above, std::uint32_t
 inline constexpr std::array<Edge, 256> kEdges = [] {
   std::array<Edge, 256> edges{};
   for (std::uint32_t index = 0; index < 256; ++index) {
-    const std::int32_t shift = static_cast<std::int32_t>(index & 15) - kMostShift;
-    if (shift <= kMostShift) edges[index] = edge_of(index >> 7 != 0, static_cast<std::int32_t>(index >> 4 & 7), shift);
+    const std::int32_t shift = static_cast<std::int32_t>(index & 15) - kMaxShift;
+    if (shift <= kMaxShift) edges[index] = edge_of(index >> 7 != 0, static_cast<std::int32_t>(index >> 4 & 7), shift);
   }
   return edges;
 }();
@@ -297,7 +297,7 @@ struct BlockHead {
 /// a code of their own, whose symbol 16 repeats the one before 3 to 6 times.
 constexpr BlockHead block_head(const Codes& codes) {
   constexpr std::uint32_t kRepeat = 16, kLengths = kSymbols + 1, kLengthSymbols = 19;
-  std::array<std::uint8_t, kLengths> told{};
+  std::array<std::uint8_t, kLengths> reported{};
   std::array<std::uint32_t, kLengths> times{};  // that follow a length told; 0 or 3 .. 6
   std::uint32_t count = 0;
   const auto length = [&](std::uint32_t s) { return s < kSymbols ? codes.length[s] : std::uint8_t{1}; };
@@ -307,10 +307,10 @@ constexpr BlockHead block_head(const Codes& codes) {
     if (s > 0 && length(s) == length(s - 1)) {
       while (like < 6 && s + like < kLengths && length(s + like) == length(s)) ++like;
     }
-    told[count] = like >= 3 ? std::uint8_t{kRepeat} : length(s);
+    reported[count] = like >= 3 ? std::uint8_t{kRepeat} : length(s);
     times[count] = like >= 3 ? like : 0;
     s += like >= 3 ? like : 1;
-    ++weights[told[count++]];
+    ++weights[reported[count++]];
   }
   const auto lengths = word_lengths(weights);
   const auto words = words_of(lengths);
@@ -327,8 +327,8 @@ constexpr BlockHead block_head(const Codes& codes) {
   head.put(Word(used - 4, 4));  // HCLEN
   for (std::uint32_t i = 0; i < used; ++i) head.put(Word(lengths[kOrder[i]], 3));
   for (std::uint32_t i = 0; i < count; ++i) {
-    head.put(words[told[i]]);
-    if (told[i] == kRepeat) head.put(Word(times[i] - 3, 2));
+    head.put(words[reported[i]]);
+    if (reported[i] == kRepeat) head.put(Word(times[i] - 3, 2));
   }
   return head;
 }

@@ -11,7 +11,7 @@ namespace {
 constexpr unsigned kUp = 2;
 
 /// Of one row, while it is written.
-struct Row {
+struct PngRow {
   const Codes& codes;
   std::uint64_t begin;  // of its bytes of bits in the stream
   std::uint32_t bytes;  // of bits
@@ -29,11 +29,11 @@ struct State {
 /// A zero, then matches, as long as it takes.
 [[gnu::noinline]] BitWriter put_long_zeros(BitWriter out, const Codes& codes, std::uint64_t zeros) {
   const Word match = codes.match[kLongestMatch];
-  const std::uint32_t most = BitWriter::kMostBits / match.length();
+  const std::uint32_t maximum = BitWriter::kMaxBits / match.length();
   Word matches;
-  for (std::uint32_t i = 0; i < most; ++i) matches = join(matches, match);
+  for (std::uint32_t i = 0; i < maximum; ++i) matches = join(matches, match);
   out.put(codes.byte[0]);
-  for (--zeros; zeros >= most * kLongestMatch; zeros -= most * kLongestMatch) out.put(matches);
+  for (--zeros; zeros >= maximum * kLongestMatch; zeros -= maximum * kLongestMatch) out.put(matches);
   const auto whole = static_cast<std::uint32_t>(zeros) / kLongestMatch, bits = whole * match.length();
   out.put(matches.bits() & ((std::uint64_t{1} << bits) - 1), bits);
   out.put(codes.more_zeros[zeros - whole * kLongestMatch]);
@@ -53,20 +53,20 @@ struct State {
 }
 
 /// All zeros up to a place, then a word of one byte or two.
-[[gnu::always_inline]] inline void put_at(State& state, const Codes& codes, std::uint64_t place, Word word,
+[[gnu::always_inline]] inline void put_at(State& state, const Codes& codes, std::uint64_t position, Word word,
                                           std::uint32_t bytes) {
-  const std::uint64_t zeros = place - state.written;
+  const std::uint64_t zeros = position - state.written;
   if (zeros < kShortZeros) [[likely]] {
     state.out.put(join(codes.zeros[zeros], word));
   } else {
     state.out = put_long_zeros(state.out, codes, zeros);
     state.out.put(word);
   }
-  state.written = place + bytes;
+  state.written = position + bytes;
 }
 
 /// Bytes `at` ... of one value, where one row is set and the other is not.
-[[gnu::always_inline]] inline void put_apart(State& state, const Row& row, std::uint32_t at, std::uint32_t count,
+[[gnu::always_inline]] inline void put_apart(State& state, const PngRow& row, std::uint32_t at, std::uint32_t count,
                                              std::uint32_t value) {
   put_at(state, row.codes, row.begin + at, {}, count);
   state.out = put_repeated(state.out, row.codes, value, count);
@@ -89,7 +89,7 @@ inline std::uint32_t take_byte(std::span<const std::uint32_t> changes, std::size
 }
 
 /// Any changes, byte by byte of those that hold one, until both rows have one colour again.
-[[gnu::noinline]] State put_bytes(State state, const Row& row) {
+[[gnu::noinline]] State put_bytes(State state, const PngRow& row) {
   std::uint32_t between = 0;  // value of bytes without a change
   std::uint32_t next = 0;     // byte behind the last one of a change
   do {
@@ -115,7 +115,7 @@ using MovedEdge = std::uint32_t;
 
 constexpr MovedEdge moved_edge(std::uint32_t at, std::size_t index) { return at << 8 | static_cast<std::uint32_t>(index); }
 
-[[gnu::always_inline]] inline void put_moved(State& state, const Row& row, MovedEdge moved) {
+[[gnu::always_inline]] inline void put_moved(State& state, const PngRow& row, MovedEdge moved) {
   const EdgeWord& word = row.codes.edge[moved & 0xFF];
   const std::uint32_t at = moved >> 8;
   const std::uint64_t zeros = row.begin + at - state.written;
@@ -134,11 +134,11 @@ constexpr MovedEdge moved_edge(std::uint32_t at, std::size_t index) { return at 
 
 /// The next change of both rows, which have one colour before it and different columns, where it is an edge that moves a
 /// little and no other change is near. returns  false if the change is another one
-[[gnu::always_inline]] inline bool put_edge(State& state, const Row& row) {
+[[gnu::always_inline]] inline bool put_edge(State& state, const PngRow& row) {
   const std::uint32_t* const change = row.changes.data() + state.next;
   const std::uint32_t* const above = row.above.data() + state.next_above;
-  const std::uint32_t shift = *change - *above + kMostShift;
-  if (shift > 2 * kMostShift) return false;
+  const std::uint32_t shift = *change - *above + kMaxShift;
+  if (shift > 2 * kMaxShift) return false;
   const std::uint32_t last = (std::max(*change, *above) - 1) | 7;  // of the last byte that differs
   if (state.next + 1 != row.changes.size() && change[1] <= last) return false;
   if (state.next_above + 1 != row.above.size() && above[1] <= last) return false;
@@ -168,7 +168,7 @@ constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
 /// count    a multiple of 4, less than there are left in both rows
 /// moved    room for as many
 /// returns  how many move; kNotEdges if one moves too far or the change behind it is near
-[[gnu::always_inline]] inline std::size_t find_moved(const State& state, const Row& row, std::size_t count, MovedEdge* moved) {
+[[gnu::always_inline]] inline std::size_t find_moved(const State& state, const PngRow& row, std::size_t count, MovedEdge* moved) {
   const std::uint32_t* const change = row.changes.data() + state.next;
   const std::uint32_t* const above = row.above.data() + state.next_above;
   const std::int32_t even = state.next % 2 == 0 ? 1 << 7 : 0, odd = even ^ 1 << 7;
@@ -177,9 +177,9 @@ constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
   std::size_t found = 0;
   for (std::size_t i = 0; i < count; i += 4) {
     const FourInts a = four(change + i), b = four(above + i);
-    const FourInts shift = a - b + kMostShift, moves = a != b;
+    const FourInts shift = a - b + kMaxShift, moves = a != b;
     const FourInts behind = (more_of(a, b) + 7) >> 3, next = less_of(four(change + i + 1), four(above + i + 1)) >> 3;
-    stops |= (shift < 0) | (shift > 2 * kMostShift) | (moves & (next < behind));
+    stops |= (shift < 0) | (shift > 2 * kMaxShift) | (moves & (next < behind));
     const FourInts edges = (less_of(a, b) >> 3) << 8 | begins | (b & 7) << 4 | (shift & 15);
     for (int lane = 0; lane < 4; ++lane) {
       moved[found] = static_cast<MovedEdge>(edges[lane]);
@@ -192,7 +192,7 @@ constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
 }
 
 /// The next changes of both rows, up to kChangesAtOnce, if all are edges that stand or move a little; or else none.
-[[gnu::noinline]] State put_at_once(State state, const Row& row, std::size_t count) {
+[[gnu::noinline]] State put_at_once(State state, const PngRow& row, std::size_t count) {
   MovedEdge moved[kChangesAtOnce + 1];
   const std::size_t found = find_moved(state, row, count, moved);
   if (found == kNotEdges) return state;
@@ -202,7 +202,7 @@ constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
 }
 
 /// Changes of both rows one by one, up to number `end` of this row or the end of one of both.
-[[gnu::always_inline]] inline void put_one_by_one(State& state, const Row& row, std::size_t end) {
+[[gnu::always_inline]] inline void put_one_by_one(State& state, const PngRow& row, std::size_t end) {
   while (state.next < end && state.next_above < row.above.size()) {
     if (row.changes[state.next] == row.above[state.next_above]) {
       ++state.next, ++state.next_above;
@@ -225,7 +225,7 @@ void FilteredRows::put_zeros(BitWriter& out, std::uint64_t zeros) {
 void FilteredRows::put(BitWriter& out, std::uint32_t r, std::span<const std::uint32_t> changes,
                        std::span<const std::uint32_t> above) {
   const std::uint64_t start = r * row_bytes_;
-  const Row row{codes_, start + 1, static_cast<std::uint32_t>(row_bytes_ - 1), changes, above};
+  const PngRow row{codes_, start + 1, static_cast<std::uint32_t>(row_bytes_ - 1), changes, above};
   State state{out, written_};
   if (!above.empty()) {
     put_at(state, codes_, start, codes_.byte[kUp], 1);

@@ -45,10 +45,10 @@ class FilteredRows {
   FilteredRows(const Codes& codes, std::uint32_t columns, std::uint32_t rows);
 
   /// Bytes that so many zeros take at most.
-  static std::size_t most_bytes_of_zeros(std::uint64_t zeros) { return static_cast<std::size_t>(zeros / 128 + 32); }
+  static std::size_t max_bytes_of_zeros(std::uint64_t zeros) { return static_cast<std::size_t>(zeros / 128 + 32); }
   /// Bytes that put() writes at most for this many changes of a row and of the one above.
-  std::size_t most_bytes(std::size_t changes) const {
-    return 9 * changes + most_bytes_of_zeros(kMostWaiting) + most_bytes_of_zeros(row_bytes_);
+  std::size_t max_bytes(std::size_t changes) const {
+    return 9 * changes + max_bytes_of_zeros(kMaxWaiting) + max_bytes_of_zeros(row_bytes_);
   }
   /// Zeros that wait to be written before this row.
   std::uint64_t waiting(std::uint32_t row) const { return row * row_bytes_ - written_; }
@@ -56,8 +56,8 @@ class FilteredRows {
   void put_zeros(BitWriter& out, std::uint64_t zeros);
 
   /// Row number `r`, which is not white. Rows come from the top; white ones are left out.
-  /// needs  at most kMostWaiting zeros before the row
-  static constexpr std::uint64_t kMostWaiting = 32 * 1024;
+  /// needs  at most kMaxWaiting zeros before the row
+  static constexpr std::uint64_t kMaxWaiting = 32 * 1024;
   void put(BitWriter& out, std::uint32_t r, std::span<const std::uint32_t> row, std::span<const std::uint32_t> above);
 
   std::uint32_t check() const { return check_.value(); }

@@ -16,23 +16,23 @@ namespace {
 constexpr std::uint32_t kZlibHeader = 0x0178;
 
 // White rows are cut here, so that a chunk is bounded whatever the image: 1 bit or more for 258 of them.
-constexpr std::uint64_t kMostZeros = std::uint64_t{1} << 22;
+constexpr std::uint64_t kMaxZeros = std::uint64_t{1} << 22;
 
 /// The memory into which chunks are written.
 class Chunks {
  public:
   Chunks(Bytes& file, std::size_t start) : file_(file), chunk_(start) {
-    const std::size_t least = start + kChunkHead + 4096;
-    if (file_.size() < least) file_.resize(std::max(least, file_.capacity()));
+    const std::size_t minimum = start + kChunkHead + 4096;
+    if (file_.size() < minimum) file_.resize(std::max(minimum, file_.capacity()));
     limit_ = limit();
   }
 
   std::byte* content() { return file_.data() + chunk_ + kChunkHead; }
 
   /// Closes a chunk that is long enough and makes room for `bytes` more.
-  void make_room(BitWriter& out, std::size_t bytes) {
+  void ensure_capacity(BitWriter& out, std::size_t bytes) {
     if (out.next() + bytes > limit_) [[unlikely]]
-      out = make_room_for(out, bytes);
+      out = reserve_bytes(out, bytes);
   }
 
   std::size_t close(std::byte* end) {
@@ -40,7 +40,7 @@ class Chunks {
   }
 
  private:
-  [[gnu::noinline]] BitWriter make_room_for(BitWriter out, std::size_t bytes) {
+  [[gnu::noinline]] BitWriter reserve_bytes(BitWriter out, std::size_t bytes) {
     std::size_t used = static_cast<std::size_t>(out.next() - file_.data());
     if (used - chunk_ >= kChunkBytes) {
       grow(used, kChunkTail + kChunkHead + bytes);
@@ -72,10 +72,10 @@ void put_block_head(BitWriter& out, const BlockHead& head) {
 }
 
 /// Zeros that wait before row `r`, but for so many.
-void put_most_zeros(BitWriter& out, Chunks& chunks, FilteredRows& rows, std::uint32_t r, std::uint64_t most_left) {
-  for (std::uint64_t zeros = rows.waiting(r); zeros > most_left; zeros = rows.waiting(r)) {
-    zeros = std::min(zeros, kMostZeros);
-    chunks.make_room(out, FilteredRows::most_bytes_of_zeros(zeros));
+void put_zero_run(BitWriter& out, Chunks& chunks, FilteredRows& rows, std::uint32_t r, std::uint64_t max_left) {
+  for (std::uint64_t zeros = rows.waiting(r); zeros > max_left; zeros = rows.waiting(r)) {
+    zeros = std::min(zeros, kMaxZeros);
+    chunks.ensure_capacity(out, FilteredRows::max_bytes_of_zeros(zeros));
     rows.put_zeros(out, zeros);
   }
 }
@@ -97,14 +97,14 @@ std::size_t put_image_data(const RunsView& runs, Bytes& file, std::size_t start)
     if (row.empty()) {
       r = g4::end_of_empty_rows(runs.row_offset, r) - 1;
     } else {
-      put_most_zeros(out, chunks, filtered, r, FilteredRows::kMostWaiting);
-      chunks.make_room(out, filtered.most_bytes(row.size() + above.size()));
+      put_zero_run(out, chunks, filtered, r, FilteredRows::kMaxWaiting);
+      chunks.ensure_capacity(out, filtered.max_bytes(row.size() + above.size()));
       filtered.put(out, r, row, above);
     }
     above = row;
   }
-  put_most_zeros(out, chunks, filtered, rows, 0);
-  chunks.make_room(out, 16);
+  put_zero_run(out, chunks, filtered, rows, 0);
+  chunks.ensure_capacity(out, 16);
   out.put(table.codes.end);
   return chunks.close(put_number(out.finish(), filtered.check()));
 }

@@ -14,7 +14,7 @@ inline constexpr std::size_t kChunkBytes = 64 * 1024;
 
 /// Rows of bits, filtered and deflated, as IDAT chunks into file[start ...). Bytes before `start` are kept; the file grows
 /// as needed and may be left larger than its content.
-/// needs    1 <= columns and rows <= kMostPixelsASide and well-formed runs (data/runs.h)
+/// needs    1 <= columns and rows <= kMaxPixelsASide and well-formed runs (data/runs.h)
 /// returns  one past the last byte of the chunks
 /// cost     a look at each change and some 5 ns for each that is not as in the row above; some 10 ns for a row that is not
 ///          white; a stretch of white rows costs the logarithm of its length and a bit in a hundred bytes

@@ -62,8 +62,8 @@ class PngEncoder : public ImageEncoder {
                    fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", runs.columns, runs.rows(), why)};
     };
     if (runs.columns == 0 || runs.rows() == 0) return failure("it has no pixels");
-    if (runs.columns > kMostPixelsASide || runs.rows() > kMostPixelsASide) {
-      return failure(fmt::format("a side has at most {} pixels", kMostPixelsASide));
+    if (runs.columns > kMaxPixelsASide || runs.rows() > kMaxPixelsASide) {
+      return failure(fmt::format("a side has at most {} pixels", kMaxPixelsASide));
     }
     file.resize(std::max(file.capacity(), kHeadBytes));
     const std::byte* data = put_first_chunks(file.data(), runs, dpi_x, dpi_y);
@@ -85,7 +85,7 @@ std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<PngEncode
 
 namespace {
 
-constexpr std::uint32_t kMostEqual = 258, kEndOfBlock = 256, kLengthOf258 = 285;
+constexpr std::uint32_t kMaxEqual = 258, kEndOfBlock = 256, kLengthOf258 = 285;
 
 constexpr std::array<std::uint8_t, 288> fixed_lengths() {
   std::array<std::uint8_t, 288> lengths{};
@@ -104,10 +104,10 @@ constexpr Word match_word(std::uint32_t length) {
   }
   return join(join(kFixed[symbol], Word(length - base, extra)), Word(0, 5));
 }
-constexpr std::array<Word, kMostEqual + 1> match_words() {
-  std::array<Word, kMostEqual + 1> words{};
-  for (std::uint32_t length = 3; length < kMostEqual; ++length) words[length] = match_word(length);
-  words[kMostEqual] = join(kFixed[kLengthOf258], Word(0, 5));
+constexpr std::array<Word, kMaxEqual + 1> match_words() {
+  std::array<Word, kMaxEqual + 1> words{};
+  for (std::uint32_t length = 3; length < kMaxEqual; ++length) words[length] = match_word(length);
+  words[kMaxEqual] = join(kFixed[kLengthOf258], Word(0, 5));
   return words;
 }
 constexpr auto kMatch = match_words();
@@ -137,8 +137,8 @@ class GreyEncoder : public LevelEncoder {
                    fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", image.columns, image.rows(), why)};
     };
     if (image.columns == 0 || image.rows() == 0) return failure("it has no pixels");
-    if (image.columns > kMostPixelsASide || image.rows() > kMostPixelsASide) {
-      return failure(fmt::format("a side has at most {} pixels", kMostPixelsASide));
+    if (image.columns > kMaxPixelsASide || image.rows() > kMaxPixelsASide) {
+      return failure(fmt::format("a side has at most {} pixels", kMaxPixelsASide));
     }
     if (full == 0 || 255 % full != 0) return failure(fmt::format("{} levels are no whole steps of 8 bits", full + 1));
     file.resize(std::max<std::size_t>(file.capacity(), 4096));
@@ -158,7 +158,7 @@ class GreyEncoder : public LevelEncoder {
       }
       put(255, image.columns - at, out, file);
     }
-    make_room(out, file);
+    ensure_capacity(out, file);
     out.put(kFixed[kEndOfBlock]);
     std::byte* end = close_chunk(file.data() + chunk_, put_number(out.finish(), check_.value()), "IDAT");
     const std::size_t last = static_cast<std::size_t>(end - file.data());
@@ -187,7 +187,7 @@ class GreyEncoder : public LevelEncoder {
   static std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
 
   /// Closes a chunk that is long enough, and makes room for some words.
-  void make_room(BitWriter& out, Bytes& file) {
+  void ensure_capacity(BitWriter& out, Bytes& file) {
     std::size_t used = static_cast<std::size_t>(out.next() - file.data());
     if (used - chunk_ < kChunkContent && used + kSlack <= file.size()) return;
     if (file.size() < used + 2 * kSlack) file.resize(2 * file.size() + 2 * kSlack);
@@ -201,11 +201,11 @@ class GreyEncoder : public LevelEncoder {
   void put(std::uint32_t byte, std::uint64_t count, BitWriter& out, Bytes& file) {
     if (count == 0) return;
     check_.add(byte, count);
-    make_room(out, file);
+    ensure_capacity(out, file);
     out.put(kFixed[byte]);
     for (--count; count > 0;) {
-      make_room(out, file);
-      const auto length = static_cast<std::uint32_t>(std::min<std::uint64_t>(count, kMostEqual));
+      ensure_capacity(out, file);
+      const auto length = static_cast<std::uint32_t>(std::min<std::uint64_t>(count, kMaxEqual));
       if (length < 3) {
         for (std::uint32_t i = 0; i < length; ++i) out.put(kFixed[byte]);
       } else {
@@ -229,7 +229,7 @@ namespace lamina::read {
 namespace {
 
 // Deflate makes at most 1032 bytes of one (zlib's technical notes); a header that promises more lies.
-constexpr std::uint64_t kMostExpansion = 1032;
+constexpr std::uint64_t kMaxExpansion = 1032;
 
 /// What libpng's callbacks see and what has to outlive a jump out of libpng.
 struct Source {
@@ -307,7 +307,7 @@ bool prepare(Source& source, std::uint32_t columns, std::size_t stride) {
 /// No object of this frame needs its destructor run when libpng jumps out.
 bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
-  png_set_user_limits(png, kMostPixelsASide, kMostPixelsASide);
+  png_set_user_limits(png, kMaxPixelsASide, kMaxPixelsASide);
   png_set_chunk_malloc_max(png, 1 << 20);
   png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
   // Comments and colours are passed over: libpng allocates whatever length they claim.
@@ -330,7 +330,7 @@ bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced images are not supported");
   const std::size_t step = static_cast<std::size_t>(depth) / 8, stride = grey ? columns * step : row_bytes(columns);
   const std::size_t coded_stride = (std::size_t{columns} * static_cast<std::size_t>(coded) + 7) / 8;
-  if ((coded_stride + 1) * std::uint64_t{rows} / kMostExpansion > source.bytes) {
+  if ((coded_stride + 1) * std::uint64_t{rows} / kMaxExpansion > source.bytes) {
     png_error(png, "more pixels than a file of this size can hold");
   }
   const bool invert = !grey && !set_is_dark(png, info, colour_type);

@@ -6,7 +6,7 @@
 
 namespace lamina::write::rp3 {
 
-std::string text_of(std::span<const Layer> layers, const Settings& settings) {
+std::string text_of(std::span<const LayerSetting> layers, const Settings& settings) {
   const auto filling_angle = [&](std::size_t layer) {
     return std::fmod(settings.first_angle_deg + settings.angle_step_deg * static_cast<double>(layer), 360);
   };
@@ -20,7 +20,7 @@ std::string text_of(std::span<const Layer> layers, const Settings& settings) {
   text +=
       "parâmetros do sólido:\n"
       "camada\toffset\traster\tlayer\tang_stl\tângulo\ta_base\ta_incr\tzigzag\tvolta\tvel_var\tvel_pos\tt_p\n-----\n";
-  const auto row = [&](std::size_t number, const Layer& layer, double filling) {
+  const auto row = [&](std::size_t number, const LayerSetting& layer, double filling) {
     text += fmt::format("{}\t{:.3f}\t{:.3f}\t{:.3f}\t{:.2f}\t{:.2f}\t{:.2f}\t{:.2f}\t0\t0\t0\t0\t0\n", number,
                         settings.contour_offset_mm, settings.raster_width_mm, layer.thickness_mm, layer.angle_deg, filling,
                         settings.first_angle_deg, settings.angle_step_deg);

@@ -7,7 +7,7 @@
 
 namespace lamina::write::rp3 {
 
-struct Layer {
+struct LayerSetting {
   double thickness_mm;
   double angle_deg;  // the flattest slope that the layer looked at: 0 a wall, 90 a horizontal face
 };
@@ -19,6 +19,6 @@ struct Settings {
 };
 
 /// The whole file: UTF-8, lines end with LF, columns are separated by tabs. README.md has the columns.
-std::string text_of(std::span<const Layer> layers, const Settings& settings);
+std::string text_of(std::span<const LayerSetting> layers, const Settings& settings);
 
 }  // namespace lamina::write::rp3

@@ -41,7 +41,7 @@ class SmlLayer final : public LayerMoves {
     feed_per_volume_ = 1 / machine.material.mm3_of_e();
   }
 
-  double lay(const BeadMove& move) override {
+  double deposit(const BeadMove& move) override {
     const bool contour = move.kind == PathKind::kOuter || move.kind == PathKind::kInner || move.kind == PathKind::kSkirt;
     if (!begun_ || contour != contour_) {
       if (const auto* pd = find_pd(machine_, layer_.thickness, contour ? "contour" : "raster")) append(out_, pd->line + "\n");
@@ -61,7 +61,7 @@ class SmlLayer final : public LayerMoves {
     moved_ = true;
     at_ = move.to;
     const double length = std::hypot(mm(std::int64_t{move.to.x} - move.from.x), mm(std::int64_t{move.to.y} - move.from.y));
-    totals_.lay(move, length, feed_per_volume_);
+    totals_.deposit(move, length, feed_per_volume_);
     totals_.seconds += length / move.speed_mm_s;
     return length;
   }

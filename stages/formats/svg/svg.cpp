@@ -112,7 +112,7 @@ class SvgEncoder : public SliceEncoder {
       svg.line({&paths.point[begin], &paths.point[end] + 1}, frame);
       svg.end_data();
       svg.attribute("class", name_of(paths.kind[begin]));
-      char width[kMostDecimal];
+      char width[kMaxDecimal];
       svg.attribute("style",
                     fmt::format("fill: none; stroke: {}; stroke-linecap: round; stroke-linejoin: round; stroke-width: {}",
                                 colour_of(paths.kind[begin]), std::string_view(width, put_mm(paths.width[begin], width))));
@@ -139,7 +139,7 @@ char* put_perl_mm(std::int64_t nm, char* out) {
 }
 
 std::string perl_mm(std::int64_t nm) {
-  char text[kMostDecimal];
+  char text[kMaxDecimal];
   return {text, put_perl_mm(nm, text)};
 }
 
@@ -196,7 +196,7 @@ class SvgPolygonEncoder : public SliceEncoder {
   static void put_polygon(const Box& box, std::span<const Point2> contour, Buffer<char>& out) {
     const bool outer = doubled_area(contour) > 0;
     append(out, outer ? "    <polygon slic3r:type=\"contour\" points=\"" : "    <polygon slic3r:type=\"hole\" points=\"");
-    append_written(out, contour.size() * (2 * kMostDecimal + 2), [&](char* text) {
+    append_written(out, contour.size() * (2 * kMaxDecimal + 2), [&](char* text) {
       for (const Point2& p : contour) {
         if (&p != contour.data()) *text++ = ' ';
         text = put_perl_mm(p.x - std::int64_t{box.lo.x}, text);

@@ -53,7 +53,7 @@ void SvgWriter::millimetres(std::string_view name, std::int64_t nm, std::string_
 void SvgWriter::begin_data() { append(out_, " d=\""); }
 
 void SvgWriter::put_points(std::span<const Point2> points, const SvgFrame& frame, bool closed) {
-  append_written(out_, points.size() * (2 * kMostDecimal + 2) + 4, [&](char* text) {
+  append_written(out_, points.size() * (2 * kMaxDecimal + 2) + 4, [&](char* text) {
     *text++ = 'M';
     for (const Point2 p : points) {
       *text++ = ' ';

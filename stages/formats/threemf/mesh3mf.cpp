@@ -22,7 +22,7 @@ class PointIndex {
 
   std::uint32_t operator()(const Point3& point) {
     if (2 * points.size() >= slots_.size()) grow();
-    for (std::size_t at = place(point);; at = (at + 1) & (slots_.size() - 1)) {
+    for (std::size_t at = position(point);; at = (at + 1) & (slots_.size() - 1)) {
       if (slots_[at] == kFree) {
         slots_[at] = static_cast<std::uint32_t>(points.size());
         points.push_back(point);
@@ -37,7 +37,7 @@ class PointIndex {
  private:
   static constexpr std::uint32_t kFree = UINT32_MAX;
 
-  std::size_t place(const Point3& p) const {
+  std::size_t position(const Point3& p) const {
     std::uint64_t mixed = static_cast<std::uint32_t>(p.x) * 0x9e3779b97f4a7c15ull ^
                           static_cast<std::uint32_t>(p.y) * 0xc2b2ae3d27d4eb4full ^
                           static_cast<std::uint32_t>(p.z) * 0x165667b19e3779f9ull;
@@ -48,7 +48,7 @@ class PointIndex {
   void grow() {
     slots_.assign(2 * slots_.size(), kFree);
     for (std::uint32_t i = 0; i < points.size(); ++i) {
-      std::size_t at = place(points[i]);
+      std::size_t at = position(points[i]);
       while (slots_[at] != kFree) at = (at + 1) & (slots_.size() - 1);
       slots_[at] = i;
     }

@@ -127,7 +127,7 @@ Result<File> Slice3mfWriter::write(const std::string& path, const FileOptions& o
                       "requiredextensions=\"s\">\n<resources>\n",
                       kXmlDeclaration, kCore3mf, "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"));
   for (std::size_t b = 0; status && b < bodies_.size(); ++b) {
-    Body& body = bodies_[b];
+    PartBody& body = bodies_[b];
     Buffer<char> head;
     append(head, "<s:slicestack");
     append_attribute(head, "id", b + 1);

@@ -30,7 +30,7 @@ class Slice3mfWriter {
   Result<File> write(const std::string& path, const FileOptions& options = {});
 
  private:
-  struct Body {
+  struct PartBody {
     std::string name;
     Deflated slices;
     Buffer<char> waiting;  // text that is deflated when there is enough of it
@@ -41,7 +41,7 @@ class Slice3mfWriter {
   Box bounds_;
   Nm first_bottom_;
   std::int64_t left_, front_;  // nm, whole mm: where the items stand, and what their coordinates count from
-  std::vector<Body> bodies_;
+  std::vector<PartBody> bodies_;
 };
 
 }  // namespace lamina::write

@@ -86,7 +86,7 @@ void append_attribute(Buffer<char>& out, std::string_view name, std::uint64_t nu
   append(out, " ");
   append(out, name);
   append(out, "=\"");
-  append_written(out, kMostDecimal, [&](char* to) { return put_whole(number, to); });
+  append_written(out, kMaxDecimal, [&](char* to) { return put_whole(number, to); });
   append(out, "\"");
 }
 

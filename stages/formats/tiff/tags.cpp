@@ -22,7 +22,7 @@ tmsize_t read_nothing(thandle_t, void*, tmsize_t) { return 0; }
 tmsize_t write_bytes(thandle_t handle, void* from, tmsize_t count) {
   MemoryFile& file = file_of(handle);
   const std::uint64_t end = file.position + static_cast<std::uint64_t>(count);
-  if (end > kMostClassicBytes) return 0;
+  if (end > kMaxClassicBytes) return 0;
   std::byte* to = file.bytes.data() + file.position;
   // Strips that were encoded in the place where libtiff puts them are there already.
   const bool in_place = from == to && end <= file.bytes.size();
@@ -71,13 +71,13 @@ Error cannot_hold(std::uint32_t columns, std::uint32_t rows, std::string_view wh
 
 Status check_size(std::uint32_t columns, std::uint32_t rows) {
   if (columns == 0 || rows == 0) return cannot_hold(columns, rows, "it has no pixels");
-  if (columns > kMostPixelsASide || rows > kMostPixelsASide) {
-    return cannot_hold(columns, rows, fmt::format("a side has at most {} pixels", kMostPixelsASide));
+  if (columns > kMaxPixelsASide || rows > kMaxPixelsASide) {
+    return cannot_hold(columns, rows, fmt::format("a side has at most {} pixels", kMaxPixelsASide));
   }
   return {};
 }
 
-void set_tags(TIFF* tiff, const Frame& frame, std::uint16_t bits, std::uint16_t compression, std::uint32_t rows_per_strip) {
+void set_tags(TIFF* tiff, const TagFrame& frame, std::uint16_t bits, std::uint16_t compression, std::uint32_t rows_per_strip) {
   TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, frame.columns);
   TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, frame.rows);
   TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, static_cast<int>(bits));
@@ -94,11 +94,11 @@ void set_tags(TIFF* tiff, const Frame& frame, std::uint16_t bits, std::uint16_t 
   TIFFSetField(tiff, TIFFTAG_SOFTWARE, "lamina");  // without a version: releases do not change the bytes of layers
 }
 
-Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const Frame& frame, const std::string& message) {
+Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const TagFrame& frame, const std::string& message) {
   const bool directory_written = strips_written && TIFFFlush(tiff.get()) != 0;
   tiff.reset();
   if (!directory_written) {
-    if (memory.position > kMostClassicBytes - kStripBytes - kDirectoryBytes) {
+    if (memory.position > kMaxClassicBytes - kStripBytes - kDirectoryBytes) {
       return cannot_hold(frame.columns, frame.rows, "the file would exceed 4 GiB; use --format tiff-g4");
     }
     return cannot_hold(frame.columns, frame.rows, message.empty() ? "out of memory" : message);
@@ -109,7 +109,7 @@ Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const Fr
 
 void LayerText::take(const LayerTags& tags) {
   constexpr std::size_t kLongestTitle = 128;
-  char bottom[kMostDecimal], top[kMostDecimal];
+  char bottom[kMaxDecimal], top[kMaxDecimal];
   *put_mm(tags.bottom, bottom) = *put_mm(tags.top, top) = 0;
   const std::string_view title = std::string_view(tags.title).substr(0, kLongestTitle);
   const auto put =
@@ -130,7 +130,7 @@ void LayerText::put(TIFF* tiff) const {
 
 namespace {
 
-constexpr std::size_t kStripAt = 8, kDirectoryAt = 4, kEntryBytes = 12, kMostTail = 1024;
+constexpr std::size_t kStripAt = 8, kDirectoryAt = 4, kEntryBytes = 12, kMaxTail = 1024;
 
 template <class Number>
 Number number_at(std::span<const std::byte> bytes, std::size_t at) {
@@ -157,12 +157,12 @@ std::size_t even(std::size_t at) { return (at + 1) & ~std::size_t{1}; }
 
 bool Ending::find_fields(std::span<const std::byte> file, std::size_t strip_end) {
   tail_at_ = even(strip_end);
-  if (file.size() < tail_at_ + 2 || file.size() > tail_at_ + kMostTail) return false;
+  if (file.size() < tail_at_ + 2 || file.size() > tail_at_ + kMaxTail) return false;
   const std::size_t directory = number_at<std::uint32_t>(file, kDirectoryAt);
   if (directory < tail_at_ || directory + 2 > file.size()) return false;
   const std::size_t entries = number_at<std::uint16_t>(file, directory);
   if (directory + 2 + entries * kEntryBytes > file.size()) return false;
-  places_.clear();
+  offsets_.clear();
   length_at_ = 0;
   for (std::size_t e = 0; e < entries; ++e) {
     const std::size_t at = directory + 2 + e * kEntryBytes, value = at + 8;
@@ -176,7 +176,7 @@ bool Ending::find_fields(std::span<const std::byte> file, std::size_t strip_end)
     } else if (bytes > 4) {
       const std::size_t offset = number_at<std::uint32_t>(file, value);
       if (offset < tail_at_ || offset + bytes > file.size()) return false;
-      places_.push_back(value - tail_at_);
+      offsets_.push_back(value - tail_at_);
     }
     if ((tag == TIFFTAG_STRIPBYTECOUNTS || tag == TIFFTAG_STRIPOFFSETS) && bytes > 4) return false;
   }
@@ -205,7 +205,7 @@ bool Ending::put(const Image& image, std::size_t strip_end, Bytes& file) const {
     put_at(bytes, at, static_cast<std::uint32_t>(offset - tail_at_ + begin));
   };
   moved(file.data(), kDirectoryAt);
-  for (const std::size_t place : places_) moved(tail, place);
+  for (const std::size_t position : offsets_) moved(tail, position);
   const std::size_t length = strip_end - kStripAt;
   if (short_length_) {
     put_at(tail, length_at_, static_cast<std::uint16_t>(length));

@@ -23,7 +23,7 @@ struct MemoryFile {
 };
 
 /// Largest size of a file whose offsets have 32 bits.
-inline constexpr std::uint64_t kMostClassicBytes = 0xFFFFFFFF;
+inline constexpr std::uint64_t kMaxClassicBytes = 0xFFFFFFFF;
 
 /// A little-endian classic TIFF to be written into `file`, which must outlive the handle, as must `message`: libtiff's
 /// own words on the first thing that goes wrong. nullptr if memory ran out.
@@ -35,7 +35,7 @@ inline constexpr std::size_t kStripBytes = 256 * 1024;
 /// Room for the directory and what it points to, so that libtiff's last writes do not grow the buffer.
 inline constexpr std::size_t kDirectoryBytes = 1024;
 
-struct Frame {
+struct TagFrame {
   std::uint32_t columns = 0, rows = 0;
   double dpi_x = 0, dpi_y = 0;
 };
@@ -44,10 +44,10 @@ Error cannot_hold(std::uint32_t columns, std::uint32_t rows, std::string_view wh
 Status check_size(std::uint32_t columns, std::uint32_t rows);
 
 /// Min-is-white, one sample of so many bits.
-void set_tags(TIFF* tiff, const Frame& frame, std::uint16_t bits, std::uint16_t compression, std::uint32_t rows_per_strip);
+void set_tags(TIFF* tiff, const TagFrame& frame, std::uint16_t bits, std::uint16_t compression, std::uint32_t rows_per_strip);
 
 /// Writes the directory; after this the file is whole or the error says why not.
-Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const Frame& frame, const std::string& message);
+Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const TagFrame& frame, const std::string& message);
 
 /// Keeps what files say of their layers, without an allocation a layer.
 class LayerText {
@@ -89,7 +89,7 @@ class Ending {
 
   Image image_;
   std::vector<std::byte> head_, tail_;  // before and behind the strip
-  std::vector<std::size_t> places_;     // in tail_, of 32-bit offsets into the file
+  std::vector<std::size_t> offsets_;     // in tail_, of 32-bit offsets into the file
   std::size_t tail_at_ = 0;             // where it stood
   std::size_t length_at_ = 0;           // in tail_, of the strip's length
   bool short_length_ = false;           // of 16 bits

@@ -33,7 +33,7 @@ class G4Encoder : public ImageEncoder {
     if (Status status = check_size(runs.columns, runs.rows()); !status) return status;
     file.resize(file.capacity());
     const std::size_t end = encoder_.encode(runs, file, kHeaderBytes);
-    if (end > kMostClassicBytes - kDirectoryBytes) return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB");
+    if (end > kMaxClassicBytes - kDirectoryBytes) return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB");
     const Ending::Image image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kHeaderBytes > UINT16_MAX};
     if (!text_.any() && ending_.put(image, end, file)) return {};
     if (file.size() < end + kDirectoryBytes) file.resize(end + kDirectoryBytes);
@@ -65,7 +65,7 @@ class StripEncoder : public ImageEncoder {
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size(runs.columns, runs.rows()); !status) return status;
     const std::size_t stride = row_bytes(runs.columns);
-    if (compression_ == COMPRESSION_NONE && stride * runs.rows() > kMostClassicBytes - kStripBytes) {
+    if (compression_ == COMPRESSION_NONE && stride * runs.rows() > kMaxClassicBytes - kStripBytes) {
       return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB; use --format tiff-g4");
     }
     const auto rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, runs.rows()));
@@ -179,7 +179,7 @@ namespace {
 constexpr std::uint32_t kLargestAllocation = 64 << 20;  // bytes; no strip that anybody writes is larger
 
 /// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
-std::uint64_t most_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
+std::uint64_t max_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
   switch (compression) {
     case COMPRESSION_NONE: return bytes / stride;
     case COMPRESSION_PACKBITS: return bytes * 64 / stride;  // two bytes make 128
@@ -205,7 +205,7 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
       return fmt::format("strip {} is not within the file", strip);
     }
     const std::uint32_t strip_rows = std::min(rows_per_strip, rows - strip * rows_per_strip);
-    if (most_rows(compression, bytes, stride) < strip_rows) return fmt::format("strip {} is too short", strip);
+    if (max_rows(compression, bytes, stride) < strip_rows) return fmt::format("strip {} is too short", strip);
   }
   return {};
 }
@@ -228,8 +228,8 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
     const std::uint64_t size = TIFFGetStrileByteCount(tiff, strip);
     if (size > kLargestAllocation) return false;
     coded.resize(size);
-    const auto place = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
-    if (::pread(file, coded.data(), coded.size(), place) != static_cast<ssize_t>(coded.size())) return false;
+    const auto position = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
+    if (::pread(file, coded.data(), coded.size(), position) != static_cast<ssize_t>(coded.size())) return false;
     const G4Strip of_rows{columns, std::min(rows_per_strip, rows - row), fill_order == FILLORDER_LSB2MSB, white_is_set};
     if (!decoder.append(coded, of_rows, runs)) return false;
   }
@@ -294,7 +294,7 @@ std::string read_tiff_head(TIFF* tiff, std::uint64_t file_bytes, int threshold, 
     return fmt::format("its Orientation tag is {}; write rows from the top and columns from the left, tag 1", orientation);
   }
   if (TIFFIsTiled(tiff) != 0) return "tiles are not supported";
-  if (head.columns == 0 || head.rows == 0 || head.columns > kMostPixelsASide || head.rows > kMostPixelsASide) {
+  if (head.columns == 0 || head.rows == 0 || head.columns > kMaxPixelsASide || head.rows > kMaxPixelsASide) {
     return fmt::format("{} x {} pixels", head.columns, head.rows);
   }
   if (std::string wrong = check_strips(tiff, file_bytes, head.compression, head.rows, head.stride()); !wrong.empty())
@@ -365,7 +365,7 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
 }
 
 Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path) {
-  constexpr std::size_t kMostPages = 1 << 20;
+  constexpr std::size_t kMaxPages = 1 << 20;
   std::string message;
   const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
@@ -381,8 +381,8 @@ Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path)
     std::uint32_t kind = 0;
     TIFFGetField(handle.get(), TIFFTAG_SUBFILETYPE, &kind);
     if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) pages.push_back(TIFFCurrentDirOffset(handle.get()));
-  } while (pages.size() <= kMostPages && TIFFReadDirectory(handle.get()) != 0);
-  if (!message.empty() || pages.size() > kMostPages) {
+  } while (pages.size() <= kMaxPages && TIFFReadDirectory(handle.get()) != 0);
+  if (!message.empty() || pages.size() > kMaxPages) {
     return Error{Fault::kInput, fmt::format("{}: page {}: {}; take a whole file", path, pages.size(),
                                             message.empty() ? "too many of them" : message)};
   }

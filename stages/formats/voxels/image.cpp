@@ -54,7 +54,7 @@ std::optional<ImageKind> image_kind(std::string_view path) {
   return {};
 }
 
-Status write_image(File& file, const VoxelView& box, Side side, ImageKind kind, std::string_view version) {
+Status write_image(File& file, const VoxelView& box, VoxelPhase side, ImageKind kind, std::string_view version) {
   const std::string head = kind == ImageKind::kNrrd   ? nrrd_head(box, version)
                            : kind == ImageKind::kMeta ? meta_head(box, version)
                                                       : vti_head(box, version);

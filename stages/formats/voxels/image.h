@@ -15,11 +15,11 @@
 namespace lamina::write::voxels {
 
 /// Which voxels of a box are meant: the set ones, or the others.
-enum class Side : std::uint8_t { kSolid, kVoid };
+enum class VoxelPhase : std::uint8_t { kSolid, kVoid };
 
 /// Puts a row into nx bytes: 1 where it is of that side, else 0.
-inline void expand_row(std::span<const std::uint32_t> changes, Side side, std::span<std::uint8_t> bytes) {
-  const auto outside = static_cast<std::uint8_t>(side == Side::kVoid), inside = static_cast<std::uint8_t>(1 - outside);
+inline void expand_row(std::span<const std::uint32_t> changes, VoxelPhase side, std::span<std::uint8_t> bytes) {
+  const auto outside = static_cast<std::uint8_t>(side == VoxelPhase::kVoid), inside = static_cast<std::uint8_t>(1 - outside);
   std::ranges::fill(bytes, outside);
   for (std::size_t i = 0; i + 1 < changes.size(); i += 2) {
     std::fill(bytes.begin() + changes[i], bytes.begin() + changes[i + 1], inside);
@@ -42,6 +42,6 @@ inline constexpr std::string_view kMark = "written by lamina";
 /// version  of this program, told in the head
 /// errors   kOutput
 /// cost     one pass; memory of some rows, never of the box
-Status write_image(File& file, const VoxelView& box, Side side, ImageKind kind, std::string_view version);
+Status write_image(File& file, const VoxelView& box, VoxelPhase side, ImageKind kind, std::string_view version);
 
 }  // namespace lamina::write::voxels

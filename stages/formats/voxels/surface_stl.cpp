@@ -15,14 +15,14 @@ constexpr std::size_t kFacet = 50, kFacetsAtOnce = 4096;  // bytes, facets
 constexpr double kPart = 1.0 / 64;                        // of a voxel: how far the middles of a parted edge move
 
 using Step = std::array<int, 3>;
-using Place = std::array<double, 3>;  // in voxels
+using GridPoint = std::array<double, 3>;  // in voxels
 
 Step operator+(const Step& a, const Step& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 
 /// The rows around one, a voxel longer at both ends: outside of the box nothing is set.
 class Neighbours {
  public:
-  Neighbours(const VoxelView& box, Side side) : box_(box), side_(side), stride_(std::size_t{box.nx} + 2) {
+  Neighbours(const VoxelView& box, VoxelPhase side) : box_(box), side_(side), stride_(std::size_t{box.nx} + 2) {
     for (auto& bytes : row_) bytes.assign(stride_, 0);
   }
   /// Goes to a row; three of the nine are known if it follows the one before.
@@ -55,7 +55,7 @@ class Neighbours {
   }
 
   const VoxelView box_;
-  Side side_;
+  VoxelPhase side_;
   std::size_t stride_;
   std::uint32_t y_ = UINT32_MAX, z_ = UINT32_MAX;
   std::array<Buffer<std::uint8_t>, 9> row_;
@@ -88,15 +88,15 @@ bool is_parted(const Neighbours& near, std::uint32_t x, const Face& face, std::s
 
 /// The corners of a face, one after the other, with the middles of parted edges between them.
 struct Ring {
-  std::array<Place, 8> place;
+  std::array<GridPoint, 8> position;
   std::size_t count = 0;
 };
 
-Ring ring_of(const Place& middle, const Face& face, std::uint32_t parted) {
+Ring ring_of(const GridPoint& middle, const Face& face, std::uint32_t parted) {
   Ring ring;
   for (std::size_t e = 0; e < 4; ++e) {
     const Step &here = face.edge[e], &next = face.edge[(e + 1) % 4];
-    Place corner = middle, bent = middle;
+    GridPoint corner = middle, bent = middle;
     // Of the two axes across the edge, it moves inwards along the one and outwards along the other.
     std::size_t across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -104,8 +104,8 @@ Ring ring_of(const Place& middle, const Face& face, std::uint32_t parted) {
       const int out = face.normal[a] + here[a];
       if (out != 0) bent[a] += out * (0.5 + (across++ == 0 ? -kPart : kPart));
     }
-    if ((parted >> e & 1) != 0) ring.place[ring.count++] = bent;
-    ring.place[ring.count++] = corner;
+    if ((parted >> e & 1) != 0) ring.position[ring.count++] = bent;
+    ring.position[ring.count++] = corner;
   }
   return ring;
 }
@@ -117,13 +117,13 @@ class FacetSink {
     for (std::size_t a = 0; a < 3; ++a) edge_mm_[a] = mm(box.edge[a]);
     piece_.reserve(kFacetsAtOnce * kFacet);
   }
-  void add(const Place& a, const Place& b, const Place& c) {
+  void add(const GridPoint& a, const GridPoint& b, const GridPoint& c) {
     std::array<float, 12> number{};
-    const Place* const corner[] = {&a, &b, &c};
+    const GridPoint* const corner[] = {&a, &b, &c};
     for (std::size_t k = 0; k < 9; ++k) number[3 + k] = static_cast<float>((*corner[k / 3])[k % 3] * edge_mm_[k % 3]);
-    Place u{}, v{};
+    GridPoint u{}, v{};
     for (std::size_t i = 0; i < 3; ++i) u[i] = (b[i] - a[i]) * edge_mm_[i], v[i] = (c[i] - a[i]) * edge_mm_[i];
-    const Place n{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+    const GridPoint n{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
     const double length = std::hypot(n[0], n[1], n[2]);
     for (std::size_t i = 0; i < 3; ++i) number[i] = static_cast<float>(n[i] / length);
     const std::size_t at = piece_.size();
@@ -144,14 +144,14 @@ class FacetSink {
   }
 
   File& file_;
-  Place edge_mm_{};
+  GridPoint edge_mm_{};
   Buffer<char> piece_;
   Status status_;
 };
 
 /// Calls take(x, y, z, face, bits of parted edges) for each face, in the order of voxels.
 template <class Take>
-void for_each_face(const VoxelView& box, Side side, const Take& take) {
+void for_each_face(const VoxelView& box, VoxelPhase side, const Take& take) {
   const std::array<Face, 6> faces = make_faces();
   Neighbours near(box, side);
   for (std::uint32_t z = 0; z < box.nz; ++z) {
@@ -174,18 +174,18 @@ std::uint32_t bits(std::uint32_t parted) { return (parted & 1) + (parted >> 1 & 
 
 }  // namespace
 
-SurfaceCounts count_surface(const VoxelView& box, Side side) {
+SurfaceCounts count_surface(const VoxelView& box, VoxelPhase side) {
   SurfaceCounts counts;
-  std::uint64_t seen = 0;  // each parted edge from four faces
+  std::uint64_t detected = 0;  // each parted edge from four faces
   for_each_face(box, side, [&](auto, auto, auto, const Face&, std::uint32_t parted) {
     counts.facets += parted == 0 ? 2 : 4 + bits(parted);
-    seen += bits(parted);
+    detected += bits(parted);
   });
-  counts.parted_edges = seen / 4;
+  counts.parted_edges = detected / 4;
   return counts;
 }
 
-Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, Side side, std::string_view version) {
+Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, VoxelPhase side, std::string_view version) {
   const SurfaceCounts counts = count_surface(box, side);
   if (counts.facets == 0) return Error{Fault::kInput, "nothing of this kind is in the window, so that it has no surface"};
   if (counts.facets > UINT32_MAX) {
@@ -199,16 +199,16 @@ Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, Side side,
   if (Status status = file.append(head); !status) return status.error();
   FacetSink sink(file, box);
   for_each_face(box, side, [&](std::uint32_t x, std::uint32_t y, std::uint32_t z, const Face& face, std::uint32_t parted) {
-    const Place middle{x + 0.5, y + 0.5, z + 0.5};
+    const GridPoint middle{x + 0.5, y + 0.5, z + 0.5};
     const Ring ring = ring_of(middle, face, parted);
     if (parted == 0) {
-      sink.add(ring.place[0], ring.place[1], ring.place[2]);
-      sink.add(ring.place[0], ring.place[2], ring.place[3]);
+      sink.add(ring.position[0], ring.position[1], ring.position[2]);
+      sink.add(ring.position[0], ring.position[2], ring.position[3]);
       return;
     }
-    Place centre = middle;
+    GridPoint centre = middle;
     for (std::size_t a = 0; a < 3; ++a) centre[a] += 0.5 * face.normal[a];
-    for (std::size_t i = 0; i < ring.count; ++i) sink.add(centre, ring.place[i], ring.place[(i + 1) % ring.count]);
+    for (std::size_t i = 0; i < ring.count; ++i) sink.add(centre, ring.position[i], ring.position[(i + 1) % ring.count]);
   });
   if (Status status = sink.finish(); !status) return status.error();
   return counts;

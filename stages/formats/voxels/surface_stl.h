@@ -17,7 +17,7 @@ struct SurfaceCounts {
 };
 
 /// What write_surface() will write. cost  one pass over the rows
-SurfaceCounts count_surface(const VoxelView& box, Side side);
+SurfaceCounts count_surface(const VoxelView& box, VoxelPhase side);
 
 /// Writes the faces between voxels of that side and others as binary STL, closed by caps at the ends of the box, in mm from its
 /// lower corner, corners counter-clockwise seen from outside.
@@ -31,6 +31,6 @@ SurfaceCounts count_surface(const VoxelView& box, Side side);
 /// version  of this program, told in the head
 /// errors   kInput: no such voxel, or more facets than STL's 32 bits count; nothing is written then. kOutput
 /// cost     two passes; two facets a face, more where edges are parted, of 50 bytes each; memory of nine rows
-Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, Side side, std::string_view version);
+Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, VoxelPhase side, std::string_view version);
 
 }  // namespace lamina::write::voxels

@@ -16,7 +16,7 @@ Status deflate_onto(Deflated& out, std::string_view text) {
   z_stream stream{};
   if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) != Z_OK) return no_memory;
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, deflateEnd);
-  Buffer<std::byte> room(std::size_t{64} << 10);
+  Buffer<std::byte> capacity(std::size_t{64} << 10);
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t count = std::min(text.size() - at, std::size_t{1} << 30);
     auto* const input = reinterpret_cast<const Bytef*>(text.data() + at);
@@ -25,10 +25,10 @@ Status deflate_onto(Deflated& out, std::string_view text) {
     stream.avail_in = static_cast<uInt>(count);
     at += count;
     do {
-      stream.next_out = reinterpret_cast<Bytef*>(room.data());
-      stream.avail_out = static_cast<uInt>(room.size());
+      stream.next_out = reinterpret_cast<Bytef*>(capacity.data());
+      stream.avail_out = static_cast<uInt>(capacity.size());
       if (deflate(&stream, at == text.size() ? Z_FULL_FLUSH : Z_NO_FLUSH) == Z_STREAM_ERROR) return no_memory;
-      out.bytes.insert(out.bytes.end(), room.begin(), room.end() - stream.avail_out);
+      out.bytes.insert(out.bytes.end(), capacity.begin(), capacity.end() - stream.avail_out);
     } while (stream.avail_out == 0);
   }
   out.size += text.size();
@@ -66,14 +66,14 @@ Result<ZipDate> zip_date(const char* text) {
 
 /// What stands before the data of an entry, and again in the directory, with the entry's place.
 std::string ZipWriter::record(const Entry& entry, bool in_directory) const {
-  const bool large_sizes = large(entry.packed) || large(entry.size), large_place = in_directory && large(entry.place);
-  const int version = large_sizes || large_place ? 45 : 20;
+  const bool large_sizes = large(entry.packed) || large(entry.size), large_offset = in_directory && large(entry.position);
+  const int version = large_sizes || large_offset ? 45 : 20;
   std::string extra;
-  if (large_sizes || large_place) {
+  if (large_sizes || large_offset) {
     put_little(extra, 1, 2);
-    put_little(extra, (large_sizes ? 16 : 0) + (large_place ? 8 : 0), 2);
+    put_little(extra, (large_sizes ? 16 : 0) + (large_offset ? 8 : 0), 2);
     if (large_sizes) put_little(extra, entry.size, 8), put_little(extra, entry.packed, 8);
-    if (large_place) put_little(extra, entry.place, 8);
+    if (large_offset) put_little(extra, entry.position, 8);
   }
   std::string out = in_directory ? "PK\x01\x02" : "PK\x03\x04";
   if (in_directory) put_little(out, version, 2);  // made by
@@ -88,7 +88,7 @@ std::string ZipWriter::record(const Entry& entry, bool in_directory) const {
   put_little(out, extra.size(), 2);
   if (in_directory) {
     out.append(10, '\0');  // no comment, the first disk, no attributes
-    put_little(out, large_place ? UINT32_MAX : entry.place, 4);
+    put_little(out, large_offset ? UINT32_MAX : entry.position, 4);
   }
   return out + entry.name + extra;
 }
@@ -113,9 +113,9 @@ Status ZipWriter::add(std::string_view name, std::span<const Deflated> pieces) {
 Status ZipWriter::finish() {
   std::string directory;
   for (const Entry& entry : entries_) directory += record(entry, true);
-  const std::uint64_t count = entries_.size(), place = written_, size = directory.size();
-  if (large(place) || large(size) || count >= UINT16_MAX) {
-    const std::uint64_t end = place + size;
+  const std::uint64_t count = entries_.size(), position = written_, size = directory.size();
+  if (large(position) || large(size) || count >= UINT16_MAX) {
+    const std::uint64_t end = position + size;
     directory += "PK\x06\x06";
     put_little(directory, 44, 8);  // bytes that follow in this record
     put_little(directory, 45, 2);
@@ -124,7 +124,7 @@ Status ZipWriter::finish() {
     put_little(directory, count, 8);
     put_little(directory, count, 8);
     put_little(directory, size, 8);
-    put_little(directory, place, 8);
+    put_little(directory, position, 8);
     directory += "PK\x06\x07";
     put_little(directory, 0, 4);
     put_little(directory, end, 8);
@@ -134,7 +134,7 @@ Status ZipWriter::finish() {
   put_little(directory, 0, 4);
   for (int i = 0; i < 2; ++i) put_little(directory, std::min<std::uint64_t>(count, UINT16_MAX), 2);
   put_little(directory, large(size) ? UINT32_MAX : size, 4);
-  put_little(directory, large(place) ? UINT32_MAX : place, 4);
+  put_little(directory, large(position) ? UINT32_MAX : position, 4);
   put_little(directory, 0, 2);
   return file_.append(directory);
 }

@@ -55,7 +55,7 @@ class ZipWriter {
   struct Entry {
     std::string name;
     std::uint32_t crc;
-    std::uint64_t packed, size, place;
+    std::uint64_t packed, size, position;
   };
   bool large(std::uint64_t number) const { return number >= zip64_from_; }
   std::string record(const Entry& entry, bool in_directory) const;

@@ -16,7 +16,7 @@ namespace lamina {
 // are matched the same way among themselves, and those that are left then by probing.
 
 bool VertexNumbers::number(const SortedBlock& block, const BlockKernels& kernels) {
-  const std::uint32_t corners = block.clusters() * SortedBlock::kCorners, most = block.triangles * 3 / 2;
+  const std::uint32_t corners = block.clusters() * SortedBlock::kCorners, maximum = block.triangles * 3 / 2;
   // A fixed number of corners a round, so that compilers unroll it.
   constexpr std::uint32_t kRound = 16;
   static_assert(SortedBlock::kCorners % kRound == 0);
@@ -27,11 +27,11 @@ bool VertexNumbers::number(const SortedBlock& block, const BlockKernels& kernels
     }
   }
   kernels.match(block, matches_);
-  if (matches_.found > most) return false;
+  if (matches_.found > maximum) return false;
   if (matches_.unmatched > 0) match_again(block);
   if (matches_.unmatched > 0) match_rest(block);
   count_ = kernels.number(corners, matches_);
-  return count_ <= most;
+  return count_ <= maximum;
 }
 
 /// The same once more among those that are left: nearly all of their slots had two vertices, one of which is matched. Whether

@@ -44,7 +44,7 @@ class VertexNumbers {
 class BlockMaker {
  public:
   /// isa  the widest instruction set to use; blocks are the same with any
-  explicit BlockMaker(Isa isa = Isa::kAuto) : kernels_(block_kernels_for(isa_at_most(isa))) {}
+  explicit BlockMaker(Isa isa = Isa::kAuto) : kernels_(block_kernels_for(limited_isa(isa))) {}
 
   /// The triangles of a block of `mesh`, sorted; whoever calls hashes the corners: equal where vertices are, and of many values
   /// where they are not.

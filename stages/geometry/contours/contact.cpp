@@ -14,7 +14,7 @@ class Search {
   Search(const ContoursView& contours, MonotoneScratch& scratch)
       : contours_(contours),
         scratch_(scratch),
-        most_chains_(32 + contours.point.size() / 6),
+        max_chains_(32 + contours.point.size() / 6),
         comparisons_left_(4096 + 8 * static_cast<std::int64_t>(contours.point.size())) {}
 
   bool run() {
@@ -22,7 +22,7 @@ class Search {
     scratch_.contact.clear();
     for (std::uint32_t c = 0; c < contours_.size(); ++c) {
       split(c);
-      if (scratch_.chain.size() > most_chains_) return false;
+      if (scratch_.chain.size() > max_chains_) return false;
     }
     auto& chains = scratch_.chain;
     std::sort(chains.begin(), chains.end(), [](const MonotoneChain& a, const MonotoneChain& b) { return a.lo.x < b.lo.x; });
@@ -93,7 +93,7 @@ class Search {
         const std::uint32_t ia = index(a, a0), ib = index(b, b0);
         if (index(a, a1) == ib || index(b, b1) == ia) return false;
       }
-      return stretches_meet(a_from, a_to, b_from, b_to);
+      return intervals_meet(a_from, a_to, b_from, b_to);
     }
     if (a1 - a0 >= b1 - b0) {
       const std::uint32_t middle = a0 + (a1 - a0) / 2;
@@ -105,7 +105,7 @@ class Search {
 
   const ContoursView& contours_;
   MonotoneScratch& scratch_;
-  std::size_t most_chains_;
+  std::size_t max_chains_;
   std::int64_t comparisons_left_;
 };
 
@@ -116,7 +116,7 @@ bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scrat
 namespace {
 
 /// Square cells of 2^shift nm over the box of all points.
-struct Grid {
+struct CellGrid {
   std::int64_t x0, y0;
   std::uint32_t shift;
   std::uint32_t columns, rows;
@@ -150,7 +150,7 @@ struct Grid {
   }
 };
 
-Grid make_grid(const ContoursView& contours) {
+CellGrid make_grid(const ContoursView& contours) {
   Point2 lo = contours.point[0], hi = lo;
   double length = 0;
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
@@ -162,7 +162,7 @@ Grid make_grid(const ContoursView& contours) {
       before = p;
     }
   }
-  Grid grid{lo.x, lo.y, 0, 0, 0};
+  CellGrid grid{lo.x, lo.y, 0, 0, 0};
   const auto edges = static_cast<double>(contours.point.size());
   const auto width = static_cast<double>(std::int64_t{hi.x} - lo.x), height = static_cast<double>(std::int64_t{hi.y} - lo.y);
   // As long as an edge on average, but no more than two cells an edge.
@@ -207,7 +207,7 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
     scratch.next[contours.offset[c + 1] - 1] = contours.offset[c];
     std::fill(scratch.contour.begin() + contours.offset[c], scratch.contour.begin() + contours.offset[c + 1], c);
   }
-  const Grid grid = make_grid(contours);
+  const CellGrid grid = make_grid(contours);
   const std::size_t cells = std::size_t{grid.columns} * grid.rows;
   scratch.offset.assign(cells + 1, 0);
   for (std::uint32_t i = 0; i < point.size(); ++i) {
@@ -217,22 +217,22 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
   for (std::uint32_t& offset : scratch.offset) total += std::exchange(offset, total);
   scratch.edge.resize(total);
   // An edge is compared with those that came into its cells before it.
-  Buffer<std::uint32_t>& place = scratch.offset;
-  const auto begin_of = [&](std::size_t cell) { return cell == 0 ? 0u : place[cell - 1]; };
+  Buffer<std::uint32_t>& position = scratch.offset;
+  const auto begin_of = [&](std::size_t cell) { return cell == 0 ? 0u : position[cell - 1]; };
   for (std::uint32_t i = 0; i < point.size(); ++i) {
     const Point2 a = point[i], b = point[scratch.next[i]];
-    grid.for_each_cell(a, b, [&](std::size_t cell) { scratch.edge[place[cell]++] = i; });
+    grid.for_each_cell(a, b, [&](std::size_t cell) { scratch.edge[position[cell]++] = i; });
   }
   bool any = false;
   for (std::size_t cell = 0; cell < cells; ++cell) {
-    const std::uint32_t end = place[cell];
+    const std::uint32_t end = position[cell];
     for (std::uint32_t k = begin_of(cell); k + 1 < end; ++k) {
       const std::uint32_t i = scratch.edge[k], after = scratch.next[i];
       const Point2 a = point[i], b = point[after];
       for (std::uint32_t m = k + 1; m < end; ++m) {
         const std::uint32_t j = scratch.edge[m];
         if (j == after || scratch.next[j] == i || j == i) continue;
-        if (!stretches_meet(a, b, point[j], point[scratch.next[j]])) continue;
+        if (!intervals_meet(a, b, point[j], point[scratch.next[j]])) continue;
         join(scratch.contour[i], scratch.contour[j]);
         any = true;
       }

@@ -74,7 +74,7 @@ inline bool boxes_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
 }
 
 /// Whether stretches ab and cd share a point, ends included.
-inline bool stretches_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
+inline bool intervals_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
   // Boxes meet, so collinear stretches do.
   return boxes_meet(a, b, c, d) && side_of(a, b, c) * side_of(a, b, d) <= 0 && side_of(c, d, a) * side_of(c, d, b) <= 0;
 }

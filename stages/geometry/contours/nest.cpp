@@ -90,7 +90,7 @@ void append(std::span<const Point2> points, bool reversed, Contours& out) {
 
 /// Unites the contours of one group about which the others wind `outside` times. Frames around the group stand for
 /// them; what becomes of the frames is left out again.
-Status unite_group(const Contours& contours, std::uint32_t group_number, const Buffer<std::uint32_t>& group,
+Status group_union(const Contours& contours, std::uint32_t group_number, const Buffer<std::uint32_t>& group,
                    std::int32_t outside, FillRule rule, Contours& out) {
   constexpr std::int64_t kAway = 1'000'000;
   Contours own;
@@ -107,11 +107,11 @@ Status unite_group(const Contours& contours, std::uint32_t group_number, const B
   const Point2 a{within(lo.x - kAway), within(lo.y - kAway)}, b{within(hi.x + kAway), within(hi.y + kAway)};
   const Point2 frame[4] = {a, {b.x, a.y}, b, {a.x, b.y}};
   for (std::int32_t i = 0; i < std::abs(outside); ++i) append(frame, outside < 0, own);
-  auto united = unite_contours(own, rule);
-  if (!united) return united.error();
-  tidy(*united);  // edges that contours share may leave spikes
-  for (std::uint32_t c = 0; c < united->size(); ++c) {
-    const auto points = (*united)[c];
+  auto merged = contour_union(own, rule);
+  if (!merged) return merged.error();
+  tidy(*merged);  // edges that contours share may leave spikes
+  for (std::uint32_t c = 0; c < merged->size(); ++c) {
+    const auto points = (*merged)[c];
     const bool is_frame = std::ranges::any_of(points, [&](Point2 p) { return p.x == a.x || p.x == b.x; });
     if (!is_frame) append(points, false, out);
   }
@@ -133,17 +133,17 @@ Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::
   };
   if (!group.empty()) {
     Contours out;
-    std::uint32_t united = 0;
+    std::uint32_t merged = 0;
     for (std::uint32_t c = 0; c < count; ++c) {
       if (group[c] == kNoContact) {
         if (const int turn = turn_of(c); turn != 0) append(contours[c], turn < 0, out);
       } else if (group[c] == c) {
-        if (Status status = unite_group(contours, c, group, outside[c], rule, out); !status) return status.error();
-        ++united;
+        if (Status status = group_union(contours, c, group, outside[c], rule, out); !status) return status.error();
+        ++merged;
       }
     }
     contours = std::move(out);
-    return united;
+    return merged;
   }
   // In place.
   std::uint32_t kept_points = 0, kept_contours = 0, begin = 0;
@@ -207,7 +207,7 @@ Bounds bounds_of(std::span<const Point2> points) {
 }
 
 /// 1: inside, 0: on the contour, -1: outside
-int place_of(std::span<const Point2> contour, Point2 p) {
+int position_of(std::span<const Point2> contour, Point2 p) {
   bool inside = false;
   Point2 a = contour.back();
   for (const Point2 b : contour) {
@@ -226,10 +226,10 @@ int place_of(std::span<const Point2> contour, Point2 p) {
 /// Clean contours touch each other in points at most, so the first point that does not decides for all.
 bool is_around(std::span<const Point2> outer, std::span<const Point2> hole) {
   for (const Point2 p : hole) {
-    if (const int place = place_of(outer, p); place != 0) return place > 0;
+    if (const int position = position_of(outer, p); position != 0) return position > 0;
   }
   const Point2 a = hole[0], b = hole[1];  // all corners touch: the middle of a side does not
-  return place_of(outer, {static_cast<Nm>((std::int64_t{a.x} + b.x) / 2), static_cast<Nm>((std::int64_t{a.y} + b.y) / 2)}) >= 0;
+  return position_of(outer, {static_cast<Nm>((std::int64_t{a.x} + b.x) / 2), static_cast<Nm>((std::int64_t{a.y} + b.y) / 2)}) >= 0;
 }
 
 /// For each hole the innermost outer contour around it.

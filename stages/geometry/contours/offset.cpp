@@ -12,7 +12,7 @@ namespace lamina {
 namespace {
 
 /// Buffers of offset_mitered, reused from piece to piece.
-struct Scratch {
+struct OffsetScratch {
   Contours curves;
   ContactScratch contact;
   Buffer<std::uint32_t> group;
@@ -20,16 +20,16 @@ struct Scratch {
 
 /// Appends the region of contours [begin, end), whose curves meet those of no other contour. clean  so are the contours
 Status append_piece(const ContoursView& contours, std::uint32_t begin, std::uint32_t end, bool clean, OffsetCurve& curve,
-                    Scratch& scratch, Contours& out) {
+                    OffsetScratch& scratch, Contours& out) {
   Contours& curves = scratch.curves;
   curves.clear();
   bool plain = clean;
   for (std::uint32_t c = begin; c < end; ++c) plain &= curve.append(contours[c], curves);
   if (plain) tidy(curves);
   if (!plain || find_contacts(curves, scratch.contact, scratch.group)) {
-    const auto united = unite_curves(curves);
-    if (!united) return united.error();
-    out.append(*united);
+    const auto merged = curve_union(curves);
+    if (!merged) return merged.error();
+    out.append(*merged);
     return {};
   }
   scratch.group.clear();
@@ -43,7 +43,7 @@ Status append_piece(const ContoursView& contours, std::uint32_t begin, std::uint
 
 Result<Contours> offset_mitered(const ContoursView& contours, std::int64_t distance) {
   OffsetCurve curve(static_cast<double>(distance));
-  Scratch scratch;
+  OffsetScratch scratch;
   Contours out;
   const bool ordered = is_ordered_by_outer(contours);
   for (std::uint32_t begin = 0, end = 0; begin < contours.size(); begin = end) {

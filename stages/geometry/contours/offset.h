@@ -1,7 +1,7 @@
 // stages/geometry/contours/offset.h: clean contours grown or shrunk, with mitered corners.
 //
 //   contours ─> curves ─> tidy ─> find_contacts ─> nest ─> contours
-//                 └─────────────────┴─> unite_curves, of those with loops or in contact
+//                 └─────────────────┴─> curve_union, of those with loops or in contact
 //
 // A curve is what the edges of a contour become when each moves along its normal. Curves without loops that keep clear of each
 // other and of themselves are the result; boolean operations are made only where edges vanish on the way, or the region

@@ -28,36 +28,36 @@ std::int64_t root(UInt128 value) {
 }
 
 /// All points within the tolerance of a stretch. Coordinates of a bed differ by less than 2^31, so products fit 64 bits.
-class Reach {
+class SegmentTolerance {
  public:
-  Reach(Point2 a, Point2 b, Nm tolerance) : a_(a), ux_(std::int64_t{b.x} - a.x), uy_(std::int64_t{b.y} - a.y) {
+  SegmentTolerance(Point2 a, Point2 b, Nm tolerance) : a_(a), ux_(std::int64_t{b.x} - a.x), uy_(std::int64_t{b.y} - a.y) {
     length2_ = ux_ * ux_ + uy_ * uy_;
-    most2_ = std::int64_t{tolerance} * tolerance;
-    most_ = root(static_cast<UInt128>(most2_) * static_cast<UInt128>(length2_));
+    max2_ = std::int64_t{tolerance} * tolerance;
+    max_ = root(static_cast<UInt128>(max2_) * static_cast<UInt128>(length2_));
   }
 
-  struct Place {
+  struct Deviation {
     bool beyond;         // further away than the tolerance
     std::int64_t apart;  // the larger of the distances along and across, times the length of the stretch
   };
-  Place place(Point2 p) const {
+  Deviation position(Point2 p) const {
     const std::int64_t vx = std::int64_t{p.x} - a_.x, vy = std::int64_t{p.y} - a_.y;
     const std::int64_t along = ux_ * vx + uy_ * vy, across = std::abs(ux_ * vy - uy_ * vx);
-    if (0 <= along && along <= length2_ && length2_ > 0) return {across > most_, across};
+    if (0 <= along && along <= length2_ && length2_ > 0) return {across > max_, across};
     const bool first = along < 0;
     const std::int64_t wx = first ? vx : vx - ux_, wy = first ? vy : vy - uy_;
-    return {wx * wx + wy * wy > most2_, std::max(across, first ? -along : along - length2_)};
+    return {wx * wx + wy * wy > max2_, std::max(across, first ? -along : along - length2_)};
   }
 
  private:
   Point2 a_;
-  std::int64_t ux_, uy_, length2_, most2_;
-  std::int64_t most_;  // across is whole: it is at most tolerance x length if it is at most the root of that squared
+  std::int64_t ux_, uy_, length2_, max2_;
+  std::int64_t max_;  // across is whole: it is at most tolerance x length if it is at most the root of that squared
 };
 
 /// So many looks at each point for every halving of the contour are enough for the furthest ones to be taken; contours of real
 /// parts take a quarter of that.
-constexpr std::size_t kLooksAPoint = 8;
+constexpr std::size_t kChecksPerPoint = 8;
 
 /// A contour's points in a circle, and which of them stay.
 class Ring {
@@ -86,39 +86,39 @@ class Ring {
 
   void split(std::size_t from, std::size_t to) {
     scratch_.open.assign(1, {from, to});
-    std::uint64_t looked_at = 0;
-    const std::uint64_t enough = kLooksAPoint * (to - from) * static_cast<std::uint64_t>(std::bit_width(to - from));
+    std::uint64_t inspected = 0;
+    const std::uint64_t enough = kChecksPerPoint * (to - from) * static_cast<std::uint64_t>(std::bit_width(to - from));
     while (!scratch_.open.empty()) {
       const auto [first, last] = scratch_.open.back();
       scratch_.open.pop_back();
-      looked_at += last - first;
-      const Reach reach(at(first), at(last), tolerance_);
+      inspected += last - first;
+      const SegmentTolerance reach(at(first), at(last), tolerance_);
       std::size_t furthest = first;
-      std::int64_t most = -1;
+      std::int64_t maximum = -1;
       bool beyond = false;
       for (std::size_t i = first + 1; i < last; ++i) {
-        const Reach::Place place = reach.place(at(i));
-        beyond |= place.beyond;
-        if (place.apart > most) most = place.apart, furthest = i;
+        const SegmentTolerance::Deviation position = reach.position(at(i));
+        beyond |= position.beyond;
+        if (position.apart > maximum) maximum = position.apart, furthest = i;
       }
       if (!beyond) continue;
       // The teeth of a comb are split off one by one: a stretch that has been looked at often is split near its middle.
-      const std::size_t near_end = looked_at > enough ? (last - first) / 8 : 0;
+      const std::size_t near_end = inspected > enough ? (last - first) / 8 : 0;
       if (furthest - first < near_end || last - furthest < near_end) furthest = first + (last - first) / 2;
       kept_[furthest < points_.size() ? furthest : furthest - points_.size()] = 1;
       scratch_.open.emplace_back(first, furthest);
       scratch_.open.emplace_back(furthest, last);
     }
-    scratch_.looks += looked_at;
+    scratch_.inspections += inspected;
   }
 
   /// Whether one stretch may stand for the two at `middle`.
   bool needless(std::uint32_t from, std::uint32_t middle, std::uint32_t to) const {
-    const Reach reach(points_[from], points_[to], tolerance_);
-    if (reach.place(points_[middle]).beyond) return false;
+    const SegmentTolerance reach(points_[from], points_[to], tolerance_);
+    if (reach.position(points_[middle]).beyond) return false;
     const std::size_t end = to > from ? to : to + points_.size();
     for (std::size_t i = std::size_t{from} + 1; i < end; ++i) {
-      if (reach.place(at(i)).beyond) return false;
+      if (reach.position(at(i)).beyond) return false;
     }
     return true;
   }
@@ -195,9 +195,9 @@ void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch) {
   };
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     scratch.whole[c] = 0;
-    const bool stands =
+    const bool suffices =
         contours[c].size() > 3 && Ring(contours[c], scratch.kept.data() + contours.offset[c], tolerance, scratch).mark();
-    if (!stands) keep_whole(c);
+    if (!suffices) keep_whole(c);
   }
   // Contours that became whole again may meet others that did not.
   for (bool again = true; again;) {

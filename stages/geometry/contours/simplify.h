@@ -31,7 +31,7 @@ struct SimplifyScratch {
   Buffer<std::uint32_t> index;  // of a contour's points that stay: numbers, the next one and the one before
   Buffer<std::uint32_t> next, before;
   std::vector<std::pair<std::size_t, std::size_t>> open;
-  std::uint64_t looks = 0;  // at points while splitting, of all contours so far: the cost
+  std::uint64_t inspections = 0;  // at points while splitting, of all contours so far: the cost
   ContactScratch contact;
   Buffer<std::uint32_t> group;
 

@@ -143,7 +143,7 @@ inline Point3 middle(const Point3& p, const Point3& q) {
 /// Counts, and keeps the `places` with the smallest triangles, of one triangle the lowest edges.
 class Collector {
  public:
-  explicit Collector(std::size_t places) : places_(places) {}
+  explicit Collector(std::size_t positions) : positions_(positions) {}
 
   /// At an edge between two points, or at a point.
   void add(std::uint32_t triangle, const Point3& p, const Point3& q) {
@@ -168,12 +168,12 @@ class Collector {
     friend auto operator<=>(const Found&, const Found&) = default;
   };
   void keep(const Found& found) {
-    if (first_.size() == places_ && (places_ == 0 || first_.back() <= found)) return;
-    if (first_.size() == places_) first_.pop_back();
+    if (first_.size() == positions_ && (positions_ == 0 || first_.back() <= found)) return;
+    if (first_.size() == positions_) first_.pop_back();
     first_.insert(std::upper_bound(first_.begin(), first_.end(), found), found);
   }
 
-  std::size_t places_;
+  std::size_t positions_;
   std::uint64_t count_ = 0;
   std::vector<Found> first_;
 };
@@ -181,11 +181,11 @@ class Collector {
 /// Degenerate facets of a list that any number of threads show piece by piece.
 class DegenerateFacets {
  public:
-  explicit DegenerateFacets(std::size_t places) : places_(places), found_(places) {}
+  explicit DegenerateFacets(std::size_t positions) : positions_(positions), found_(positions) {}
 
   /// first  the number of the first of these facets
-  void look(std::uint32_t first, std::span<const Triangle> facets) {
-    Collector here(places_);
+  void inspection(std::uint32_t first, std::span<const Triangle> facets) {
+    Collector here(positions_);
     for (std::size_t i = 0; i < facets.size(); ++i)
       if (!has_area(facets[i])) here.add(first + static_cast<std::uint32_t>(i), facets[i].a, facets[i].a);
     if (here.count() == 0) return;
@@ -195,7 +195,7 @@ class DegenerateFacets {
   Diagnosis::Finding finding() const { return found_.finding(); }
 
  private:
-  std::size_t places_;
+  std::size_t positions_;
   Collector found_;
   std::mutex mutex_;
 };

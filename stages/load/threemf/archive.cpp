@@ -21,31 +21,31 @@ struct CloseEntry {
 
 struct SourceOfZip {
   const Source* source;
-  std::uint64_t* place;
+  std::uint64_t* position;
 };
 
 zip_int64_t read_source(const SourceOfZip& from, void* data, zip_uint64_t count) {
-  const std::uint64_t most = std::min<std::uint64_t>(count, from.source->size() - *from.place);
-  if (!from.source->read(*from.place, static_cast<char*>(data), static_cast<std::size_t>(most))) return -1;
-  *from.place += most;
-  return static_cast<zip_int64_t>(most);
+  const std::uint64_t maximum = std::min<std::uint64_t>(count, from.source->size() - *from.position);
+  if (!from.source->read(*from.position, static_cast<char*>(data), static_cast<std::size_t>(maximum))) return -1;
+  *from.position += maximum;
+  return static_cast<zip_int64_t>(maximum);
 }
 
 /// libzip reads from a Source, on disk or in memory, by these commands.
 zip_int64_t serve_zip(void* user, void* data, zip_uint64_t count, zip_source_cmd_t command) {
   const auto& from = *static_cast<SourceOfZip*>(user);
   switch (command) {
-    case ZIP_SOURCE_OPEN: *from.place = 0; return 0;
+    case ZIP_SOURCE_OPEN: *from.position = 0; return 0;
     case ZIP_SOURCE_CLOSE: return 0;
     case ZIP_SOURCE_READ: return read_source(from, data, count);
-    case ZIP_SOURCE_TELL: return static_cast<zip_int64_t>(*from.place);
+    case ZIP_SOURCE_TELL: return static_cast<zip_int64_t>(*from.position);
     case ZIP_SOURCE_SEEK: {
       zip_error_t error;
       zip_error_init(&error);
-      const zip_int64_t place = zip_source_seek_compute_offset(*from.place, from.source->size(), data, count, &error);
+      const zip_int64_t position = zip_source_seek_compute_offset(*from.position, from.source->size(), data, count, &error);
       zip_error_fini(&error);
-      if (place >= 0) *from.place = static_cast<std::uint64_t>(place);
-      return place < 0 ? -1 : 0;
+      if (position >= 0) *from.position = static_cast<std::uint64_t>(position);
+      return position < 0 ? -1 : 0;
     }
     case ZIP_SOURCE_STAT: {
       auto* const stat = static_cast<zip_stat_t*>(data);
@@ -75,10 +75,10 @@ void Archive::Discard::operator()(zip* archive) const { zip_discard(archive); }
 Result<Archive> Archive::open(const Source& source, const LoadOptions& options) {
   if (const Status loaded = load_zip(); !loaded) return loaded.error();
   Archive archive(source, options);
-  archive.place_ = std::make_unique<std::uint64_t>(0);
+  archive.position_ = std::make_unique<std::uint64_t>(0);
   zip_error_t why;
   zip_error_init(&why);
-  auto user = std::make_unique<SourceOfZip>(SourceOfZip{&source, archive.place_.get()});
+  auto user = std::make_unique<SourceOfZip>(SourceOfZip{&source, archive.position_.get()});
   zip_source_t* const from = zip_source_function_create(serve_zip, user.get(), &why);
   if (from != nullptr) {
     static_cast<void>(user.release());  // freed by ZIP_SOURCE_FREE
@@ -115,14 +115,14 @@ Status Archive::list() {
     if (const Status fits = check_sizes(entry.comp_size, entry.size, total); !fits) return fits;
     const std::string_view name = entry.name;
     if (name.ends_with('/') || name.ends_with('\\')) continue;
-    if (!entries_.emplace(part_name(name), Entry{static_cast<std::uint64_t>(i), entry.comp_size}).second)
+    if (!entries_.emplace(part_name(name), PackedFile{static_cast<std::uint64_t>(i), entry.comp_size}).second)
       return source_->error(fmt::format("holds two entries of the name {}; export it again", quoted(name)));
   }
   return {};
 }
 
 Status Archive::read(const std::string& name, const std::function<Status(std::string_view)>& take) {
-  const Entry& entry = entries_.at(name);
+  const PackedFile& entry = entries_.at(name);
   const auto damaged = [&](const char* why) {
     return source_->error(fmt::format("zip entry {} is damaged ({}); copy or export the file again", entry.index + 1, why));
   };

@@ -32,7 +32,7 @@ class Archive {
   Status read(const std::string& name, const std::function<Status(std::string_view)>& take);
 
  private:
-  struct Entry {
+  struct PackedFile {
     std::uint64_t index, packed;
   };
   struct Discard {
@@ -44,9 +44,9 @@ class Archive {
 
   const Source* source_;
   std::uint64_t limit_;
-  std::unique_ptr<std::uint64_t> place_;  // where libzip reads in the source
+  std::unique_ptr<std::uint64_t> position_;  // where libzip reads in the source
   std::unique_ptr<zip, Discard> archive_;
-  std::map<std::string, Entry> entries_;
+  std::map<std::string, PackedFile> entries_;
   std::uint64_t inflated_ = 0;
 };
 

@@ -95,7 +95,7 @@ struct Expansion {
   std::vector<Leaf> leaves;
   std::uint64_t supports = 0, others = 0, modifiers = 0;
   std::uint32_t item = 0;
-  std::vector<bool> told;  // of objects
+  std::vector<bool> reported;  // of objects
 
   Status add(const ObjectReference& reference, const Transform& transform, std::vector<Note>& notes) {
     const std::uint32_t index = reference.object;
@@ -110,14 +110,14 @@ struct Expansion {
       ++(object.type == ModelObject::Type::kSupport ? supports : others);
       return {};
     }
-    if (!told[index]) {
+    if (!reported[index]) {
       if (const Status fits = check_content(source, package, object); !fits) return fits;
       for (const Volume& volume : object.volumes) {
         if (volume.role == Role::kNegative)
           return negative(object, fmt::format("has {},", quoted(std::string_view(volume.name))));
       }
-      tell(object, notes);
-      told[index] = true;
+      report(object, notes);
+      reported[index] = true;
     }
     const double unit = package.files[object.file].unit_mm;
     if (!object.triangles.empty()) {
@@ -138,7 +138,7 @@ struct Expansion {
                     label(package, object), is));
   }
 
-  void tell(const ModelObject& object, std::vector<Note>& notes) const {
+  void report(const ModelObject& object, std::vector<Note>& notes) const {
     const auto count = std::count_if(object.volumes.begin(), object.volumes.end(),
                                      [](const Volume& volume) { return volume.role == Role::kModifier; });
     if (count > 0)
@@ -176,8 +176,8 @@ Status resolve_references(const Source& source, ModelPackage& package, std::uint
   }
   if (triangles > triangle_limit)
     return source.error(fmt::format("its components expand to more triangles than the limit of {}", triangle_limit));
-  if (objects > kMostObjects)
-    return source.error(fmt::format("its components expand to more than {} objects; export them as one", kMostObjects));
+  if (objects > kMaxObjects)
+    return source.error(fmt::format("its components expand to more than {} objects; export them as one", kMaxObjects));
   package.has_forward_references = refers_forward(package);
   return {};
 }

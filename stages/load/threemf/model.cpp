@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::string_view kWellKnown[] = {"Title",  "Designer",     "Description",      "Copyright",  "LicenseTerms",
                                            "Rating", "CreationDate", "ModificationDate", "Application"};
-constexpr std::size_t kMostRemembered = 4096, kLongest = 64;
+constexpr std::size_t kMaxRemembered = 4096, kLongest = 64;
 constexpr std::string_view kCura = "cura:";
 
 }  // namespace
@@ -38,7 +38,7 @@ std::string Metadata::begin(const XmlReader& reader, XmlAttributes attributes, M
     package.depart("metadata of a name that is neither of 3MF nor of a namespace (core 3.4.1)", name_);
   if (colon != name_.npos && !reader.attribute_name(name_).declared)
     package.depart("metadata whose name has a prefix that is not declared (core 3.4.1)", name_);
-  if (names_.size() < kMostRemembered && !names_.insert(name_).second)
+  if (names_.size() < kMaxRemembered && !names_.insert(name_).second)
     package.depart("metadata of one name twice (core 3.4.1)", name_);
   return {};
 }

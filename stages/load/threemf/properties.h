@@ -29,17 +29,17 @@ class Properties {
   Status check_references(std::uint64_t& line) const;
 
  private:
-  enum class Kind { kNone, kMaterials, kComposites, kColors, kTexture, kTextureGroup, kMulti };
+  enum class GroupKind { kNone, kMaterials, kComposites, kColors, kTexture, kTextureGroup, kMulti };
   struct Reference {
-    Kind from;
+    GroupKind from;
     std::vector<std::uint64_t> to;
     std::uint64_t line;
   };
-  static Kind kind_of(std::string_view element);
-  Kind kind_of(std::uint64_t id) const;
+  static GroupKind kind_of(std::string_view element);
+  GroupKind kind_of(std::uint64_t id) const;
   Status check(const Reference& reference) const;
 
-  std::map<std::uint64_t, Kind> kinds_;  // of resources by their ids
+  std::map<std::uint64_t, GroupKind> kinds_;  // of resources by their ids
   std::vector<Reference> references_;
 };
 

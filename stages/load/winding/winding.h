@@ -24,8 +24,8 @@ class WindingTree {
 
   /// The solid angle of all facets seen from a point, over that of a sphere: 1 within a closed outward surface, 0 outside,
   /// in between near openings. Within some hundredths. Safe from any thread.
-  /// looked_at  boxes and facets that it took are added to it, if given
-  double at(const Point& point, std::uint64_t* looked_at = nullptr) const;
+  /// inspected  boxes and facets that it took are added to it, if given
+  double at(const Point& point, std::uint64_t* inspected = nullptr) const;
 
  private:
   struct Node {

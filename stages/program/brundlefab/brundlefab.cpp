@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::write::brundlefab {
@@ -35,7 +35,7 @@ double bar_seconds(const Machine& machine, std::int64_t dots) { return static_ca
 /// Dots of the bar that a shot takes, a drop a dot of each nozzle: kShotDots in one run there and back, or more runs.
 constexpr std::int64_t kShotDots = kLastDot - kBrakeDots + 1;
 double shot_s(const Machine& machine) {
-  const std::int64_t drops = machine.care.spit_drops, runs = (drops + kShotDots - 1) / kShotDots;
+  const std::int64_t drops = machine.maintenance.spit_drops, runs = (drops + kShotDots - 1) / kShotDots;
   return 2 * bar_seconds(machine, drops + runs * 2 * kBrakeDots);
 }
 
@@ -78,9 +78,9 @@ class Writer final : public ProgramWriter {
       last = std::max<std::int64_t>(last, dot);
     });
     const double across = carriage_.across(sweep.first_line);
-    const CareClock::Place place{across, 0};                 // the bar's home
+    const MaintenanceClock::MachinePoint position{across, 0};                 // the bar's home
     const std::int64_t end = band_end(last) + kWorthWiping;  // a shot before it may have been longer
-    if (clock_.before_sweep(place, place, 2 * bar_seconds(machine_, end)).shot) {
+    if (clock_.before_sweep(position, position, 2 * bar_seconds(machine_, end)).shot) {
       const auto dots = dots_;
       shoot(out);
       dots_ = dots;
@@ -142,11 +142,11 @@ class Writer final : public ProgramWriter {
       const bool blocked = std::ranges::find(machine_.head.blocked, nozzle) != machine_.head.blocked.end();
       all = static_cast<std::uint16_t>(all | (blocked ? 0u : 1u << nozzle));
     }
-    for (std::int64_t left = machine_.care.spit_drops; left > 0; left -= kShotDots) {
+    for (std::int64_t left = machine_.maintenance.spit_drops; left > 0; left -= kShotDots) {
       const std::int64_t drops = std::min(left, kShotDots);
       dots_.fill(0);
       std::fill_n(dots_.begin() + kBrakeDots, drops, all);
-      put_band((*machine_.care.spit_mm)[0], kBrakeDots + drops - 1, out);
+      put_band((*machine_.maintenance.spit_mm)[0], kBrakeDots + drops - 1, out);
     }
   }
 
@@ -180,7 +180,7 @@ class Writer final : public ProgramWriter {
 
   const Machine& machine_;
   Carriage carriage_;
-  CareClock clock_;
+  MaintenanceClock clock_;
   std::array<std::uint16_t, kBarDots + kBrakeDots + 1> dots_{};
   std::int64_t longest_ = 0;  // the dots loaded since the bar was wiped
 };
@@ -198,31 +198,31 @@ std::string wrong_bins(const Machine& machine) {
 
 /// The bar runs along the whole bed, whatever Y: a shot has to be beside it in X, and begins at the bar's home.
 Status check_shots(const Machine& machine, const Carriage& carriage, const HeadGrid& grid) {
-  const auto& care = machine.care;
+  const auto& maintenance = machine.maintenance;
   const auto wrong = [&](std::string_view key, const std::string& what) {
     return Error{Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
   };
-  if (!care.spits()) return {};
-  const auto& [x, y] = *care.spit_mm;
-  if (y != 0) return wrong("care.spit_mm", "the ink bar runs from its home along Y; give 0 for y");
+  if (!maintenance.spits()) return {};
+  const auto& [x, y] = *maintenance.spit_mm;
+  if (y != 0) return wrong("maintenance.spit_mm", "the ink bar runs from its home along Y; give 0 for y");
   const double line = grid.line_nm / kNmPerMm, head = grid.swath_lines() * line;
   const double ends[] = {carriage.across(0), carriage.across(std::int64_t{grid.lines} - 1)};
   const double low = std::min(ends[0], ends[1]) - head, high = std::max(ends[0], ends[1]) + head;
   if (x > low && x < high) {
-    return wrong("care.spit_mm", fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x beside it, as 400, "
+    return wrong("maintenance.spit_mm", fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x beside it, as 400, "
                                              "over the waste bin",
                                              low, high));
   }
   if (x < kPenMm || x >= kPenMm + kLongestXMm) {
-    return wrong("care.spit_mm", fmt::format("the pen reaches x {:g} to {:g} mm", kPenMm, kPenMm + kLongestXMm));
+    return wrong("maintenance.spit_mm", fmt::format("the pen reaches x {:g} to {:g} mm", kPenMm, kPenMm + kLongestXMm));
   }
-  if (care.spit_seconds == 0) return {};
+  if (maintenance.spit_seconds == 0) return {};
   const double way = std::max(std::abs(x - low), std::abs(x - high));
   const double needed =
       move_seconds(machine, way, machine.motion.travel_speed_mm_s) + 2 * bar_seconds(machine, kBarDots + kBrakeDots);
-  if (needed < kOfCareLimit * care.spit_seconds) return {};
-  return wrong("care.spit_seconds", fmt::format("{:g} s, and a band ends up to {:.2f} s later; give more, or move faster",
-                                                care.spit_seconds, needed));
+  if (needed < kShareOfLimit * maintenance.spit_seconds) return {};
+  return wrong("maintenance.spit_seconds", fmt::format("{:g} s, and a band ends up to {:.2f} s later; give more, or move faster",
+                                                maintenance.spit_seconds, needed));
 }
 
 }  // namespace
@@ -242,10 +242,10 @@ Status check(const Machine& machine, const HeadGrid& grid) {
     return wrong("motion, powder",
                  "a BrundleFab has the axes X (bands, recoater), Y (ink bar), +Z (part bin) and +E (feed bin)");
   }
-  if (const double most = std::max({machine.motion.travel_speed_mm_s, powder.roller_speed_mm_s, powder.vat_speed_mm_s});
-      most * 60 > kLongestNumber) {
+  if (const double maximum = std::max({machine.motion.travel_speed_mm_s, powder.roller_speed_mm_s, powder.vat_speed_mm_s});
+      maximum * 60 > kLongestNumber) {
     return wrong("motion.travel_speed_mm_s",
-                 fmt::format("F{:.0f} is more than the 16 bits of the firmware's numbers", most * 60));
+                 fmt::format("F{:.0f} is more than the 16 bits of the firmware's numbers", maximum * 60));
   }
   if (const std::string bins = wrong_bins(machine); !bins.empty()) return wrong("bed.build_height_mm, powder.dose", bins);
   if (powder.vats != 1) return wrong("powder.vats", "a BrundleFab has one feed bin");

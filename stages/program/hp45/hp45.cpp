@@ -6,16 +6,16 @@
 #include <cmath>
 #include <string>
 
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 
 namespace lamina::write::hp45 {
 namespace {
 
-constexpr CareWords kCare{"G1", Head::spit, Head::kWait, "", "", 1};
+constexpr MaintenanceWords kMaintenance{"G1", Head::spit, Head::kWait, "", "", 1};
 
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), care_(machine, kCare) {}
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t, ProgramBytes& out) override {
     put(out, "G21\nG90\n");
@@ -24,10 +24,10 @@ class Writer final : public ProgramWriter {
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     head_.settings(out);
     put_powder_cycle(machine_, cycle, out);
-    care_.begin_layer(cycle, out);
+    maintenance_.begin_layer(cycle, out);
   }
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    head_.sweep(sweep, vectors, care_, out);
+    head_.sweep(sweep, vectors, maintenance_, out);
   }
   void end_layer(const LayerCycle&, ProgramBytes& out) override {
     put(out, "G1 {}{} {}{} F{}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]), machine_.motion.y_axis,
@@ -40,7 +40,7 @@ class Writer final : public ProgramWriter {
  private:
   const Machine& machine_;
   Head head_;
-  Care care_;
+  Care maintenance_;
 };
 
 }  // namespace
@@ -58,9 +58,9 @@ constexpr std::uint32_t kNozzles = 300;     // of the cartridge
 constexpr double kHalfRowGapUm = 2025;      // from the centre to either row (Position.ino: ROW_GAP)
 constexpr std::uint32_t kSpeedCounts = 50;  // of the encoder that one measure of speed takes; the first after rest is wrong
 // Position.ino forgets the speed 100 ms after its last measure, of 50 counts: nothing fires below 500 counts a second.
-constexpr double kLeastCountsPerSecond = 600;
-constexpr std::int64_t kMostProduct = 2'000'000'000;  // of micrometres and counts an inch in 32 bits
-constexpr std::uint32_t kMostPrimed = 25'000;         // HP45_Standalone_V4.ino cuts the bursts of PRM there
+constexpr double kMinCountsPerSecond = 600;
+constexpr std::int64_t kMaxProduct = 2'000'000'000;  // of micrometres and counts an inch in 32 bits
+constexpr std::uint32_t kMaxPrimed = 25'000;         // HP45_Standalone_V4.ino cuts the bursts of PRM there
 constexpr std::uint32_t kLines = 3950;                // the host stops at 50 free lines of 4000
 
 // Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one. Drops of the first
@@ -149,12 +149,12 @@ Status check(const Machine& machine, const HeadGrid& grid) {
                     pixel_um));
   }
   const double speed = machine.motion.scan_speed_mm_s,
-               least = kLeastCountsPerSecond * kUmPerInch / 1000 / encoder_counts(machine, pixel_um);
-  if (speed < least || !whole(speed)) {
+               minimum = kMinCountsPerSecond * kUmPerInch / 1000 / encoder_counts(machine, pixel_um);
+  if (speed < minimum || !whole(speed)) {
     return wrong("motion.scan_speed_mm_s",
                  fmt::format("{:g} mm/s; the HP45 controller takes speeds in whole mm/s and forgets those below {:.0f} with "
                              "this encoder, where nothing fires; give {:.0f} or a higher whole number",
-                             speed, std::ceil(least), std::ceil(std::max(speed, least))));
+                             speed, std::ceil(minimum), std::ceil(std::max(speed, minimum))));
   }
   return {};
 }
@@ -186,15 +186,15 @@ void Head::line(double encoder_um, const std::uint64_t* words, std::uint32_t cou
 }
 
 void Head::spit(const Machine& machine, ProgramBytes& out) {
-  for (std::uint32_t left = machine.care.spit_drops; left > 0; left -= std::min(left, kMostPrimed)) {
-    put(out, "PRM {}\n", number(std::min(left, kMostPrimed)));
+  for (std::uint32_t left = machine.maintenance.spit_drops; left > 0; left -= std::min(left, kMaxPrimed)) {
+    put(out, "PRM {}\n", number(std::min(left, kMaxPrimed)));
   }
   put(out, "BCL\n");  // answered when the last burst is fired, as PRM is not
 }
 
-void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& care, ProgramBytes& out) const {
+void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& maintenance, ProgramBytes& out) const {
   const double step_um = grid_.step_nm() / 1000, count_um = kUmPerInch / counts_;
-  const double ahead = sweep.backward == grid_.places_from_end ? 1 : -1;  // of the carriage
+  const double ahead = sweep.backward == grid_.positions_from_end ? 1 : -1;  // of the carriage
   const std::uint32_t last = vectors.first_step + vectors.steps - 1;
   const auto before = [&](std::uint32_t step) { return carriage_.along(step) * 1000 - ahead * step_um / 2; };
   const auto after = [&](std::uint32_t step) { return before(step) + ahead * step_um; };
@@ -207,10 +207,10 @@ void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& care, Pr
   const double end =
       after(sweep.backward ? vectors.first_step : last) + ahead * (std::max(ramp_um, 2 * count_um) + kHalfRowGapUm);
   auto zero = static_cast<std::int64_t>(std::llround(start / count_um));
-  if (zero < 0 || um_of_counts(zero, counts_) > kMostProduct / counts_) zero = 0;  // any count does that all lines start from
+  if (zero < 0 || um_of_counts(zero, counts_) > kMaxProduct / counts_) zero = 0;  // any count does that all lines start from
   const auto encoder = [&](double um) { return static_cast<double>(zero) * count_um + um - start; };
 
-  care.before_sweep(carriage_.place(start / 1000, sweep.first_line), carriage_.place(end / 1000, sweep.first_line), out);
+  maintenance.before_sweep(carriage_.position(start / 1000, sweep.first_line), carriage_.position(end / 1000, sweep.first_line), out);
   put(out, "G1 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(start / 1000), carriage_.line_axis(),
       mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
   wait(out);

@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::write::m578 {
@@ -26,14 +26,14 @@ std::uint32_t working_nozzles(const Machine& machine) {
 
 void put_spit(const Machine& machine, ProgramBytes& out) {
   const std::uint32_t all = working_nozzles(machine);
-  for (std::uint32_t drop = 0; drop < machine.care.spit_drops; ++drop) put(out, "M578 S{}\n", all);
+  for (std::uint32_t drop = 0; drop < machine.maintenance.spit_drops; ++drop) put(out, "M578 S{}\n", all);
 }
 
-constexpr CareWords kCare{"G0", put_spit, "", "; fill the vats, then go on\nM226\n", "G4 P", 1e-3, shot_s};
+constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "; fill the vats, then go on\nM226\n", "G4 P", 1e-3, shot_s};
 
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid), care_(machine, kCare) {}
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put(out, "; print program of {}, {} layers, for RepRapFirmware 1.09r to 3.4 built with SUPPORT_INKJET\nG21\nG90\n",
@@ -42,15 +42,15 @@ class Writer final : public ProgramWriter {
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     put(out, "; layer {} of {}\n", cycle.layer, cycle.layers);
-    care_.refill(cycle, out);
+    maintenance_.refill(cycle, out);
     put_powder_cycle(machine_, cycle, out);
-    care_.begin_layer(cycle, out);
+    maintenance_.begin_layer(cycle, out);
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    if (machine_.care.spit_seconds > 0 || machine_.care.wipe_seconds > 0) {
-      care_.before_sweep(carriage_.place(carriage_.begin(sweep, vectors), sweep.first_line),
-                         carriage_.place(carriage_.end(sweep, vectors), sweep.first_line), sweep_s(sweep, vectors), out);
+    if (machine_.maintenance.spit_seconds > 0 || machine_.maintenance.wipe_seconds > 0) {
+      maintenance_.before_sweep(carriage_.position(carriage_.begin(sweep, vectors), sweep.first_line),
+                         carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), sweep_s(sweep, vectors), out);
     }
     put(out, "; swath {} of {}\nG0 {}{} {}{} F{}\n", sweep.number, sweep.of, carriage_.scan_axis(),
         mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(), mm_text(carriage_.across(sweep.first_line)),
@@ -64,7 +64,7 @@ class Writer final : public ProgramWriter {
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    care_.dry(out);
+    maintenance_.dry(out);
     put(out, "G0 {}{} {}{} F{}\nM400\n; end of layer {}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
         machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s), cycle.layer);
   }
@@ -85,7 +85,7 @@ class Writer final : public ProgramWriter {
 
   const Machine& machine_;
   Carriage carriage_;
-  Care care_;
+  Care maintenance_;
 };
 
 }  // namespace
@@ -95,7 +95,7 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
 }
 
 double shot_s(const Machine& machine) {
-  return machine.care.spit_drops * std::popcount(working_nozzles(machine)) * kSecondsOfNozzle;
+  return machine.maintenance.spit_drops * std::popcount(working_nozzles(machine)) * kSecondsOfNozzle;
 }
 
 double longest_sweep_s(const Machine& machine, const HeadGrid& grid) {

@@ -10,7 +10,7 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
 /// errors  kUsage: a version of the firmware that has no M578
 Status check(const Machine& machine, const HeadGrid& grid);
 
-/// CareRules: shots of one nozzle after the other, and a sweep that stops at each step and fires all.
+/// MaintenanceRules: shots of one nozzle after the other, and a sweep that stops at each step and fires all.
 double shot_s(const Machine& machine);
 double longest_sweep_s(const Machine& machine, const HeadGrid& grid);
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <charconv>
 
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::write::nuferbj {
@@ -21,32 +21,32 @@ constexpr auto kDigits = [] {
   return digits;
 }();
 
-void put_spit(const Machine& machine, ProgramBytes& out) { put(out, "M816 N{}\n", machine.care.spit_drops); }
+void put_spit(const Machine& machine, ProgramBytes& out) { put(out, "M816 N{}\n", machine.maintenance.spit_drops); }
 
-constexpr CareWords kCare{"G0", put_spit, "", "M815\n", "G4 P", 1e-3};
+constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "M815\n", "G4 P", 1e-3};
 
 class Writer final : public ProgramWriter {
  public:
   Writer(const Machine& machine, const HeadGrid& grid)
-      : machine_(machine), grid_(grid), carriage_(machine, grid), care_(machine, kCare) {}
+      : machine_(machine), grid_(grid), carriage_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put(out, "; print program of {}, dialect nuferbj 1\n", machine_.name);
-    put(out, "G21\nG90\nM810 L{} N{} W{} K{} Q{:.3f}\n", layers, grid_.nozzles, grid_.places, grid_.steps_per_pixel,
+    put(out, "G21\nG90\nM810 L{} N{} W{} K{} Q{:.3f}\n", layers, grid_.nozzles, grid_.positions, grid_.steps_per_pixel,
         grid_.step_nm());
     put_base_zero(machine_, out);
   }
 
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     put(out, "M811 L{} T{} H{}\n", cycle.layer, cycle.layers, mm_text(static_cast<double>(cycle.thickness_nm) / kNmPerMm));
-    care_.refill(cycle, out);
+    maintenance_.refill(cycle, out);
     put_powder_cycle(machine_, cycle, out);
-    care_.begin_layer(cycle, out);
+    maintenance_.begin_layer(cycle, out);
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    care_.before_sweep(carriage_.place(carriage_.begin(sweep, vectors), sweep.first_line),
-                       carriage_.place(carriage_.end(sweep, vectors), sweep.first_line), out);
+    maintenance_.before_sweep(carriage_.position(carriage_.begin(sweep, vectors), sweep.first_line),
+                       carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), out);
     put(out, "M812 S{} T{} D{}\n", sweep.number, sweep.of, sweep.backward ? 1 : 0);
     put(out, "G0 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(),
         mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
@@ -73,7 +73,7 @@ class Writer final : public ProgramWriter {
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    care_.dry(out);
+    maintenance_.dry(out);
     put(out, "G0 {}{} {}{} F{}\nM813 L{}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
         machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s), cycle.layer);
   }
@@ -105,7 +105,7 @@ class Writer final : public ProgramWriter {
   const Machine& machine_;
   const HeadGrid& grid_;
   Carriage carriage_;
-  Care care_;
+  Care maintenance_;
 };
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 #include "stages/program/hp45/hp45.h"
 #include "stages/program/program_text.h"
 
@@ -14,11 +14,11 @@ constexpr double kHysteresisMm = 1, kClearanceMm = 0.25;
 // Where homing leaves the gantry.
 constexpr double kHomeMm[] = {5, 245};
 
-constexpr CareWords kCare{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then go on\nM0\n", "G4 P", 1};
+constexpr MaintenanceWords kMaintenance{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then go on\nM0\n", "G4 P", 1};
 
-class Writer final : public ProgramWriter {
+class OasisWriter final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), care_(machine, kCare) {}
+  OasisWriter(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t, ProgramBytes& out) override {
     const auto& motion = machine_.motion;
@@ -29,10 +29,10 @@ class Writer final : public ProgramWriter {
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override;
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    head_.sweep(sweep, vectors, care_, out);
+    head_.sweep(sweep, vectors, maintenance_, out);
   }
   void end_layer(const LayerCycle&, ProgramBytes& out) override {
-    care_.dry(out);
+    maintenance_.dry(out);
     go(machine_.motion.safe_mm[0], machine_.motion.safe_mm[1], out);
     hp45::Head::wait(out);
     put(out, "BRL\n");
@@ -59,12 +59,12 @@ class Writer final : public ProgramWriter {
 
   const Machine& machine_;
   hp45::Head head_;
-  Care care_;
+  MaintenanceWriter maintenance_;
 };
 
-void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
+void OasisWriter::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
   head_.settings(out);
-  care_.refill(cycle, out);
+  maintenance_.refill(cycle, out);
   bool again = false;
   for_each_spread(machine_, cycle, [&](std::int64_t bottom_nm, std::int64_t thickness_nm) {
     if (again) go(machine_.motion.safe_mm[0], machine_.motion.safe_mm[1], out);  // where spreading begins
@@ -72,12 +72,12 @@ void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
     spread(bottom_nm, thickness_nm, out);
   });
   hp45::Head::wait(out);
-  care_.begin_layer(cycle, out);
+  maintenance_.begin_layer(cycle, out);
 }
 
 // SerialGRBL.py, NewLayer, from the back, where each layer ends: pistons to their places, the spreader to the front, pistons
 // down clear. The build piston's places are absolute here, so that a layer does not depend on those before it.
-void Writer::spread(std::int64_t bottom_nm, std::int64_t thickness_nm, ProgramBytes& out) const {
+void OasisWriter::spread(std::int64_t bottom_nm, std::int64_t thickness_nm, ProgramBytes& out) const {
   const auto& powder = machine_.powder;
   const double bottom = mm(bottom_nm), top = mm(bottom_nm + thickness_nm);
   build_to(bottom + kHysteresisMm, out);
@@ -117,7 +117,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
 }
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
-  return std::make_unique<Writer>(machine, grid);
+  return std::make_unique<OasisWriter>(machine, grid);
 }
 
 }  // namespace lamina::write::oasis

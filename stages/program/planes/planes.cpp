@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "stages/program/binary_program.h"
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 
 namespace lamina::write::planes {
 namespace {
@@ -11,10 +11,10 @@ namespace {
 constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kStart = 0x4C04, kDone = 0x4C05, kGrey = 0x4C06;
 constexpr std::size_t kPlaneHead = 36, kGreyHead = 40;
 
-constexpr std::uint32_t kCare = 0x4C10;  // and the number of the record
+constexpr std::uint32_t kMaintenance = 0x4C10;  // and the number of the record
 
-void put_care(CareRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out) {
-  put_little<std::uint32_t>(out, kCare + static_cast<std::uint32_t>(kind));
+void put_maintenance(MaintenanceRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out) {
+  put_little<std::uint32_t>(out, kMaintenance + static_cast<std::uint32_t>(kind));
   put_little<std::uint32_t>(out, static_cast<std::uint32_t>(numbers.size()));
   for (const std::uint32_t number : numbers) put_little<std::uint32_t>(out, number);
 }
@@ -22,11 +22,11 @@ void put_care(CareRecord kind, std::span<const std::uint32_t> numbers, ProgramBy
 class Writer final : public ProgramWriter {
  public:
   Writer(const Machine& machine, const HeadGrid& grid)
-      : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32), care_(machine, grid, put_care) {}
+      : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32), maintenance_(machine, grid, put_maintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     const bool grey = grid_.drop_bits > 1;
-    for (const std::uint32_t value : {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.places, grid_.lines,
+    for (const std::uint32_t value : {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.positions, grid_.lines,
                                       grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
@@ -71,17 +71,17 @@ class Writer final : public ProgramWriter {
     for (const std::uint32_t value : {kDone, 0u}) put_little<std::uint32_t>(out, value);
   }
 
-  void care_of_layer(const LayerCycle& cycle, ProgramBytes& out) override { care_.begin_layer(cycle, out); }
-  void care_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    care_.before_sweep(sweep, vectors, out);
+  void maintenance_of_layer(const LayerCycle& cycle, ProgramBytes& out) override { maintenance_.begin_layer(cycle, out); }
+  void maintenance_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
+    maintenance_.before_sweep(sweep, vectors, out);
   }
-  void care_behind(ProgramBytes& out) override { care_.dry(out); }
+  void maintenance_after(ProgramBytes& out) override { maintenance_.dry(out); }
 
  private:
   const Machine& machine_;
   const HeadGrid& grid_;
   std::uint32_t words_;  // of 32 bits a vector
-  CareRecords care_;
+  MaintenanceRecords maintenance_;
 };
 
 }  // namespace

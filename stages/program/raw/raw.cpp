@@ -3,14 +3,14 @@
 #include <algorithm>
 
 #include "stages/program/binary_program.h"
-#include "stages/program/care/care.h"
+#include "stages/program/care/maintenance.h"
 
 namespace lamina::write::raw {
 namespace {
 
 constexpr std::size_t kSegmentHead = 8;
 
-void put_care(CareRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out) {
+void put_maintenance(MaintenanceRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out) {
   constexpr char kTags[][5] = {"GOTO", "FILL", "BASE", "ROLL", "WIPE", "SPIT", "DRYS", "LINE"};
   put_tag(out, kTags[static_cast<std::size_t>(kind)]);
   put_little<std::uint32_t>(out, static_cast<std::uint32_t>(numbers.size()));
@@ -20,13 +20,13 @@ void put_care(CareRecord kind, std::span<const std::uint32_t> numbers, ProgramBy
 class Writer final : public ProgramWriter {
  public:
   Writer(const Machine& machine, const HeadGrid& grid)
-      : machine_(machine), grid_(grid), words_((grid.nozzles + 127) / 128), care_(machine, grid, put_care) {}
+      : machine_(machine), grid_(grid), words_((grid.nozzles + 127) / 128), maintenance_(machine, grid, put_maintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put_tag(out, "LRAW");
     const bool grey = grid_.drop_bits > 1;
     for (const std::uint32_t value :
-         {grey ? 2u : 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
+         {grey ? 2u : 1u, layers, grid_.nozzles, grid_.positions, grid_.lines, grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
     if (grey) put_little<std::uint32_t>(out, grid_.drop_bits);
@@ -65,17 +65,17 @@ class Writer final : public ProgramWriter {
   }
   void end(ProgramBytes& out) override { put_tag(out, "DONE"); }
 
-  void care_of_layer(const LayerCycle& cycle, ProgramBytes& out) override { care_.begin_layer(cycle, out); }
-  void care_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    care_.before_sweep(sweep, vectors, out);
+  void maintenance_of_layer(const LayerCycle& cycle, ProgramBytes& out) override { maintenance_.begin_layer(cycle, out); }
+  void maintenance_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
+    maintenance_.before_sweep(sweep, vectors, out);
   }
-  void care_behind(ProgramBytes& out) override { care_.dry(out); }
+  void maintenance_after(ProgramBytes& out) override { maintenance_.dry(out); }
 
  private:
   const Machine& machine_;
   const HeadGrid& grid_;
   std::uint32_t words_;  // of 128 bits a vector of one bit of the drops
-  CareRecords care_;
+  MaintenanceRecords maintenance_;
 };
 
 }  // namespace

@@ -3,7 +3,7 @@
 namespace lamina::replay::brundle {
 namespace {
 
-constexpr int kMostInteger = 32'767;       // int of an ATmega2560
+constexpr int kMaxInteger = 32'767;       // int of an ATmega2560
 constexpr std::size_t kLongestLine = 254;  // GCODE_LINE_MAX, without its end
 constexpr std::size_t kLongestText = 255;  // PATH_MAX, without its end
 
@@ -58,7 +58,7 @@ class LineParser {
   void take_digit(int digit) {
     int& number = mode_ == Mode::kFraction ? fraction_ : whole_;
     if (mode_ == Mode::kNone) return;
-    if (number > (kMostInteger - digit) / 10 || (mode_ == Mode::kFraction && base_ > kMostInteger / 10)) {
+    if (number > (kMaxInteger - digit) / 10 || (mode_ == Mode::kFraction && base_ > kMaxInteger / 10)) {
       overflows_ = true;
       return;
     }

@@ -27,10 +27,10 @@ constexpr double kPenMm = 195;  // fab/brundle.py, X_OFFSET_PEN: where the pen i
 constexpr double kBladeMm = 0;  // X_OFFSET_BLADE: where the recoater is
 // Axis_DCEncoder spreads 5250 ticks of 600 dpi and the 10 before home over 222.25 mm (_mm_to_position): its dots are longer.
 constexpr double kLongerDots = 5260.0 / 5250 - 1;
-constexpr double kMostXMm = 650;                   // X_MM_MAX
-constexpr double kMostMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
+constexpr double kMaxXMm = 650;                   // X_MM_MAX
+constexpr double kMaxMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
 constexpr std::array kTools = {0, 1, 20, 21, 22};  // BrundleFab.ino, setup()
-constexpr std::array kPlaceMm = {kPenMm, kPenMm, 45.0, kBladeMm, 95.0};  // of each tool on the carriage
+constexpr std::array kPositionMm = {kPenMm, kPenMm, 45.0, kBladeMm, 95.0};  // of each tool on the carriage
 constexpr double kBinMm = 140, kLiftedMm = 2;  // Z_MM_MAX, E_MM_MAX; the feed bin before the first layer
 constexpr int kInk = 1, kRecoater = 21;
 enum Axis : std::size_t { kX, kY, kZ, kE };
@@ -89,19 +89,19 @@ class Firmware {
     if (!block.text.starts_with(want) || (block.text.size() > want.size() && block.text[want.size()] != ' ')) {
       return fault("M117 is not of this layer");
     }
-    if (!begun_) tell_layers(std::string_view(block.text).substr(want.size()));
+    if (!begun_) read_layers(std::string_view(block.text).substr(want.size()));
     ended_ = begun_;
     begun_ = true;
   }
 
   /// " of 9"
-  void tell_layers(std::string_view text) {
+  void read_layers(std::string_view text) {
     constexpr std::string_view kOf = " of ";
     std::uint32_t layers = 0;
     if (text.starts_with(kOf)) text.remove_prefix(kOf.size());
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), layers);
     if (error != std::errc() || end != text.data() + text.size()) return fault("M117 does not tell how many layers there are");
-    printing_.tells_layers(layers);
+    printing_.state_layers(layers);
   }
 
   // GCode::_block_do, 'T': stop, select, parameters, start.
@@ -142,13 +142,13 @@ class Firmware {
       case 20:
       case 21:
         unit_mm_ = block.command == 20 ? 25.4f : 1.0f;
-        unit_told_ = true;
+        unit_stated_ = true;
         return;
       case 28: return home(block);
       case 90:
       case 91:
         relative_ = block.command == 91;
-        mode_told_ = true;
+        mode_stated_ = true;
         return;
       default: unknown(block);
     }
@@ -165,11 +165,11 @@ class Firmware {
     const auto row = static_cast<std::size_t>(found - kTools.begin());
     if (block.has('X')) {
       offset_mm_[row] = block['X'];
-      place_told_[row] = true;
+      position_reported_[row] = true;
     }
-    if (std::abs(offset_mm_[row] - kPlaceMm[row]) > 1e-3) {
+    if (std::abs(offset_mm_[row] - kPositionMm[row]) > 1e-3) {
       return fault(fmt::format("sets tool {} at {:g} mm of the carriage, where {:g} is its place", tool, offset_mm_[row],
-                               kPlaceMm[row]));
+                               kPositionMm[row]));
     }
     parameters(block, tool);
   }
@@ -202,18 +202,18 @@ class Firmware {
   void bins(double feed, double part, double seconds) {
     moved_ = true;
     const double longest = std::max(std::abs(feed), std::abs(part));
-    const double time = std::max(seconds, longest / kMostMmPerMinute * 60);
+    const double time = std::max(seconds, longest / kMaxMmPerMinute * 60);
     if (feed != 0) printing_.feeds(0, feed, std::abs(feed) / time);
     if (feed == 0) printing_.takes(time);
     moved_mm_[kE] += feed;
     moved_mm_[kZ] += part;
-    const double top = printing_.standing().build_mm, below = top + printing_.profile().powder.base_mm();
-    bin_stands_at("feed", kLiftedMm + printing_.profile().powder.dose * below + moved_mm_[kE]);
-    bin_stands_at("part", below + moved_mm_[kZ]);
-    printing_.build_vat_stands_at(top + moved_mm_[kZ]);  // whatever is below the first layer counts below 0
+    const double top = printing_.axis_positions().build_mm, below = top + printing_.profile().powder.base_mm();
+    bin_is_at("feed", kLiftedMm + printing_.profile().powder.dose * below + moved_mm_[kE]);
+    bin_is_at("part", below + moved_mm_[kZ]);
+    printing_.build_vat_is_at(top + moved_mm_[kZ]);  // whatever is below the first layer counts below 0
   }
   /// Axis_Stepper::update cuts what is beyond.
-  void bin_stands_at(std::string_view name, double mm) {
+  void bin_is_at(std::string_view name, double mm) {
     if (mm > -1e-3 && mm < kBinMm + 1e-3) return;
     fault(fmt::format("moves the {} bin to {:g} mm, and the firmware stops it at 0 and {:g}", name, mm, kBinMm));
   }
@@ -222,25 +222,25 @@ class Firmware {
   void go(double seconds) {
     const auto tool = static_cast<std::size_t>(std::ranges::find(kTools, tool_) - kTools.begin());
     const double from = axis_x_;
-    if (!unit_told_ || !mode_told_ || !place_told_[tool]) {
+    if (!unit_stated_ || !mode_stated_ || !position_reported_[tool]) {
       return fault(fmt::format("moves before {}: the firmware keeps what another print has set",
-                               !unit_told_   ? "G21 tells the unit"
-                               : !mode_told_ ? "G90 tells that places are absolute"
+                               !unit_stated_   ? "G21 tells the unit"
+                               : !mode_stated_ ? "G90 tells that places are absolute"
                                              : fmt::format("G10 tells where tool {} is", tool_)));
     }
-    axis_x_ = std::clamp<double>(position_[kX] - offset_mm_[tool], 0, kMostXMm);
+    axis_x_ = std::clamp<double>(position_[kX] - offset_mm_[tool], 0, kMaxXMm);
     const double way = axis_x_ - from;
     carry_out(bar_.move(position_[kY]), std::abs(way) > 1e-4);
-    if (way != 0) carriage(way, std::max(seconds, std::abs(way) / kMostMmPerMinute * 60));
-    if (position_[kY] > 0 && !bar_told_) read_ahead();
-    bar_told_ = position_[kY] > 0;
+    if (way != 0) carriage(way, std::max(seconds, std::abs(way) / kMaxMmPerMinute * 60));
+    if (position_[kY] > 0 && !bar_stated_) read_ahead();
+    bar_stated_ = position_[kY] > 0;
   }
 
   void carriage(double way, double seconds) {
     moved_ = true;
-    printing_.leaves_place();
+    printing_.leaves_position();
     printing_.head_moves(std::abs(way), std::abs(way) / seconds, false);
-    if (tool_ == kRecoater) printing_.roller_stands_at(axis_x_ + kBladeMm);
+    if (tool_ == kRecoater) printing_.roller_is_at(axis_x_ + kBladeMm);
     if (way > 0 && tool_ == kRecoater) spread_mm_ = moved_mm_;
     if (way < 0 && moved_mm_[kZ] < spread_mm_[kZ] + 1e-3)
       fault("the carriage goes back over powder that does not give way to it");
@@ -272,8 +272,8 @@ class Firmware {
 
   /// Whether the pen is where the head is fired off the bed.
   bool off_bed() const {
-    const auto& care = printing_.profile().care;
-    return care.spits() && care.spit_mm && std::abs(axis_x_ + kPenMm - (*care.spit_mm)[0]) < 1e-3;
+    const auto& maintenance = printing_.profile().maintenance;
+    return maintenance.spits() && maintenance.spit_mm && std::abs(axis_x_ + kPenMm - (*maintenance.spit_mm)[0]) < 1e-3;
   }
 
   // A dot is a drop of each nozzle that works, half of it on the way there. It may be inked nowhere over the bed.
@@ -288,7 +288,7 @@ class Firmware {
         if ((bar_.dot(dot) >> nozzle & 1) == (blocked ? 0u : 1u)) continue;
         return fault(fmt::format("a shot off the bed {} nozzle {}", blocked ? "fires blocked" : "leaves out", nozzle));
       }
-      printing_.beside_bed(axis_x_ + kPenMm, (dot + 0.5) * kDotMm);
+      printing_.outside_bed(axis_x_ + kPenMm, (dot + 0.5) * kDotMm);
       ++drops;
     }
     inked_[pass.forward ? 0 : 1] += drops;
@@ -333,15 +333,15 @@ class Firmware {
   double feed_mm_min_ = 3000;        // GCode::begin
   std::array<float, 4> position_{};  // CNC::_pos: X of the tool
   std::array<double, kTools.size()> offset_mm_{};
-  std::array<bool, kTools.size()> place_told_{};
-  bool unit_told_ = false, mode_told_ = false;
+  std::array<bool, kTools.size()> position_reported_{};
+  bool unit_stated_ = false, mode_stated_ = false;
   int tool_ = kRecoater;                  // the layer before ends with it
   double axis_x_ = 0, inked_x_ = -1;      // of the carriage
   std::array<double, 4> moved_mm_{};      // of the bins since the layer began
   std::array<double, 4> spread_mm_{};     // the same when powder was spread
   std::array<std::uint64_t, 2> inked_{};  // drops, on the way there and back
   std::uint32_t sweep_ = 0;
-  bool begun_ = false, ended_ = false, moved_ = false, bar_told_ = false;
+  bool begun_ = false, ended_ = false, moved_ = false, bar_stated_ = false;
 };
 
 }  // namespace

@@ -38,8 +38,8 @@ bool base64(std::string_view text) {
 }
 
 void put(Burst& burst, std::uint32_t nozzle) {
-  const std::uint32_t place = kCartridgeNozzles - 1 - nozzle;
-  burst[place / 64] |= std::uint64_t{1} << (63 - place % 64);
+  const std::uint32_t location = kCartridgeNozzles - 1 - nozzle;
+  burst[location / 64] |= std::uint64_t{1} << (63 - location % 64);
 }
 
 // Buffer.cpp: the overlays. Nozzles of odd primitives are the odd ones (NewNozzleTable.ino), side 0 of the buffer. Place 0 of
@@ -78,7 +78,7 @@ Status Controller::execute(std::string_view command, std::string_view rest) {
   std::int32_t value = 0;
   for (const char c : small) value = value * 64 + digit_of(c);
   if (negative) value = -value;
-  tell(command);
+  report(command);
   if (command == "SBR") return add(value, raw);
   if (command == "BCL") {  // BufferClear
     if (unread() > 0) return wrong(fmt::format("{} lines that the head has not come to are cleared", unread()));
@@ -96,13 +96,13 @@ Status Controller::execute(std::string_view command, std::string_view rest) {
   return set(command, value);
 }
 
-void Controller::tell(std::string_view command) {
+void Controller::report(std::string_view command) {
   const auto setting = std::ranges::find(kSettings, command == "SDPI" ? "SDP" : command);
-  if (setting != std::end(kSettings)) told_ |= 1u << (setting - std::begin(kSettings));
+  if (setting != std::end(kSettings)) reports_ |= 1u << (setting - std::begin(kSettings));
 }
 
 std::string_view Controller::unset() const {
-  const auto first = static_cast<std::size_t>(std::countr_one(told_));
+  const auto first = static_cast<std::size_t>(std::countr_one(reports_));
   return first < std::size(kSettings) ? kSettings[first] : std::string_view();
 }
 
@@ -231,8 +231,8 @@ bool Controller::update_side(std::uint32_t s) {
       first_[s] = false;
     }
     required_[s] = ahead - target_[s] >= 0 ? 1 : -1;
-    least_[s] = std::min(ahead, target_[s]);
-    most_[s] = std::max(ahead, target_[s]);
+    min_[s] = std::min(ahead, target_[s]);
+    max_[s] = std::max(ahead, target_[s]);
     target_[s] = ahead;
     next_state_[s] = false;
     changed = true;
@@ -245,7 +245,7 @@ bool Controller::update_side(std::uint32_t s) {
 void Controller::update_burst() {
   bool changed = false;
   for (std::uint32_t s = 0; s < 2; ++s) {
-    const bool on = required_[s] == direction_ && current_[s] > least_[s] && current_[s] < most_[s] && measures_ > 0;
+    const bool on = required_[s] == direction_ && current_[s] > min_[s] && current_[s] < max_[s] && measures_ > 0;
     changed |= on != active_[s];
     active_[s] = on;  // Buffer::SetActive
   }

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kClearanceMm =
     0.25;                            // SerialGRBL.py, NewLayer: the pistons stand so far nearer to the spreader than layers say
-constexpr int kMostBusyTravels = 8;  // over lines that are not done; hosts have none
-constexpr int kMostRewinds = 8;      // BRES reads up to 4000 lines again; hosts have none
+constexpr int kMaxBusyTravels = 8;  // over lines that are not done; hosts have none
+constexpr int kMaxRewinds = 8;      // BRES reads up to 4000 lines again; hosts have none
 constexpr double kBurstsPerInch = 600;
 // Of the profile: DMAPrint.cpp gives them another one's address and primitive, so that their drops fall on its line.
 constexpr std::uint32_t kMisplaced[] = {0, 129, 263};
@@ -57,7 +57,7 @@ class Hp45Reader {
   }
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
-  void end_stretch(std::uint32_t row);
+  void end_span(std::uint32_t row);
   void drop(bool sweeping, bool upwards);
   std::uint64_t drops() const;
   double step_of(double um) const { return (um / 1000 - printing_.position_of(0)) / (grows_ ? step_um_ : -step_um_) * 1000; }
@@ -86,7 +86,7 @@ class Hp45Reader {
     std::uint32_t line = 0, steps = 0;
     double from_um = 0, to_um = 0;
     bool any = false;
-  } stretch_[2];
+  } interval_[2];
 };
 
 void Hp45Reader::read() {
@@ -119,7 +119,7 @@ void Hp45Reader::command(const GcodeLine& line) {
   if (line.command == "SBR" && lines_ == 0) printing_.reading_sweep(sweep_);
   if (moving_) return reader_.fault(fmt::format("{} is sent while the head may still move; G4 P0 waits for it", line.command));
   if (line.command == "SBR" && !ready()) return;
-  if (line.command == "BRES" && ++rewinds_ > kMostRewinds) return reader_.fault("rewinds the buffer again and again");
+  if (line.command == "BRES" && ++rewinds_ > kMaxRewinds) return reader_.fault("rewinds the buffer again and again");
   primes_ = line.command == "PRM";
   if (primes_) return prime(line.rest);
   if (const Status done = controller_.execute(line.command, line.rest); !done) return reader_.fault(done.error().message);
@@ -178,16 +178,16 @@ bool Hp45Reader::ready() {
 void Hp45Reader::take_burst() {
   const hp45::Burst& burst = controller_.last_burst();
   printing_.reading_step(std::llround(step_of(controller_.true_um(controller_.last_position_um()))));
-  for (std::uint32_t place = 0; place < hp45::kCartridgeNozzles; ++place) {
+  for (std::uint32_t position = 0; position < hp45::kCartridgeNozzles; ++position) {
     const auto bit = [&](std::uint32_t at) { return (burst[at / 64] >> (63 - at % 64) & 1) != 0; };
-    if (!bit(place)) continue;
-    const std::uint32_t nozzle = place / repeat_;
+    if (!bit(position)) continue;
+    const std::uint32_t nozzle = position / repeat_;
     if (nozzle >= printing_.nozzles()) return reader_.fault(fmt::format("nozzle {} does not exist", nozzle));
     for (std::uint32_t r = 0; r < repeat_; ++r) {
       if (!bit(nozzle * repeat_ + r)) return reader_.fault(fmt::format("nozzle {} is set in part; SDP is wrong", nozzle));
     }
     const auto& blocked = printing_.profile().head.blocked;
-    if (std::ranges::find(kMisplaced, place) != std::end(kMisplaced) && std::ranges::find(blocked, nozzle) != blocked.end()) {
+    if (std::ranges::find(kMisplaced, position) != std::end(kMisplaced) && std::ranges::find(blocked, nozzle) != blocked.end()) {
       return reader_.fault(fmt::format("nozzle {} is set, which is blocked: its drops fall on another one's line", nozzle));
     }
   }
@@ -203,7 +203,7 @@ void Hp45Reader::move(const GcodeLine& line) {
     return reader_.fault("moves while PRM may still fire: the controller answers at once, and again behind its last burst");
   }
   if (line.command == "G0") return reader_.fault("G0 goes as fast as the motion controller can, whatever F");
-  const double from = axes_.at(scan_.along), beside = axes_.at(scan_.across);
+  const double from = axes_.at(scan_.along), neighbour = axes_.at(scan_.across);
   if (!axes_.take(line, sweeping)) {
     return reader_.fault(fmt::format("'{}' is no command of the dialect {}", line.command, oasis_ ? "oasis" : "hp45"));
   }
@@ -219,14 +219,14 @@ void Hp45Reader::move(const GcodeLine& line) {
   if (to == from || !printing_.ok()) return;
   if (!hp45::reaches(printing_, controller_.counts_per_inch(), to))
     return reader_.fault(fmt::format("moves to {:g} mm, out of the machine", to));
-  if (!sweeping && !controller_.idle() && ++busy_travels_ > kMostBusyTravels) {
+  if (!sweeping && !controller_.idle() && ++busy_travels_ > kMaxBusyTravels) {
     return reader_.fault("travels to and fro over lines that are not done");
   }
   const bool upwards = (to > from) == grows_;
   if (sweeping && !begins_well(from * 1000, to * 1000)) return;
   if (sweeping) {
     printing_.begin_sweep(sweep_++, !upwards);
-    if (axes_.at(scan_.across) != beside) return reader_.fault("moves across while it fires");
+    if (axes_.at(scan_.across) != neighbour) return reader_.fault("moves across while it fires");
     printing_.go_across(axes_.at(scan_.across));
     const Status speed = hp45::check_speed(axes_.speed_mm_s(), controller_.counts_per_inch());
     if (!speed) return reader_.fault(speed.error().message);
@@ -235,8 +235,8 @@ void Hp45Reader::move(const GcodeLine& line) {
   hurried_ = 0;
   first_um_ = last_um_ = std::nan("");
   controller_.move(to * 1000, [&](const hp45::Controller::Firing& firing) { take_firing(firing); });
-  end_stretch(0);
-  end_stretch(1);
+  end_span(0);
+  end_span(1);
   drop(sweeping, upwards);
   lines_ = 0;
   if (!sweeping || std::isnan(first_um_)) return;
@@ -264,13 +264,13 @@ void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
   const double way = firing.to_um > firing.from_um ? 1 : -1;
   if (std::isnan(first_um_) || way * (firing.from_um - row - first_um_) < 0) first_um_ = firing.from_um - row;
   if (std::isnan(last_um_) || way * (firing.to_um - row - last_um_) > 0) last_um_ = firing.to_um - row;
-  Stretch& now = stretch_[firing.row];
-  if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_stretch(firing.row);
+  Stretch& now = interval_[firing.row];
+  if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_span(firing.row);
   if (!now.any) {
     now = {firing.line, 0, firing.from_um, firing.to_um, true};
     // The encoder's counts put the line's begin beside the edge of its step.
-    const double begin = step_of(firing.from_um), beside = std::abs(begin - std::floor(begin) - 0.5) * step_um_;
-    printing_.count.farthest_along_um = std::max(printing_.count.farthest_along_um, beside);
+    const double begin = step_of(firing.from_um), neighbour = std::abs(begin - std::floor(begin) - 0.5) * step_um_;
+    printing_.count.farthest_along_um = std::max(printing_.count.farthest_along_um, neighbour);
   }
   now.to_um = firing.to_um;
   if (!firing.steady) ++hurried_;
@@ -285,17 +285,17 @@ void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
       shot.words = *firing.burst;
       for (const std::uint32_t nozzle : kMisplaced) shot.words[nozzle / 64] &= ~(std::uint64_t{1} << (63 - nozzle % 64));
     }
-    for (std::uint32_t place = 0; repeat_ > 1 && place < printing_.nozzles() * repeat_; ++place) {
-      const std::uint32_t nozzle = place / repeat_;
-      shot.words[nozzle / 64] |= ((*firing.burst)[place / 64] >> (63 - place % 64) & 1) << (63 - nozzle % 64);
+    for (std::uint32_t position = 0; repeat_ > 1 && position < printing_.nozzles() * repeat_; ++position) {
+      const std::uint32_t nozzle = position / repeat_;
+      shot.words[nozzle / 64] |= ((*firing.burst)[position / 64] >> (63 - position % 64) & 1) << (63 - nozzle % 64);
     }
     shots_[firing.row].push_back(shot);
   }
 }
 
 // A line that is on for less than a step may fire or not: the firmware's bursts come by the clock.
-void Hp45Reader::end_stretch(std::uint32_t row) {
-  Stretch& now = stretch_[row];
+void Hp45Reader::end_span(std::uint32_t row) {
+  Stretch& now = interval_[row];
   if (now.any && now.steps == 0) {
     printing_.reading_step(std::llround(step_of(now.from_um)));
     printing_.fault(fmt::format("nozzles are on for {:.0f} um, between two steps", std::abs(now.to_um - now.from_um)));
@@ -351,11 +351,11 @@ void Hp45Reader::spread(const GcodeLine& line) {
     }
     if (!spreading_) return reader_.fault("M5 stops a spreader that does not turn");
     spread_ = true;
-    printing_.roller_stands_at(axes_.at(powder.roller_axis));
+    printing_.roller_is_at(axes_.at(powder.roller_axis));
     printing_.roller_turns(0);
     // On the gantry it does not touch the powder on the way back.
     if (powder.roller_axis == scan_.along || powder.roller_axis == scan_.across)
-      printing_.roller_stands_at(powder.roller_mm[0]);
+      printing_.roller_is_at(powder.roller_mm[0]);
   } else if (std::abs(axes_.at(powder.roller_axis) - powder.roller_mm[0]) > 1e-3) {
     return reader_.fault(
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));

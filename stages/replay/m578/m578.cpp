@@ -42,10 +42,10 @@ bool has_m578(std::string_view version) {
 }
 
 /// Whether the carriage stands where the head fires off the bed.
-bool beside_bed(Axes& axes, const Machine& profile) {
-  const auto& place = profile.care.spit_mm;
-  return place && profile.care.spits() && std::abs(axes.at(profile.motion.x_axis) - (*place)[0]) < 1e-3 &&
-         std::abs(axes.at(profile.motion.y_axis) - (*place)[1]) < 1e-3;
+bool outside_bed(Axes& axes, const Machine& profile) {
+  const auto& position = profile.maintenance.spit_mm;
+  return position && profile.maintenance.spits() && std::abs(axes.at(profile.motion.x_axis) - (*position)[0]) < 1e-3 &&
+         std::abs(axes.at(profile.motion.y_axis) - (*position)[1]) < 1e-3;
 }
 
 /// A shot off the bed: every nozzle that is not blocked, one after the other.
@@ -90,7 +90,7 @@ void read_m578(std::string_view text, Printing& printing) {
   std::int64_t step = INT64_MIN;
   while (reader.next(line)) {
     if (ended) return reader.fault("goes on behind M400");
-    if (line.command == "M578" && !in_sweep && beside_bed(axes, printing.profile())) {
+    if (line.command == "M578" && !in_sweep && outside_bed(axes, printing.profile())) {
       spit_inkjet(line, reader, axes, printing);
     } else if (line.command == "M226") {
       printing.refills();

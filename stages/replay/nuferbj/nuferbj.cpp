@@ -28,14 +28,14 @@ class Loaded {
     Vector vector;
     const std::string_view number = line.command.substr(1);
     const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), vector.step);
-    if (error != std::errc() || stop != number.data() + number.size() || vector.step < -kMostStep || vector.step > kMostStep) {
+    if (error != std::errc() || stop != number.data() + number.size() || vector.step < -kMaxStep || vector.step > kMaxStep) {
       reader.fault("a vector without a step");
       return 0;
     }
-    const std::size_t place = words_.size();
-    words_.resize(place + words_a_vector_, 0);
+    const std::size_t position = words_.size();
+    words_.resize(position + words_a_vector_, 0);
     vectors_.push_back(vector);
-    read_words(line.rest, std::span(words_).subspan(place), reader);
+    read_words(line.rest, std::span(words_).subspan(position), reader);
     return vector.step;
   }
 
@@ -44,7 +44,7 @@ class Loaded {
     std::uint32_t repeats = 0;
     const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), repeats);
     if (vectors_.empty() || error != std::errc() || stop != number.data() + number.size()) return false;
-    if (repeats > kMostRepeats - vectors_.back().repeats) return false;
+    if (repeats > kMaxRepeats - vectors_.back().repeats) return false;
     vectors_.back().repeats += repeats;
     return true;
   }
@@ -56,8 +56,8 @@ class Loaded {
   void clear() { vectors_.clear(), words_.clear(); }
 
  private:
-  static constexpr std::uint32_t kMostRepeats = 100'000'000;
-  static constexpr std::int64_t kMostStep = UINT32_MAX;
+  static constexpr std::uint32_t kMaxRepeats = 100'000'000;
+  static constexpr std::int64_t kMaxStep = UINT32_MAX;
 
   void read_words(std::string_view text, std::span<std::uint64_t> words, GcodeReader& reader) const {
     const std::uint32_t groups = (nozzles_ + 31) / 32;
@@ -118,7 +118,7 @@ void fire(const Loaded& loaded, bool backward, double from, double to, Printing&
 }
 
 /// Carries out what is no drop, powder or movement; false if it is another command.
-bool take_care(const GcodeLine& line, GcodeReader& reader, Axes& axes, Printing& printing) {
+bool take_maintenance(const GcodeLine& line, GcodeReader& reader, Axes& axes, Printing& printing) {
   const auto& profile = printing.profile();
   if (line.command == "M815") {
     printing.refills();
@@ -145,8 +145,8 @@ void read_nuferbj(std::string_view text, Printing& printing) {
   if (!reader.next(line) || line.command != "M811" || reader.count(line, 'L') != printing.layer()) {
     return printing.fault("the program does not begin with M811 of this layer");
   }
-  printing.tells_layers(reader.count(line, 'T'));
-  printing.tells_heights({}, reader.number(line, 'H'));
+  printing.state_layers(reader.count(line, 'T'));
+  printing.state_heights({}, reader.number(line, 'H'));
   const ScanAxes scan(printing.profile());
   Loaded loaded(printing.nozzles());  // fired by the next G1 along the scan
   bool in_sweep = false, backward = false, ended = false;
@@ -173,7 +173,7 @@ void read_nuferbj(std::string_view text, Printing& printing) {
       if (!printing.ok()) return;
       loaded.clear();
       in_sweep = false;
-    } else if (!in_sweep && take_care(line, reader, axes, printing)) {
+    } else if (!in_sweep && take_maintenance(line, reader, axes, printing)) {
       if (!printing.ok()) return;
     } else if (line.command == "M813") {
       if (in_sweep || reader.count(line, 'L') != printing.layer()) return reader.fault("the layer ends within a swath");

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stages/replay/bytes.h"
-#include "stages/replay/care_records.h"
+#include "stages/replay/maintenance_records.h"
 #include "stages/replay/dialects.h"
 
 namespace lamina::replay {
@@ -42,16 +42,16 @@ class Rows {
       passes.at(step);
       return printing.fire_words(vector_[0]);
     }
-    std::uint32_t most = 0;
+    std::uint32_t maximum = 0;
     for (std::uint32_t nozzle = 0; nozzle < words_ * 32; ++nozzle) {
       std::uint32_t drops = 0;
       for (std::size_t p = 0; p < vector_.size(); ++p) {
         drops |= static_cast<std::uint32_t>(vector_[p][nozzle / 64] >> (63 - nozzle % 64) & 1) << p;
       }
-      most = std::max(most, drops);
+      maximum = std::max(maximum, drops);
       if (drops > 0) printing.fire(nozzle, drops);
     }
-    passes.at(step, most);
+    passes.at(step, maximum);
   }
 
  private:
@@ -71,12 +71,12 @@ void read_planes(std::string_view text, Printing& printing) {
   const std::uint32_t counts = reader.word();
   if (!layer || (counts != 4 && counts != 5) || reader.word() != printing.layer())
     return reader.fault("does not begin with this layer");
-  printing.tells_layers(reader.word());
+  printing.state_layers(reader.word());
   const double bottom_mm = reader.mm();
-  printing.tells_heights(bottom_mm, reader.mm());
+  printing.state_heights(bottom_mm, reader.mm());
   printing.count.vats = counts == 5 ? reader.word() : 1;
   while (printing.ok()) {
-    take_care_records(reader, printing, passes);
+    take_maintenance_records(reader, printing, passes);
     const std::uint32_t command = reader.word(), size = reader.word();
     if (command == kEnd) {
       if (size != 1 || reader.word() != printing.layer() || !reader.done())

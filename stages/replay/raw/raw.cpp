@@ -1,6 +1,6 @@
 // stages/program/raw/README.md tells the format.
 #include "stages/replay/bytes.h"
-#include "stages/replay/care_records.h"
+#include "stages/replay/maintenance_records.h"
 #include "stages/replay/dialects.h"
 
 namespace lamina::replay {
@@ -9,13 +9,13 @@ void read_raw(std::string_view text, Printing& printing) {
   ByteReader reader(text, printing);
   Passes passes(printing);
   if (reader.take(4) != "LAYR" || reader.word() != printing.layer()) return reader.fault("does not begin with this layer");
-  printing.tells_layers(reader.word());
+  printing.state_layers(reader.word());
   const double bottom_mm = reader.mm();
-  printing.tells_heights(bottom_mm, reader.mm());
+  printing.state_heights(bottom_mm, reader.mm());
   printing.count.vats = reader.word();
   const std::uint32_t words = (printing.nozzles() + 127) / 128, planes = printing.drop_bits();
   while (printing.ok()) {
-    take_care_records(reader, printing, passes);
+    take_maintenance_records(reader, printing, passes);
     const std::string_view tag = reader.take(4);
     if (tag == "LEND") {
       if (reader.word() != printing.layer() || !reader.done())
@@ -41,17 +41,17 @@ void read_raw(std::string_view text, Printing& printing) {
         if (!any) continue;
         printing.at_step(step);
         // Each word is a number of 128 bits, the highest byte first; bit i is nozzle i of the word.
-        std::uint32_t most = 0;
+        std::uint32_t maximum = 0;
         for (std::uint32_t nozzle = 0; nozzle < words * 128; ++nozzle) {
           std::uint32_t drops = 0;
           for (std::uint32_t plane = 0; plane < planes; ++plane) {
             const auto byte = static_cast<std::uint8_t>(bytes[(plane * words + nozzle / 128) * 16 + 15 - nozzle % 128 / 8]);
             drops += static_cast<std::uint32_t>(byte >> (nozzle % 8) & 1) << plane;
           }
-          most = std::max(most, drops);
+          maximum = std::max(maximum, drops);
           if (drops > 0) printing.fire(nozzle, drops);
         }
-        passes.at(step, most);
+        passes.at(step, maximum);
       }
     }
   }

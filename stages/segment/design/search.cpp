@@ -35,18 +35,18 @@ double squares_of(const std::array<double, N>& values) {
 }
 
 /// Logarithms of what a plan is, over what is wished; 0 where nothing is.
-std::array<double, 4> misses(const PoreWish& wish, const Slots& slots, const Pores& pores) {
-  const auto miss = [](const std::optional<double>& wished, double is) {
-    return wished ? std::log(std::max(is, 1e-30) / *wished) : 0.0;
+std::array<double, 4> misses(const PoreTarget& target, const Slots& slots, const Pores& pores) {
+  const auto miss = [](const std::optional<double>& requested_range, double is) {
+    return requested_range ? std::log(std::max(is, 1e-30) / *requested_range) : 0.0;
   };
-  return {miss(wish.porosity, slots.porosity), miss(wish.permeability_m2, slots.permeability_m2),
-          miss(wish.pore_width_mm, pores.width_mm), miss(wish.pore_length_mm, pores.length_mm)};
+  return {miss(target.porosity, slots.porosity), miss(target.permeability_m2, slots.permeability_m2),
+          miss(target.pore_width_mm, pores.width_mm), miss(target.pore_length_mm, pores.length_mm)};
 }
 
-class Search {
+class RatioSearch {
  public:
-  Search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, std::span<const RatioAt> known)
-      : wish_(wish), limits_(limits), ratio_(ratio), known_(known), layer_mm_(limits.calibration().height_mm) {}
+  RatioSearch(const PoreTarget& target, const DesignLimits& limits, const SlotRatio& ratio, std::span<const RatioAt> known)
+      : target_(target), limits_(limits), ratio_(ratio), known_(known), layer_mm_(limits.calibration().height_mm) {}
 
   SlotRatio ratio_at(const Choice& choice) const {
     const Free here = free_of(choice);
@@ -65,7 +65,7 @@ class Search {
   }
 
   Slots corrected(const Segmentation& plan, const SlotRatio& ratio) const {
-    Slots slots = slots_of(limits_.laid(plan), layer_mm_);
+    Slots slots = slots_of(limits_.deposited(plan), layer_mm_);
     slots.porosity *= ratio.porosity;
     slots.permeability_m2 *= ratio.permeability;
     return slots;
@@ -123,7 +123,7 @@ class Search {
     design.ratio = ratio_at(choice);
     design.slots = corrected(design.plan, design.ratio);
     design.pores = predict_pores(design.plan);
-    design.miss = miss_of(wish_, design.slots, design.pores);
+    design.miss = miss_of(target_, design.slots, design.pores);
     for (const double part : limits_.beyond(choice)) design.beyond += part * part;
     design.beyond = std::sqrt(design.beyond);
     return design;
@@ -135,7 +135,7 @@ class Search {
 
   /// Not rounded to what is written.
   Residuals residuals(const Choice& choice) const {
-    Settings settings = limits_.settings_of(choice);
+    SegmentSettings settings = limits_.settings_of(choice);
     settings.thick_extrusion = choice.extrusion;
     settings.thick_mm = choice.thick_mm;
     settings.thin_mm = choice.thin_mm;
@@ -146,16 +146,16 @@ class Search {
     Residuals all;
     all.fill(1e6);
     if (!plan) return all;
-    const auto wished = misses(wish_, corrected(*plan, ratio_at(choice)), predict_pores(*plan));
+    const auto requested_range = misses(target_, corrected(*plan, ratio_at(choice)), predict_pores(*plan));
     const auto beyond = limits_.beyond(choice);
     for (std::size_t i = 0; i < 4; ++i) {
-      all[i] = wished[i] / kExact;
+      all[i] = requested_range[i] / kExact;
       all[4 + i] = beyond[i];
     }
     return all;
   }
 
-  const PoreWish& wish_;
+  const PoreTarget& target_;
   const DesignLimits& limits_;
   SlotRatio ratio_;
   std::span<const RatioAt> known_;
@@ -170,21 +170,21 @@ bool better(const Design& one, const Design& other) {
 
 }  // namespace
 
-double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores) {
+double miss_of(const PoreTarget& target, const Slots& slots, const Pores& pores) {
   double worst = 0;
-  for (const double miss : misses(wish, slots, pores)) worst = std::max(worst, std::abs(std::expm1(miss)));
+  for (const double miss : misses(target, slots, pores)) worst = std::max(worst, std::abs(std::expm1(miss)));
   return worst;
 }
 
-Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds,
+Design search(const PoreTarget& target, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds,
               std::span<const RatioAt> known) {
-  const Search finder(wish, limits, ratio, known);
+  const RatioSearch finder(target, limits, ratio, known);
   const Interval extrusion = limits.extrusion();
   std::optional<Design> best;
-  for (std::uint32_t lines = bounds.least; lines <= bounds.most; ++lines) {
+  for (std::uint32_t lines = bounds.minimum; lines <= bounds.maximum; ++lines) {
     for (const double share : {0.5, 0.0, 1.0}) {
       for (const double thick : {1.5, 1.1, 2.2}) {
-        const double percent = extrusion.least + share * (extrusion.most - extrusion.least);
+        const double percent = extrusion.minimum + share * (extrusion.maximum - extrusion.minimum);
         const Design design = finder.design_of(finder.descend({lines, percent, thick, 1.6, 0.005}));
         if (!best || better(design, *best)) best = design;
       }

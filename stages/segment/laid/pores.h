@@ -31,25 +31,25 @@ class LineNeighbours {
   std::array<std::optional<double>, 2> of(std::uint32_t run, double low, double high);
 
  private:
-  struct Line {
+  struct NeighbourLine {
     PathKind kind;
     bool straight;
     std::int32_t number;
     std::uint32_t run, end;    // points run .. end of the toolpaths
     double low, high, across;  // nm, of straight ones
   };
-  void look_up(std::uint32_t run);
-  std::optional<double> curve_at(std::span<const Line> beside) const;
-  std::optional<double> straight_at(std::span<const Line> beside, double low, double high) const;
+  void find_neighbours(std::uint32_t run);
+  std::optional<double> curve_at(std::span<const NeighbourLine> neighbour) const;
+  std::optional<double> straight_at(std::span<const NeighbourLine> neighbour, double low, double high) const;
 
   const ToolpathsView& paths_;
   const LayerCut& cut_;
-  std::vector<Line> lines_;           // by kind, number and place
+  std::vector<NeighbourLine> lines_;           // by kind, number and place
   std::vector<std::uint32_t> order_;  // into lines_, by run
   // --- of the run that was asked for last
   std::uint32_t run_ = UINT32_MAX;
-  const Line* line_ = nullptr;
-  std::array<std::span<const Line>, 2> beside_;
+  const NeighbourLine* line_ = nullptr;
+  std::array<std::span<const NeighbourLine>, 2> adjacent_;
   std::array<std::optional<double>, 2> curve_;
 };
 
@@ -59,7 +59,7 @@ class PoreCounter {
   /// All have to outlive it. counts  what is found is added
   PoreCounter(const ToolpathsView& paths, const LayerCut& cut, const Segmentation& plan, PoreCounts& counts);
 
-  void add(const Stretch& s) {
+  void add(const PathInterval& s) {
     const bool follows = s.run == run_ && s.from == at_;
     if (before_ == Thickness::kThin && !(follows && s.thickness == Thickness::kThin)) {
       finish(follows && s.thickness == Thickness::kThick);
@@ -76,9 +76,9 @@ class PoreCounter {
   }
 
  private:
-  void extend(const Stretch& s, bool follows);
+  void extend(const PathInterval& s, bool follows);
   void finish(bool thick_after);
-  void judge(const std::optional<double>& distance_mm, double other_mm, bool thick_ends);
+  void check(const std::optional<double>& distance_mm, double other_mm, bool thick_ends);
 
   const LayerCut& cut_;
   const Segmentation& plan_;

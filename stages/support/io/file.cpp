@@ -78,8 +78,8 @@ struct File::State {
   int hash_what_is_there() {
     Buffer<std::byte> piece(256 << 10);
     for (std::uint64_t at = 0; at < size;) {
-      const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), size - at));
-      const ssize_t got = ::pread(file, piece.data(), most, static_cast<off_t>(at));
+      const auto maximum = static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), size - at));
+      const ssize_t got = ::pread(file, piece.data(), maximum, static_cast<off_t>(at));
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) return got < 0 ? errno : EIO;
       XXH3_128bits_update(hash.get(), piece.data(), static_cast<std::size_t>(got));

@@ -22,15 +22,15 @@ std::string size_text(std::uint64_t bytes) {
   return bytes % (1 << 10) == 0 ? fmt::format("{} KiB", bytes >> 10) : fmt::format("{} bytes", bytes);
 }
 
-std::string too_long(std::uint64_t most) {
-  return fmt::format("holds more than {}, the most for such a file", size_text(most));
+std::string too_long(std::uint64_t maximum) {
+  return fmt::format("holds more than {}, the most for such a file", size_text(maximum));
 }
 
 /// Empty, or why a file of this kind is not read.
 std::string fault_of_kind(const struct stat& status, bool stream, const ReadRules& rules) {
   if (S_ISDIR(status.st_mode)) return std::string(rules.directory);
   if (S_ISREG(status.st_mode)) {
-    return static_cast<std::uint64_t>(status.st_size) > rules.most_bytes ? too_long(rules.most_bytes) : std::string();
+    return static_cast<std::uint64_t>(status.st_size) > rules.max_bytes ? too_long(rules.max_bytes) : std::string();
   }
   if (stream) return {};
   return std::string(rules.device) + (rules.streams ? "; give what it holds to standard input and name it -" : "");
@@ -61,13 +61,13 @@ struct FileReader::State {
   }
 
   /// Reads up to `most` bytes behind `end`; false at the end of the file and after an error.
-  bool fill(std::size_t most) {
+  bool fill(std::size_t maximum) {
     if (at_end || !status) return false;
     if (begin > 0) {
       std::memmove(buffer.data(), buffer.data() + begin, end - begin);
       end -= std::exchange(begin, 0);
     }
-    if (buffer.size() < end + most) buffer.resize(std::max(end + most, buffer.size() + buffer.size() / 2));
+    if (buffer.size() < end + maximum) buffer.resize(std::max(end + maximum, buffer.size() + buffer.size() / 2));
     pollfd waiting{file, POLLIN, 0};
     if (stream && ::poll(&waiting, 1, -1) < 0 && errno == EINTR) {  // unlike read(), it is never taken up again
       status = Error{Fault::kInterrupted, fmt::format("{}: interrupted", path)};
@@ -75,7 +75,7 @@ struct FileReader::State {
     }
     ssize_t got = 0;
     do {
-      got = ::read(file, buffer.data() + end, most);
+      got = ::read(file, buffer.data() + end, maximum);
     } while (got < 0 && errno == EINTR);
     if (got < 0) {
       status = error(fmt::format("cannot be read: {}", std::strerror(errno)));
@@ -84,8 +84,8 @@ struct FileReader::State {
     at_end = got == 0;
     end += static_cast<std::size_t>(got);
     taken += static_cast<std::uint64_t>(got);
-    if (taken > rules.most_bytes) {
-      status = error(too_long(rules.most_bytes));
+    if (taken > rules.max_bytes) {
+      status = error(too_long(rules.max_bytes));
       return false;
     }
     return !at_end;

@@ -20,7 +20,7 @@
 namespace lamina::write {
 namespace {
 
-constexpr int kMostLinks = 40;  // as the kernel
+constexpr int kMaxLinks = 40;  // as the kernel
 
 /// The open descriptor that a name means, or -1.
 int descriptor_of(std::string_view name) {
@@ -73,7 +73,7 @@ int write_all(int file, std::span<const std::byte> bytes) {
 
 Result<FileTarget> find_target(const std::string& path, bool follow) {
   std::string name = path;
-  for (int links = 0; links < kMostLinks; ++links) {
+  for (int links = 0; links < kMaxLinks; ++links) {
     if (const int descriptor = descriptor_of(name); descriptor >= 0) return FileTarget{{}, name, descriptor};
     struct stat status {};
     if (::lstat(name.c_str(), &status) != 0) {

@@ -28,8 +28,8 @@ Error not_started(const std::string& program, int reason) {
 std::string find_program(const std::string& program) {
   std::error_code error;
   const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path beside = own.parent_path() / program;
-  return !error && std::filesystem::exists(beside, error) ? beside.string() : program;
+  const std::filesystem::path neighbour = own.parent_path() / program;
+  return !error && std::filesystem::exists(neighbour, error) ? neighbour.string() : program;
 }
 
 /// A file in memory that no folder shows.

@@ -19,7 +19,7 @@ namespace lamina::write {
 namespace {
 
 // Bytes that the thread waits for: few at first, so that a small job has less to wait for at its end, then twice as many.
-constexpr std::uint64_t kFirst = 512 << 10, kMost = 4 << 20;
+constexpr std::uint64_t kFirst = 512 << 10, kMax = 4 << 20;
 
 /// The reason of a failed sync, 0 if the file system only cannot do it.
 int failure() { return errno == EINVAL || errno == ENOTSUP || errno == ENOSYS || errno == EROFS || errno == EBADF ? 0 : errno; }
@@ -81,7 +81,7 @@ struct FolderSync::Folders {
       changed.wait(lock, [this] { return ends || waiting >= enough; });
       if (ends || !met) return;
       waiting = 0;
-      enough = std::min(2 * enough, kMost);
+      enough = std::min(2 * enough, kMax);
       lock.unlock();
       Status status = sync_all();
       lock.lock();

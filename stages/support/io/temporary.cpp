@@ -26,7 +26,7 @@
 namespace lamina::write {
 namespace {
 
-constexpr int kMostTries = 16;  // of two runs that begin in the same instant
+constexpr int kMaxTries = 16;  // of two runs that begin in the same instant
 constexpr std::string_view kMark = ".lamina-", kPart = ".part";
 constexpr std::size_t kDigits = 13;        // of 64 bits, 5 each
 constexpr std::size_t kLongestName = 200;  // a longer one is cut, so that the temporary name fits into 255 bytes
@@ -96,9 +96,9 @@ Status remove_stale(const std::string& path, const std::string& part) {
 }
 
 /// The folder of a file, locked while a run looks around in it: of several that begin in the same instant one comes first.
-class Turn {
+class FolderTurn {
  public:
-  explicit Turn(const std::string& target) {
+  explicit FolderTurn(const std::string& target) {
     const std::string folder = std::filesystem::path(target).parent_path().string();
     file_ = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     // Another program may hold the folder for long. Without a turn both of two runs may be refused, no more.
@@ -107,9 +107,9 @@ class Turn {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
-  ~Turn() {
+  FolderTurn(const FolderTurn&) = delete;
+  FolderTurn& operator=(const FolderTurn&) = delete;
+  ~FolderTurn() {
     if (file_ >= 0) ::close(file_);
   }
   int folder() const { return file_; }
@@ -139,8 +139,8 @@ bool is_written(int folder, const char* name, const std::string& path, bool remo
 /// remove  temporary files that killed runs left
 bool another_writes(int folder, const std::string& target, const std::string& own, bool remove) {
   if (folder < 0) return false;
-  const std::filesystem::path place(target);
-  const std::string name = place.filename().string(), stem = stem_of(name), part = part_of(name);
+  const std::filesystem::path position(target);
+  const std::string name = position.filename().string(), stem = stem_of(name), part = part_of(name);
   const std::string skipped = std::filesystem::path(own).filename().string();
   const int copy = ::openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(copy < 0 ? nullptr : ::fdopendir(copy), &::closedir);
@@ -149,7 +149,7 @@ bool another_writes(int folder, const std::string& target, const std::string& ow
     const dirent* entry = ::readdir(entries.get());
     if (entry == nullptr) break;
     if (!is_temporary_of(entry->d_name, stem) || entry->d_name == skipped) continue;
-    written = is_written(folder, entry->d_name, (place.parent_path() / entry->d_name).string(), remove);
+    written = is_written(folder, entry->d_name, (position.parent_path() / entry->d_name).string(), remove);
   }
   return written;
 }
@@ -173,9 +173,9 @@ std::string temporary_name(const std::string& target) {
 }
 
 Result<Temporary> create_temporary(const std::string& path, const std::string& target, bool lock) {
-  std::optional<Turn> turn;
+  std::optional<FolderTurn> turn;
   if (lock) turn.emplace(target);
-  for (int tries = 0; tries < kMostTries; ++tries) {
+  for (int tries = 0; tries < kMaxTries; ++tries) {
     Temporary made;
     made.name = temporary_name(target);
     made.file = ::open(made.name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
@@ -194,8 +194,8 @@ Result<Temporary> create_temporary(const std::string& path, const std::string& t
 
 Result<int> create_part(const std::string& path, const std::string& part) {
   const std::string target = part.substr(0, part.size() - kPart.size());
-  const Turn turn(target);
-  for (int tries = 0; tries < kMostTries; ++tries) {
+  const FolderTurn turn(target);
+  for (int tries = 0; tries < kMaxTries; ++tries) {
     const int file = ::open(part.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file < 0) {
       if (errno != EEXIST) return write_failure(path, errno);
@@ -252,9 +252,9 @@ void Claim::hand_over() {
   state_->removes = false;
 }
 
-Result<Claim> Claim::take(const std::string& path, const std::string& told) {
+Result<Claim> Claim::take(const std::string& path, const std::string& reported) {
   const std::string part = part_of(path);
-  for (int tries = 0; tries < kMostTries; ++tries) {
+  for (int tries = 0; tries < kMaxTries; ++tries) {
     if (Status status = check_is_file(part); !status) return status.error();
     const int file = ::open(part.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK, 0666);
     if (file < 0) return write_failure(part, errno);
@@ -263,18 +263,18 @@ Result<Claim> Claim::take(const std::string& path, const std::string& told) {
       struct stat status {};
       const bool empty = ::fstat(file, &status) == 0 && status.st_size == 0;
       Claim claim(std::make_unique<State>(part, file, empty));
-      const Turn turn(path);
+      const FolderTurn turn(path);
       another_writes(turn.folder(), path, part, true);  // for what killed runs left
       return claim;
     }
     ::close(file);
     if (got == Lock::kTaken) break;
   }
-  return busy(told);
+  return busy(reported);
 }
 
 Status check_not_being_written(const std::string& path) {
-  const Turn turn(path);
+  const FolderTurn turn(path);
   return another_writes(turn.folder(), path, {}, false) ? Status(busy(path)) : Status();
 }
 
@@ -294,8 +294,8 @@ std::error_code MadeFolders::make(const std::string& folder) {
   namespace fs = std::filesystem;
   std::error_code error;
   std::vector<std::string> absent;
-  for (fs::path place = folder; !place.empty() && !fs::exists(fs::symlink_status(place, error)); place = place.parent_path()) {
-    if (place.has_filename()) absent.push_back(place.string());
+  for (fs::path position = folder; !position.empty() && !fs::exists(fs::symlink_status(position, error)); position = position.parent_path()) {
+    if (position.has_filename()) absent.push_back(position.string());
   }
   fs::create_directories(folder, error);
   if (!error) made_.insert(made_.end(), absent.rbegin(), absent.rend());

@@ -53,7 +53,7 @@ class Claim {
  public:
   /// told    named by errors
   /// errors  as create_part
-  static Result<Claim> take(const std::string& path, const std::string& told);
+  static Result<Claim> take(const std::string& path, const std::string& reported);
   Claim(Claim&&) noexcept;
   Claim& operator=(Claim&&) = delete;
   /// Lets go. Removes a NAME.part that is of claims only and that nothing has replaced.

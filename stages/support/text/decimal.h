@@ -13,7 +13,7 @@
 namespace lamina::write {
 
 /// Room that put_fixed() and put_mm() need at most: a sign, 20 digits, a point, and a little more.
-inline constexpr std::size_t kMostDecimal = 24;
+inline constexpr std::size_t kMaxDecimal = 24;
 
 /// "000102...99": the two digits of n begin at 2 n.
 inline constexpr auto kDigitPairs = [] {
@@ -87,15 +87,15 @@ inline char* put_mm(std::int64_t nm, char* out) {
 inline void append(Buffer<char>& out, std::string_view text) { out.insert(out.end(), text.begin(), text.end()); }
 
 inline void append_mm(Buffer<char>& out, std::int64_t nm) {
-  char text[kMostDecimal];
+  char text[kMaxDecimal];
   append(out, {text, static_cast<std::size_t>(put_mm(nm, text) - text)});
 }
 
 /// Appends what `write(char*)`, which returns its end, writes into at most `most` bytes.
 template <class Write>
-void append_written(Buffer<char>& out, std::size_t most, Write&& write) {
+void append_written(Buffer<char>& out, std::size_t maximum, Write&& write) {
   const std::size_t before = out.size();
-  out.resize(before + most);
+  out.resize(before + maximum);
   char* const begin = out.data() + before;
   out.resize(before + static_cast<std::size_t>(write(begin) - begin));
 }

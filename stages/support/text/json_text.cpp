@@ -103,13 +103,13 @@ BeyondBound toml_beyond_bounds(std::string_view text) {
       at = std::min(text.find('\n', at), text.size());
       continue;
     }
-    if (c == '.' && ++dots >= kMostKeyParts) return beyond(fmt::format("a key of more than {} parts", kMostKeyParts));
+    if (c == '.' && ++dots >= kMaxKeyParts) return beyond(fmt::format("a key of more than {} parts", kMaxKeyParts));
     if (c == ',' || c == '=' || c == '[' || c == ']' || c == '{' || c == '}' || c == '\n') dots = 0;
     if ((c == '[' || c == '{') && ++depth > kDeepestText) return beyond(fmt::format("more than {} levels", kDeepestText));
     if ((c == ']' || c == '}') && depth > 0) --depth;
     // A list has a value for each comma, an assignment or a header begins one.
-    if ((c == ',' || c == '=' || c == '[') && ++values > kMostValues) {
-      return beyond(fmt::format("more than {} values", kMostValues));
+    if ((c == ',' || c == '=' || c == '[') && ++values > kMaxValues) {
+      return beyond(fmt::format("more than {} values", kMaxValues));
     }
     if (c == '\n') {
       ++line;
@@ -120,7 +120,7 @@ BeyondBound toml_beyond_bounds(std::string_view text) {
   return {};
 }
 
-bool json_nests_within(std::string_view text, std::uint32_t most) {
+bool json_nests_within(std::string_view text, std::uint32_t maximum) {
   std::uint32_t depth = 0;
   for (std::size_t at = 0; at < text.size(); ++at) {
     const char c = text[at];
@@ -129,7 +129,7 @@ bool json_nests_within(std::string_view text, std::uint32_t most) {
         if (text[at] == '\\') ++at;
       }
     } else if (c == '[' || c == '{') {
-      if (++depth > most) return false;
+      if (++depth > maximum) return false;
     } else if ((c == ']' || c == '}') && depth > 0) {
       --depth;
     }

@@ -16,7 +16,7 @@ bool is_utf8(std::string_view text);
 // --- bounds on nesting, checked before a parser that recurses sees the text.
 
 /// No file of lamina nests deeper, has keys of more parts, or has more values.
-inline constexpr std::uint32_t kDeepestText = 16, kMostKeyParts = 16, kMostValues = 1'000'000;
+inline constexpr std::uint32_t kDeepestText = 16, kMaxKeyParts = 16, kMaxValues = 1'000'000;
 
 /// A place in a text that goes beyond a bound; `what` is empty if none does.
 struct BeyondBound {
@@ -29,6 +29,6 @@ struct BeyondBound {
 BeyondBound toml_beyond_bounds(std::string_view text);
 
 /// Whether the objects and lists of a JSON text nest at most so deep; strings are passed over.
-bool json_nests_within(std::string_view text, std::uint32_t most = kDeepestText);
+bool json_nests_within(std::string_view text, std::uint32_t maximum = kDeepestText);
 
 }  // namespace lamina

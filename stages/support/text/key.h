@@ -40,7 +40,7 @@ struct Key : KeyName {
   /// Reads the value from the text of an option; lists are separated by commas.
   std::string read(std::string_view text, Target& target) const { return read_text(*this, text, target); }
   /// Reads the value from a file. at  the place of an error
-  std::string read(const TomlValue& tree, Target& target, Place& at) const {
+  std::string read(const TomlValue& tree, Target& target, TextPosition& at) const {
     if (read_tree != nullptr) return read_tree(*this, tree, target, at);
     const auto text = flat_text(tree);
     return text ? read_text(*this, *text, target) : "is not a single value or a list of them";
@@ -80,7 +80,7 @@ struct Key : KeyName {
   Limits limits = {};
   const void* inner = nullptr;  // the key of a member's table
   std::string (*read_text)(const Key&, std::string_view, Target&) = nullptr;
-  std::string (*read_tree)(const Key&, const TomlValue&, Target&, Place&) = nullptr;
+  std::string (*read_tree)(const Key&, const TomlValue&, Target&, TextPosition&) = nullptr;
   std::string (*write_text)(const Key&, const Target&) = nullptr;
   std::string (*check_target)(const Key&, const Target&) = nullptr;
   void (*copy_value)(const Key&, const Target&, Target&) = nullptr;
@@ -205,11 +205,11 @@ constexpr auto structure(const KeyName& name) {
   using Target = key_detail::TargetOf<Path...>;
   using K = Key<Target>;
   K key = key_detail::begin<Target, Path...>(name, Form::kToml);
-  key.read_tree = [](const K&, const TomlValue& tree, Target& target, Place& at) -> std::string {
+  key.read_tree = [](const K&, const TomlValue& tree, Target& target, TextPosition& at) -> std::string {
     return Read(tree, member<Path...>(target), at);
   };
   key.read_text = [](const K& self, std::string_view text, Target& target) -> std::string {
-    Place unused;
+    TextPosition unused;
     const auto tree = read_toml_value(text);
     return self.read_tree(self, tree ? *tree : TomlValue{TomlValue::Kind::kText, std::string(text), {}, {}, {}}, target,
                           unused);
@@ -236,7 +236,7 @@ auto inside(const Key<Inner>& inner, std::string_view section, unsigned decides)
   key.read_text = [](const K& self, std::string_view text, Target& target) {
     return key_detail::inner_of<Inner>(self).read(text, member<Path...>(target));
   };
-  key.read_tree = [](const K& self, const TomlValue& tree, Target& target, Place& at) {
+  key.read_tree = [](const K& self, const TomlValue& tree, Target& target, TextPosition& at) {
     return key_detail::inner_of<Inner>(self).read(tree, member<Path...>(target), at);
   };
   key.write_text = [](const K& self, const Target& target) {
@@ -284,9 +284,9 @@ const Key<Target>* find_key(std::span<const Key<Target>> keys, std::string_view 
 /// read  receives the index of each key read, unless null
 template <class Target>
 std::string read_table(const TomlValue& table, std::string_view section, std::span<const Key<Target>> keys, Target& target,
-                       Place& at, std::vector<std::size_t>* read = nullptr) {
+                       TextPosition& at, std::vector<std::size_t>* read = nullptr) {
   for (std::size_t i = 0; i < table.value.size(); ++i) {
-    at = table.value[i].place;
+    at = table.value[i].position;
     std::string wrong;
     const auto* key = find_key(keys, section, table.name[i], wrong);
     if (key != nullptr) wrong = key->read(table.value[i], target, at);
@@ -301,15 +301,15 @@ std::string read_table(const TomlValue& table, std::string_view section, std::sp
 template <class Target>
 Status read_section(const TomlValue& table, std::string_view section, const std::string& file,
                     std::span<const Key<Target>> keys, Target& target) {
-  const auto refuse = [&](const Place& at, const std::string& what) {
+  const auto refuse = [&](const TextPosition& at, const std::string& what) {
     return Error{Fault::kUsage, fmt::format("{}{}", at.text(file), what)};
   };
   const auto names = section_names(keys);
   bool known = false;
   for (const std::string_view name : names) known = known || name == section;
-  if (!known) return refuse(table.place, fmt::format("{}: {}", section, no_such_section(section, names)));
-  if (!table.is_table()) return refuse(table.place, fmt::format("{} is a section; write [{}]", section, section));
-  Place at;
+  if (!known) return refuse(table.position, fmt::format("{}: {}", section, no_such_section(section, names)));
+  if (!table.is_table()) return refuse(table.position, fmt::format("{} is a section; write [{}]", section, section));
+  TextPosition at;
   const std::string wrong = read_table(table, section, keys, target, at);
   return wrong.empty() ? Status() : refuse(at, fmt::format("{}.{}", section, wrong));
 }

@@ -4,14 +4,14 @@ namespace lamina {
 
 std::string range_name(double from_mm, double to_mm) { return fmt::format("{}:{}", number_text(from_mm), number_text(to_mm)); }
 
-std::string take_ends(TomlValue& table, double& from_mm, double& to_mm, Place& at) {
+std::string take_ends(TomlValue& table, double& from_mm, double& to_mm, TextPosition& at) {
   for (const auto& [name, end] : {std::pair{"from_mm", &from_mm}, {"to_mm", &to_mm}}) {
-    at = table.place;
+    at = table.position;
     const TomlValue* value = table.find(name);
     if (value == nullptr) return fmt::format("{} is missing; give both ends, from_mm and to_mm", name);
-    at = value->place;
+    at = value->position;
     if (!value->is_text()) return fmt::format("{}: is not a number", name);
-    if (auto wrong = read_number(value->text, 0, kMostMm, " mm", *end); !wrong.empty())
+    if (auto wrong = read_number(value->text, 0, kMaxMm, " mm", *end); !wrong.empty())
       return fmt::format("{}: {}", name, wrong);
     table.remove(name);
   }

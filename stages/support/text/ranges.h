@@ -12,7 +12,7 @@ namespace lamina {
 std::string range_name(double from_mm, double to_mm);
 
 /// Removes from_mm and to_mm from a table into the arguments. returns "" or an error message
-std::string take_ends(TomlValue& table, double& from_mm, double& to_mm, Place& at);
+std::string take_ends(TomlValue& table, double& from_mm, double& to_mm, TextPosition& at);
 
 /// "is an array of tables; ..." for any other value, else "".
 std::string check_tables(const TomlValue& value, std::string_view example);
@@ -23,7 +23,7 @@ void apply(std::span<const Key<Target>> keys, const Changes<Target>& changes, Ta
 }
 
 template <class Target>
-std::string read_changes(const TomlValue& table, std::span<const Key<Target>> keys, Changes<Target>& changes, Place& at) {
+std::string read_changes(const TomlValue& table, std::span<const Key<Target>> keys, Changes<Target>& changes, TextPosition& at) {
   if (!table.is_table()) return "is a table of keys, as in { gap_mm = 0.1 }";
   Changes<Target> read;
   auto wrong = read_table(table, keys.front().section, keys, read.values, at, &read.keys);
@@ -46,12 +46,12 @@ std::string changes_text(std::span<const Key<Target>> keys, const Changes<Target
 /// Ranges in the order of their heights, disjoint.
 template <class Target>
 std::string read_ranges(const TomlValue& list, std::span<const Key<Target>> keys, std::vector<Range<Target>>& ranges,
-                        Place& at) {
+                        TextPosition& at) {
   if (auto wrong = check_tables(list, "from_mm, to_mm and the keys that differ"); !wrong.empty()) return wrong;
   std::vector<Range<Target>> read;
   for (TomlValue table : list.value) {
     Range<Target>& range = read.emplace_back();
-    at = table.place;
+    at = table.position;
     if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
     const std::string name = range_name(range.from_mm, range.to_mm);
     if (auto wrong = read_changes(table, keys, range.changes, at); !wrong.empty()) return fmt::format("{}: {}", name, wrong);

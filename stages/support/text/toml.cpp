@@ -27,7 +27,7 @@ namespace {
 
 TomlValue tree_of(const toml::node& node) {
   TomlValue tree;
-  tree.place = {static_cast<std::uint32_t>(node.source().begin.line), static_cast<std::uint32_t>(node.source().begin.column)};
+  tree.position = {static_cast<std::uint32_t>(node.source().begin.line), static_cast<std::uint32_t>(node.source().begin.column)};
   if (const auto* string = node.as_string()) {
     tree.text = string->get();
   } else if (const auto* whole = node.as_integer()) {
@@ -43,9 +43,9 @@ TomlValue tree_of(const toml::node& node) {
     tree.kind = TomlValue::Kind::kTable;
     for (const auto& [name, entry] : *table) {
       tree.add(name.str(), tree_of(entry));
-      Place& place = tree.value.back().place;  // a header's, where the table was opened without one
-      if (place.line == 0) {
-        place = {static_cast<std::uint32_t>(name.source().begin.line), static_cast<std::uint32_t>(name.source().begin.column)};
+      TextPosition& position = tree.value.back().position;  // a header's, where the table was opened without one
+      if (position.line == 0) {
+        position = {static_cast<std::uint32_t>(name.source().begin.line), static_cast<std::uint32_t>(name.source().begin.column)};
       }
     }
   } else {
@@ -56,7 +56,7 @@ TomlValue tree_of(const toml::node& node) {
 
 }  // namespace
 
-std::string Place::text(const std::string& file) const {
+std::string TextPosition::text(const std::string& file) const {
   return line == 0 ? std::string() : fmt::format("{}:{}:{}: ", file, line, column);
 }
 

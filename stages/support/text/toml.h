@@ -12,7 +12,7 @@
 namespace lamina {
 
 /// The start of a value in its file, from 1; 0 without a file.
-struct Place {
+struct TextPosition {
   std::uint32_t line = 0, column = 0;
   /// "job.toml:12:5: ", or "" without a place.
   std::string text(const std::string& file) const;
@@ -24,7 +24,7 @@ struct TomlValue {
   std::string text;               // of a string, a number or a switch
   std::vector<std::string> name;  // of the values of a table, in alphabetical order
   std::vector<TomlValue> value;   // of a list or table
-  Place place;
+  TextPosition position;
 
   bool is_text() const { return kind == Kind::kText; }
   bool is_list() const { return kind == Kind::kList; }

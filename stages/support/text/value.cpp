@@ -42,8 +42,8 @@ std::string check_value(std::int64_t value, const Limits& limits) {
 }
 
 std::string check_length(std::size_t length, const Limits& limits) {
-  if (length < limits.least) return fmt::format("holds {} values; give at least {}", length, limits.least);
-  if (length > limits.most) return fmt::format("holds {} values; give at most {}", length, limits.most);
+  if (length < limits.minimum) return fmt::format("holds {} values; give at least {}", length, limits.minimum);
+  if (length > limits.maximum) return fmt::format("holds {} values; give at most {}", length, limits.maximum);
   return {};
 }
 

@@ -17,15 +17,15 @@
 
 namespace lamina {
 
-inline constexpr double kLeastMm = 1e-6;  // 1 nm
-inline constexpr double kMostMm = 2147;   // the range of 32-bit nanometres, in whole mm
+inline constexpr double kMinMm = 1e-6;  // 1 nm
+inline constexpr double kMaxMm = 2147;   // the range of 32-bit nanometres, in whole mm
 
 /// The limits of a number, and of the length of a list.
 struct Limits {
   double low = 0, high = 0;
   std::string_view unit = {};  // for messages, as in " mm"
   bool one_for_all = false;    // one number may stand for a list of fixed length
-  std::size_t least = 0, most = 100'000;
+  std::size_t minimum = 0, maximum = 100'000;
 };
 
 // --- one value

@@ -36,9 +36,9 @@ Result<Levels> levels_of_layer(const SheetRequest& request, const SheetLayer& la
     std::swap(before, all);
     add_levels(before, *image, all);
   }
-  if (const int found = highest(all); found > request.most) {
+  if (const int found = highest(all); found > request.maximum) {
     return Error{Fault::kVerification, fmt::format("{}: has pixels of {} drops, the job at most {}; plan the layer again",
-                                                   layer.paths.front(), found, request.most)};
+                                                   layer.paths.front(), found, request.maximum)};
   }
   return all;
 }
@@ -108,7 +108,7 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
   const Result<PixelWindow> window = shown_window(request, read);
   if (!window) return window.error();
   const int cells = static_cast<int>(request.layers.size());
-  const SheetLayout layout = lay_out(cells, *window, request.grid, static_cast<int>(request.width));
+  const SheetLayout layout = layout_chart(cells, *window, request.grid, static_cast<int>(request.width));
   Canvas canvas(layout.width, layout.height, kGround);
   const std::string title = request.title + "   |   " + shown_size(*window, request.grid) + " shown";
   canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size,
@@ -117,7 +117,7 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
 
   const Status status = for_each_image(request, read, [&](std::size_t index, const LevelsView& levels) {
     Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
-    coverage(levels, request.most, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
+    coverage(levels, request.maximum, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
     const int cell = static_cast<int>(index);
     const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;
     canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, request.layers[index].warns ? kWarning : kInk);

@@ -8,10 +8,10 @@ namespace {
 
 // Sizes on a sheet of this width; others in proportion, within limits at which text can still be read.
 constexpr double kDesignWidth = 2400;
-constexpr double kLeastScale = 0.45, kMostScale = 2;
+constexpr double kMinScale = 0.45, kMaxScale = 2;
 constexpr double kWantedProportion = 1.5;
 // A cell is at most so many times as high as it is wide; a picture that is higher becomes narrower.
-constexpr int kMostHeight = 3;
+constexpr int kMaxHeight = 3;
 
 int scaled(double size, double scale) { return static_cast<int>(std::lround(size * scale)); }
 
@@ -27,7 +27,7 @@ SheetLayout with_columns(int columns, int cells, double proportion, int width, d
   layout.caption_size = std::clamp(layout.cell_width / 14, 9, scaled(26, scale));
   layout.caption_height = layout.caption_size * 3 / 2;
   const double height = layout.cell_width * proportion;
-  layout.cell_height = std::max(1, static_cast<int>(std::lround(std::min<double>(height, kMostHeight * layout.cell_width))));
+  layout.cell_height = std::max(1, static_cast<int>(std::lround(std::min<double>(height, kMaxHeight * layout.cell_width))));
   layout.picture_height = layout.cell_height;
   layout.picture_width = std::clamp(static_cast<int>(std::lround(layout.cell_height / proportion)), 1, layout.cell_width);
   const int rows = (cells + columns - 1) / columns;
@@ -38,9 +38,9 @@ SheetLayout with_columns(int columns, int cells, double proportion, int width, d
 
 /// 0 is best: far from the wanted proportion, or with places left empty in the last row, is worse.
 double badness(const SheetLayout& layout, int cells) {
-  const int places = (cells + layout.columns - 1) / layout.columns * layout.columns;
+  const int positions = (cells + layout.columns - 1) / layout.columns * layout.columns;
   return std::abs(std::log(static_cast<double>(layout.width) / layout.height / kWantedProportion)) +
-         static_cast<double>(places - cells) / cells;
+         static_cast<double>(positions - cells) / cells;
 }
 
 }  // namespace
@@ -57,8 +57,8 @@ PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid) {
           std::min(bed.bottom, window.bottom + y)};
 }
 
-SheetLayout lay_out(int cells, const PixelWindow& window, const PixelGrid& grid, int width) {
-  const double scale = std::clamp(width / kDesignWidth, kLeastScale, kMostScale);
+SheetLayout layout_chart(int cells, const PixelWindow& window, const PixelGrid& grid, int width) {
+  const double scale = std::clamp(width / kDesignWidth, kMinScale, kMaxScale);
   const double proportion =
       static_cast<double>(window.height()) / grid.y.dpi() * grid.x.dpi() / static_cast<double>(window.width());
   if (cells == 1) {

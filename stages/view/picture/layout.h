@@ -27,6 +27,6 @@ struct SheetLayout {
 PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid);
 
 /// A sheet at most `width` wide of `cells` pictures of `window`, as near to the proportion 3 : 2 as their shape allows.
-SheetLayout lay_out(int cells, const PixelWindow& window, const PixelGrid& grid, int width);
+SheetLayout layout_chart(int cells, const PixelWindow& window, const PixelGrid& grid, int width);
 
 }  // namespace lamina::write::picture

@@ -68,13 +68,13 @@ void legend(Canvas& canvas, std::vector<LegendEntry> entries, int left, int righ
 
 Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layers, const Box& box, std::uint32_t width,
                                      const std::function<Result<LayerShapes>(std::size_t)>& shapes_of) {
-  constexpr std::int64_t kPixels = 20'000, kLeastPixel = 1000;  // of the longer side: no cell is as large; nm
+  constexpr std::int64_t kPixels = 20'000, kMinPixel = 1000;  // of the longer side: no cell is as large; nm
   const std::int64_t shown = std::max<std::int64_t>(box.width(), 1000) * 26 / 25,
                      tall = std::max<std::int64_t>(box.depth(), 1000) * 26 / 25;
-  const std::int64_t side = std::max(shown, tall), dots = std::min(kPixels, side / kLeastPixel);
+  const std::int64_t side = std::max(shown, tall), dots = std::min(kPixels, side / kMinPixel);
   const PixelGrid grid{PixelAxis(dots, shown, side), PixelAxis(dots, tall, side)};
   const SheetLayout layout =
-      lay_out(static_cast<int>(layers), {0, grid.columns(), 0, grid.rows()}, grid, static_cast<int>(width));
+      layout_chart(static_cast<int>(layers), {0, grid.columns(), 0, grid.rows()}, grid, static_cast<int>(width));
   Canvas canvas(layout.width, layout.height, kGround);
   const double pixels_per_nm = layout.picture_width / static_cast<double>(shown);
   const Scale scale{(static_cast<double>(box.lo.x) + box.hi.x) / 2 - static_cast<double>(shown) / 2,

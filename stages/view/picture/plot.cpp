@@ -12,7 +12,7 @@
 namespace lamina::write::picture {
 namespace {
 
-constexpr int kMostPixels = 20'000;
+constexpr int kMaxPixels = 20'000;
 constexpr double kNmPerPixel = 100'000;  // contours are whole nm
 
 int rounded(double pixels) { return static_cast<int>(std::lround(pixels)); }
@@ -66,7 +66,7 @@ Status put(Canvas& canvas, const Plot::Image& image) {
 }  // namespace
 
 Result<Buffer<std::byte>> plot_png(const Plot& plot) {
-  if (std::min(plot.width, plot.height) < 1 || std::max(plot.width, plot.height) > kMostPixels) {
+  if (std::min(plot.width, plot.height) < 1 || std::max(plot.width, plot.height) > kMaxPixels) {
     return Error{Fault::kUsage, fmt::format("a plot of {} x {} pixels cannot be drawn", plot.width, plot.height)};
   }
   Canvas canvas(plot.width, plot.height, {255, 255, 255});
@@ -78,12 +78,12 @@ Result<Buffer<std::byte>> plot_png(const Plot& plot) {
   }
   for (const Plot::Image& image : plot.images)
     if (Status status = put(canvas, image); !status) return status.error();
-  for (const Plot::Line& line : plot.lines) {
+  for (const Plot::PlotLine& line : plot.lines) {
     if (Status status = stroke(canvas, line.points, 1, 1, colour_of(line.colour)); !status) return status.error();
   }
   for (const Plot::Dot& dot : plot.dots) {
-    const std::vector<std::array<double, 2>> place = {{dot.x - 0.01, dot.y}, {dot.x + 0.01, dot.y}};
-    if (Status status = stroke(canvas, place, 2 * dot.radius, 0.5, colour_of(dot.colour)); !status) return status.error();
+    const std::vector<std::array<double, 2>> position = {{dot.x - 0.01, dot.y}, {dot.x + 0.01, dot.y}};
+    if (Status status = stroke(canvas, position, 2 * dot.radius, 0.5, colour_of(dot.colour)); !status) return status.error();
   }
   for (const Plot::Text& text : plot.texts) {
     const int width = text_width(text.line, text.size), x = rounded(text.x);

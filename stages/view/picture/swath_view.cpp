@@ -10,7 +10,7 @@ namespace lamina::write::picture {
 namespace {
 
 constexpr Colour kGround{255, 255, 255}, kBed{247, 247, 244}, kOdd{236, 240, 245}, kPresent{255, 240, 214};
-constexpr Colour kEdge{176, 182, 190}, kAsked{150, 160, 175}, kFired{24, 44, 92}, kNozzle{150, 95, 20}, kFires{225, 20, 20};
+constexpr Colour kEdge{176, 182, 190}, kRequested{150, 160, 175}, kFired{24, 44, 92}, kNozzle{150, 95, 20}, kFires{225, 20, 20};
 constexpr Colour kText{40, 44, 52};
 
 }  // namespace
@@ -54,7 +54,7 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   const PixelWindow window{0, view.grid.columns(), 0, view.grid.rows()};
   Buffer<std::uint8_t> shares(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
   const auto paint = [&](const LevelsView& levels, Colour ink) {
-    coverage(levels, view.most, window, static_cast<std::uint32_t>(wide), shares);
+    coverage(levels, view.maximum, window, static_cast<std::uint32_t>(wide), shares);
     for (int row = 0; row < high; ++row) {
       canvas.paint(left, top + row, wide,
                    std::span(shares).subspan(static_cast<std::size_t>(row) * static_cast<std::size_t>(wide),
@@ -62,10 +62,10 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
                    ink);
     }
   };
-  paint(view.image, kAsked);
+  paint(view.image, kRequested);
   paint(view.fired, kFired);
   const double radius = std::max(0.5, 1.6 / sx);
-  for (const NozzlePlace& nozzle : view.nozzles) {
+  for (const NozzlePosition& nozzle : view.nozzles) {
     box(nozzle.column + 0.5 - radius, nozzle.row + 0.5 - radius * sx / sy, nozzle.column + 0.5 + radius,
         nozzle.row + 0.5 + radius * sx / sy, nozzle.fires ? kFires : kNozzle);
   }

@@ -18,9 +18,9 @@ struct SwathView {
   PixelGrid grid;
   LevelsView image;              // drops that are to be jetted: drawn light
   LevelsView fired;              // drops so far: drawn dark
-  std::uint8_t most = 1;         // drops of a pixel, which is drawn by its share of them
+  std::uint8_t maximum = 1;         // drops of a pixel, which is drawn by its share of them
   std::vector<SwathBand> bands;  // the present one is marked
-  std::vector<NozzlePlace> nozzles;
+  std::vector<NozzlePosition> nozzles;
   std::uint32_t width = 1200;  // of the picture
 };
 

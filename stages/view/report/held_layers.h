@@ -16,12 +16,12 @@ class HeldLayers {
   /// limit  bytes of the page
   explicit HeldLayers(std::uint64_t limit) : limit_(limit) {}
 
-  bool wants(std::uint32_t place) const { return place % stride_ == 0; }
+  bool wants(std::uint32_t location) const { return location % stride_ == 0; }
   /// cost  O(1), and O(layers held) each time their number is halved
-  void add(std::uint32_t place, Buffer<std::byte> code) {
-    if (!wants(place)) return;
+  void add(std::uint32_t location, Buffer<std::byte> code) {
+    if (!wants(location)) return;
     bytes_ += cost(code);
-    layers_.push_back({place, std::move(code)});
+    layers_.push_back({location, std::move(code)});
     while (bytes_ > limit_ && layers_.size() > 1) {
       stride_ *= 2;
       std::erase_if(layers_, [&](const auto& layer) { return layer.first % stride_ != 0; });

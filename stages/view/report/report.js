@@ -58,7 +58,7 @@ const decodeLayer = async index => decodeRuns(await unpack('r' + index), head.ro
 
 // --- the layer
 const view = $('view');
-const stretch = head.pixel_mm[1] / head.pixel_mm[0];  // a pixel is 1 wide and so much high
+const pixel_aspect = head.pixel_mm[1] / head.pixel_mm[0];  // a pixel is 1 wide and so much high
 function size(canvas) {
   const ratio = Math.min(window.devicePixelRatio || 1, 2), box = canvas.getBoundingClientRect();
   const width = Math.max(1, Math.round(box.width * ratio)), height = Math.max(1, Math.round(box.height * ratio));
@@ -68,7 +68,7 @@ function size(canvas) {
 function drawView() {
   if (!state.runs) return;
   size(view);
-  const width = view.width, height = view.height, sx = state.scale, sy = state.scale * stretch;
+  const width = view.width, height = view.height, sx = state.scale, sy = state.scale * pixel_aspect;
   const left = state.x - width / 2 / sx, top = state.y - height / 2 / sy;
   const share = new Float32Array(width * height);
   const { rowOffset, change } = state.runs;
@@ -105,24 +105,24 @@ function drawView() {
     }
   }
   pen.putImageData(image, 0, 0);
-  drawPlaces(pen, left, top, sx, sy);
+  drawLocations(pen, left, top, sx, sy);
 }
 
 // Frames around what --inspect found in the layer at hand.
-function placesOf(number) { return head.places.filter(place => place.layers[0] <= number && number <= place.layers[1]); }
-function drawPlaces(pen, left, top, sx, sy) {
-  const frames = placesOf(head.first_layer + (shown[state.at] ?? 0)).map(place => {
-    const [x, y, width, depth] = place.box_mm, least = 14;
-    const w = Math.max(least, width / head.pixel_mm[0] * sx + 8), h = Math.max(least, depth / head.pixel_mm[1] * sy + 8);
+function locationsOf(number) { return head.locations.filter(spot => spot.layers[0] <= number && number <= spot.layers[1]); }
+function drawLocations(pen, left, top, sx, sy) {
+  const frames = locationsOf(head.first_layer + (shown[state.at] ?? 0)).map(spot => {
+    const [x, y, width, depth] = spot.box_mm, minimum = 14;
+    const w = Math.max(minimum, width / head.pixel_mm[0] * sx + 8), h = Math.max(minimum, depth / head.pixel_mm[1] * sy + 8);
     return [(x / head.pixel_mm[0] - left) * sx - w / 2, (y / head.pixel_mm[1] - top) * sy - h / 2, w, h];
   });
   pen.strokeStyle = colour('--bad'); pen.lineWidth = 3;
   for (const frame of frames) pen.strokeRect(...frame);
   state.frames = frames;
 }
-async function showPlace(place) {
-  await showLayer(place.layers[0]);
-  const [x, y, width, depth] = place.box_mm;
+async function showLocation(spot) {
+  await showLayer(spot.layers[0]);
+  const [x, y, width, depth] = spot.box_mm;
   state.x = x / head.pixel_mm[0]; state.y = y / head.pixel_mm[1];
   const across = Math.max(width, depth / 2, 2) * 4 / head.pixel_mm[0];  // of the view: four times the place
   state.scale = Math.min(64, Math.max(state.scale, view.width / across));
@@ -134,31 +134,31 @@ function fit() {
   size(view);
   const [l, t, r, b] = head.window;
   state.x = (l + r) / 2; state.y = (t + b) / 2;
-  state.scale = 0.94 * Math.min(view.width / Math.max(1, r - l), view.height / (Math.max(1, b - t) * stretch));
+  state.scale = 0.94 * Math.min(view.width / Math.max(1, r - l), view.height / (Math.max(1, b - t) * pixel_aspect));
   drawView();
 }
 function zoom(factor, px = view.width / 2, py = view.height / 2) {
   const scale = Math.min(64, Math.max(1e-3, state.scale * factor));
   state.x += (px - view.width / 2) * (1 / state.scale - 1 / scale);
-  state.y += (py - view.height / 2) * (1 / state.scale - 1 / scale) / stretch;
+  state.y += (py - view.height / 2) * (1 / state.scale - 1 / scale) / pixel_aspect;
   state.scale = scale;
   drawView();
 }
-function pan(dx, dy) { state.x -= dx / state.scale; state.y -= dy / (state.scale * stretch); drawView(); }
+function pan(dx, dy) { state.x -= dx / state.scale; state.y -= dy / (state.scale * pixel_aspect); drawView(); }
 
 let wanted = 0;
-async function show(place) {  // place: within `shown`
-  place = Math.max(0, Math.min(shown.length - 1, place));
-  const asked = ++wanted, runs = await decodeLayer(shown[place]);
-  if (asked !== wanted) return;
-  state.at = place; state.runs = runs;
-  const i = shown[place];
-  $('slider').value = place; $('number').value = head.first_layer + i;
+async function show(spot) {  // place: within `shown`
+  spot = Math.max(0, Math.min(shown.length - 1, spot));
+  const requested = ++wanted, runs = await decodeLayer(shown[spot]);
+  if (requested !== wanted) return;
+  state.at = spot; state.runs = runs;
+  const i = shown[spot];
+  $('slider').value = spot; $('number').value = head.first_layer + i;
   $('readout').textContent = `z ${mm(layers.bottom[i])} to ${mm(layers.bottom[i] + layers.thickness[i])} mm, ` +
     `${(layers.set[i] * head.pixel_mm[0] * head.pixel_mm[1]).toFixed(2)} mm², ` +
     (head.images ? `${layers.set[i].toLocaleString('en')} pixels` : `${layers.volume[i].toFixed(3)} mm³ in beads`) +
     (layers.seconds ? `, about ${duration(layers.seconds[i])}` : '') +
-    placesOf(head.first_layer + i).map(place => `, ${place.code}`).filter((code, k, all) => all.indexOf(code) === k).join('');
+    locationsOf(head.first_layer + i).map(spot => `, ${spot.code}`).filter((code, k, all) => all.indexOf(code) === k).join('');
   if (!state.fitted) { state.fitted = true; fit(); } else drawView();
   drawPlots();
   document.documentElement.dataset.layer = head.first_layer + i;
@@ -166,7 +166,7 @@ async function show(place) {  // place: within `shown`
 function showLayer(number) {  // the nearest that the page holds
   const i = number - head.first_layer;
   let best = 0;
-  shown.forEach((have, place) => { if (Math.abs(have - i) < Math.abs(shown[best] - i)) best = place; });
+  shown.forEach((have, spot) => { if (Math.abs(have - i) < Math.abs(shown[best] - i)) best = spot; });
   return show(best);
 }
 
@@ -177,14 +177,14 @@ async function drawViews() {
   for (const [name, title] of [['top', 'from above'], ['front', 'from the front'], ['side', 'from the right']]) {
     const figure = element('figure', undefined, $('views'));
     element('figcaption', title, figure);
-    const canvas = element('canvas', undefined, figure), [width, height, most] = head.views[name];
+    const canvas = element('canvas', undefined, figure), [width, height, maximum] = head.views[name];
     canvas.setAttribute('role', 'img'); canvas.setAttribute('aria-label', 'the parts ' + title);
     const bytes = await unpack('v-' + name);
     const picture = document.createElement('canvas');
     picture.width = width; picture.height = height;
     const pen = picture.getContext('2d'), image = pen.createImageData(width, height);
     const paint = (at, light, cover) => image.data.set([35 + 190 * light, 55 + 185 * light, 80 + 172 * light, cover], 4 * at);
-    if (most === 0) {  // ray-cast: for each pixel how light, and how much of it is part
+    if (maximum === 0) {  // ray-cast: for each pixel how light, and how much of it is part
       for (let at = 0; at < width * height; ++at) paint(at, bytes[2 * at] / 255, bytes[2 * at + 1]);
     } else {  // the layers: depth, lighter where it is nearer
       const depth = new Uint16Array(bytes.buffer, 0, width * height);
@@ -193,7 +193,7 @@ async function drawViews() {
           if (!depth[at]) continue;
           const right = x + 1 < width && depth[at + 1] ? depth[at + 1] - depth[at] : 0;
           const below = y + 1 < height && depth[at + width] ? depth[at + width] - depth[at] : 0;
-          paint(at, 0.4 + 0.4 * depth[at] / most + Math.max(-0.25, Math.min(0.2, (right + below) * 10 / most)), 255);
+          paint(at, 0.4 + 0.4 * depth[at] / maximum + Math.max(-0.25, Math.min(0.2, (right + below) * 10 / maximum)), 255);
         }
       }
     }
@@ -213,12 +213,12 @@ async function drawViews() {
 // --- over the height
 const plots = [], redraw = [];
 function addPlot(title, unit, values) {
-  const figure = element('figure', undefined, $('plots')), most = values.reduce((a, b) => Math.max(a, b), 0);
-  const least = values.reduce((a, b) => Math.min(a, b), Infinity);
-  element('figcaption', `${title}: ${+least.toPrecision(6)} to ${+most.toPrecision(6)} ${unit}`, figure);
+  const figure = element('figure', undefined, $('plots')), maximum = values.reduce((a, b) => Math.max(a, b), 0);
+  const minimum = values.reduce((a, b) => Math.min(a, b), Infinity);
+  element('figcaption', `${title}: ${+minimum.toPrecision(6)} to ${+maximum.toPrecision(6)} ${unit}`, figure);
   const canvas = element('canvas', undefined, figure);
   canvas.setAttribute('role', 'img'); canvas.setAttribute('aria-label', title + ' against height');
-  plots.push({ canvas, values, most: most || 1 });
+  plots.push({ canvas, values, maximum: maximum || 1 });
   canvas.addEventListener('click', event => {
     const box = canvas.getBoundingClientRect(), z = (event.clientX - box.left) / box.width * height();
     let i = 0;
@@ -228,10 +228,10 @@ function addPlot(title, unit, values) {
 }
 const height = () => layers.bottom.at(-1) + layers.thickness.at(-1) - layers.bottom[0];
 function drawPlots() {
-  for (const { canvas, values, most } of plots) {
+  for (const { canvas, values, maximum } of plots) {
     size(canvas);
     const pen = canvas.getContext('2d'), w = canvas.width, h = canvas.height, all = height();
-    const x = nm => (nm - layers.bottom[0]) / all * w, y = value => h - 4 - value / most * (h - 12);
+    const x = nm => (nm - layers.bottom[0]) / all * w, y = value => h - 4 - value / maximum * (h - 12);
     pen.clearRect(0, 0, w, h);
     const i = shown[state.at] ?? 0;
     pen.fillStyle = colour('--accent'); pen.globalAlpha = 0.35;
@@ -254,7 +254,7 @@ function fillTexts() {
   $('facts').textContent = `${head.layer_count.toLocaleString('en')} layers, ` + (head.images ?
     `${head.columns} × ${head.rows} pixels of ${+head.dpi[0].toFixed(3)} × ${+head.dpi[1].toFixed(3)} dpi, ` :
     `drawn in pixels of ${Math.round(head.pixel_mm[0] * 1000)} µm, `) + head.format + (head.machine ? `, ${head.machine}, about ${duration(layers.seconds.reduce((a, b) => a + b, 0))}` : '') + (head.sweeps ? `; sweeps: ${head.sweeps}` : '');
-  if (head.stride > 1) $('note').textContent = `To keep this page small, every ${head.stride}th layer can be looked at.`;
+  if (head.stride > 1) $('note').textContent = `To keep this page small, every ${head.stride}th layer can be inspected at.`;
   const warnings = $('warnings'), warn = (text, layer) => {
     const line = element('li', layer === undefined ? text : undefined, warnings);
     if (layer === undefined) return;
@@ -264,24 +264,24 @@ function fillTexts() {
   };
   for (const warning of head.warnings) warn(warning.text, warning.layer);
   for (const part of head.parts) for (const note of part.notes) warn(`${part.path}: ${note}`);
-  let told = 0, more = 0;
+  let reported = 0, more = 0;
   layers.capped.forEach((rows, i) => {
     const empty = layers.set[i] === 0;
     if (!rows && !empty) return;
-    if (told++ >= 200) { ++more; return; }
+    if (reported++ >= 200) { ++more; return; }
     const number = head.first_layer + i;
     warn(`layer ${number}: ` + (empty ? head.images ? 'nothing is set' : 'nothing is laid' : `${rows} rows are closed only thanks to repair`), number);
   });
   if (more) warn(`and ${more} more layers`);
   if (!warnings.children.length) warn('none');
-  $('h-places').hidden = !head.places.length;
-  for (const place of head.places) {
-    const [x, y, z] = place.mm.map(value => +value.toFixed(2)), unit = { mm2: 'mm²', mm3: 'mm³' }[place.unit];
-    const button = element('button', `${place.code}` + (unit ? ` of ${+place.amount.toPrecision(3)} ${unit}` : '') +
-      ` at x ${x}, y ${y}, z ${z} mm, layer ${place.layers[0]}` +
-      (place.layers[1] > place.layers[0] ? ` to ${place.layers[1]}` : ''), element('li', undefined, $('places')));
+  $('h-locations').hidden = !head.locations.length;
+  for (const spot of head.locations) {
+    const [x, y, z] = spot.mm.map(value => +value.toFixed(2)), unit = { mm2: 'mm²', mm3: 'mm³' }[spot.unit];
+    const button = element('button', `${spot.code}` + (unit ? ` of ${+spot.amount.toPrecision(3)} ${unit}` : '') +
+      ` at x ${x}, y ${y}, z ${z} mm, layer ${spot.layers[0]}` +
+      (spot.layers[1] > spot.layers[0] ? ` to ${spot.layers[1]}` : ''), element('li', undefined, $('places')));
     button.type = 'button';
-    button.addEventListener('click', () => showPlace(place));
+    button.addEventListener('click', () => showLocation(spot));
   }
   const row = (table, cells, cell = 'td') => { const line = element('tr', undefined, table); cells.forEach(text => element(cell, text, line)); };
   row($('parts'), ['part', 'copies', 'triangles', 'from, mm', 'to, mm'], 'th');
@@ -291,12 +291,12 @@ function fillTexts() {
   $('cost').hidden = !head.quote.length;
   head.quote.forEach((cells, i) => row($('quote'), i ? cells : cells.map(name => name.replaceAll('_', ' ')), i ? 'td' : 'th'));
   $('job').textContent = head.job;
-  $('laid').hidden = !head.laid;
-  $('laid-lines').textContent = head.laid;
-  if (head.laid_svg) {
-    const picture = element('img', undefined, $('laid'));
+  $('deposited').hidden = !head.deposited;
+  $('deposited-lines').textContent = head.deposited;
+  if (head.deposited_svg) {
+    const picture = element('img', undefined, $('deposited'));
     picture.alt = 'sections through beads and pores, across the layers and along them';
-    picture.src = 'data:image/svg+xml;base64,' + head.laid_svg;
+    picture.src = 'data:image/svg+xml;base64,' + head.deposited_svg;
   }
   const line = $('manifest');
   line.append(`${head.manifest.name}, ${head.manifest.bytes} bytes, XXH3-128 `);
@@ -339,24 +339,24 @@ function listen() {
     act();
   });
   const ratio = () => view.width / view.getBoundingClientRect().width, fingers = new Map();
-  const place = event => { const box = view.getBoundingClientRect(); return [(event.clientX - box.left) * ratio(), (event.clientY - box.top) * ratio()]; };
-  view.addEventListener('pointerdown', event => { view.setPointerCapture(event.pointerId); fingers.set(event.pointerId, place(event)); });
+  const spot = event => { const box = view.getBoundingClientRect(); return [(event.clientX - box.left) * ratio(), (event.clientY - box.top) * ratio()]; };
+  view.addEventListener('pointerdown', event => { view.setPointerCapture(event.pointerId); fingers.set(event.pointerId, spot(event)); });
   for (const name of ['pointerup', 'pointercancel']) view.addEventListener(name, event => fingers.delete(event.pointerId));
   view.addEventListener('pointermove', event => {
     if (!fingers.has(event.pointerId)) return;
-    const before = [...fingers.values()].map(p => [...p]), now = place(event), old = fingers.get(event.pointerId);
+    const before = [...fingers.values()].map(p => [...p]), now = spot(event), old = fingers.get(event.pointerId);
     fingers.set(event.pointerId, now);
     if (before.length === 1) { pan(now[0] - old[0], now[1] - old[1]); return; }
     const after = [...fingers.values()], apart = p => Math.hypot(p[0][0] - p[1][0], p[0][1] - p[1][1]);
     if (apart(before) > 0) zoom(apart(after) / apart(before), (after[0][0] + after[1][0]) / 2, (after[0][1] + after[1][1]) / 2);
   });
-  view.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(-event.deltaY / 400), ...place(event)); }, { passive: false });
+  view.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(-event.deltaY / 400), ...spot(event)); }, { passive: false });
   addEventListener('resize', () => { drawView(); drawPlots(); redraw.forEach(draw => draw()); });
   addEventListener('hashchange', fromAddress);
 }
 function fromAddress() {
-  const asked = /layer=(\d+)/.exec(location.hash);
-  return asked ? showLayer(+asked[1]) : show(Math.floor(shown.length / 2));
+  const requested = /layer=(\d+)/.exec(location.hash);
+  return requested ? showLayer(+requested[1]) : show(Math.floor(shown.length / 2));
 }
 
 fillTexts();
@@ -368,4 +368,4 @@ if (layers.seconds) addPlot('time, estimated', 's', layers.seconds);
 if (layers.sweeps) addPlot('sweeps', '', layers.sweeps);
 if (layers.filament) addPlot('filament', 'mm', layers.filament);
 const ready = fromAddress().then(drawViews).then(() => { document.documentElement.dataset.ready = 'yes'; });
-window.laminaReport = { head, state, decodeLayer, showLayer, showPlace, ready };
+window.laminaReport = { head, state, decodeLayer, showLayer, showLocation, ready };

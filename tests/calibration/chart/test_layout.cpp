@@ -53,13 +53,13 @@ std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> fired(const Hea
 TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
   for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
     const auto machine = machine_of_chart(std::string(name));
-    const auto laid = chart::lay_out(machine.machine, machine.grid);
-    ASSERT_TRUE(laid) << name << ": " << laid.error().message;
-    Chart dashes = *laid;
+    const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+    ASSERT_TRUE(deposited) << name << ": " << deposited.error().message;
+    Chart dashes = *deposited;
     dashes.marks.clear();
     dashes.bars.clear();
     dashes.wedges.clear();
-    dashes.joints.clear();
+    dashes.stitches.clear();
     dashes.verniers.clear();
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> wanted;
     for (const ChartDash& dash : dashes.dashes)
@@ -73,25 +73,25 @@ TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
           << name << ": swath " << who.first << ", nozzle " << who.second;
     }
     const auto free_nozzles = machine.grid.nozzles - machine.grid.blocked.size();
-    EXPECT_EQ(wanted.size(), free_nozzles * laid->swaths) << name;
+    EXPECT_EQ(wanted.size(), free_nozzles * deposited->swaths) << name;
   }
 }
 
 TEST(ChartLayout, NothingTouchesAnythingElse) {
   for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
     const auto machine = machine_of_chart(std::string(name));
-    const auto laid = chart::lay_out(machine.machine, machine.grid);
-    ASSERT_TRUE(laid);
-    std::vector<ChartBox> boxes = laid->marks;
-    for (const ChartBar& bar : laid->bars) boxes.push_back(bar.box);
-    for (const ChartWedge& wedge : laid->wedges) boxes.push_back(wedge.box);
-    for (const ChartBox& joint : laid->joints) boxes.push_back(joint);
-    for (const ChartVernier& vernier : laid->verniers) {
+    const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+    ASSERT_TRUE(deposited);
+    std::vector<ChartBox> boxes = deposited->marks;
+    for (const ChartBar& bar : deposited->bars) boxes.push_back(bar.box);
+    for (const ChartWedge& wedge : deposited->wedges) boxes.push_back(wedge.box);
+    for (const ChartBox& joint : deposited->stitches) boxes.push_back(joint);
+    for (const ChartVernier& vernier : deposited->verniers) {
       boxes.insert(boxes.end(), vernier.before.begin(), vernier.before.end());
       boxes.insert(boxes.end(), vernier.after.begin(), vernier.after.end());
     }
-    for (const ChartDash& dash : laid->dashes) boxes.push_back(dash.box);
-    const std::size_t others = boxes.size() - laid->dashes.size();
+    for (const ChartDash& dash : deposited->dashes) boxes.push_back(dash.box);
+    const std::size_t others = boxes.size() - deposited->dashes.size();
     for (std::size_t i = 0; i < others; ++i) {
       for (std::size_t j = i + 1; j < boxes.size(); ++j) {
         const ChartBox &a = boxes[i], &b = boxes[j];
@@ -104,12 +104,12 @@ TEST(ChartLayout, NothingTouchesAnythingElse) {
 
 TEST(ChartLayout, JsonKeepsAllOfAChart) {
   const auto machine = machine_of_chart("nuferbj");
-  const auto laid = chart::lay_out(machine.machine, machine.grid);
-  ASSERT_TRUE(laid);
-  const std::string text = chart_text(*laid);
+  const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+  ASSERT_TRUE(deposited);
+  const std::string text = chart_text(*deposited);
   const auto again = read_chart(text, "chart.json");
   ASSERT_TRUE(again) << again.error().message;
-  EXPECT_EQ(*again, *laid);
+  EXPECT_EQ(*again, *deposited);
   // Every cut of it is refused in one line.
   for (std::size_t length = 0; length + 1 < text.size(); length += text.size() / 97) {
     const auto cut = read_chart(text.substr(0, length), "chart.json");
@@ -119,27 +119,27 @@ TEST(ChartLayout, JsonKeepsAllOfAChart) {
   }
 }
 
-TEST(ChartLayout, ABedWithoutRoomIsRefused) {
+TEST(ChartLayout, ABedWithoutSpaceIsRefused) {
   auto machine = *pipeline::find_machine("hp45");
   machine.bed.size_mm = {30, 30};
   const auto resolved = pipeline::resolve_profile(machine);
   ASSERT_TRUE(resolved);
-  const auto laid = chart::lay_out(resolved->machine, resolved->grid);
-  ASSERT_FALSE(laid);
-  EXPECT_EQ(laid.error().fault, Fault::kUsage);
+  const auto deposited = chart::layout_chart(resolved->machine, resolved->grid);
+  ASSERT_FALSE(deposited);
+  EXPECT_EQ(deposited.error().fault, Fault::kUsage);
 }
 
 TEST(ChartDrops, AreAsManyAsStatedAndEvenAmongNozzles) {
   const auto machine = machine_of_chart("nuferbj");
   for (const std::uint64_t drops : {1ull, 127ull, 364'032ull, 364'033ull, 1'000'000ull}) {
-    const auto wanted = chart::lay_out_drops(machine.machine, machine.grid, drops);
+    const auto wanted = chart::layout_drops(machine.machine, machine.grid, drops);
     ASSERT_TRUE(wanted);
     std::uint64_t sum = 0;
     for (std::uint32_t layer = 0; layer < wanted->layers; ++layer)
       sum += set_pixels(chart::draw_drops(*wanted, machine.grid, layer));
     EXPECT_EQ(sum, drops);
   }
-  const auto whole = chart::lay_out_drops(machine.machine, machine.grid, 364'032);
+  const auto whole = chart::layout_drops(machine.machine, machine.grid, 364'032);
   ASSERT_TRUE(whole);
   ASSERT_EQ(whole->layers, 1u);
   std::map<std::uint32_t, std::uint64_t> by_nozzle;
@@ -147,7 +147,7 @@ TEST(ChartDrops, AreAsManyAsStatedAndEvenAmongNozzles) {
     by_nozzle[who.second] += count;
   ASSERT_EQ(by_nozzle.size(), 128u);
   for (const auto& [nozzle, count] : by_nozzle) EXPECT_EQ(count, 364'032u / 128);
-  EXPECT_FALSE(chart::lay_out_drops(machine.machine, machine.grid, 1'000'000'000'000));
+  EXPECT_FALSE(chart::layout_drops(machine.machine, machine.grid, 1'000'000'000'000));
 }
 
 /// 52.5 mg of water, a million drops: 52.5 nl / 1000, by hand.
@@ -158,15 +158,15 @@ TEST(ChartDrops, VolumeFollowsFromMass) {
 }
 
 /// Ticks of a swath are fired by it alone, and pair m + k lines up if the later swath lies k places too far.
-TEST(ChartLayout, VerniersTellWholePixels) {
-  std::size_t seen = 0;
+TEST(ChartLayout, VerniersShowWholePixels) {
+  std::size_t detected = 0;
   for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
     const auto machine = machine_of_chart(std::string(name));
-    const auto laid = chart::lay_out(machine.machine, machine.grid);
-    ASSERT_TRUE(laid);
+    const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+    ASSERT_TRUE(deposited);
     // Beside the dashes, which say where swaths begin.
-    Chart dashes = *laid;
-    dashes.marks.clear(), dashes.bars.clear(), dashes.wedges.clear(), dashes.joints.clear(), dashes.verniers.clear();
+    Chart dashes = *deposited;
+    dashes.marks.clear(), dashes.bars.clear(), dashes.wedges.clear(), dashes.stitches.clear(), dashes.verniers.clear();
     const auto alone = fired(machine.grid, chart::draw(dashes));
     const auto drops_of_swath = [&](const ChartVernier& ticks) {
       Chart more = dashes;
@@ -177,8 +177,8 @@ TEST(ChartLayout, VerniersTellWholePixels) {
           drops[who.first - alone.begin()->first.first] += count;
       return drops;
     };
-    for (const ChartVernier& vernier : laid->verniers) {
-      ++seen;
+    for (const ChartVernier& vernier : deposited->verniers) {
+      ++detected;
       ASSERT_EQ(vernier.before.size(), 9u);
       const auto one = drops_of_swath({vernier.swath, vernier.before, {}}),
                  other = drops_of_swath({vernier.swath, {}, vernier.after});
@@ -186,24 +186,24 @@ TEST(ChartLayout, VerniersTellWholePixels) {
       EXPECT_EQ(one.begin()->first, vernier.swath - 1) << name;
       EXPECT_EQ(other.begin()->first, vernier.swath) << name;
       for (std::size_t i = 0; i < 9; ++i) {
-        const std::int64_t a = laid->scan_along_x ? vernier.before[i].left : vernier.before[i].top,
-                           b = laid->scan_along_x ? vernier.after[i].left : vernier.after[i].top;
-        EXPECT_EQ(b + (static_cast<std::int64_t>(i) - 4) * laid->along_sign, a) << name << ' ' << i;
+        const std::int64_t a = deposited->scan_along_x ? vernier.before[i].left : vernier.before[i].top,
+                           b = deposited->scan_along_x ? vernier.after[i].left : vernier.after[i].top;
+        EXPECT_EQ(b + (static_cast<std::int64_t>(i) - 4) * deposited->along_sign, a) << name << ' ' << i;
       }
     }
   }
-  EXPECT_GE(seen, 10u);
+  EXPECT_GE(detected, 10u);
 }
 
 /// nuferbj, by hand: 50 pl = 50,000 um3 on 96.944 x 96.944 x 100 um, of which 40 % are voids: 13.30 %.
 TEST(ChartMeasured, WedgesAreTakenForSaturations) {
   const auto machine = machine_of_chart("nuferbj");
-  auto laid = chart::lay_out(machine.machine, machine.grid);
-  ASSERT_TRUE(laid);
-  EXPECT_EQ(pipeline::saturation_of(100, *laid, machine.machine), 0);  // of no thickness
-  laid->layer_mm = 0.1;
-  EXPECT_NEAR(pipeline::saturation_of(100, *laid, machine.machine), 13.30, 0.01);
-  EXPECT_NEAR(pipeline::saturation_of(25, *laid, machine.machine), 3.325, 0.003);
+  auto deposited = chart::layout_chart(machine.machine, machine.grid);
+  ASSERT_TRUE(deposited);
+  EXPECT_EQ(pipeline::saturation_of(100, *deposited, machine.machine), 0);  // of no thickness
+  deposited->layer_mm = 0.1;
+  EXPECT_NEAR(pipeline::saturation_of(100, *deposited, machine.machine), 13.30, 0.01);
+  EXPECT_NEAR(pipeline::saturation_of(25, *deposited, machine.machine), 3.325, 0.003);
 }
 
 /// A reading with two rows: odd nozzles land 10 um too far, so that their row stands less far behind by as much. One is seen
@@ -219,12 +219,12 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   chart.layer_mm = 0.1;
   const char* reading =
       R"({"pixels_a_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"untold":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"along_within_um":2.25,"across_um":null,"across_within_um":80},null],)"
-      R"("nozzles":[{"along_um":-5,"along_seen_um":-5,"along_error_um":0.5,"across_um":0,"across_seen_um":0,"across_error_um":0.5},)"
-      R"({"along_um":5,"along_seen_um":5,"along_error_um":0.5,"across_um":0,"across_seen_um":0,"across_error_um":0.5},null,)"
-      R"({"along_um":5,"along_seen_um":5,"along_error_um":0.5,"across_um":1,"across_seen_um":1,"across_error_um":0.5},)"
-      R"({"along_um":null,"along_seen_um":-8,"along_error_um":3,"across_um":1,"across_seen_um":1,"across_error_um":0.5},null],)"
+      R"("nozzles":[{"along_um":-5,"along_detected_um":-5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},)"
+      R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},null,)"
+      R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":1,"across_detected_um":1,"across_error_um":0.5},)"
+      R"({"along_um":null,"along_detected_um":-8,"along_error_um":3,"across_um":1,"across_detected_um":1,"across_error_um":0.5},null],)"
       R"("joints":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
-      R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"seen_percent":61}]})";
+      R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"detected_percent":61}]})";
   const auto lines = pipeline::take_over(reading, chart, machine);
   ASSERT_TRUE(lines) << lines.error().message;
   EXPECT_EQ(machine.head.blocked, (std::vector<std::uint32_t>{2}));

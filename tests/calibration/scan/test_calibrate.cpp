@@ -35,9 +35,9 @@ TEST(CalibrateScan, APhotographBecomesAProfile) {
   std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
                                                            << picture.width << ' ' << picture.height << "\n255\n"
                                                            << std::string(picture.grey.begin(), picture.grey.end());
-  const Outcome seen = run_lamina(
+  const Outcome detected = run_lamina(
       words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay seen.png"), directory.path());
-  ASSERT_EQ(seen.code, 0) << seen.err;
+  ASSERT_EQ(detected.code, 0) << detected.err;
   EXPECT_TRUE(std::filesystem::exists(directory / "seen.png"));
   const auto mine = pipeline::find_machine(directory / "mine.toml");
   ASSERT_TRUE(mine) << mine.error().message;
@@ -102,12 +102,12 @@ TEST(CompareScan, AnyDropOfAGreyLayerIsInk) {
   std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
                                                            << picture.width << ' ' << picture.height << "\n255\n"
                                                            << std::string(picture.grey.begin(), picture.grey.end());
-  const Outcome seen = run_lamina(words_of("compare job/layers/000000.tif photo.pgm --machine jet1000-grey"), directory.path());
-  ASSERT_EQ(seen.code, 0) << seen.err << seen.out;
-  EXPECT_NEAR(std::stod(seen.out.substr(seen.out.find("area      ") + 10)), 45, 1) << seen.out;
+  const Outcome detected = run_lamina(words_of("compare job/layers/000000.tif photo.pgm --machine jet1000-grey"), directory.path());
+  ASSERT_EQ(detected.code, 0) << detected.err << detected.out;
+  EXPECT_NEAR(std::stod(detected.out.substr(detected.out.find("area      ") + 10)), 45, 1) << detected.out;
 }
 
-TEST(CalibrateScan, AMassTooLargeIsToldByItsOption) {
+TEST(CalibrateScan, AMassTooLargeIsReportedByItsOption) {
   Directory directory;
   const Outcome refused =
       run_lamina(words_of("calibrate --machine nuferbj --drops 10 --weighed-mg 1e6 -o no.toml"), directory.path());

@@ -23,7 +23,7 @@ namespace {
 
 /// Blobs with holes, 6 to 20 mm wide, on the bed of the default machine.
 Runs random_layer(const HeadGrid& grid, std::mt19937_64& random) {
-  const auto between = [&](double least, double most) { return std::uniform_real_distribution<double>(least, most)(random); };
+  const auto between = [&](double minimum, double maximum) { return std::uniform_real_distribution<double>(minimum, maximum)(random); };
   struct Blob {
     double x, y, r, lobes, phase, depth, hole;
   };
@@ -31,7 +31,7 @@ Runs random_layer(const HeadGrid& grid, std::mt19937_64& random) {
   for (int i = std::uniform_int_distribution<int>(2, 6)(random); i > 0; --i)
     blobs.push_back({between(25, 70), between(25, 70), between(4, 10), std::floor(between(2, 6)), between(0, 6),
                      between(0, 0.4), between(0, 0.5)});
-  const double pixel = grid.place_nm * 1e-6;
+  const double pixel = grid.position_nm * 1e-6;
   Runs layer;
   layer.columns = grid.image.columns();
   layer.row_offset.push_back(0);
@@ -54,8 +54,8 @@ Runs random_layer(const HeadGrid& grid, std::mt19937_64& random) {
 }
 
 TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
-  const char* asked = std::getenv("LAMINA_LAYERS");
-  const int layers = asked == nullptr ? 6 : std::atoi(asked);
+  const char* requested = std::getenv("LAMINA_LAYERS");
+  const int layers = requested == nullptr ? 6 : std::atoi(requested);
   Machine machine;
   machine.name = "along x";
   machine.mounting.tilt_deg = 45;
@@ -65,21 +65,21 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
   std::vector<double> area;
   for (int i = 0; i < layers; ++i) {
     std::mt19937_64 random(static_cast<std::uint64_t>(i) * 104'729 + 7);
-    const auto between = [&](double least, double most) { return std::uniform_real_distribution<double>(least, most)(random); };
+    const auto between = [&](double minimum, double maximum) { return std::uniform_real_distribution<double>(minimum, maximum)(random); };
     const Runs layer = random_layer(*grid, random);
     // Three lines of 97 um: 0.3 mm of a swath, where at least 5 mm are to be printed; every other layer lacks nothing.
     std::uint32_t gap = UINT32_MAX;
     if (i % 2 == 0) {
       do gap = std::uniform_int_distribution<std::uint32_t>(0, layer.view().rows() - 4)(random);
       while ([&] {
-        std::uint64_t least = UINT64_MAX;
+        std::uint64_t minimum = UINT64_MAX;
         for (std::uint32_t r = gap - std::min(gap, 12u); r < std::min(gap + 15, layer.view().rows()); ++r) {
           std::uint64_t set = 0;
           for (std::size_t k = 0; k + 1 < layer.view().row(r).size(); k += 2)
             set += layer.view().row(r)[k + 1] - layer.view().row(r)[k];
-          least = std::min(least, set);
+          minimum = std::min(minimum, set);
         }
-        return least < 60;
+        return minimum < 60;
       }());
     }
     Printing printing;
@@ -104,29 +104,29 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
     for (int y = 0; y < picture.height; ++y)
       std::memcpy(grey.ptr(y), picture.grey.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width),
                   static_cast<std::size_t>(picture.width));
-    const auto seen =
-        scan::compare_layer(scan::photo_of(std::move(grey)), {layer.view(), grid->place_nm, grid->line_nm, true, 100});
+    const auto detected =
+        scan::compare_layer(scan::photo_of(std::move(grey)), {layer.view(), grid->position_nm, grid->line_nm, true, 100});
     missing += gap != UINT32_MAX;
-    if (!seen) {
+    if (!detected) {
       ++unread;
-      ADD_FAILURE() << "layer " << i << ": " << seen.error().message;
+      ADD_FAILURE() << "layer " << i << ": " << detected.error().message;
       continue;
     }
     const double at = (gap + 1.5) * grid->line_nm * 1e-6;
     bool hit = false;
-    for (const scan::MissingBand& band : seen->bands) {
+    for (const scan::MissingBand& band : detected->bands) {
       const bool here = gap != UINT32_MAX && band.from_mm - 0.2 < at && at < band.to_mm + 0.2;
       hit = hit || here;
       wrong += !here;
     }
     found += hit;
-    if (asked != nullptr && (hit != (gap != UINT32_MAX) || seen->bands.size() > 1))
-      printf("layer %d: %zu bands, gap %u, likeness %.3f, ink %.2f, turn %.2f\n", i, seen->bands.size(), gap, seen->likeness,
+    if (requested != nullptr && (hit != (gap != UINT32_MAX) || detected->bands.size() > 1))
+      printf("layer %d: %zu bands, gap %u, likeness %.3f, ink %.2f, turn %.2f\n", i, detected->bands.size(), gap, detected->likeness,
              camera.ink, camera.turn_deg);
-    extra += seen->extra.size();
+    extra += detected->extra.size();
     if (gap == UINT32_MAX) {
       double expected = 0, got = 0;
-      for (const scan::BodySeen& body : seen->bodies) expected += body.expected_mm2, got += body.seen_mm2;
+      for (const scan::BodyReading& body : detected->bodies) expected += body.expected_mm2, got += body.detected_mm2;
       area.push_back(std::abs(got / expected - 1));
     }
   }
@@ -148,7 +148,7 @@ struct SheetOfBlocks {
     const auto made = program::make_head_grid(machine);
     EXPECT_TRUE(made);
     grid = *made;
-    const double x_mm = grid.place_nm * 1e-6, y_mm = grid.line_nm * 1e-6;
+    const double x_mm = grid.position_nm * 1e-6, y_mm = grid.line_nm * 1e-6;
     layer.columns = grid.image.columns();
     layer.row_offset.push_back(0);
     for (std::uint32_t r = 0; r < grid.image.rows(); ++r) {
@@ -191,19 +191,19 @@ cv::Mat grey_of_blocks(const SheetOfBlocks& sheet, std::uint64_t seed) {
 
 Result<scan::Comparison> compare_blocks(const SheetOfBlocks& sheet, const cv::Mat& grey) {
   return scan::compare_layer(scan::photo_of(grey.clone()),
-                             {sheet.layer.view(), sheet.grid.place_nm, sheet.grid.line_nm, true, 100});
+                             {sheet.layer.view(), sheet.grid.position_nm, sheet.grid.line_nm, true, 100});
 }
 
-TEST(ComparedLayer, InkWhereTheLayerHasNoneIsTold) {
+TEST(ComparedLayer, InkWhereTheLayerHasNoneIsReported) {
   const SheetOfBlocks all(true), one(false);
   const cv::Mat grey = grey_of_blocks(all, 1);
-  const auto seen = compare_blocks(one, grey);
-  ASSERT_TRUE(seen) << seen.error().message;
-  ASSERT_EQ(seen->extra.size(), 2u);
-  EXPECT_NEAR(seen->extra[0].x_mm, 53, 0.3);
-  EXPECT_NEAR(seen->extra[0].y_mm, 43, 0.3);
-  EXPECT_NEAR(seen->extra[0].mm2, 36, 3);
-  EXPECT_NEAR(seen->extra[1].mm2, 9, 1);
+  const auto detected = compare_blocks(one, grey);
+  ASSERT_TRUE(detected) << detected.error().message;
+  ASSERT_EQ(detected->extra.size(), 2u);
+  EXPECT_NEAR(detected->extra[0].x_mm, 53, 0.3);
+  EXPECT_NEAR(detected->extra[0].y_mm, 43, 0.3);
+  EXPECT_NEAR(detected->extra[0].mm2, 36, 3);
+  EXPECT_NEAR(detected->extra[1].mm2, 9, 1);
   const auto whole = compare_blocks(all, grey);
   ASSERT_TRUE(whole) << whole.error().message;
   EXPECT_TRUE(whole->extra.empty());

@@ -125,8 +125,8 @@ TEST(Photo, WhatCannotBeReadOrIsTooSmallOrTooLargeIsRefusedInALine) {
   const std::string path = directory / "photo.tif", pgm = directory / "photo.pgm";
   write_photo(path, some_greys(), kWide, kHigh, {1, 8});
   const auto put = [&](const std::string& bytes) { std::ofstream(pgm, std::ios::binary) << bytes; };
-  const auto expect_refused = [](const std::string& file, int least, const std::string& words) {
-    const auto photo = scan::read_photo(file, least);
+  const auto expect_refused = [](const std::string& file, int minimum, const std::string& words) {
+    const auto photo = scan::read_photo(file, minimum);
     ASSERT_FALSE(photo) << words;
     EXPECT_EQ(photo.error().fault, Fault::kInput);
     EXPECT_NE(photo.error().message.find(words), std::string::npos) << photo.error().message;
@@ -147,11 +147,11 @@ TEST(Photo, SheetsWithoutAChartEndInALine) {
   machine.mounting.tilt_deg = 45;
   const auto grid = program::make_head_grid(chart::chart_machine(machine));
   ASSERT_TRUE(grid);
-  const auto laid = chart::lay_out(chart::chart_machine(machine), *grid);
-  ASSERT_TRUE(laid);
+  const auto deposited = chart::layout_chart(chart::chart_machine(machine), *grid);
+  ASSERT_TRUE(deposited);
   std::mt19937 random(7);
   const auto refused = [&](const char* what, const cv::Mat& grey) {
-    const auto reading = scan::read_chart_photo(scan::photo_of(grey.clone()), *laid);
+    const auto reading = scan::read_chart_photo(scan::photo_of(grey.clone()), *deposited);
     ASSERT_FALSE(reading) << what;
     EXPECT_EQ(reading.error().fault, Fault::kInput);
     EXPECT_EQ(std::ranges::count(reading.error().message, '\n'), 0);

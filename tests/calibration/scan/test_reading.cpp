@@ -50,9 +50,9 @@ PrintedChart chart_of(bool along_y) {
   const Machine machine = chart::chart_machine(head_machine(along_y));
   const auto grid = program::make_head_grid(machine);
   EXPECT_TRUE(grid) << grid.error().message;
-  const auto laid = chart::lay_out(machine, *grid);
-  EXPECT_TRUE(laid) << laid.error().message;
-  return {*grid, *laid, chart::draw(*laid)};
+  const auto deposited = chart::layout_chart(machine, *grid);
+  EXPECT_TRUE(deposited) << deposited.error().message;
+  return {*grid, *deposited, chart::draw(*deposited)};
 }
 
 struct Trial {
@@ -63,8 +63,8 @@ struct Trial {
 
 Trial random_trial(const PrintedChart& printed, std::mt19937_64& random) {
   std::mt19937_64 seeded = random;  // of its own: photographs stay what they were
-  const auto between = [&](double least, double most) { return std::uniform_real_distribution<double>(least, most)(random); };
-  const auto whole = [&](std::uint32_t most) { return std::uniform_int_distribution<std::uint32_t>(0, most)(random); };
+  const auto between = [&](double minimum, double maximum) { return std::uniform_real_distribution<double>(minimum, maximum)(random); };
+  const auto whole = [&](std::uint32_t maximum) { return std::uniform_int_distribution<std::uint32_t>(0, maximum)(random); };
   Trial trial;
   for (std::uint32_t left = whole(6); left > 0; --left) {
     const std::uint32_t nozzle = whole(printed.grid.nozzles - 1);
@@ -148,7 +148,7 @@ struct Beyond {
   }
   double percent() const { return 100.0 * static_cast<double>(beyond) / static_cast<double>(std::max<std::size_t>(all, 1)); }
   /// One in a hundred, and three standard deviations of chance.
-  double most() const { return 0.01 * static_cast<double>(all) + 3 * std::sqrt(0.01 * static_cast<double>(all)); }
+  double maximum() const { return 0.01 * static_cast<double>(all) + 3 * std::sqrt(0.01 * static_cast<double>(all)); }
 };
 
 struct Errors {
@@ -156,16 +156,16 @@ struct Errors {
   Beyond nozzles, swaths, rows;                // also of those that are not told
   std::vector<double> row_um, ragged_um;       // of rows, and of gains where rows lie apart
   std::size_t blocked = 0, found = 0, accused = 0, unread = 0;
-  std::size_t nozzles_untold = 0, swaths_untold = 0;
+  std::size_t nozzles_unreadable = 0, swaths_unreadable = 0;
   std::vector<double> joint_along, joint_across;  // pixels of the layer
-  std::size_t joints_without = 0, joints_doubted = 0;
+  std::size_t stitches_without = 0, stitches_unclear = 0;
 };
 
 void add_measure(const scan::Measure& measure, double pitch_um, double truth, std::vector<double>& errors, Beyond& beyond,
-                 std::size_t& untold) {
+                 std::size_t& unreadable) {
   if (measure.error_um > 0) beyond.add(measure.um - truth * pitch_um, measure.within_um);  // else all its dashes are marred
-  if (!measure.told) {
-    ++untold;
+  if (!measure.reported) {
+    ++unreadable;
     return;
   }
   errors.push_back(std::abs(measure.um / pitch_um - truth));
@@ -173,18 +173,18 @@ void add_measure(const scan::Measure& measure, double pitch_um, double truth, st
 
 void add_errors(const PrintedChart& printed, const Trial& trial, const scan::ChartReading& reading, Errors& errors) {
   const scan::HeadReading& head = reading.head;
-  const double along_um = printed.grid.place_nm * 1e-3, across_um = printed.grid.line_nm * 1e-3;
+  const double along_um = printed.grid.position_nm * 1e-3, across_um = printed.grid.line_nm * 1e-3;
   for (const std::uint32_t n : trial.printing.blocked) errors.found += std::ranges::count(head.blocked, n) > 0;
   errors.blocked += trial.printing.blocked.size();
   for (const std::uint32_t n : head.blocked) errors.accused += !trial.printing.blocked.contains(n);
   const HeadLine along = line_through(trial.printing, 0), across = line_through(trial.printing, 1);
   for (std::uint32_t n = 0; n < printed.grid.nozzles; ++n) {
     if (!head.nozzle[n]) continue;
-    const auto& told = trial.printing.nozzle[n];
-    add_measure(head.nozzle[n]->along, along_um, told[0] - along.middle - along.slope * n, errors.nozzle, errors.nozzles,
-                errors.nozzles_untold);
-    add_measure(head.nozzle[n]->across, across_um, told[1] - across.middle - across.slope * n, errors.nozzle, errors.nozzles,
-                errors.nozzles_untold);
+    const auto& reported = trial.printing.nozzle[n];
+    add_measure(head.nozzle[n]->along, along_um, reported[0] - along.middle - along.slope * n, errors.nozzle, errors.nozzles,
+                errors.nozzles_unreadable);
+    add_measure(head.nozzle[n]->across, across_um, reported[1] - across.middle - across.slope * n, errors.nozzle, errors.nozzles,
+                errors.nozzles_unreadable);
   }
   const ChartBox& dash = printed.chart.dashes[0].box;
   const bool along_x = printed.chart.scan_along_x, from_end = printed.grid.lines_from_end;
@@ -196,19 +196,19 @@ void add_errors(const PrintedChart& printed, const Trial& trial, const scan::Cha
     const auto &from = trial.printing.swath[base], &to = trial.printing.swath[base + s];
     const double lines = s * printed.grid.nozzles;
     add_measure(head.swath[s]->along, along_um, to[0] - from[0] - along.slope * lines, errors.swath, errors.swaths,
-                errors.swaths_untold);
+                errors.swaths_unreadable);
     add_measure(head.swath[s]->across, across_um, to[1] - from[1] - across.slope * lines, errors.swath, errors.swaths,
-                errors.swaths_untold);
+                errors.swaths_unreadable);
   }
-  for (const scan::JointReading& joint : reading.joints) {
+  for (const scan::JointReading& joint : reading.stitches) {
     const auto &from = trial.printing.swath[base + joint.swath - 1], &to = trial.printing.swath[base + joint.swath];
     const auto off = [&](double um, double pitch_um, std::size_t axis, double slope) {
       return std::abs(um / pitch_um - (to[axis] - from[axis] - slope * printed.grid.nozzles));
     };
     if (joint.along_um) errors.joint_along.push_back(off(*joint.along_um, along_um, 0, along.slope));
     if (joint.across_um) errors.joint_across.push_back(off(*joint.across_um, across_um, 1, across.slope));
-    errors.joints_without += !joint.along_um + !joint.across_um;
-    errors.joints_doubted += !joint.agrees;
+    errors.stitches_without += !joint.along_um + !joint.across_um;
+    errors.stitches_unclear += !joint.agrees;
   }
   if (printed.chart.nozzle_rows == 2) {
     std::vector<std::optional<chart::Located>> nozzles;
@@ -235,11 +235,11 @@ double share_of(std::vector<double>& values, double share) {
 
 /// LAMINA_SCANS=N: the first N; A:B: from A on, below B. Else some, among them one with a swath far from the others, and one
 /// whose fourth mark is cut off. Every fifth has no blur.
-std::vector<int> scans_of(const char* asked) {
-  if (asked == nullptr) return {0, 1, 2, 3, 4, 112, 321};
-  const char* colon = std::strchr(asked, ':');
+std::vector<int> scans_of(const char* requested) {
+  if (requested == nullptr) return {0, 1, 2, 3, 4, 112, 321};
+  const char* colon = std::strchr(requested, ':');
   std::vector<int> scans;
-  for (int i = colon == nullptr ? 0 : std::atoi(asked); i < std::atoi(colon == nullptr ? asked : colon + 1); ++i)
+  for (int i = colon == nullptr ? 0 : std::atoi(requested); i < std::atoi(colon == nullptr ? requested : colon + 1); ++i)
     scans.push_back(i);
   return scans;
 }
@@ -249,8 +249,8 @@ double worst_from(const std::vector<double>& values, std::size_t begin) {
 }
 
 TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
-  const char* asked = std::getenv("LAMINA_SCANS");
-  const std::vector<int> scans = scans_of(asked);
+  const char* requested = std::getenv("LAMINA_SCANS");
+  const std::vector<int> scans = scans_of(requested);
   const PrintedChart printed[2] = {chart_of(false), chart_of(true)};
   Errors errors;
   for (const int i : scans) {
@@ -269,13 +269,13 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
     add_errors(one, trial, *reading, errors);
     const double worst = worst_from(errors.nozzle, before.nozzle.size()), joint = worst_from(errors.swath, before.swath.size());
     const std::size_t missed = errors.blocked - errors.found - (before.blocked - before.found);
-    const std::size_t untold = errors.nozzles_untold - before.nozzles_untold,
-                      swaths = errors.swaths_untold - before.swaths_untold;
-    if (asked != nullptr &&
-        (worst > 0.08 || joint > 0.08 || missed > 0 || errors.accused > before.accused || untold + swaths > 0)) {
+    const std::size_t unreadable = errors.nozzles_unreadable - before.nozzles_unreadable,
+                      swaths = errors.swaths_unreadable - before.swaths_unreadable;
+    if (requested != nullptr &&
+        (worst > 0.08 || joint > 0.08 || missed > 0 || errors.accused > before.accused || unreadable + swaths > 0)) {
       printf(
           "scan %d: nozzles within %.3f, swaths %.3f, missed %zu, accused %zu; not told %zu and %zu; blur %.2f, noise %.1f, %.1f pixels a mm\n",
-          i, worst, joint, missed, errors.accused - before.accused, untold, swaths, trial.camera.blur_pixels,
+          i, worst, joint, missed, errors.accused - before.accused, unreadable, swaths, trial.camera.blur_pixels,
           trial.camera.noise, trial.camera.pixels_a_mm);
       std::fflush(stdout);
     }
@@ -289,14 +289,14 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
       "joints by verniers: %zu, half within %.4f, 99 %% within %.4f, all within %.4f; by blocks: %zu, half %.4f, 99 %% %.4f, all %.4f; "
       "%zu not read, %zu not as the dashes have them\n"
       "gain in um: half within %.2f, 99 %% within %.2f, all within %.2f; along the scan where rows lie apart: all within %.2f\n",
-      scans.size(), errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(), errors.nozzles_untold,
+      scans.size(), errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(), errors.nozzles_unreadable,
       share_of(errors.nozzle, 0.5), share_of(errors.nozzle, 0.999), share_of(errors.nozzle, 1), errors.swath.size(),
-      errors.swaths_untold, share_of(errors.swath, 0.5), share_of(errors.swath, 0.99), share_of(errors.swath, 1),
+      errors.swaths_unreadable, share_of(errors.swath, 0.5), share_of(errors.swath, 0.99), share_of(errors.swath, 1),
       errors.nozzles.percent(), errors.nozzles.all, errors.swaths.percent(), errors.swaths.all, errors.rows.percent(),
       errors.rows.all, share_of(errors.row_um, 0.5), share_of(errors.row_um, 0.99), share_of(errors.row_um, 1),
       errors.joint_along.size(), share_of(errors.joint_along, 0.5), share_of(errors.joint_along, 0.99),
       share_of(errors.joint_along, 1), errors.joint_across.size(), share_of(errors.joint_across, 0.5),
-      share_of(errors.joint_across, 0.99), share_of(errors.joint_across, 1), errors.joints_without, errors.joints_doubted,
+      share_of(errors.joint_across, 0.99), share_of(errors.joint_across, 1), errors.stitches_without, errors.stitches_unclear,
       share_of(errors.gain_um, 0.5), share_of(errors.gain_um, 0.99), share_of(errors.gain_um, 1),
       share_of(errors.ragged_um, 1));
   EXPECT_GE(static_cast<double>(errors.found), 0.995 * static_cast<double>(errors.blocked));
@@ -305,10 +305,10 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   EXPECT_LE(share_of(errors.swath, 1), 0.1);
   for (const Beyond& kind : {errors.nozzles, errors.swaths, errors.rows}) {
     EXPECT_GT(kind.all, 0u);
-    EXPECT_LE(static_cast<double>(kind.beyond), kind.most()) << kind.all;
+    EXPECT_LE(static_cast<double>(kind.beyond), kind.maximum()) << kind.all;
   }
-  EXPECT_LE(errors.nozzles_untold * 50, errors.nozzle.size());
-  EXPECT_LE(errors.swaths_untold * 20, errors.swath.size());
+  EXPECT_LE(errors.nozzles_unreadable * 50, errors.nozzle.size());
+  EXPECT_LE(errors.swaths_unreadable * 20, errors.swath.size());
   for (const auto* some : {&errors.joint_along, &errors.joint_across, &errors.gain_um, &errors.ragged_um})
     EXPECT_FALSE(some->empty());
   EXPECT_LE(share_of(errors.joint_along, 0.99), 0.15);
@@ -319,7 +319,7 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
 
 /// Little noise: what is wrong by more than a tenth of a micrometre or two is the reading's own. Dashes that are looked for
 /// where they were seen before, sample by sample, stay there: 1.5 um.
-TEST(ScannedChart, NozzlesAreNotHeldWhereTheyWereSeenBefore) {
+TEST(ScannedChart, NozzlesAreNotHeldWhereTheyWereDetectedBefore) {
   const PrintedChart printed = chart_of(false);
   for (const int i : {24, 34}) {
     std::mt19937_64 random(static_cast<std::uint64_t>(i) * 7919 + 1);
@@ -330,7 +330,7 @@ TEST(ScannedChart, NozzlesAreNotHeldWhereTheyWereSeenBefore) {
     std::vector<double> off_um;
     for (std::uint32_t n = 0; n < printed.grid.nozzles; ++n) {
       const auto& nozzle = reading->head.nozzle[n];
-      if (nozzle && nozzle->across.told)
+      if (nozzle && nozzle->across.reported)
         off_um.push_back(std::abs(nozzle->across.um - printed.grid.line_nm * 1e-3 *
                                                           (trial.printing.nozzle[n][1] - across.middle - across.slope * n)));
     }

@@ -36,7 +36,7 @@ Machine fine_head() {
 struct RowsRead {
   std::vector<double> row_offset_um;
   std::string lines;
-  std::size_t told = 0;  // nozzles along the scan
+  std::size_t reported = 0;  // nozzles along the scan
 };
 
 /// shift_um  of each row, further along the scan
@@ -45,30 +45,30 @@ RowsRead read_rows(const std::vector<double>& shift_um, const Camera& camera) {
   Machine machine = chart::chart_machine(fine_head());
   const auto grid = program::make_head_grid(machine);
   EXPECT_TRUE(grid) << grid.error().message;
-  const auto laid = chart::lay_out(machine, *grid);
-  EXPECT_TRUE(laid) << laid.error().message;
+  const auto deposited = chart::layout_chart(machine, *grid);
+  EXPECT_TRUE(deposited) << deposited.error().message;
   Printing printing;
-  for (std::uint32_t n = 0; n < grid->nozzles; ++n) printing.nozzle.push_back({shift_um[n % kRows] * 1e3 / grid->place_nm, 0});
+  for (std::uint32_t n = 0; n < grid->nozzles; ++n) printing.nozzle.push_back({shift_um[n % kRows] * 1e3 / grid->position_nm, 0});
   std::mt19937_64 random(7);
-  const GreyPicture picture = photograph(print_sheet(*grid, chart::draw(*laid).view(), printing), camera, random);
+  const GreyPicture picture = photograph(print_sheet(*grid, chart::draw(*deposited).view(), printing), camera, random);
   cv::Mat grey(picture.height, picture.width, CV_8U);
   std::memcpy(grey.data, picture.grey.data(), picture.grey.size());
-  const auto reading = scan::read_chart_photo(scan::photo_of(std::move(grey)), *laid);
+  const auto reading = scan::read_chart_photo(scan::photo_of(std::move(grey)), *deposited);
   EXPECT_TRUE(reading) << reading.error().message;
   if (!reading) return read;
-  for (const auto& nozzle : reading->head.nozzle) read.told += nozzle && nozzle->along.told;
-  const auto lines = pipeline::take_over(json_line(scan::reading_json(*reading)), *laid, machine);
+  for (const auto& nozzle : reading->head.nozzle) read.reported += nozzle && nozzle->along.reported;
+  const auto lines = pipeline::take_over(json_line(scan::reading_json(*reading)), *deposited, machine);
   EXPECT_TRUE(lines) << lines.error().message;
   for (const std::string& line : *lines) read.lines += line + "\n";
   read.row_offset_um = machine.head.row_offset_um;
   return read;
 }
 
-TEST(ScannedRows, RowsFarOffAreToldWhereNoNozzleIs) {
+TEST(ScannedRows, RowsFarOffAreReportedWhereNoNozzleIs) {
   const std::vector<double> shift_um{0, 70, 0, -20};
   for (const double pixels_a_mm : {18.0, 24.0}) {
     const RowsRead read = read_rows(shift_um, {.pixels_a_mm = pixels_a_mm, .turn_deg = 3, .noise = pixels_a_mm / 6});
-    EXPECT_LT(read.told, 60u) << read.lines;
+    EXPECT_LT(read.reported, 60u) << read.lines;
     ASSERT_EQ(read.row_offset_um.size(), kRows);
     for (std::uint32_t r = 0; r < kRows; ++r) EXPECT_NEAR(read.row_offset_um[r], 2540 * r - shift_um[r], 2) << read.lines;
     EXPECT_NE(read.lines.find("rows      against the first one, changed by -"), std::string::npos) << read.lines;

@@ -34,27 +34,27 @@ Machine head_of(std::uint32_t nozzles, double dpi, std::vector<double> row_offse
 }
 
 /// Rows, blocked nozzles and single offsets, on sheets seen sharp and blurred, sampled in other ways, as JPEG.
-TEST(WarpedPhotograph, TellsWhatAChartWasPrintedWith) {
+TEST(WarpedPhotograph, ReportsWhatAChartWasPrintedWith) {
   const Directory directory;
   const std::vector<double> row_um{0, 45, -30, 12};
   const std::set<std::uint32_t> blocked{7, 90};
   const Machine machine = chart::chart_machine(head_of(160, 360, {0, 2540, 5080, 7620}));
   const auto grid = program::make_head_grid(machine);
   ASSERT_TRUE(grid) << grid.error().message;
-  const auto laid = chart::lay_out(machine, *grid);
-  ASSERT_TRUE(laid) << laid.error().message;
-  ASSERT_TRUE(laid->scan_along_x);
-  std::vector<std::optional<std::uint32_t>> nozzle_of_row(laid->rows);
-  for (const ChartDash& dash : laid->dashes) nozzle_of_row[dash.box.top] = dash.nozzle;
+  const auto deposited = chart::layout_chart(machine, *grid);
+  ASSERT_TRUE(deposited) << deposited.error().message;
+  ASSERT_TRUE(deposited->scan_along_x);
+  std::vector<std::optional<std::uint32_t>> nozzle_of_row(deposited->rows);
+  for (const ChartDash& dash : deposited->dashes) nozzle_of_row[dash.box.top] = dash.nozzle;
   // Beside its row, each seventh nozzle strays across.
   const auto across_um = [](std::uint32_t n) { return n % 7 == 3 ? 24.0 : 0.0; };
   const InkedSheet sheet =
-      inked_sheet(chart::draw(*laid), laid->pixel_x_nm * 1e-6, laid->pixel_y_nm * 1e-6,
+      inked_sheet(chart::draw(*deposited), deposited->pixel_x_nm * 1e-6, deposited->pixel_y_nm * 1e-6,
                   [&](std::uint32_t row) -> std::optional<cv::Point2d> {
                     if (!nozzle_of_row[row]) return cv::Point2d();
                     const std::uint32_t n = *nozzle_of_row[row];
                     if (blocked.contains(n)) return std::nullopt;
-                    return cv::Point2d(laid->along_sign * 1e-3 * row_um[n % 4], laid->across_sign * 1e-3 * across_um(n));
+                    return cv::Point2d(deposited->along_sign * 1e-3 * row_um[n % 4], deposited->across_sign * 1e-3 * across_um(n));
                   });
   const Shot shots[] = {
       {.pixels_a_mm = 22, .turn_deg = 3, .keystone = 0.03, .noise = 2, .jpeg_quality = 90},
@@ -71,7 +71,7 @@ TEST(WarpedPhotograph, TellsWhatAChartWasPrintedWith) {
     SCOPED_TRACE(shot.turn_deg);
     const auto photo = scan::read_photo(photograph_to(directory / "chart", sheet, shot), 200);
     ASSERT_TRUE(photo) << photo.error().message;
-    const auto reading = scan::read_chart_photo(*photo, *laid);
+    const auto reading = scan::read_chart_photo(*photo, *deposited);
     ASSERT_TRUE(reading) << reading.error().message;
     const scan::HeadReading& head = reading->head;
     EXPECT_EQ(head.blocked, std::vector<std::uint32_t>(blocked.begin(), blocked.end()));
@@ -80,7 +80,7 @@ TEST(WarpedPhotograph, TellsWhatAChartWasPrintedWith) {
       if (!head.nozzle[n]) continue;
       along[n] = chart::Located{head.nozzle[n]->along.um, head.nozzle[n]->along.error_um, 0};
       const double off = head.nozzle[n]->across.um - across_um(n);
-      EXPECT_LE(std::abs(off), 0.1e-3 * laid->pixel_y_nm) << n;
+      EXPECT_LE(std::abs(off), 0.1e-3 * deposited->pixel_y_nm) << n;
     }
     const auto rows = chart::rows_of(along, 4);
     for (std::uint32_t r = 1; r < 4; ++r) {
@@ -92,7 +92,7 @@ TEST(WarpedPhotograph, TellsWhatAChartWasPrintedWith) {
 }
 
 /// A blot that was planted is told by place and area; a scratch narrower than half a millimetre is not.
-TEST(WarpedPhotograph, TellsInkThatTheLayerDoesNotHave) {
+TEST(WarpedPhotograph, ReportsInkThatTheLayerDoesNotHave) {
   const Directory directory;
   const double pitch_mm = 0.1, x_mm = 47, y_mm = 33, radius_mm = 1.2;
   Runs layer{800, {0}, {}};
@@ -114,15 +114,15 @@ TEST(WarpedPhotograph, TellsInkThatTheLayerDoesNotHave) {
     SCOPED_TRACE(shot.turn_deg);
     const auto photo = scan::read_photo(photograph_to(directory / "layer", sheet, shot), 50);
     ASSERT_TRUE(photo) << photo.error().message;
-    const auto seen = scan::compare_layer(*photo, {layer.view(), 1e6 * pitch_mm, 1e6 * pitch_mm, true, 100});
-    ASSERT_TRUE(seen) << seen.error().message;
-    EXPECT_TRUE(seen->bands.empty());
-    ASSERT_EQ(seen->extra.size(), 1u);
-    EXPECT_NEAR(seen->extra[0].x_mm, x_mm, 0.1);
-    EXPECT_NEAR(seen->extra[0].y_mm, y_mm, 0.1);
-    EXPECT_NEAR(seen->extra[0].mm2, std::numbers::pi * radius_mm * radius_mm, 0.45);
-    ASSERT_EQ(seen->bodies.size(), 1u);
-    EXPECT_NEAR(seen->bodies[0].seen_mm2, seen->bodies[0].expected_mm2, 0.02 * seen->bodies[0].expected_mm2);
+    const auto detected = scan::compare_layer(*photo, {layer.view(), 1e6 * pitch_mm, 1e6 * pitch_mm, true, 100});
+    ASSERT_TRUE(detected) << detected.error().message;
+    EXPECT_TRUE(detected->bands.empty());
+    ASSERT_EQ(detected->extra.size(), 1u);
+    EXPECT_NEAR(detected->extra[0].x_mm, x_mm, 0.1);
+    EXPECT_NEAR(detected->extra[0].y_mm, y_mm, 0.1);
+    EXPECT_NEAR(detected->extra[0].mm2, std::numbers::pi * radius_mm * radius_mm, 0.45);
+    ASSERT_EQ(detected->bodies.size(), 1u);
+    EXPECT_NEAR(detected->bodies[0].detected_mm2, detected->bodies[0].expected_mm2, 0.02 * detected->bodies[0].expected_mm2);
   }
 }
 

@@ -17,7 +17,7 @@ BatchJob job_of(std::uint32_t number, std::uint64_t need_bytes, const std::strin
   BatchJob job;
   job.number = number;
   job.entry.name = "job " + std::to_string(number);
-  job.call.output = job.output = job.place = output;
+  job.call.output = job.output = job.position = output;
   job.call.run = std::move(run);
   job.need_bytes = need_bytes;
   job.id.low = number;
@@ -68,9 +68,9 @@ TEST(BatchQueue, JobsShareThreadsAndMemoryAndEachIsReportedOnce) {
   std::sort(reported.begin(), reported.end());
   ASSERT_EQ(reported.size(), 24u);
   for (std::uint32_t number = 1; number <= 24; ++number) EXPECT_EQ(reported[number - 1], number);
-  EXPECT_LE(summary->most_need_bytes, 100u);
+  EXPECT_LE(summary->max_need_bytes, 100u);
   EXPECT_LE(highest.load(), 100u);
-  EXPECT_LE(summary->most_running, 4u);
+  EXPECT_LE(summary->max_running, 4u);
 
   // The second run continues the record: what is done and unchanged is kept, what failed runs again.
   options.resume = true;

@@ -27,7 +27,7 @@ std::string rows(const char* sample, double share) {
   return text;
 }
 
-TEST(Drops, AColumnNamesTheSamplesAndTheirSpreadIsTold) {
+TEST(Drops, AColumnNamesTheSamplesAndTheirSpreadIsReported) {
   const Directory directory;
   const std::string table = directory / "drops.csv";
   write_text(table, "sample,velocity_m_s,drop_pa\n" + rows("left", 1) + rows("right", 2));
@@ -51,7 +51,7 @@ TEST(Drops, AColumnNamesTheSamplesAndTheirSpreadIsTold) {
   EXPECT_EQ(as_text(plain->front()).find("sample"), std::string::npos);
 }
 
-TEST(Drops, BothFormsAreToldOfAGasAndOneThatFitsAloneStandsAlone) {
+TEST(Drops, BothFormsAreReportedForAGasAndOneThatFitsAloneIsAlone) {
   const Directory directory;
   const std::string table = directory / "drops.csv";
   write_text(table, "sample,velocity_m_s,drop_pa\n" + rows("left", 1) + rows("right", 1.1));

@@ -7,7 +7,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/terminal/arguments.h"
-#include "pipeline/cli/terminal/foreign_words.h"
+#include "pipeline/cli/terminal/slicer_aliases.h"
 #include "pipeline/cli/terminal/pages.h"
 #include "stages/support/text/names.h"
 
@@ -71,9 +71,9 @@ TEST(Manual, EveryPageSaysWhereFilesLieAndWhatTheEnvironmentDoes) {
   }
 }
 
-TEST(ForeignWords, OfOtherSlicersAreAnsweredWithOurs) {
-  const auto asked = [](const char* command, const char* flag) {
-    return foreign_word(flag, pipeline::spec_of(*pipeline::find_command(command)));
+TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
+  const auto requested = [](const char* command, const char* flag) {
+    return slicer_alias(flag, pipeline::spec_of(*pipeline::find_command(command)));
   };
   const struct {
     const char *command, *flag, *ours;
@@ -94,9 +94,9 @@ TEST(ForeignWords, OfOtherSlicersAreAnsweredWithOurs) {
       {"extrude", "--brim", "lamina lays no brim"},
       {"extrude", "--raft-layers", "lamina lays no raft"},
   };
-  for (const auto& row : rows) EXPECT_NE(asked(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;
-  EXPECT_EQ(asked("info", "--layer-height"), "") << "info has no layers";
-  EXPECT_EQ(asked("jet", "--dip"), "");
+  for (const auto& row : rows) EXPECT_NE(requested(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;
+  EXPECT_EQ(requested("info", "--layer-height"), "") << "info has no layers";
+  EXPECT_EQ(requested("jet", "--dip"), "");
   const auto refused = read_arguments(pipeline::spec_of(*pipeline::find_command("jet")), {"part.stl", "--layer-height=0.2"});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message, "--layer-height: no such option; did you mean '--layer'?");

@@ -24,11 +24,11 @@ struct Completion : testing::Test {
   std::vector<std::string> candidates(const std::string& line) const {
     const std::string script = "cd '" + folder.path().string() + "'; HOME=$PWD; source ./lamina.bash; COMP_WORDS=(" + line +
                                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _lamina; printf '%s\\n' \"${COMPREPLY[@]}\" > told";
-    write_text(folder / "ask.bash", script);
-    EXPECT_EQ(std::system(("bash '" + (folder / "ask.bash") + "'").c_str()), 0) << line;
-    std::istringstream told(read_text(folder / "told"));
+    write_text(folder / "request.bash", script);
+    EXPECT_EQ(std::system(("bash '" + (folder / "request.bash") + "'").c_str()), 0) << line;
+    std::istringstream reported(read_text(folder / "stated"));
     std::vector<std::string> words;
-    for (std::string word; std::getline(told, word);) {
+    for (std::string word; std::getline(reported, word);) {
       if (!word.empty()) words.push_back(word);
     }
     std::ranges::sort(words);

@@ -7,7 +7,7 @@
 namespace lamina::terminal {
 namespace {
 
-TEST(Progress, TellsRateAndTimeLeftOfTheLayersThatWerePlannedNow) {
+TEST(Progress, ReportsRateAndTimeLeftOfTheLayersThatWerePlannedNow) {
   EXPECT_EQ(Progress::rate(60, 100, 0, 6), "60/100 layers, 10.0 layers/s, 4.0 s left");
   EXPECT_EQ(Progress::rate(60, 100, 50, 1), "60/100 layers, 10.0 layers/s, 4.0 s left") << "50 were kept by resume";
   EXPECT_EQ(Progress::rate(60, 100, 60, 1), "60/100 layers");
@@ -17,10 +17,10 @@ TEST(Progress, TellsRateAndTimeLeftOfTheLayersThatWerePlannedNow) {
 
 TEST(Progress, MillionEventsCostNoMillionWrites) {
   Progress progress(Progress::Style::kBar);
-  std::string told;
-  for (std::uint32_t i = 0; i < 1'000'000; ++i) told += progress.tell(i, 1'000'000);
-  told += progress.clear();
-  EXPECT_LT(std::count(told.begin(), told.end(), '\r'), 1000);
+  std::string reported;
+  for (std::uint32_t i = 0; i < 1'000'000; ++i) reported += progress.report(i, 1'000'000);
+  reported += progress.clear();
+  EXPECT_LT(std::count(reported.begin(), reported.end(), '\r'), 1000);
 }
 
 }  // namespace

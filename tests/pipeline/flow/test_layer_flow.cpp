@@ -22,11 +22,11 @@ using pipeline::Ticket;
 
 /// What layers hold at once, as they do it.
 struct Meter {
-  std::atomic<std::int64_t> now{0}, most{0};
+  std::atomic<std::int64_t> now{0}, maximum{0};
   void add(std::int64_t bytes) {
     const std::int64_t sum = now += bytes;
-    std::int64_t before = most;
-    while (before < sum && !most.compare_exchange_weak(before, sum)) {
+    std::int64_t before = maximum;
+    while (before < sum && !maximum.compare_exchange_weak(before, sum)) {
     }
   }
 };
@@ -43,11 +43,11 @@ struct Layers {
   std::vector<std::uint64_t> first, more, real;
 };
 
-Layers random_layers(std::uint32_t count, std::uint64_t most, std::mt19937& random) {
+Layers random_layers(std::uint32_t count, std::uint64_t maximum, std::mt19937& random) {
   Layers layers;
   for (std::uint32_t i = 0; i < count; ++i) {
     layers.first.push_back(random() % 50);
-    layers.more.push_back(random() % most);
+    layers.more.push_back(random() % maximum);
     layers.real.push_back(layers.more.back() == 0 ? 0 : random() % layers.more.back());
   }
   return layers;
@@ -101,9 +101,9 @@ TEST(LayerFlow, LayersInFlightHoldTheBudgetOrItAndOneLayer) {
     ASSERT_EQ(order.size(), kLayers);
     EXPECT_TRUE(std::ranges::is_sorted(order));
     const std::uint64_t largest = *std::ranges::max_element(layers.more);
-    EXPECT_LE(meter.most, static_cast<std::int64_t>(limits.budget_bytes + largest));
+    EXPECT_LE(meter.maximum, static_cast<std::int64_t>(limits.budget_bytes + largest));
     EXPECT_LE(report.max_bytes, limits.budget_bytes + largest);
-    EXPECT_GE(report.max_bytes, static_cast<std::uint64_t>(meter.most));
+    EXPECT_GE(report.max_bytes, static_cast<std::uint64_t>(meter.maximum));
     EXPECT_GE(report.max_in_flight, turn % 4 != 0 ? 2u : 1u);
     ASSERT_EQ(report.steps.size(), 3u);
     EXPECT_EQ(report.steps[2].name, "record");
@@ -169,7 +169,7 @@ TEST(LayerFlow, ACancelledFlowRecordsWhatIsInFlight) {
   EXPECT_LT(recorded, 1000u);
 }
 
-TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsAtMost) {
+TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsNoMoreThan) {
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
   for (const std::uint32_t slow : {0u, 1u, 50u}) {
     FlowLimits limits;
@@ -241,7 +241,7 @@ TEST(LayerFlow, EstimatesFollowWhatLayersHeld) {
     FlowReport report;
     const std::atomic<bool> cancel{false};
     ASSERT_TRUE(flow_layers(60, steps, limits, cancel, report).ok());
-    EXPECT_LE(meter.most, static_cast<std::int64_t>(limits.budget_bytes));
+    EXPECT_LE(meter.maximum, static_cast<std::int64_t>(limits.budget_bytes));
     EXPECT_GE(report.max_in_flight, held == 8 * kMegabyte ? 4u : 1u) << "80 MB were charged for 8";
     EXPECT_EQ(report.oversized, 0u);
   }

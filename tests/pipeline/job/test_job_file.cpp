@@ -12,7 +12,7 @@ using test::Directory;
 
 FillChanges changes_of(std::string_view table) {
   FillChanges changes;
-  Place at;
+  TextPosition at;
   EXPECT_EQ(read_fill_changes(*read_toml_value(table), changes, at), "");
   return changes;
 }
@@ -73,7 +73,7 @@ Job unusual_job(const Directory& directory) {
   job.dose.dithered = false;
   job.levels = 4;
   job.inspect = true;
-  job.least_wall_mm = 0.35;
+  job.min_wall_mm = 0.35;
   job.allow_unbound = true;
   job.output = directory / "out";
   job.engine = Engine::kBoth;
@@ -229,13 +229,13 @@ TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
       {"[bed\n", ":1:"},
       {"[image]\nformat = 'tif'\n", ":2:10: image.format: 'tif' is none of"},
   };
-  for (const auto& [text, told] : jobs) {
+  for (const auto& [text, reported] : jobs) {
     test::write_text(directory / "job.toml", text);
     Job job;
     const Status status = read_job(directory / "job.toml", job);
     ASSERT_FALSE(status.ok()) << text;
     EXPECT_EQ(status.error().fault, Fault::kUsage) << text;
-    EXPECT_NE(status.error().message.find("job.toml" + std::string(told)), std::string::npos) << status.error().message;
+    EXPECT_NE(status.error().message.find("job.toml" + std::string(reported)), std::string::npos) << status.error().message;
     EXPECT_EQ(status.error().message.find('\n'), std::string::npos) << text;
   }
 }
@@ -258,7 +258,7 @@ TEST(JobFile, ContoursAndMovesAreDecidedByTheirOwnKeys) {
   EXPECT_EQ(canonical_job_text(back, Product::kContours), contours);
 }
 
-TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePlace) {
+TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePosition) {
   const Directory directory;
   const std::string begin = "[[fill.range]]\nfrom_mm = 2.7\nto_mm = 3\n";
   const auto read = [&](const std::string& text, Job& job) {
@@ -289,11 +289,11 @@ TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePlace) {
       {"[fill]\ngap_by_height = [[0, 0.75], [0, 0.1]]\n", ":2:29: fill.gap_by_height: [0, 0.1]: heights have to increase"},
       {"[[part]]\npath = 'a'\nfill = { gap_mm = 1, distance_mm = 1 }\n", "both say how far lines lie from each other"},
   };
-  for (const auto& [text, told] : wrong) {
+  for (const auto& [text, reported] : wrong) {
     Job bad;
     const Status status = read(text, bad);
     ASSERT_FALSE(status.ok()) << text;
-    EXPECT_NE(status.error().message.find(told), std::string::npos) << status.error().message;
+    EXPECT_NE(status.error().message.find(reported), std::string::npos) << status.error().message;
   }
 }
 

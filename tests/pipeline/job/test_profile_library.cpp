@@ -77,7 +77,7 @@ TEST_F(ProfileLibrary, AListHasItsOrderAndAFileCountsOnce) {
   EXPECT_EQ(machine({"base", directory_ / "b.toml"}).cost.hour_price, 20);
 }
 
-TEST_F(ProfileLibrary, WhatIsWrongIsToldWithFileAndKey) {
+TEST_F(ProfileLibrary, WhatIsWrongIsReportedWithFileAndKey) {
   const std::string a = write("a.toml", "inherits = \"b.toml\"\n");
   const std::string b = write("b.toml", "\ninherits = \"sub/../a.toml\"\n");
   EXPECT_EQ(refused(a), b + ":2:12: inherits: goes round in a circle: " + a + " > " + b + " > " + a);
@@ -101,7 +101,7 @@ TEST_F(ProfileLibrary, WhatIsWrongIsToldWithFileAndKey) {
   EXPECT_TRUE(refused("deep19").ends_with("is more than 16 files deep")) << refused("deep19");
 }
 
-TEST_F(ProfileLibrary, AWrongKeyIsToldWithTheFileThatHasIt) {
+TEST_F(ProfileLibrary, AWrongKeyIsReportedWithTheFileThatHasIt) {
   write("bad.toml", "inherits = \"base\"\n[head]\nnozzels = 3\n");
   ASSERT_TRUE(library().add(write("good.toml", "inherits = \"bad\"\n[head]\nnozzles = 3\n"), files_).ok());
   const auto machine = read_machine(files_, kDialects);

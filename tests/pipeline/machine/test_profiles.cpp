@@ -38,7 +38,7 @@ TEST(Profiles, AreFoundByNameAndErrorsNameLineAndColumn) {
 }
 
 // Without voids each saturation would be one that drops do not reach.
-TEST(Profiles, OfPowderWithoutVoidsAreToldByThatKey) {
+TEST(Profiles, OfPowderWithoutVoidsAreReportedByThatKey) {
   for (const char* packing : {"1", "0.995", "0"}) {
     const auto solid = read_machine("[machine]\nname = \"x\"\n[powder]\npacking = " + std::string(packing) + "\n", "x.toml");
     ASSERT_FALSE(solid.ok()) << packing;

@@ -100,7 +100,7 @@ TEST(Manifest, WhatIsWrittenIsRead) {
 }
 
 /// A head of two materials whose pixels get up to three drops.
-ManifestHead head_of_drops(const std::string& format, std::uint32_t most) {
+ManifestHead head_of_drops(const std::string& format, std::uint32_t maximum) {
   ManifestHead head = some_head();
   head.format = format;
   head.extension = ".tif";
@@ -108,16 +108,16 @@ ManifestHead head_of_drops(const std::string& format, std::uint32_t most) {
   head.dialect = "raw";
   head.program_extension = write::find_dialect("raw")->extension;
   head.materials = {{"steel", 0}, {"bronze-drop2", 1}};
-  head.most_drops = most;
+  head.max_drops = maximum;
   return head;
 }
 
 // Names of a material's drops are no other material's, and numbers of layers come back.
 TEST(Manifest, OfDropsOfMaterialsIsReadAsItIsWritten) {
-  for (const auto& [format, most, images] :
+  for (const auto& [format, maximum, images] :
        {std::tuple{"tiff-g4", 3u, 6u}, {"tiff-8", 3u, 2u}, {"tiff-g4", 1u, 2u}, {"tiff-8", 1u, 2u}}) {
     const Directory directory;
-    const ManifestHead head = head_of_drops(format, most);
+    const ManifestHead head = head_of_drops(format, maximum);
     ASSERT_EQ(head.named_images(), images);
     std::set<std::string> names;
     for (std::size_t i = 0; i < images; ++i) {
@@ -130,19 +130,19 @@ TEST(Manifest, OfDropsOfMaterialsIsReadAsItIsWritten) {
     EXPECT_EQ(names.size(), images);
     auto writer = ManifestWriter::open(directory / "manifest.json", head, {});
     ASSERT_TRUE(writer.ok()) << writer.error().message;
-    const bool told = head.drops_of_materials();
+    const bool reported = head.drops_of_materials();
     for (std::uint32_t i = 0; i < kLayers; ++i) {
       LayerRecord made = record(i);
       made.images.resize(images);
-      made.set_pixels = told ? 40 + i : 0;
-      made.most_drops = told || head.grey_drops() ? most : 1;
+      made.set_pixels = reported ? 40 + i : 0;
+      made.max_drops = reported || head.grey_drops() ? maximum : 1;
       made.drops = 5;
       made.bytes = 0;
       for (std::size_t m = 0; m < images; ++m) {
         made.images[m].bytes = 10 + m, made.images[m].set_pixels = 100 * m + i, made.images[m].unfed_pixels = m;
         made.images[m].drops = head.grey_drops() ? 1000 + m : 0;
         made.bytes += made.images[m].bytes;
-        if (!told) made.set_pixels += made.images[m].set_pixels;
+        if (!reported) made.set_pixels += made.images[m].set_pixels;
       }
       ASSERT_TRUE(writer->append(made).ok());
     }
@@ -159,8 +159,8 @@ TEST(Manifest, OfDropsOfMaterialsIsReadAsItIsWritten) {
         EXPECT_EQ(read.images[m].drops, head.grey_drops() ? 1000 + m : 0);
       }
       EXPECT_EQ(read.bytes, bytes);
-      EXPECT_EQ(read.set_pixels, told ? 40 + read.layer.index : set);
-      EXPECT_EQ(read.most_drops, told || head.grey_drops() ? most : 1);
+      EXPECT_EQ(read.set_pixels, reported ? 40 + read.layer.index : set);
+      EXPECT_EQ(read.max_drops, reported || head.grey_drops() ? maximum : 1);
       EXPECT_EQ(read.pixels_of_materials(2)[1], 100 * images / 2 + read.layer.index);
     }
   }
@@ -169,7 +169,7 @@ TEST(Manifest, OfDropsOfMaterialsIsReadAsItIsWritten) {
   many.materials.push_back({"third", 1});  // of a machine with two vats
   many.last_layer = many.first_layer;
   ASSERT_TRUE(ManifestWriter::open(directory / "manifest.json", many, {})->finish().ok());
-  EXPECT_NE(read_manifest_head(directory / "manifest.json").error().message.find("most_drops"), std::string::npos);
+  EXPECT_NE(read_manifest_head(directory / "manifest.json").error().message.find("max_drops"), std::string::npos);
 }
 
 TEST(Manifest, IsJsonForEverybody) {
@@ -187,7 +187,7 @@ TEST(Manifest, PoresOfRangesAreReadAsTheyAreWritten) {
   head.product = Product::kMoves;
   head.file = "a.gcode";
   PathFacts facts;
-  facts.laid.pores.closed = 9;
+  facts.deposited.pores.closed = 9;
   facts.by_range.resize(2);
   facts.by_range[0] = {12.5, {.closed = 7, .length_mm = 7.25, .crossing = 4, .crossed = 1}};
   facts.by_range[1] = {100.0 / 3, {.closed = 2, .edges = 5}};

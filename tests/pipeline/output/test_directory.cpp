@@ -50,7 +50,7 @@ TEST(LayerFiles, AreThoseOfNamesThatLaminaWrites) {
     EXPECT_FALSE(read_layer_file_name(name, index, partial)) << name;
 }
 
-TEST(LayerFiles, WhatAKilledJobLeftBesideThemGoesAndNothingElse) {
+TEST(LayerFiles, WhatAKilledJobLeftNextToThemGoesAndNothingElse) {
   const test::Directory directory;
   std::filesystem::create_directories(directory.path() / "program");
   const std::string ours = write::temporary_name("start.gcode"), theirs = write::temporary_name("notes.txt");
@@ -72,7 +72,7 @@ TEST_F(LoadingMeanwhile, AnotherSplitIsRefused) {
   EXPECT_NE(refusal().find("split otherwise"), std::string::npos);
 }
 
-TEST_F(LoadingMeanwhile, NobodyElseIsNoError) { EXPECT_EQ(refusal(), ""); }
+TEST_F(LoadingMeanwhile, NoOtherRunIsNoError) { EXPECT_EQ(refusal(), ""); }
 
 }  // namespace
 }  // namespace lamina::pipeline

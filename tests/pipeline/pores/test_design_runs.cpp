@@ -14,19 +14,19 @@ namespace {
 constexpr double kDarcy = 9.869233e-13;
 constexpr pipeline::ForwardGrid kCoarse{10, 40, 20, 2};
 
-pipeline::DesignRequest wish_of(double porosity, double darcy) {
+pipeline::DesignRequest target_of(double porosity, double darcy) {
   pipeline::DesignRequest request;
   request.machine = "anet-a8";
   request.grid = kCoarse;
-  if (porosity > 0) request.wish.porosity = porosity;
-  if (darcy > 0) request.wish.permeability_m2 = darcy * kDarcy;
+  if (porosity > 0) request.target.porosity = porosity;
+  if (darcy > 0) request.target.permeability_m2 = darcy * kDarcy;
   return request;
 }
 
 bool go_on(double) { return true; }
 
-TEST(DesignedJob, TheForwardRunOfWhatIsWrittenMeetsTheWish) {
-  const auto found = pipeline::design_job(wish_of(0.23, 180), go_on);
+TEST(DesignedJob, TheForwardRunOfWhatIsWrittenMeetsTheTarget) {
+  const auto found = pipeline::design_job(target_of(0.23, 180), go_on);
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_TRUE(found->met);
   EXPECT_NEAR(found->forward.porosity, 0.23, 0.05 * 0.23);
@@ -46,7 +46,7 @@ TEST(DesignedJob, TheForwardRunOfWhatIsWrittenMeetsTheWish) {
 }
 
 TEST(DesignedJob, TheVoidOfAForwardRunIsThatOfTheSlots) {
-  const auto found = pipeline::design_job(wish_of(0.2, 0), go_on);
+  const auto found = pipeline::design_job(target_of(0.2, 0), go_on);
   ASSERT_TRUE(found.ok());
   EXPECT_TRUE(found->met);
   EXPECT_LE(found->runs, 2u) << "beads keep their volume, slots nearly so";
@@ -56,8 +56,8 @@ TEST(DesignedJob, TheVoidOfAForwardRunIsThatOfTheSlots) {
   EXPECT_NEAR(found->forward.pore_length_mm, found->design.pores.length_mm, 1e-3);
 }
 
-TEST(DesignedJob, WhatIsOutOfReachIsToldWithTheNearest) {
-  const auto found = pipeline::design_job(wish_of(0.5, 0), go_on);
+TEST(DesignedJob, WhatIsOutOfReachIsReportedWithTheNearest) {
+  const auto found = pipeline::design_job(target_of(0.5, 0), go_on);
   ASSERT_TRUE(found.ok());
   EXPECT_FALSE(found->met);
   EXPECT_LE(found->runs, 2u) << "a further search finds the same";
@@ -66,8 +66,8 @@ TEST(DesignedJob, WhatIsOutOfReachIsToldWithTheNearest) {
   EXPECT_FALSE(found->outside.empty());
 }
 
-TEST(DesignedJob, ItEndsWhenItIsTold) {
-  const auto found = pipeline::design_job(wish_of(0.2, 0), [](double) { return false; });
+TEST(DesignedJob, ItEndsOnRequest) {
+  const auto found = pipeline::design_job(target_of(0.2, 0), [](double) { return false; });
   ASSERT_FALSE(found.ok());
   EXPECT_EQ(found.error().fault, Fault::kInterrupted);
 }
@@ -78,18 +78,18 @@ TEST(DesignedJob, TheCommandWritesAJobThatExtrudeTakes) {
   const auto made = test::run_lamina(
       {"design", "--pore", "0.12x0.9", "--machine", "anet-a8", "--voxel", "30", "--json", "-o", "a.toml"}, folder.path());
   ASSERT_EQ(made.code, 0) << made.err;
-  const nlohmann::ordered_json told = nlohmann::ordered_json::parse(made.out);
-  EXPECT_EQ(told["met"], true);
-  EXPECT_NEAR(told["pore_mm"][0].get<double>(), 0.12, 0.002);
-  const auto laid = test::run_lamina({"extrude", "part.stl", "--job", "a.toml", "--json", "-o", "a.gcode"}, folder.path());
-  ASSERT_EQ(laid.code, 0) << laid.err;
-  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(laid.out);
+  const nlohmann::ordered_json reported = nlohmann::ordered_json::parse(made.out);
+  EXPECT_EQ(reported["met"], true);
+  EXPECT_NEAR(reported["pore_mm"][0].get<double>(), 0.12, 0.002);
+  const auto deposited = test::run_lamina({"extrude", "part.stl", "--job", "a.toml", "--json", "-o", "a.gcode"}, folder.path());
+  ASSERT_EQ(deposited.code, 0) << deposited.err;
+  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(deposited.out);
   EXPECT_TRUE(summary["warnings"].empty()) << summary["warnings"].dump();
   EXPECT_NEAR(summary["pores"][0]["width_mm"].get<double>(), 0.12, 0.002);
   EXPECT_NEAR(summary["pores"][0]["length_mm"].get<double>(), 0.9, 0.02);
 }
 
-TEST(DesignedJob, ARefusedWishWritesNothingUnlessTheNearestIsWanted) {
+TEST(DesignedJob, ARefusedTargetWritesNothingUnlessTheNearestIsWanted) {
   test::Directory folder;
   const std::vector<std::string> far = {"design", "--pore", "0.4x1", "--machine", "anet-a8", "--voxel", "30", "-o", "a.toml"};
   const auto refused = test::run_lamina(far, folder.path());

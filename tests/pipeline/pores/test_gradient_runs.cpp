@@ -19,13 +19,13 @@ pipeline::DesignRequest coarse_request() {
   return request;
 }
 
-segment::PoreWish darcies(double darcy) {
-  segment::PoreWish wish;
-  wish.permeability_m2 = darcy * kUnit;
-  return wish;
+segment::PoreTarget darcies(double darcy) {
+  segment::PoreTarget target;
+  target.permeability_m2 = darcy * kUnit;
+  return target;
 }
 
-TEST(DesignedGradient, AWishThatRisesGivesPermeabilitiesThatRise) {
+TEST(DesignedGradient, ATargetThatRisesGivesPermeabilitiesThatRise) {
   const auto steps = segment::steps_of(darcies(70), darcies(150), {1.5, 3, 4.5});
   const auto found = pipeline::design_gradient(coarse_request(), steps, [](double) { return true; });
   ASSERT_TRUE(found.ok()) << found.error().message;
@@ -34,7 +34,7 @@ TEST(DesignedGradient, AWishThatRisesGivesPermeabilitiesThatRise) {
   double before = 0, resistance = 0, porosity = 0;
   for (const auto& [step, job] : found->steps) {
     const double k1 = job.forward.permeability_m2;
-    EXPECT_NEAR(k1, *step.wish.permeability_m2, 0.05 * *step.wish.permeability_m2);
+    EXPECT_NEAR(k1, *step.target.permeability_m2, 0.05 * *step.target.permeability_m2);
     EXPECT_GT(k1, before);
     EXPECT_LE(job.miss, found->miss);
     before = k1;
@@ -71,26 +71,26 @@ TEST(DesignedGradient, ARegionOfTheOneFileIsAsTheSameFillingAlone) {
   EXPECT_GT(found->steps[0].found.forward.permeability_m2, found->steps[1].found.forward.permeability_m2) << "downwards too";
 }
 
-TEST(DesignedGradient, TheCommandWritesRegionsThatExtrudeLays) {
+TEST(DesignedGradient, TheCommandWritesRegionsThatExtrudeDeposits) {
   Directory folder;
   write_box(folder / "part.stl", {0, 0, 0}, {12, 12, 2});
   const auto made = run_lamina(words_of("design --pore 0.11x0.9:0.14x0.9 --height 2 --steps 2 --machine anet-a8 --voxel 30 "
                                         "--json --quiet -o a.toml"),
                                folder.path());
   ASSERT_EQ(made.code, 0) << made.err;
-  const nlohmann::ordered_json told = nlohmann::ordered_json::parse(made.out);
-  EXPECT_EQ(told["met"], true);
-  ASSERT_EQ(told["steps"].size(), 2u);
-  EXPECT_EQ(told["steps"][0]["to_mm"], 0.9);
-  EXPECT_EQ(told["steps"][1]["to_mm"], 2.1) << "the layer that reaches the height";
-  const auto laid = run_lamina(words_of("extrude part.stl --job a.toml --json -o a.gcode"), folder.path());
-  ASSERT_EQ(laid.code, 0) << laid.err;
-  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(laid.out);
+  const nlohmann::ordered_json reported = nlohmann::ordered_json::parse(made.out);
+  EXPECT_EQ(reported["met"], true);
+  ASSERT_EQ(reported["steps"].size(), 2u);
+  EXPECT_EQ(reported["steps"][0]["to_mm"], 0.9);
+  EXPECT_EQ(reported["steps"][1]["to_mm"], 2.1) << "the layer that reaches the height";
+  const auto deposited = run_lamina(words_of("extrude part.stl --job a.toml --json -o a.gcode"), folder.path());
+  ASSERT_EQ(deposited.code, 0) << deposited.err;
+  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(deposited.out);
   EXPECT_TRUE(summary["warnings"].empty()) << summary["warnings"].dump();
-  EXPECT_EQ(laid.err.find("none closes"), std::string::npos) << "nothing is said of heights that no layer has\n" << laid.err;
+  EXPECT_EQ(deposited.err.find("none closes"), std::string::npos) << "nothing is said of heights that no layer has\n" << deposited.err;
   for (std::size_t i = 0; i < 2; ++i) {
     const double width = i == 0 ? 0.11 : 0.14;
-    EXPECT_NEAR(told["steps"][i]["pore_mm"][0].get<double>(), width, 0.05 * width);
+    EXPECT_NEAR(reported["steps"][i]["pore_mm"][0].get<double>(), width, 0.05 * width);
     EXPECT_NEAR(summary["pores"][i + 1]["width_mm"].get<double>(), width, 0.05 * width);
     EXPECT_NEAR(summary["pores"][i + 1]["length_mm"].get<double>(), 0.9, 0.045);
   }
@@ -105,9 +105,9 @@ TEST(DesignedGradient, AStepOutOfReachIsNamedWithTheNearest) {
   EXPECT_NE(refused.err.find("not reachable: 1 of 2 regions; from 0.9 to 1.8 mm nearest to --pore 0.4x0.9 is --pore 0."),
             std::string::npos)
       << refused.err;
-  const nlohmann::ordered_json told = nlohmann::ordered_json::parse(refused.out);
-  EXPECT_EQ(told["steps"][0]["met"], true);
-  EXPECT_EQ(told["steps"][1]["met"], false);
+  const nlohmann::ordered_json reported = nlohmann::ordered_json::parse(refused.out);
+  EXPECT_EQ(reported["steps"][0]["met"], true);
+  EXPECT_EQ(reported["steps"][1]["met"], false);
   EXPECT_TRUE(files_below(folder.path()).empty());
   EXPECT_EQ(run_lamina(words_of(line + " --nearest"), folder.path()).code, 0);
   EXPECT_EQ(files_below(folder.path()).size(), 1u);

@@ -45,7 +45,7 @@ void write_grey(const std::string& path, std::uint32_t columns, std::uint32_t ro
 class ImageStack : public testing::Test {
  protected:
   test::Outcome run(const std::string& line) { return test::run_lamina(test::words_of("permeability " + line), folder.path()); }
-  nlohmann::json told(const std::string& line) {
+  nlohmann::json reported(const std::string& line) {
     const test::Outcome outcome = run(line + " --json");
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.code == 0 ? nlohmann::json::parse(outcome.out) : nlohmann::json();
@@ -64,17 +64,17 @@ TEST_F(ImageStack, OfASlitHasItsPermeabilityFromGreyAndFromBlackAndWhite) {
   }
   const double wanted = 0.75 * 120e-6 * 120e-6 / 12;
   for (const char* call : {"grey --pixel 10 --threshold 100 --periodic xyz", "bits --pixel 10 --periodic xyz"}) {
-    const nlohmann::json json = told(call);
+    const nlohmann::json json = reported(call);
     ASSERT_TRUE(json.contains("flow")) << call;
     EXPECT_EQ(json["porosity"].get<double>(), 0.75) << call;
     for (const std::size_t along : {1, 2})
       EXPECT_NEAR(json["flow"][along]["k1_m2"][along].get<double>() / wanted, 1, 0.03) << call;
     EXPECT_EQ(json["flow"][0]["k1_darcy"].get<double>(), 0) << call;
   }
-  EXPECT_EQ(told("bits --pixel 10 --dark --no-flow")["porosity"].get<double>(), 0.25);
-  EXPECT_EQ(told("grey --pixel 10 --threshold 99 --no-flow")["porosity"].get<double>(), 0);
-  EXPECT_EQ(told("bits --pixel 10 --voxel 20 --no-flow")["voxels"], (nlohmann::json{8, 2, 2}));
-  EXPECT_EQ(told("bits --pixel 20 --layer-um 60 --window 0.16,0.08,0.18 --no-flow")["voxels"], (nlohmann::json{8, 4, 2}));
+  EXPECT_EQ(reported("bits --pixel 10 --dark --no-flow")["porosity"].get<double>(), 0.25);
+  EXPECT_EQ(reported("grey --pixel 10 --threshold 99 --no-flow")["porosity"].get<double>(), 0);
+  EXPECT_EQ(reported("bits --pixel 10 --voxel 20 --no-flow")["voxels"], (nlohmann::json{8, 2, 2}));
+  EXPECT_EQ(reported("bits --pixel 20 --layer-um 60 --window 0.16,0.08,0.18 --no-flow")["voxels"], (nlohmann::json{8, 4, 2}));
 }
 
 TEST_F(ImageStack, OfAJobKnowsItsPixelsAndLayers) {
@@ -82,7 +82,7 @@ TEST_F(ImageStack, OfAJobKnowsItsPixelsAndLayers) {
   ASSERT_EQ(
       test::run_lamina(test::words_of("jet part.stl --layer 0.25 --dpi 254 --bed 20x20 --quiet -o job"), folder.path()).code,
       0);
-  const nlohmann::json inside = told("job --window 2,1,1 --no-flow"), all = told("job --window 6,4,3 --no-flow");
+  const nlohmann::json inside = reported("job --window 2,1,1 --no-flow"), all = reported("job --window 6,4,3 --no-flow");
   EXPECT_EQ(inside["voxels"], (nlohmann::json{20, 10, 4}));
   EXPECT_EQ(inside["porosity"].get<double>(), 0);
   EXPECT_EQ(all["voxels"], (nlohmann::json{60, 40, 12}));
@@ -104,7 +104,7 @@ TEST_F(ImageStack, OfAJobOfSeveralDropsIsSolidWhereAnyFalls) {
     const test::Outcome made =
         test::run_lamina(test::words_of("jet --job job.toml --quiet --format " + format + " -o " + format), folder.path());
     ASSERT_EQ(made.code, 0) << made.err;
-    EXPECT_EQ(told(format + " --window 2,2,2 --no-flow")["porosity"].get<double>(), 0) << format;
+    EXPECT_EQ(reported(format + " --window 2,2,2 --no-flow")["porosity"].get<double>(), 0) << format;
   }
 }
 
@@ -163,21 +163,21 @@ TEST_F(ImageStack, IsPicturedAlongTheAxisThatLetsThrough) {
 }
 
 /// Some other program's manifest.json says nothing of the images beside it.
-TEST_F(ImageStack, BesideAForeignManifestIsAStackOfImages) {
+TEST_F(ImageStack, NextToAnUnrelatedManifestIsAStackOfImages) {
   fs::create_directory(folder / "web");
   for (int z = 1; z <= 6; ++z)
     write_pbm(numbered(folder / "web", z, ".pbm"), 16, 16, [](auto column, auto) { return column < 4; });
   for (const char* manifest :
        {"{\"name\": \"gallery\", \"icons\": []}\n", "{\n  \"short_name\": \"x\"\n}\n", "", "[]", "\xff\xfe"}) {
     test::write_text(folder / "web/manifest.json", manifest);
-    EXPECT_EQ(told("web --pixel 10 --no-flow")["porosity"].get<double>(), 0.25) << manifest;
+    EXPECT_EQ(reported("web --pixel 10 --no-flow")["porosity"].get<double>(), 0.25) << manifest;
   }
   test::write_text(folder / "web/manifest.json", "{\n\"lamina\": \"0.1.0\",\n");
   EXPECT_EQ(run("web --no-flow").code, 3) << "one of lamina that is cut off";
 }
 
 /// What the manifest tells no option contradicts.
-TEST_F(ImageStack, OfAJobRefusesWhatItsManifestTells) {
+TEST_F(ImageStack, OfAJobRefusesWhatItsManifestStates) {
   test::write_box(folder / "part.stl", {0, 0, 0}, {6, 4, 3});
   ASSERT_EQ(
       test::run_lamina(test::words_of("jet part.stl --layer 0.25 --dpi 254 --bed 20x20 --quiet -o job"), folder.path()).code,
@@ -271,7 +271,7 @@ TEST_F(ImageStack, OfAPlanThatIsShiftedAndGrownByAVoxelComesBackWithBoth) {
                                          is(x, y, z - 1) || is(x, y, z + 1)));
       });
     }
-    const nlohmann::json json = told("lines.gcode --scan " + name + " --pixel 25 --dark --range 8 --window 1.6,1.6,0.9");
+    const nlohmann::json json = reported("lines.gcode --scan " + name + " --pixel 25 --dark --range 8 --window 1.6,1.6,0.9");
     ASSERT_TRUE(json.contains("shift_voxels"));
     EXPECT_EQ(json["shift_voxels"], (nlohmann::json{3, -2, 1})) << name;
     EXPECT_EQ(json["voxels"], (nlohmann::json{64, 64, 36}));

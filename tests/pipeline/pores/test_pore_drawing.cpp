@@ -59,7 +59,7 @@ Pictured pictured(const std::string& path, bool flow) {
   pipeline::FlowRequest request;
   request.section = flow;
   Result<pipeline::PoreReport> report =
-      pipeline::look_at_pores({all.voxels, all.fine, all.coarse}, request, [](double) { return true; });
+      pipeline::analyse_pores({all.voxels, all.fine, all.coarse}, request, [](double) { return true; });
   EXPECT_TRUE(report.ok());
   all.report = std::move(*report);
   Result<Plot> plot = pipeline::draw_window(path, all.choice, all.report, all.fine, &all.file, &all.pile);
@@ -68,7 +68,7 @@ Pictured pictured(const std::string& path, bool flow) {
   return all;
 }
 
-bool tells(const Plot& plot, const std::string& words) {
+bool contains_text(const Plot& plot, const std::string& words) {
   return std::ranges::any_of(plot.texts, [&](const Plot::Text& text) { return text.line.find(words) != std::string::npos; });
 }
 
@@ -82,9 +82,9 @@ TEST(PoreDrawing, ShowsTheFlowAlongZAndTheLayersThatItPasses) {
   for (const float value : all.report.section->across.value) sum += value;
   EXPECT_NEAR(sum / (24 * 24), 1, 0.02) << "what passes the throat passes every plane";
   EXPECT_EQ(all.plot.images.size(), 5u);
-  EXPECT_TRUE(tells(all.plot, "lines.gcode: k1 "));
-  EXPECT_TRUE(tells(all.plot, "D along z"));
-  EXPECT_TRUE(tells(all.plot, "repeats along x, y, z"));
+  EXPECT_TRUE(contains_text(all.plot, "lines.gcode: k1 "));
+  EXPECT_TRUE(contains_text(all.plot, "D along z"));
+  EXPECT_TRUE(contains_text(all.plot, "repeats along x, y, z"));
   const auto has = [](const Plot::Image& image, std::uint8_t pixel) { return std::ranges::count(image.pixels, pixel) > 0; };
   EXPECT_TRUE(has(all.plot.images[3], 4)) << "middles of beads";
   EXPECT_TRUE(has(all.plot.images[4], 0) || has(all.plot.images[4], 1));
@@ -123,7 +123,7 @@ TEST(PoreDrawing, WithoutAFlowSolidAndVoidAreDrawn) {
   const Pictured all = pictured(folder / "lines.gcode", false);
   EXPECT_FALSE(all.report.section);
   EXPECT_EQ(all.plot.images.size(), 2u);
-  EXPECT_FALSE(tells(all.plot, "k1"));
+  EXPECT_FALSE(contains_text(all.plot, "k1"));
 }
 
 TEST(PoreDrawing, IsTheSameForAnyNumberOfThreads) {

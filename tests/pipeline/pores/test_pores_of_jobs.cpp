@@ -24,7 +24,7 @@ void write_two_jobs(const Directory& folder) {
   write_text(folder / "powder.toml", kPowder);
 }
 
-Outcome told(const std::string& line, const Directory& folder) { return run_lamina(words_of(line), folder.path()); }
+Outcome reported(const std::string& line, const Directory& folder) { return run_lamina(words_of(line), folder.path()); }
 
 /// What is told of a job but for the job itself.
 nlohmann::ordered_json without_job(const std::string& text) {
@@ -36,9 +36,9 @@ nlohmann::ordered_json without_job(const std::string& text) {
 TEST(PoresOfJobs, AJobOfFilamentHasThePoresOfItsToolpaths) {
   Directory folder;
   write_two_jobs(folder);
-  ASSERT_EQ(told("extrude --job filament.toml --quiet -o part.gcode", folder).code, 0);
-  const auto file = told("permeability part.gcode --voxel 30 --json", folder);
-  const auto job = told("permeability filament.toml --voxel 30 --json", folder);
+  ASSERT_EQ(reported("extrude --job filament.toml --quiet -o part.gcode", folder).code, 0);
+  const auto file = reported("permeability part.gcode --voxel 30 --json", folder);
+  const auto job = reported("permeability filament.toml --voxel 30 --json", folder);
   ASSERT_EQ(job.code, 0) << job.err;
   EXPECT_EQ(without_job(job.out), nlohmann::ordered_json::parse(file.out));
   EXPECT_EQ(job.err, file.err);
@@ -48,7 +48,7 @@ TEST(PoresOfJobs, AJobOfFilamentHasThePoresOfItsToolpaths) {
   EXPECT_EQ(said["machine"], "Anet A8");
   EXPECT_EQ(said["layers"], 5);
   EXPECT_EQ(said["parts"][0], "part.stl");
-  const auto text = told("permeability filament.toml --voxel 30 --no-flow", folder);
+  const auto text = reported("permeability filament.toml --voxel 30 --no-flow", folder);
   EXPECT_EQ(text.out.rfind("job       filament.toml: planned as lamina extrude does, 5 layers of 0.3 mm, Anet A8\n", 0), 0u)
       << text.out;
 }
@@ -56,9 +56,9 @@ TEST(PoresOfJobs, AJobOfFilamentHasThePoresOfItsToolpaths) {
 TEST(PoresOfJobs, AJobOfPowderHasThePoresOfItsBitmaps) {
   Directory folder;
   write_two_jobs(folder);
-  ASSERT_EQ(told("jet --job powder.toml --quiet -o job", folder).code, 0);
-  const auto files = told("permeability job --window 1,1,0.4 --periodic z --json", folder);
-  const auto job = told("permeability powder.toml --window 1,1,0.4 --periodic z --json", folder);
+  ASSERT_EQ(reported("jet --job powder.toml --quiet -o job", folder).code, 0);
+  const auto files = reported("permeability job --window 1,1,0.4 --periodic z --json", folder);
+  const auto job = reported("permeability powder.toml --window 1,1,0.4 --periodic z --json", folder);
   ASSERT_EQ(job.code, 0) << job.err;
   EXPECT_EQ(without_job(job.out), nlohmann::ordered_json::parse(files.out));
   EXPECT_EQ(nlohmann::ordered_json::parse(job.out)["job"]["command"], "jet");
@@ -68,9 +68,9 @@ TEST(PoresOfJobs, OptionsAndPartsGoBeforeWhatTheJobSays) {
   Directory folder;
   write_two_jobs(folder);
   const std::string set = " --set segment.thin_mm=2 --machine anet-a8";
-  ASSERT_EQ(told("extrude other.stl --job filament.toml --quiet -o other.gcode" + set, folder).code, 0);
-  const auto file = told("permeability other.gcode --no-flow --json", folder);
-  const auto job = told("permeability filament.toml other.stl --no-flow --json" + set, folder);
+  ASSERT_EQ(reported("extrude other.stl --job filament.toml --quiet -o other.gcode" + set, folder).code, 0);
+  const auto file = reported("permeability other.gcode --no-flow --json", folder);
+  const auto job = reported("permeability filament.toml other.stl --no-flow --json" + set, folder);
   ASSERT_EQ(job.code, 0) << job.err;
   EXPECT_EQ(without_job(job.out), nlohmann::ordered_json::parse(file.out));
   EXPECT_EQ(nlohmann::ordered_json::parse(job.out)["window_mm"][1], 3.5) << "a period of 1.5 and 2 mm";
@@ -81,10 +81,10 @@ TEST(PoresOfJobs, TheWindowLiesInTheMiddleOfTheFirstOfSeveralParts) {
   write_two_jobs(folder);
   write_text(folder / "both.toml",
              std::string(kFilament) + "at_mm = [20, 30]\n\n[[part]]\npath = \"other.stl\"\nat_mm = [100, 100]\n");
-  const auto both = told("permeability both.toml --no-flow", folder);
+  const auto both = reported("permeability both.toml --no-flow", folder);
   ASSERT_EQ(both.code, 0) << both.err;
   EXPECT_NE(both.out.find(" around 25.00, 35.00 mm, one layer from layer 2 on"), std::string::npos) << both.out;
-  EXPECT_EQ(told("permeability both.toml --no-flow --window 11,3,0.3", folder).code, 2) << "the first part is 10 mm wide";
+  EXPECT_EQ(reported("permeability both.toml --no-flow --window 11,3,0.3", folder).code, 2) << "the first part is 10 mm wide";
 }
 
 TEST(PoresOfJobs, NothingIsLeftBehind) {
@@ -94,8 +94,8 @@ TEST(PoresOfJobs, NothingIsLeftBehind) {
   const char* before = ::getenv("TMPDIR");
   const std::string kept = before == nullptr ? "" : before;
   ::setenv("TMPDIR", (folder / "tmp").c_str(), 1);
-  const auto well = told("permeability filament.toml --no-flow", folder);
-  const auto badly = told("permeability filament.toml --window 90,1,1", folder);
+  const auto well = reported("permeability filament.toml --no-flow", folder);
+  const auto badly = reported("permeability filament.toml --window 90,1,1", folder);
   before == nullptr ? ::unsetenv("TMPDIR") : ::setenv("TMPDIR", kept.c_str(), 1);
   EXPECT_EQ(well.code, 0) << well.err;
   EXPECT_EQ(badly.code, 2);
@@ -134,9 +134,9 @@ TEST(PoresOfJobs, AWrongJobIsALine) {
       {"permeability part.gcode --set layers.thickness_mm=1", 2, "--set is for job files"},
   };
   for (const auto& row : rows) expect_refused(row.line, row.code, row.words, folder);
-  const auto empty = told("permeability walls.toml --no-flow", folder);
+  const auto empty = reported("permeability walls.toml --no-flow", folder);
   EXPECT_NE(empty.err.find("note: walls.toml: no bead"), std::string::npos) << empty.err << "and not the file that it became";
-  const auto solid = told("permeability solid.toml", folder);
+  const auto solid = reported("permeability solid.toml", folder);
   EXPECT_EQ(solid.code, 0) << solid.err;
   EXPECT_NE(solid.out.find("no void leads through"), std::string::npos) << "what is solid is told as it is";
 }

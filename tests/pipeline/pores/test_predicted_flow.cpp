@@ -32,11 +32,11 @@ void write_lines(const std::string& path, bool crossed) {
   }
 }
 
-struct Laid {
+struct DepositedParts {
   read::GcodeFile file;
   pipeline::Pile pile;
 };
-Laid laid(const std::string& path) {
+DepositedParts deposited(const std::string& path) {
   Result<read::GcodeFile> file = read::GcodeFile::open(path);
   EXPECT_TRUE(file.ok());
   Result<pipeline::Pile> pile = pipeline::pile_of(*file);
@@ -45,7 +45,7 @@ Laid laid(const std::string& path) {
 }
 
 /// Of so many voxels, each `finer` times finer along its edges.
-pipeline::Window period_around(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
+pipeline::Window period_around(const DepositedParts& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
                                std::uint32_t finer = 1) {
   pipeline::Window window;
   window.box.add(Point3{17'600'000, 17'600'000, static_cast<Nm>(lines.pile.layers[1].low)});
@@ -56,7 +56,7 @@ pipeline::Window period_around(const Laid& lines, std::uint32_t layers, std::arr
 }
 
 /// Of so many layers, in these voxels and in twice as large ones.
-pipeline::PoreReport report_of(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
+pipeline::PoreReport report_of(const DepositedParts& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
                                std::array<std::uint32_t, 3> coarse_count) {
   const auto cut = [&](std::array<std::uint32_t, 3> into, std::uint32_t finer) {
     Result<VoxelStack> voxels = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, layers, into, finer));
@@ -64,7 +64,7 @@ pipeline::PoreReport report_of(const Laid& lines, std::uint32_t layers, std::arr
     return std::move(*voxels);
   };
   const VoxelStack voxels = cut(count, 1), fine = cut(count, pipeline::kFiner), coarse = cut(coarse_count, pipeline::kFiner);
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores({voxels, fine, coarse}, {}, [](double) { return true; });
+  const Result<pipeline::PoreReport> report = pipeline::analyse_pores({voxels, fine, coarse}, {}, [](double) { return true; });
   EXPECT_TRUE(report.ok());
   return *report;
 }
@@ -73,7 +73,7 @@ TEST(PredictedFlow, WhatRepeatsIsFoundInTheFile) {
   test::Directory folder;
   write_lines(folder / "straight.gcode", false);
   write_lines(folder / "crossed.gcode", true);
-  const Laid straight = laid(folder / "straight.gcode"), crossed = laid(folder / "crossed.gcode");
+  const DepositedParts straight = deposited(folder / "straight.gcode"), crossed = deposited(folder / "crossed.gcode");
   ASSERT_EQ(straight.pile.layers.size(), 5u);
   EXPECT_EQ(straight.pile.layers[2].low, 600'000);
   const Result<pipeline::Repeat> one = pipeline::find_repeat(straight.file, straight.pile, {17'600'000, 17'600'000}, 1);
@@ -90,7 +90,7 @@ TEST(PredictedFlow, WhatRepeatsIsFoundInTheFile) {
 TEST(PredictedFlow, StraightLinesLeaveWhatTheirStadiaDoAndNothingFlowsAcrossThem) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", false);
-  const Laid lines = laid(folder / "lines.gcode");
+  const DepositedParts lines = deposited(folder / "lines.gcode");
   const pipeline::PoreReport report = report_of(lines, 1, {80, 8, 60}, {40, 4, 30});
   const double bead = kHeight * (kWidth - kHeight) + std::numbers::pi / 4 * kHeight * kHeight;
   EXPECT_NEAR(report.porosity.total(), 1 - bead / (kSpacing * kHeight), 0.005);
@@ -105,18 +105,18 @@ TEST(PredictedFlow, StraightLinesLeaveWhatTheirStadiaDoAndNothingFlowsAcrossThem
 TEST(PredictedFlow, CrossedLinesLeadAlikeAlongXAndY) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", true);
-  const Laid lines = laid(folder / "lines.gcode");
+  const DepositedParts lines = deposited(folder / "lines.gcode");
   const pipeline::PoreReport report = report_of(lines, 2, {32, 32, 24}, {16, 16, 12});
   EXPECT_EQ(report.flow[0]->k_m2[0], report.flow[1]->k_m2[1]) << "turned and upside down it is the same window";
   EXPECT_DOUBLE_EQ(report.porosity.total(), report.porosity.percolating(2));
 }
 
 /// 1 mm of filament of 1.75 mm on 15.2 mm, in the middle of lines that the melt's lag does not reach.
-TEST(PredictedFlow, WhatIsFedIsLaid) {
+TEST(PredictedFlow, WhatIsFedIsDeposited) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", false);
-  const Laid lines = laid(folder / "lines.gcode");
-  bead::LayRules rules;
+  const DepositedParts lines = deposited(folder / "lines.gcode");
+  bead::DepositionRules rules;
   rules.machine.tau_s = 0.046;
   rules.machine.acceleration_mm_s2 = 400;
   const double area = std::numbers::pi / 4 * 1.75 * 1.75 / 15.2;
@@ -133,12 +133,12 @@ TEST(PredictedFlow, WhatIsFedIsLaid) {
 TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", false);
-  const Laid lines = laid(folder / "lines.gcode");
+  const DepositedParts lines = deposited(folder / "lines.gcode");
   const Result<VoxelStack> box = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 1, {80, 80, 30}));
   ASSERT_TRUE(box.ok());
   pipeline::FlowRequest request;
   request.memory_bytes = 1'000'000;
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores({*box, *box, *box}, request, [](double) { return true; });
+  const Result<pipeline::PoreReport> report = pipeline::analyse_pores({*box, *box, *box}, request, [](double) { return true; });
   ASSERT_FALSE(report.ok());
   EXPECT_EQ(report.error().fault, Fault::kUsage);
   EXPECT_NE(report.error().message.find("take --voxel"), std::string::npos) << report.error().message;
@@ -148,7 +148,7 @@ TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
 TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", true);
-  const Laid lines = laid(folder / "lines.gcode");
+  const DepositedParts lines = deposited(folder / "lines.gcode");
   const pipeline::PoreReport report = report_of(lines, 2, {5, 5, 4}, {1, 1, 1});
   for (std::size_t a = 0; a < 3; ++a) {
     const pipeline::Darcy& darcy = *report.flow[a];
@@ -161,18 +161,18 @@ TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
 }
 
 /// Two thousand times upon itself a line finds no room; told widths do not care.
-TEST(PredictedFlow, BeadsUponEachOtherAreRefusedByRulesAndNotAsTold) {
+TEST(PredictedFlow, BeadsUponEachOtherAreRefusedByRulesAndNotAsStated) {
   test::Directory folder;
   std::ofstream file(folder / "heap.gcode");
   file << "G21\nG90\nM83\n;LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\nG1 Z0.3 F600\n;WIDTH:0.5\n";
   for (int line = 0; line < 2000; ++line) file << "G0 X10 Y10\nG1 X25 Y10 E1 F900\n";
   file.close();
-  const Laid heap = laid(folder / "heap.gcode");
+  const DepositedParts heap = deposited(folder / "heap.gcode");
   pipeline::Window window;
   window.box.add(Point3{17'000'000, 9'500'000, 0});
   window.box.add(Point3{18'000'000, 10'500'000, 300'000});
   window.count = {20, 20, 6};
-  bead::LayRules rules;
+  bead::DepositionRules rules;
   rules.machine.tau_s = 0.046;
   EXPECT_TRUE(pipeline::bead_voxels(heap.file, heap.pile, window).ok());
   const Result<VoxelStack> refused = pipeline::bead_voxels(heap.file, heap.pile, window, &rules);
@@ -183,7 +183,7 @@ TEST(PredictedFlow, BeadsUponEachOtherAreRefusedByRulesAndNotAsTold) {
 TEST(PredictedFlow, AWindowLargerThanThePrintIsRefused) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", false);
-  const Laid lines = laid(folder / "lines.gcode");
+  const DepositedParts lines = deposited(folder / "lines.gcode");
   for (const std::array<double, 3> size : {std::array{50.0, 1.0, 0.3}, {1.0, 50.0, 0.3}, {1.0, 1.0, 2.0}}) {
     const Result<pipeline::WindowChoice> choice = pipeline::choose_window(lines.file, lines.pile, {10, size});
     ASSERT_FALSE(choice.ok());
@@ -194,7 +194,7 @@ TEST(PredictedFlow, AWindowLargerThanThePrintIsRefused) {
 TEST(PredictedFlow, LayersThatDoNotLieAboveTheOthersAreCounted) {
   test::Directory folder;
   std::ofstream(folder / "low.gcode") << "G90\nM82\nG1 Z0 F300\nG1 X0 Y0\nG1 X10 Y0 E1\nG1 X10 Y10 E2\n";
-  const Laid lines = laid(folder / "low.gcode");
+  const DepositedParts lines = deposited(folder / "low.gcode");
   EXPECT_TRUE(lines.pile.layers.empty());
   EXPECT_EQ(lines.pile.skipped, 1u);
 }

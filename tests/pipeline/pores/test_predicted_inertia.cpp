@@ -26,21 +26,21 @@ struct Found {
   pipeline::PoreReport report;
   Result<pipeline::Forchheimer> inertia;
 };
-Found look(bool wedge, Nm edge) {
+Found analysis(bool wedge, Nm edge) {
   const VoxelStack voxels = pore(2, wedge, edge / 2), fine = pore(2 * pipeline::kFiner, wedge, edge / 6),
                    coarse = pore(pipeline::kFiner, wedge, edge / 3);
   const pipeline::PoreRasters rasters{voxels, fine, coarse};
   const auto go_on = [](double) { return true; };
   pipeline::FlowRequest request;
   request.axes = {false, false, true};
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(rasters, request, go_on);
+  const Result<pipeline::PoreReport> report = pipeline::analyse_pores(rasters, request, go_on);
   EXPECT_TRUE(report.ok());
-  return {*report, pipeline::look_at_inertia(rasters, *report, go_on)};
+  return {*report, pipeline::analyse_inertia(rasters, *report, go_on)};
 }
 
 /// k1 goes with the square of a length, k2 with the length, velocities of a Reynolds number against it.
 TEST(PredictedInertia, ScalesAsItsUnitsDo) {
-  const Found one = look(true, 12'000), large = look(true, 36'000);
+  const Found one = analysis(true, 12'000), large = analysis(true, 36'000);
   ASSERT_TRUE(one.inertia.ok() && large.inertia.ok());
   const pipeline::Forchheimer &small = *one.inertia, &big = *large.inertia;
   EXPECT_GT(small.fit.k2_m, 0);
@@ -68,7 +68,7 @@ TEST(PredictedInertia, ScalesAsItsUnitsDo) {
 }
 
 TEST(PredictedInertia, StraightPoresHaveNone) {
-  const Found straight = look(false, 12'000);
+  const Found straight = analysis(false, 12'000);
   if (straight.inertia.ok()) {
     const segment::Fluid air;
     const auto& last = straight.inertia->points.back();
@@ -85,9 +85,9 @@ TEST(PredictedInertia, ItsMemoryIsCounted) {
   pipeline::FlowRequest request;
   request.memory_bytes = 200 * voxels.view().voxels();
   const auto go_on = [](double) { return true; };
-  EXPECT_TRUE(pipeline::look_at_pores({voxels, fine, coarse}, request, go_on).ok());
+  EXPECT_TRUE(pipeline::analyse_pores({voxels, fine, coarse}, request, go_on).ok());
   request.inertia = true;
-  EXPECT_FALSE(pipeline::look_at_pores({voxels, fine, coarse}, request, go_on).ok());
+  EXPECT_FALSE(pipeline::analyse_pores({voxels, fine, coarse}, request, go_on).ok());
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ Runs layer_of(const Job& job, const std::string& name) {
 
 bool same(const Runs& a, const Runs& b) { return a.row_offset == b.row_offset && a.change == b.change; }
 
-Runs united(const Runs& a, const Runs& b) {
+Runs merged(const Runs& a, const Runs& b) {
   Runs both;
   combine(a, b, SetOperation::kUnion, both);
   return both;
@@ -85,7 +85,7 @@ TEST(PartDoses, AreThoseOfJobsWithThePartAlone) {
   for (const std::string layer : {"000000", "000003"}) {
     for (const std::string drop : {"-drop1.tif", "-drop2.tif", "-drop3.tif"}) {
       const Runs first = layer_of(alone[0], layer + drop), second = layer_of(alone[1], layer + drop);
-      EXPECT_TRUE(same(layer_of(both, layer + drop), united(first, second))) << layer << drop;
+      EXPECT_TRUE(same(layer_of(both, layer + drop), merged(first, second))) << layer << drop;
     }
   }
 }
@@ -159,7 +159,7 @@ TEST(PartDoses, RecordedDropsAreComparedWithTheImages) {
   ASSERT_TRUE(run_part_doses(job).ok());
   const std::string path = job.output + "/manifest.json";
   std::string manifest = test::read_text(path);
-  const std::size_t drops = manifest.rfind("\"asked_drops\"");
+  const std::size_t drops = manifest.rfind("\"requested_drops\"");
   const std::size_t at = manifest.rfind("\"drops\":", drops);
   ASSERT_NE(at, std::string::npos);
   const std::size_t digit = manifest.find_first_of("0123456789", at);

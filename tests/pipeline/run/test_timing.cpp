@@ -64,7 +64,7 @@ int ended_while_measuring(const test::Directory& folder, int signal) {
   return WIFSIGNALED(result) ? WTERMSIG(result) : 0;
 }
 
-TEST(Timing, ARunTellsEachStepAndWhatTheLimitReadsAndWrites) {
+TEST(Timing, ARunReportsEachStepAndWhatTheLimitReadsAndWrites) {
   const test::Directory folder;
   const std::string part = test::corpus_file("dental_crown.stl");
   const std::vector<std::string> job = {"jet",     part,  "--bed",  "30x30",   "--dpi", "600",
@@ -180,12 +180,12 @@ TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
   const Json limit = timing_json(timing)["limit"];
   EXPECT_EQ(limit.size(), 1u) << json_text(limit);
   EXPECT_EQ(limit["not_measured"], timing.not_measured);
-  bool told = false;
+  bool reported = false;
   for (const auto& [label, line] : timing_lines(timing)) {
-    told |= line.find("not measured: ") != std::string::npos;
+    reported |= line.find("not measured: ") != std::string::npos;
     EXPECT_EQ(line.find("times the limit"), std::string::npos) << line;
   }
-  EXPECT_TRUE(told);
+  EXPECT_TRUE(reported);
 }
 
 }  // namespace

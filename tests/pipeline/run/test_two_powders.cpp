@@ -103,15 +103,15 @@ void expect_same(const Runs& a, const Runs& b, const std::string& what) {
   EXPECT_EQ(a.change, b.change) << what;
 }
 
-TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsStand) {
-  const std::array<std::array<double, 2>, 3> places[] = {{{{20, 30}, {55, 40}, {30, 60}}},   // apart
+TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsAre) {
+  const std::array<std::array<double, 2>, 3> positions[] = {{{{20, 30}, {55, 40}, {30, 60}}},   // apart
                                                          {{{30, 30}, {35, 33}, {40, 36}}},   // all over each other
                                                          {{{30, 30}, {30, 30}, {30, 30}}}};  // inside of each other
   int variant = 0;
-  for (const auto& place : places) {
+  for (const auto& position : positions) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 1, "steel"), part("dental_crown.stl", 2, "bronze"),
                                       part("rabbit_9_overlapping_shells.obj", 1, "steel")};
-    for (std::size_t p = 0; p < parts.size(); ++p) parts[p].at_mm = place[p];
+    for (std::size_t p = 0; p < parts.size(); ++p) parts[p].at_mm = position[p];
     const auto changed = [&](Job made) {
       made.mirror = variant == 1 ? Mirror::kX : Mirror::kNone;
       if (variant == 2) made.dose.bleed_um = {120, 80}, made.dose.shell_mm = 0.8, made.dose.core = 0.6;
@@ -175,10 +175,10 @@ TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) 
     EXPECT_GT(mixed, 0u);
     EXPECT_GT(single, 0u);
     // Whose binder falls into the other powder is told.
-    const auto told = std::ranges::find(summary->warnings, "mixed-powders", &Warning::code);
-    EXPECT_EQ(told == summary->warnings.end(), rule == "both") << rule;
+    const auto reported = std::ranges::find(summary->warnings, "mixed-powders", &Warning::code);
+    EXPECT_EQ(reported == summary->warnings.end(), rule == "both") << rule;
     if (rule == "first" || rule == "second") {
-      EXPECT_NE(told->text.find(fmt::format(" in {} layers", mixed)), std::string::npos) << told->text;
+      EXPECT_NE(reported->text.find(fmt::format(" in {} layers", mixed)), std::string::npos) << reported->text;
     }
   }
 }
@@ -388,7 +388,7 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   EXPECT_NE(read::check_material("a/b").find("is no name of a material"), std::string::npos);
   const auto wrong_ranges = [](const char* text) {
     std::vector<MaterialRange> ranges;
-    Place at;
+    TextPosition at;
     return read_material_ranges(*read_toml_value(text), ranges, at);
   };
   EXPECT_NE(wrong_ranges("[{ from_mm = 4, to_mm = 2, material = 'bronze' }]").find("ends at or below its start"),

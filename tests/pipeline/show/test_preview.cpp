@@ -97,7 +97,7 @@ TEST_F(Preview, MakesAContactSheetOfTheWantedWidthAndTheSameBytesEachTime) {
   EXPECT_EQ(testing::load(sheet()), bytes);
 }
 
-TEST_F(Preview, ASingleLayerIsNeverWiderThanAskedFor) {
+TEST_F(Preview, ASingleLayerIsNeverWiderThanRequested) {
   for (const char* options : {"--layer 0 --width 300", "--layer 19 --whole-bed --width 2000", "--every 7", "--count 1"}) {
     const Outcome outcome = preview(directory() + " -o " + sheet() + " " + options);
     ASSERT_EQ(outcome.code, 0) << outcome.output;
