@@ -8,14 +8,14 @@ set(report_source ${PROJECT_BINARY_DIR}/report_page.cpp)
 file(CONFIGURE OUTPUT ${report_source} @ONLY CONTENT [[// Made from stages/view/report/ by cmake/report.cmake.
 #include "stages/view/report/page.h"
 
-namespace lamina::write::report {
+namespace lamina::view::report {
 
 const PageTexts& page_texts() {
   static constexpr PageTexts kTexts = {R"page(@report_html@)page", R"page(@report_css@)page", R"page(@report_js@)page"};
   return kTexts;
 }
 
-}  // namespace lamina::write::report
+}  // namespace lamina::view::report
 ]])
 
 target_sources(lamina_stages PRIVATE ${report_source})

@@ -22,8 +22,8 @@ Outcome draw_plot(Context& context) {
     return status ? code : static_cast<int>(status.error().fault);
   };
   const auto text = read_file("-", {.fault = Fault::kUsage, .max_bytes = 1u << 30, .streams = true});
-  const auto plot = text ? write::read_plot(*text) : text.error();
-  const auto picture = plot ? write::picture::plot_png(*plot) : plot.error();
+  const auto plot = text ? formats::read_plot(*text) : text.error();
+  const auto picture = plot ? view::picture::plot_png(*plot) : plot.error();
   if (!picture) return end(picture.error().message, static_cast<int>(picture.error().fault));
   return end({reinterpret_cast<const char*>(picture->data()), picture->size()}, 0);
 }
@@ -74,7 +74,7 @@ Outcome draw(const Arguments& arguments, Context& context) {
   if (!request) return request.error();
   const auto preview = draw_preview(*request);
   if (!preview) return preview.error();
-  if (Status status = write::write_file(request->output, preview->bytes); !status) return status;
+  if (Status status = write_file(request->output, preview->bytes); !status) return status;
   for (const std::string& warning : preview->warnings) {
     if (!arguments.has("--quiet")) context.say(warning);
   }

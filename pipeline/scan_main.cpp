@@ -10,7 +10,7 @@
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/json_text.h"
 
-namespace lamina::scan {
+namespace lamina::pipeline {
 namespace {
 
 Error at_photo(const std::string& path, const Error& error) { return {error.fault, path + ": " + error.message}; }
@@ -76,14 +76,14 @@ int end(const Result<std::string>& result) {
 }
 
 }  // namespace
-}  // namespace lamina::scan
+}  // namespace lamina::pipeline
 
 int main(int count, char** words) {
   using namespace lamina;
   try {
-    return scan::end(scan::run(count == 2 ? words[1] : ""));
+    return calibration::end(calibration::run(count == 2 ? words[1] : ""));
   } catch (const std::exception& error) {
-    return scan::end(is_shortage(error) ? out_of_memory()
-                                        : Error{Fault::kInternal, std::string("internal error: ") + error.what()});
+    return calibration::end(is_shortage(error) ? out_of_memory()
+                                               : Error{Fault::kInternal, std::string("internal error: ") + error.what()});
   }
 }

@@ -129,7 +129,8 @@ struct PlanSlice {
   std::uint32_t layer(std::int64_t position) const { return static_cast<std::uint32_t>(first + position * step); }
   PlannedLayer at(std::int64_t requested) const {
     const std::int64_t position = requested < 0 ? requested + count : requested;
-    if (position < 0 || position >= count) throw py::index_error(fmt::format("layer {} of a slice: it has {}", requested, count));
+    if (position < 0 || position >= count)
+      throw py::index_error(fmt::format("layer {} of a slice: it has {}", requested, count));
     return plan->layer(layer(position));
   }
   PlanSlice part(const py::slice& requested) const {

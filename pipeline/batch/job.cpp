@@ -77,7 +77,7 @@ class Preparation {
     for (const std::string& word : job.entry.words) identity += fmt::format("{}:{}\n", word.size(), word);
     for (const std::string& input : std::set<std::string>(job.call.inputs.begin(), job.call.inputs.end())) {
       const auto [known, fresh] = digests_.try_emplace(input, Error{});
-      if (fresh && write::is_file(input)) known->second = digest_file(input);
+      if (fresh && is_file(input)) known->second = digest_file(input);
       const Result<FileDigest>& digest = known->second;
       if (!digest) continue;
       identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));

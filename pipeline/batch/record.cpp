@@ -64,7 +64,7 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   fs::create_directories(directory, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
   const std::string path = (fs::path(directory) / "batch.jsonl").string();
-  auto journal = write::Journal::open(path, "another batch is running here right now; wait for it or name another directory");
+  auto journal = Journal::open(path, "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
   if (!journal->empty() && !resume && !overwrite) {
     return Error{Fault::kUsage, fmt::format("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, "

@@ -42,10 +42,10 @@ class BatchRecord {
   Status ended(const BatchJob& job, const BatchResult& result);
 
  private:
-  explicit BatchRecord(write::Journal journal) : journal_(std::move(journal)) {}
+  explicit BatchRecord(Journal journal) : journal_(std::move(journal)) {}
   Status append(const Json& entry);
 
-  write::Journal journal_;
+  Journal journal_;
   std::map<std::string, Earlier> earlier_;
 };
 

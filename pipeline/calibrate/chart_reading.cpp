@@ -14,7 +14,7 @@
 namespace lamina::pipeline {
 namespace {
 
-using chart::Located;
+using calibration::Located;
 
 std::string list_of(const std::vector<std::uint32_t>& nozzles) {
   return nozzles.empty() ? "none" : fmt::format("{}", fmt::join(nozzles, ", "));
@@ -36,7 +36,7 @@ std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char
 std::string correct_rows(const std::vector<std::optional<Located>>& along, const Chart& chart, Machine& machine) {
   std::vector<double>& rows = machine.head.row_offset_um;
   if (rows.size() < 2) return "";
-  const auto detected = chart::rows_of(along, static_cast<std::uint32_t>(rows.size()));
+  const auto detected = calibration::rows_of(along, static_cast<std::uint32_t>(rows.size()));
   const double pixel_um = 1e-3 * (chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm);
   std::string line;
   std::size_t unreadable = 0;
@@ -57,7 +57,8 @@ std::string correct_rows(const std::vector<std::optional<Located>>& along, const
 }
 
 /// How far nozzles lie off, of all that were read.
-std::string positions_line(const std::vector<std::optional<Located>>& along, const std::vector<std::optional<Located>>& across) {
+std::string positions_line(const std::vector<std::optional<Located>>& along,
+                           const std::vector<std::optional<Located>>& across) {
   const auto maximum = [](const std::vector<std::optional<Located>>& nozzles) {
     double um = 0;
     for (const auto& one : nozzles) um = std::max(um, one ? std::abs(one->um) : 0);
@@ -143,7 +144,8 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
   if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
   for (std::string& line : joint_lines(json.at("joints"))) lines.push_back(std::move(line));
-  if (auto unreadable_offsets = unreadable_line(nozzles); !unreadable_offsets.empty()) lines.push_back(std::move(unreadable_offsets));
+  if (auto unreadable_offsets = unreadable_line(nozzles); !unreadable_offsets.empty())
+    lines.push_back(std::move(unreadable_offsets));
   if (const Json* gain = json.find("dot_gain_um")) {
     const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
     const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace lamina::scan {
+namespace lamina::pipeline {
 
 Json reading_json(const ChartReading& reading) {
   const auto rounded = [](double um) { return std::round(100 * um) / 100; };
@@ -12,7 +12,8 @@ Json reading_json(const ChartReading& reading) {
     for (const auto& one : list) {
       Json& entry = json.emplace_back();
       if (!one) continue;
-      const auto add = [&](const char* name, const char* detected, const char* error, const char* within, const Measure& measure) {
+      const auto add = [&](const char* name, const char* detected, const char* error, const char* within,
+                           const Measure& measure) {
         entry[name] = measure.reported ? Json(rounded(measure.um)) : Json();
         entry[detected] = measure.error_um > 0 ? Json(rounded(measure.um)) : Json();  // null: all dashes are marred
         entry[error] = rounded(measure.error_um);
@@ -62,4 +63,4 @@ Json comparison_json(const Comparison& comparison) {
   return json;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::pipeline

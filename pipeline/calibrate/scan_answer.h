@@ -5,11 +5,11 @@
 #include "stages/calibration/scan/reading.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::scan {
+namespace lamina::pipeline {
 
 /// What chart_reading.h takes over: lengths in um, as the keys say; null where the photograph does not show them.
 Json reading_json(const ChartReading& reading);
 /// Lengths in mm from the upper left corner of the layer's image.
 Json comparison_json(const Comparison& comparison);
 
-}  // namespace lamina::scan
+}  // namespace lamina::pipeline

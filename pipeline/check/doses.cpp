@@ -135,10 +135,12 @@ std::string DoseCheck::fault_of_target(const LayerRecord& record) const {
   const double minimum = std::max(0.0, dosed - apart) * std::max(0.0, target->minimum * (1 - kOfDrops) - kDropStep) - 0.5001;
   const double maximum = (dosed + apart) * (target->maximum * (1 + kOfDrops) + kDropStep) + 0.5001;
   if (requested >= minimum && requested <= maximum) return {};
-  const std::string drops =
-      target->minimum == target->maximum ? fmt::format("{:.6g}", target->minimum) : fmt::format("{:.6g} to {:.6g}", target->minimum, target->maximum);
-  return fmt::format("{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says requested_drops {}",
-                     record.dosed_pixels, drops, std::ceil(std::max(0.0, minimum)), std::floor(maximum), record.requested_drops);
+  const std::string drops = target->minimum == target->maximum
+                                ? fmt::format("{:.6g}", target->minimum)
+                                : fmt::format("{:.6g} to {:.6g}", target->minimum, target->maximum);
+  return fmt::format(
+      "{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says requested_drops {}",
+      record.dosed_pixels, drops, std::ceil(std::max(0.0, minimum)), std::floor(maximum), record.requested_drops);
 }
 
 }  // namespace lamina::pipeline

@@ -55,10 +55,11 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
   return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMaxProgramBytes);
 }
 
-Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels) {
+Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,
+                                        Levels& levels) {
   const bool grey = head.grey_drops() || head.full_level() > 0;
-  if (!grey) return read::image(path);
-  auto image = read::levels(path, head.full_level(), levels);
+  if (!grey) return formats::image(path);
+  auto image = formats::levels(path, head.full_level(), levels);
   if (!image || !head.grey_drops()) return image;
   if (const std::uint32_t maximum = highest(levels); maximum > head.max_drops) {
     return Error{Fault::kVerification,

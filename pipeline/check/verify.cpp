@@ -86,11 +86,11 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
     const replay::Count reported{.drops = says.drops,
-                             .sweeps = says.sweeps,
-                             .added = says.added_sweeps,
-                             .microseconds = says.microseconds,
-                             .added_microseconds = says.added_microseconds,
-                             .spat = says.spat};
+                                 .sweeps = says.sweeps,
+                                 .added = says.added_sweeps,
+                                 .microseconds = says.microseconds,
+                                 .added_microseconds = says.added_microseconds,
+                                 .spat = says.spat};
     if (const Status counted = check_count(inspection.machine->profile(), reported, *replay); same && !counted)
       return fmt::format("{}: {}", name, counted.error().message);
     if (same) {
@@ -114,7 +114,7 @@ std::string fault_of_image(const Verification& inspection, const Layer& layer, s
   if (!image) return image.error().message;
   const std::uint64_t own = sum_of_levels(levels);
   sum += own;
-  if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels, layer); !what.empty())
+  if (const std::string what = formats::difference(*image, inspection.head.grid, file.record.set_pixels, layer); !what.empty())
     return fmt::format("{}: {}", name, what);
   if (file.record.drops > 0 && own != file.record.drops)
     return fmt::format("{}: has {} drops, the manifest says {}", name, own, file.record.drops);

@@ -113,7 +113,7 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
   Arguments arguments;
   arguments.given = words;
   if (!command.reads_itself) {
-    Result<Arguments> read = terminal::read_arguments(spec_of(command), words);
+    Result<Arguments> read = pipeline::read_arguments(spec_of(command), words);
     if (!read) return read.error();
     if (read->help) return console.print(*read->help);
     arguments = std::move(*read);
@@ -145,7 +145,7 @@ namespace {
   } catch (const std::exception& error) {
     if (!is_shortage(error)) std::abort();
     constexpr std::string_view kLine = "lamina: out of memory; give a smaller --memory or fewer --threads\n";
-    write::write_all(2, std::as_bytes(std::span(kLine)));
+    write_all(2, std::as_bytes(std::span(kLine)));
     std::_Exit(static_cast<int>(Fault::kMemory));
   } catch (...) {
   }
@@ -160,7 +160,7 @@ int run_program(int argument_count, char** arguments, Program program) {
   Console console;
   try {
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
-    for (const std::string& left : write::take_left_behind()) console.say("lamina: note: " + left);
+    for (const std::string& left : take_left_behind()) console.say("lamina: note: " + left);
     return outcome.error ? console.complain(*outcome.error) : outcome.code;
   } catch (const std::exception& error) {
     if (is_shortage(error)) return console.complain(out_of_memory());

@@ -16,10 +16,10 @@
 
 namespace lamina::pipeline {
 
-using terminal::Arguments;
-using terminal::at_option;
-using terminal::CommandSpec;
-using terminal::OptionSpec;
+using pipeline::Arguments;
+using pipeline::at_option;
+using pipeline::CommandSpec;
+using pipeline::OptionSpec;
 
 /// Receives a command's messages and results, and can cancel it. Implemented by the console and by a batch job.
 class Context {

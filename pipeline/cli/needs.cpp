@@ -117,7 +117,7 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
     const bool beads = need.met == deposits_lines || need.met == deposits_beads;
     const auto met = study ? need.in_study : need.met;
     if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && named)) continue;
-    return terminal::at_option(need.flag, std::string(need.unmet));
+    return pipeline::at_option(need.flag, std::string(need.unmet));
   }
   if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off") {
     return Error{Fault::kUsage, "--no-repair and --repair exclude each other; give one of them"};
@@ -129,7 +129,7 @@ Status check_machine_needs(const Extruder& machine, const Arguments& arguments) 
   if (machine.format != "sml") return {};
   for (const std::string_view flag : kOfGcode) {
     if (arguments.has(flag)) {
-      return terminal::at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
+      return pipeline::at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
     }
   }
   return {};

@@ -12,7 +12,7 @@
 
 namespace lamina::pipeline {
 
-using terminal::Arguments;
+using pipeline::Arguments;
 
 /// Refuses options that would do nothing in this job; keys of files are not looked at.
 /// study   of layers alone: what decides none may still tell something about them

@@ -12,7 +12,7 @@
 
 namespace lamina::pipeline {
 
-using terminal::Arguments;
+using pipeline::Arguments;
 
 /// An input file of a call, with its role: "the job file".
 struct InputFile {

@@ -70,7 +70,7 @@ Result<Job> read_job_of(const Arguments& arguments) {
 /// The command that a saved job names in its first line; "" for others.
 std::string saved_command(const std::string& path) {
   const auto text = read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes});
-  return text ? std::string(read::command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
+  return text ? std::string(pipeline::command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
 }
 
 /// errors  kUsage: no such machine, or nothing tells
@@ -156,14 +156,14 @@ Outcome predict_job(const Arguments& arguments, Context& context, Predict predic
   for (const PartSummary& part : summary->parts) parts.push_back(part.path);
   const std::string machine = summary->machine.empty() ? "" : ", " + one_line(summary->machine);
   JobContext reported(context, job->output, one_line(path),
-                  fmt::format("job       {}: planned as lamina {} does, {} layers {}{}\n", one_line(path),
-                              command_name(*product), summary->layers_planned, summary->layer_text, machine),
-                  {{"path", path},
-                   {"command", command_name(*product)},
-                   {"machine", summary->machine},
-                   {"layers", summary->layers_planned},
-                   {"parts", parts},
-                   {"warnings", warnings_json(summary->warnings)}});
+                      fmt::format("job       {}: planned as lamina {} does, {} layers {}{}\n", one_line(path),
+                                  command_name(*product), summary->layers_planned, summary->layer_text, machine),
+                      {{"path", path},
+                       {"command", command_name(*product)},
+                       {"machine", summary->machine},
+                       {"layers", summary->layers_planned},
+                       {"parts", parts},
+                       {"warnings", warnings_json(summary->warnings)}});
   Outcome outcome = predict(arguments_on(job->output, *job, *product, arguments), reported,
                             moves ? first_part(*summary, corner_mm) : std::nullopt);
   if (outcome.error) outcome.error->message = reported.shown(outcome.error->message);

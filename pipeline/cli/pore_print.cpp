@@ -70,7 +70,7 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   request.inertia = arguments.has("--inertia");
   request.section = arguments.has("--plot");
   if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
-  const Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  const Result<formats::GcodeFile> file = formats::GcodeFile::open(path);
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
   if (!pile) return pile.error();
@@ -117,7 +117,8 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   print_warnings(*pile, *report, context);
   context.say(beads->reported);
   if (!arguments.has("--json"))
-    return context.print(as_text(*choice, *report) + (*inertia ? as_text(**inertia) : "") + as_text(*analysis) + as_text(*files));
+    return context.print(as_text(*choice, *report) + (*inertia ? as_text(**inertia) : "") + as_text(*analysis) +
+                         as_text(*files));
   Json json = as_json(*choice, *report);
   if (*inertia) json["inertia"] = as_json(**inertia);
   add_to(*analysis, json);

@@ -114,7 +114,7 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   return context.give(json);
 }
 
-Outcome compare_scan(const Arguments& arguments, Context& context, const read::GcodeFile& file, const Pile& pile,
+Outcome compare_scan(const Arguments& arguments, Context& context, const formats::GcodeFile& file, const Pile& pile,
                      const bead::DepositionRules* rules) {
   for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--plot", "--no-flow", "--inertia", "--memory"})
     if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} does nothing beside --scan; leave it out", flag)};

@@ -19,7 +19,7 @@ Result<WindowRequest> read_window_request(const Arguments& arguments, double vox
 Outcome predict_stack(const Arguments& arguments, Context& context);
 
 /// Toolpaths beside the scan of --scan. rules  of bead_voxels()
-Outcome compare_scan(const Arguments& arguments, Context& context, const read::GcodeFile& file, const Pile& pile,
+Outcome compare_scan(const Arguments& arguments, Context& context, const formats::GcodeFile& file, const Pile& pile,
                      const bead::DepositionRules* rules);
 
 }  // namespace lamina::pipeline

@@ -16,7 +16,7 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using write::voxels::VoxelPhase;
+using formats::voxels::VoxelPhase;
 
 struct Choice {
   const char *flag, *content;
@@ -28,32 +28,32 @@ bool is_stl(const std::string& path) { return lower_case(fs::path(path).extensio
 
 }  // namespace
 
-std::vector<terminal::OptionSpec> window_file_options() {
+std::vector<pipeline::OptionSpec> window_file_options() {
   return {{"--solid", "FILE", "what is solid in the window, as voxels .nrrd, .mha, .vti, or as a closed surface .stl", "",
            "Result"},
           {"--void", "FILE", "the same of its void", "", "Result"},
           {"--no-flow", "", "tell pores and write files, but compute no flow", "", "Result"}};
 }
 
-Status check_window_files(const terminal::Arguments& arguments) {
+Status check_window_files(const pipeline::Arguments& arguments) {
   if (Status status = check_plot_name(arguments.text("--plot")); !status) return status;
   for (const Choice& choice : kChoices) {
     if (!arguments.has(choice.flag)) continue;
     const std::string path = arguments.text(choice.flag), reported = one_line(path);
-    if (!is_stl(path) && !write::voxels::image_kind(path))
+    if (!is_stl(path) && !formats::voxels::image_kind(path))
       return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, reported)};
     if (Status status = check_folder(choice.flag, path); !status) return status;
   }
   return {};
 }
 
-Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window,
+Result<std::vector<WindowFile>> write_window_files(const pipeline::Arguments& arguments, const VoxelView& window,
                                                    const std::function<Result<Plot>()>& draw) {
   std::vector<WindowFile> written;
-  std::vector<write::File> files;
-  const auto begin = [&](const char* flag, const char* content) -> Result<write::File*> {
+  std::vector<File> files;
+  const auto begin = [&](const char* flag, const char* content) -> Result<File*> {
     written.push_back({arguments.text(flag), content, 0, 0});
-    auto file = write::File::open(written.back().path);
+    auto file = File::open(written.back().path);
     if (!file) return file.error();
     files.push_back(std::move(*file));
     return &files.back();
@@ -64,12 +64,12 @@ Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& ar
     if (!file) return file.error();
     WindowFile& one = written.back();
     if (is_stl(one.path)) {
-      const auto counts = write::voxels::write_surface(**file, window, choice.side, version());
+      const auto counts = formats::voxels::write_surface(**file, window, choice.side, version());
       if (!counts)
         return Error{counts.error().fault, fmt::format("{} {}: {}", choice.flag, one_line(one.path), counts.error().message)};
       one.facets = counts->facets;
     } else if (Status status =
-                   write::voxels::write_image(**file, window, choice.side, *write::voxels::image_kind(one.path), version());
+                   formats::voxels::write_image(**file, window, choice.side, *formats::voxels::image_kind(one.path), version());
                !status) {
       return status.error();
     }

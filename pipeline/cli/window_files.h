@@ -22,15 +22,15 @@ struct WindowFile {
 };
 
 /// For the help; --plot is of measurements too.
-std::vector<terminal::OptionSpec> window_file_options();
+std::vector<pipeline::OptionSpec> window_file_options();
 
 /// errors  kUsage: an ending of no format; kOutput: no such folder
-Status check_window_files(const terminal::Arguments& arguments);
+Status check_window_files(const pipeline::Arguments& arguments);
 
 /// Writes what was asked for; files take their names when all of them are whole.
 /// draw    makes the plot of --plot
 /// errors  kOutput; kInput: more facets than an STL file counts
-Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window,
+Result<std::vector<WindowFile>> write_window_files(const pipeline::Arguments& arguments, const VoxelView& window,
                                                    const std::function<Result<Plot>()>& draw);
 
 /// A line each, which ends with LF.

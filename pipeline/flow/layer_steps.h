@@ -31,7 +31,7 @@ struct LayerSteps {
   std::function<Status(const Ticket&)> record;                    // one at a time, in order; an error ends the flow
   std::function<std::uint64_t(std::uint32_t work)> bytes_held;    // of a slot's buffers
   std::function<void(std::uint32_t work)> let_go;                 // frees the buffers of an idle slot
-  std::function<std::uint64_t()> extra_bytes = {};               // optional: that `record` keeps, called after each
+  std::function<std::uint64_t()> extra_bytes = {};                // optional: that `record` keeps, called after each
   /// Whether `record` reads the scratch: a layer then keeps it until recorded, otherwise until its last step.
   bool records_from_work = false;
 };

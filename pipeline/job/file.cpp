@@ -52,7 +52,7 @@ bool has_section(std::string_view section) {
 
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
-  if (Status status = read::replace_paths(*tree, file, job.missing); !status) return status;
+  if (Status status = pipeline::replace_paths(*tree, file, job.missing); !status) return status;
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
     if (section == "part") {
@@ -155,9 +155,9 @@ Status set_key(Job& job, std::string_view assignment) {
 
 std::string job_text(const Job& job, const std::string& directory) {
   Job named = job;
-  named.output = read::path_in(directory, named.output);
-  change_profiles(named.machine, [&](const std::string& name) { return read::profile_in(directory, name); });
-  for (PartRequest& part : named.parts) part.path = read::path_in(directory, part.path);
+  named.output = pipeline::path_in(directory, named.output);
+  change_profiles(named.machine, [&](const std::string& name) { return pipeline::profile_in(directory, name); });
+  for (PartRequest& part : named.parts) part.path = pipeline::path_in(directory, part.path);
   std::string text = sections_text(job_keys(), named, [](const JobKey&, const std::string& value) { return !value.empty(); });
   for (const PartRequest& part : named.parts) text += part_text(part);
   return text;
@@ -167,7 +167,7 @@ std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
-  change_profiles(whole.machine, read::profile_name);
+  change_profiles(whole.machine, pipeline::profile_name);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
@@ -179,9 +179,9 @@ std::string canonical_job_text(const Job& job, Product product) {
   return text;
 }
 
-Result<write::File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
+Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
   for (const PartRequest& part : job.parts) {
-    if (write::same_file(path, part.path)) {
+    if (same_file(path, part.path)) {
       return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
     }
     if (!is_utf8(part.path)) {
@@ -191,9 +191,9 @@ Result<write::File> write_job(const std::string& path, const Job& job, bool dura
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
   const auto& [profile, presets] = std::tie(job.machine.profile, job.machine.presets);
-  if (Status status = read::check_nameable(directory.string(), profile, presets); !status) return status.error();
-  const std::string text = read::job_command_line(command) + "\n\n" + job_text(job, directory.string());
-  auto file = write::File::open(path, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
+  if (Status status = pipeline::check_nameable(directory.string(), profile, presets); !status) return status.error();
+  const std::string text = pipeline::job_command_line(command) + "\n\n" + job_text(job, directory.string());
+  auto file = File::open(path, {.durable = durable ? Durable::kAll : Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());
   if (status) status = file->flush();
   return status ? std::move(file) : status.error();

@@ -9,7 +9,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina::pipeline {
 class File;
 }
 
@@ -47,6 +47,6 @@ std::string canonical_job_text(const Job& job, Product product);
 /// errors  kOutput; kUsage if a path is not UTF-8
 Status save_job(const std::string& path, const Job& job, std::string_view command = "jet");
 /// The same, but the file takes its name when it is finished.
-Result<write::File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command);
+Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command);
 
 }  // namespace lamina::pipeline

@@ -41,7 +41,7 @@ using HeightsRequest = heights::Settings;
 
 /// Section [slice]: contours and their files.
 struct SliceRequest {
-  std::string format = "svg";          // of write::slice_formats()
+  std::string format = "svg";          // of formats::slice_formats()
   bool file_a_layer = false;           // layers/000000.svg ... in place of one file
   bool empty_first_layer = false;      // CLI
   std::optional<double> tolerance_um;  // simplification: greatest displacement of contours; absent: tolerance_um_of()
@@ -136,13 +136,13 @@ struct Job {
   bool resume = false;
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
-  bool strict = false;                  // warnings are errors
-  bool inspect = false;                 // look through the layers for islands, hollows, thin places
+  bool strict = false;                // warnings are errors
+  bool inspect = false;               // look through the layers for islands, hollows, thin places
   std::optional<double> min_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
-  bool allow_empty = false;             // a whole job may have nothing
-  bool allow_unbound = false;           // layers may get less binder than the machine's powder needs
-  bool timing = false;                  // tell where the time goes
-  bool quote = false;                   // tell what each part uses up, without prices too
+  bool allow_empty = false;           // a whole job may have nothing
+  bool allow_unbound = false;         // layers may get less binder than the machine's powder needs
+  bool timing = false;                // tell where the time goes
+  bool quote = false;                 // tell what each part uses up, without prices too
   bool json = false;
   bool quiet = false;
   std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"

@@ -46,8 +46,9 @@ const JobKey kBedKeys[] = {
 };
 
 const JobKey kPlacementKeys[] = {
-    field<&Job::gap_mm>({"placement", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
-                        {0, kMaxMm, " mm"}),
+    field<&Job::gap_mm>(
+        {"placement", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
+        {0, kMaxMm, " mm"}),
 };
 
 // --- [heights]
@@ -157,13 +158,13 @@ constexpr Word<Mirror> kMirrors[] = {{"none", Mirror::kNone}, {"x", Mirror::kX},
 
 std::vector<std::string_view> image_formats() {
   std::vector<std::string_view> ids;
-  for (const auto& format : write::image_formats()) ids.push_back(format.id);
-  for (const auto& format : write::level_formats()) ids.push_back(format.id);
+  for (const auto& format : formats::image_formats()) ids.push_back(format.id);
+  for (const auto& format : formats::level_formats()) ids.push_back(format.id);
   return ids;
 }
 
 std::string check_image_format(std::string_view text) {
-  return !write::extension_of(text) ? not_one_of(text, image_formats()) : std::string();
+  return !formats::extension_of(text) ? not_one_of(text, image_formats()) : std::string();
 }
 
 std::string check_title(std::string_view) { return {}; }
@@ -225,11 +226,11 @@ using raster::BeadEnds;
 
 std::string read_rule(std::string_view text, std::optional<VatRule>& rule) {
   VatRule read{};
-  std::string wrong = read::read_vat_rule(text, read);
+  std::string wrong = pipeline::read_vat_rule(text, read);
   if (wrong.empty()) rule = read;
   return wrong;
 }
-std::string rule_text(const std::optional<VatRule>& rule) { return rule ? read::vat_rule_text(*rule) : std::string(); }
+std::string rule_text(const std::optional<VatRule>& rule) { return rule ? pipeline::vat_rule_text(*rule) : std::string(); }
 
 constexpr Word<std::uint32_t> kLevels[] = {{"off", 0}, {"2", 2}, {"4", 4}, {"16", 16}};
 
@@ -240,7 +241,7 @@ const JobKey kMachineKeys[] = {
         {"machine", "profile", "--machine", "NAME|FILE",
          "write the print program of this machine, and take bed and dpi from it; lamina machines lists them",
          decides::images | decides::moves}),
-    custom<Job, read::read_presets, read::presets_text, &Job::machine, &MachineRequest::presets>(
+    custom<Job, pipeline::read_presets, pipeline::presets_text, &Job::machine, &MachineRequest::presets>(
         {"machine", "presets", "--preset", "NAME|FILE,...",
          "powder, binder and process that change the machine's profile, in their order; lamina machines lists them",
          decides::images},
@@ -257,7 +258,7 @@ const JobKey kMachineKeys[] = {
         {"machine", "vat_rule", "--vat-rule", "RULE",
          "vat that feeds a layer of two powders, instead of the machine's; refuse: there must be none", decides::images},
         Form::kString)
-        .with_words(read::vat_rule_words),
+        .with_words(pipeline::vat_rule_words),
 };
 
 const JobKey kDoseKeys[] = {
@@ -309,12 +310,12 @@ const JobKey kDoseKeys[] = {
 
 std::vector<std::string_view> slice_format_words() {
   std::vector<std::string_view> words;
-  for (const write::SliceFormat& format : write::slice_formats()) words.push_back(format.id);
+  for (const formats::SliceFormat& format : formats::slice_formats()) words.push_back(format.id);
   return words;
 }
 
 std::string check_slice_format(std::string_view text) {
-  return write::find_slice_format(text) != nullptr ? "" : not_one_of(text, slice_format_words());
+  return formats::find_slice_format(text) != nullptr ? "" : not_one_of(text, slice_format_words());
 }
 
 constexpr unsigned kContour = decides::contours | decides::moves;
@@ -344,15 +345,17 @@ const JobKey kSliceKeys[] = {
 
 // --- [extrude]
 
-std::string read_machine_changes(const TomlValue& tree, read::ProfileChanges& changes, Place& at) {
-  return tree.is_text() ? read::read_changes(tree.text, changes) : read::read_changes(tree, changes, at);
+std::string read_machine_changes(const TomlValue& tree, pipeline::ProfileChanges& changes, Place& at) {
+  return tree.is_text() ? pipeline::read_changes(tree.text, changes) : pipeline::read_changes(tree, changes, at);
 }
 
 JobKey machine_key() {
-  JobKey key = structure<read_machine_changes, read::changes_text, &Job::extrude, &ExtrudeRequest::machine>(
+  JobKey key = structure<read_machine_changes, pipeline::changes_text, &Job::extrude, &ExtrudeRequest::machine>(
       {"extrude", "machine", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in fan.from_layer=2",
        decides::moves});
-  key.read_text = [](const JobKey&, std::string_view text, Job& job) { return read::read_changes(text, job.extrude.machine); };
+  key.read_text = [](const JobKey&, std::string_view text, Job& job) {
+    return pipeline::read_changes(text, job.extrude.machine);
+  };
   return key;
 }
 

@@ -81,7 +81,7 @@ const PartKey kPartKeys[] = {
         Form::kList),
     structure<read_fill_changes, fill_changes_text, &PartRequest::fill>(
         {"part", "fill", "", "{...}", "keys of the job's filling that differ for this part", decides::all}),
-    text<read::check_material, &PartRequest::material>(
+    text<pipeline::check_material, &PartRequest::material>(
         {"part", "material", "", "NAME", "powder of the part, for machines with two vats", decides::all}),
     structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
         {"part", "material_range", "", "[{...}]", "other powders between two heights above the part's bottom", decides::all}),
@@ -128,7 +128,7 @@ std::span<const PartKey> part_keys() { return kPartKeys; }
 namespace {
 
 constexpr Key<MaterialRange> kMaterialKeys[] = {
-    text<read::check_material, &MaterialRange::material>({"material_range", "material"})};
+    text<pipeline::check_material, &MaterialRange::material>({"material_range", "material"})};
 
 }  // namespace
 
@@ -140,7 +140,7 @@ Status set_materials(std::string_view text, Job& job) {
   }
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     const auto name = names[names.size() == 1 ? 0 : p];
-    if (const std::string what = read::check_material(name); !what.empty()) return Error{Fault::kUsage, what};
+    if (const std::string what = pipeline::check_material(name); !what.empty()) return Error{Fault::kUsage, what};
     job.parts[p].material = name;
   }
   return {};

@@ -24,30 +24,30 @@ namespace {
 
 /// The files of a profile, shipped or the user's. unknown(suggestion, names)  makes the error for an unknown name
 template <class Unknown>
-Result<read::ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
-                                const Unknown& unknown) {
-  const read::Library library = profile_library();
+Result<pipeline::ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
+                                    const Unknown& unknown) {
+  const pipeline::Library library = profile_library();
   std::vector<std::string_view> names = names_of(shipped);
-  if (!read::is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
+  if (!pipeline::is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
       !library.is_own(name_or_file)) {
     const std::vector<std::string> own = library.own_names();
     names.insert(names.end(), own.begin(), own.end());
     return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
   }
-  read::ProfileFiles files;
+  pipeline::ProfileFiles files;
   const Status status = library.add(name_or_file, files);
-  return status ? Result<read::ProfileFiles>(std::move(files)) : status.error();
+  return status ? Result<pipeline::ProfileFiles>(std::move(files)) : status.error();
 }
 
 bool is_one_of(std::span<const ShippedProfile> shipped, std::string_view name) {
   return std::ranges::find(shipped, name, &ShippedProfile::name) != shipped.end();
 }
 
-Result<ExtruderProfile> extruder_of(const read::ProfileFiles& files) {
+Result<ExtruderProfile> extruder_of(const pipeline::ProfileFiles& files) {
   if (have_section(files, "head") && !have_section(files, "material"))
     return Error{Fault::kUsage, files.back().where + ": is the profile of a powder printer; lamina jet takes it"};
   count(Decision::kMachine);
-  auto profile = read::read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
+  auto profile = pipeline::read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
   if (const Status status = segment::check(profile->calibration); !status) {
     return Error{Fault::kUsage, fmt::format("{}: calibration.{}", files.back().where, status.error().message)};
@@ -57,14 +57,14 @@ Result<ExtruderProfile> extruder_of(const read::ProfileFiles& files) {
 
 }  // namespace
 
-read::Library profile_library() {
+pipeline::Library profile_library() {
   std::vector<ShippedProfile> all;
   for (const auto shipped : {shipped_machines(), shipped_presets(), shipped_extruders()})
     all.insert(all.end(), shipped.begin(), shipped.end());
-  return {std::move(all), read::profile_folder()};
+  return {std::move(all), pipeline::profile_folder()};
 }
 
-Result<Machine> read_machine(const read::ProfileFiles& files) {
+Result<Machine> read_machine(const pipeline::ProfileFiles& files) {
   if (have_section(files, "material") && !have_section(files, "head")) {
     const auto other = extruder_of(files);
     return Error{Fault::kUsage, other ? files.back().where + ": is the profile of an extrusion printer; lamina extrude takes it"
@@ -72,13 +72,13 @@ Result<Machine> read_machine(const read::ProfileFiles& files) {
   }
   count(Decision::kMachine);
   std::vector<std::string_view> dialects;
-  for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
-  return read::read_machine(files, dialects);
+  for (const auto& dialect : program::dialects()) dialects.push_back(dialect.id);
+  return pipeline::read_machine(files, dialects);
 }
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
   auto keys = read_toml(text, where);
-  return keys ? read_machine(read::ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
+  return keys ? read_machine(pipeline::ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
 }
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
@@ -86,7 +86,7 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
   return keys ? extruder_of({{std::move(*keys), where, {}}}) : keys.error();
 }
 
-Result<read::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
+Result<pipeline::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
   auto files = find(name_or_file, shipped_machines(), [&](const std::string& near, const std::string& names) {
     if (is_one_of(shipped_extruders(), name_or_file))
       return fmt::format("'{}' is an extrusion printer, of lamina extrude; name a profile or one of {}", name_or_file, names);
@@ -126,12 +126,12 @@ Result<bool> names_extruder(const std::string& name_or_file) {
 }
 
 Result<ExtruderProfile> resolve_extruder(const Job& job) {
-  if (Status status = read::check_there(job.missing, job.machine.profile, {}); !status) return status.error();
+  if (Status status = pipeline::check_there(job.missing, job.machine.profile, {}); !status) return status.error();
   auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
   if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
   ExtruderProfile& profile = *found;
   for (const auto& [name, value] : job.extrude.machine) {
-    if (const std::string wrong = read::set_extruder_key(name, value, profile); !wrong.empty()) {
+    if (const std::string wrong = pipeline::set_extruder_key(name, value, profile); !wrong.empty()) {
       return Error{Fault::kUsage, fmt::format("extrude.machine: {}", wrong)};
     }
   }
@@ -188,9 +188,9 @@ Error wrong(const std::string& key, const std::string& what) { return {Fault::kU
 Result<ResolvedMachine> resolve_profile(const Machine& machine) {
   auto grid = program::make_head_grid(machine);
   if (!grid) return grid.error();
-  const write::Dialect* dialect = write::find_dialect(machine.dialect);
+  const program::Dialect* dialect = program::find_dialect(machine.dialect);
   if (dialect == nullptr) return wrong("machine.dialect", fmt::format("there is no dialect '{}'", machine.dialect));
-  if (Status status = write::check_dialect(*dialect, machine, *grid); !status) return status.error();
+  if (Status status = program::check_dialect(*dialect, machine, *grid); !status) return status.error();
   grid->bit_order = dialect->bit_order;
   if (!machine.powder.materials.empty() && machine.powder.materials.size() != machine.powder.vats) {
     return wrong("powder.materials", fmt::format("{} names for {} vats of {}; name what is in each",
@@ -210,7 +210,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
     printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
     return printer;
   }
-  const Status there = read::check_there(job.missing, request.profile, request.presets);
+  const Status there = pipeline::check_there(job.missing, request.profile, request.presets);
   if (!there) return there.error();
   Result<Machine> found = find_machine(request.profile, request.presets);
   if (!found) return found.error();

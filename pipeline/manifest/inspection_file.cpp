@@ -21,7 +21,7 @@ constexpr std::array<std::string_view, 1> kMarks = {"\"kind\":\"inspection\""};
 /// Of this job, or of any if head is null.
 std::optional<Json> read_of(const std::string& directory, const ManifestHead* head) {
   const std::string path = inspection_path(directory);
-  if (!write::is_file(path)) return std::nullopt;
+  if (!is_file(path)) return std::nullopt;
   const auto text = read_file(path, {.max_bytes = kMaxBytes});
   if (!text || !json_nests_within(*text)) return std::nullopt;
   Json json;
@@ -45,7 +45,7 @@ std::string inspection_path(const std::string& directory) { return directory + "
 
 Status check_inspection_file(const std::string& directory) {
   const std::string path = inspection_path(directory);
-  if (write::is_replaceable(path, kMarks)) return {};
+  if (is_replaceable(path, kMarks)) return {};
   return Error{Fault::kUsage,
                fmt::format("{}: is there already, and lamina did not write it; remove it, leave out --inspect, or "
                            "name another output",
@@ -57,7 +57,7 @@ Status write_inspection(const std::string& directory, const ManifestHead& head, 
   Json json{{"lamina", head.version}, {"kind", "inspection"}, {"job", hex(head.id())}};
   json.update(facts);
   const std::string text = json_line(json);
-  return write::write_file(inspection_path(directory), std::string_view(text));
+  return write_file(inspection_path(directory), std::string_view(text));
 }
 
 Status keep_inspection_of(const std::string& directory, const ManifestHead& head) {

@@ -44,8 +44,8 @@ namespace fs = std::filesystem;
 OnRecord find_on_record(const std::string& directory) {
   const std::string path = (fs::path(directory) / "manifest.json").string();
   std::error_code error;
-  OnRecord found{fs::exists(path, error), has_manifest_head(write::part_of(path)), false, {}};
-  if (const auto begun = found.begun ? read_manifest(write::part_of(path)) : Result<Manifest>(Manifest()); begun) {
+  OnRecord found{fs::exists(path, error), has_manifest_head(part_of(path)), false, {}};
+  if (const auto begun = found.begun ? read_manifest(part_of(path)) : Result<Manifest>(Manifest()); begun) {
     found.all_made = found.begun && begun->layers.size() == begun->head.last_layer - begun->head.first_layer;
   }
   if (!found.finished) return found;
@@ -127,7 +127,7 @@ std::vector<LayerRecord> waiting_records(const fs::path& directory, const fs::pa
   }
   for (fs::directory_iterator entry(waiting, error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (!write::named_by_temporary(name).empty()) write::remove_or_note(entry->path().string());
+    if (!named_by_temporary(name).empty()) remove_or_note(entry->path().string());
   }
   return kept;
 }
@@ -135,7 +135,7 @@ std::vector<LayerRecord> waiting_records(const fs::path& directory, const fs::pa
 }  // namespace
 
 Result<KeptJob> find_kept_job(const std::string& directory, const std::string& waiting, const ManifestHead& head) {
-  const std::string path = (fs::path(directory) / "manifest.json").string(), begun_path = write::part_of(path);
+  const std::string path = (fs::path(directory) / "manifest.json").string(), begun_path = part_of(path);
   const bool begun = has_manifest_head(begun_path), finished = is_plain(path, fs::file_type::regular);
   KeptJob kept;
   if (finished) {

@@ -25,7 +25,7 @@ bool take_end(std::string_view& text, std::string_view end) {
 
 /// The same for the ending of a temporary file.
 bool take_temporary_end(std::string_view& name) {
-  const std::string_view named = write::named_by_temporary(name);
+  const std::string_view named = named_by_temporary(name);
   if (named.empty()) return take_end(name, ".part");
   name = named;
   return true;
@@ -57,8 +57,8 @@ std::vector<fs::path> program_frames(const std::string& directory) {
   std::vector<fs::path> found;
   for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
     const std::string file = entry.path().filename().string();
-    const std::string_view named = write::named_by_temporary(file), name = named.empty() ? file : named;
-    const bool frame = std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) {
+    const std::string_view named = named_by_temporary(file), name = named.empty() ? file : named;
+    const bool frame = std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) {
       return name == fmt::format("start{}", one.extension) || name == fmt::format("end{}", one.extension);
     });
     if (frame || name == "machine.toml") found.push_back(entry.path());
@@ -121,7 +121,7 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
   std::string_view& extension = name;
   if (!take_layer_index(name, index)) return false;
   if (extension.starts_with('-')) extension.remove_prefix(std::min(extension.find('.'), extension.size()));  // a material
-  return std::ranges::any_of(write::image_formats(), [&](const write::ImageFormat& format) {
+  return std::ranges::any_of(formats::image_formats(), [&](const formats::ImageFormat& format) {
     return !extension.empty() && extension == format.extension;
   });
 }
@@ -129,7 +129,7 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
   partial = take_temporary_end(name);
   return take_layer_index(name, index) &&
-         std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) { return name == one.extension; });
+         std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) { return name == one.extension; });
 }
 
 bool holds_layers(const std::string& directory) {
@@ -167,12 +167,12 @@ void sweep_partial_files(const std::string& directory, std::uint32_t first, std:
     if (!read_layer_file_name(file.filename().string(), index, partial)) {
       read_program_file_name(file.filename().string(), index, partial);
     }
-    if (partial && index >= first && index < last) write::remove_or_note(file.string());
+    if (partial && index >= first && index < last) remove_or_note(file.string());
   }
   for (const fs::path& file : program_frames(directory)) {
     // Another shard may be writing its own right now.
     const bool whole = first == 0 && last == UINT32_MAX;
-    if (whole && !write::named_by_temporary(file.filename().string()).empty()) write::remove_or_note(file.string());
+    if (whole && !named_by_temporary(file.filename().string()).empty()) remove_or_note(file.string());
   }
 }
 

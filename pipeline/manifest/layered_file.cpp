@@ -41,7 +41,7 @@ class Hasher {
 
 struct LayeredFile::State {
   LayeredFileOptions options;
-  std::optional<write::File> file;
+  std::optional<File> file;
   std::optional<ManifestWriter> manifest;  // absent where the file is streamed
   std::vector<LayerRecord> kept;
   bool finished = false;
@@ -57,10 +57,10 @@ struct LayeredFile::State {
 
   /// Opens the file, behind the kept layers or with `start`.
   Status open_file(std::string_view start) {
-    write::FileOptions how{.stream = options.stream, .hash = true, .keep_part = true};
+    FileOptions how{.stream = options.stream, .hash = true, .keep_part = true};
     how.replace = options.replace || options.resume;
-    if (options.sync == Sync::kOff) how.durable = write::Durable::kNo;
-    auto opened = kept.empty() ? write::File::open(options.file, how) : write::File::reopen(options.file, size, how);
+    if (options.sync == Sync::kOff) how.durable = Durable::kNo;
+    auto opened = kept.empty() ? File::open(options.file, how) : File::reopen(options.file, size, how);
     if (!opened) return opened.error();
     file.emplace(std::move(*opened));
     if (kept.empty()) {
@@ -86,7 +86,7 @@ namespace {
 
 /// A run that was killed between its last two names has left a whole file and the whole record of it.
 void take_last_name(const std::string& manifest, const std::string& target) {
-  const std::string record = write::part_of(manifest);
+  const std::string record = part_of(manifest);
   const auto begun = read_manifest(record);
   if (!begun || begun->file.bytes == 0) return;
   const auto digest = digest_file(target, begun->file.bytes);
@@ -98,7 +98,7 @@ void take_last_name(const std::string& manifest, const std::string& target) {
 Status find_kept(const LayeredFile::LayeredFileOptions& options, const ManifestHead& head, std::string_view start,
                  const std::string& target, std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
   if (!options.resume) return {};
-  const std::string begun_file = write::part_of(target), begun_record = write::part_of(options.manifest);
+  const std::string begun_file = part_of(target), begun_record = part_of(options.manifest);
   const bool begun = has_manifest_head(begun_record);
   if (begun && !is_there(begun_file) && is_there(target) && !is_there(options.manifest))
     take_last_name(options.manifest, target);
@@ -109,7 +109,7 @@ Status find_kept(const LayeredFile::LayeredFileOptions& options, const ManifestH
     if (!same && !begun) return same;
     const auto digest = same && is_there(target) ? digest_file(target) : FileDigest();
     if (same && digest && digest->bytes > 0 && digest->hash == finished->file.hash) {
-      for (const std::string& left : {begun_file, begun_record}) write::remove_or_note(left);
+      for (const std::string& left : {begun_file, begun_record}) remove_or_note(left);
       kept = std::move(finished->layers);
       whole_size = digest->bytes;
       return {};
@@ -126,9 +126,9 @@ Status find_kept(const LayeredFile::LayeredFileOptions& options, const ManifestH
 }  // namespace
 
 Status LayeredFile::check_part(const std::string& file, const std::string& manifest) {
-  const auto target = write::find_target(file);
-  if (!target || target->file.empty() || has_manifest_head(write::part_of(manifest))) return {};
-  const std::string part = write::part_of(target->file);
+  const auto target = find_target(file);
+  if (!target || target->file.empty() || has_manifest_head(part_of(manifest))) return {};
+  const std::string part = part_of(target->file);
   struct stat status {};
   if (::lstat(part.c_str(), &status) != 0) return {};
   return Error{Fault::kUsage, fmt::format("{}: is there already, without a record of lamina beside it; remove it, or name "
@@ -137,21 +137,21 @@ Status LayeredFile::check_part(const std::string& file, const std::string& manif
 }
 
 Result<LayeredFile> LayeredFile::open(LayeredFileOptions options, const ManifestHead& head, std::string_view start,
-                                      std::optional<write::Claim> claim) {
+                                      std::optional<Claim> claim) {
   LayeredFile made;
   State& state = *made.state_;
   state.options = std::move(options);
   const std::string &path = state.options.file, &manifest_path = state.options.manifest;
-  const auto target = write::find_target(path);
+  const auto target = find_target(path);
   if (!target) return target.error();
   const bool streams = target->file.empty();
   if (!streams) {
     if (!claim) {
-      auto taken = write::Claim::take(manifest_path, path);
+      auto taken = Claim::take(manifest_path, path);
       if (!taken) return taken.error();
       claim.emplace(std::move(*taken));
     }
-    if (Status status = check_begun_manifest(write::part_of(manifest_path)); !status) return status.error();
+    if (Status status = check_begun_manifest(part_of(manifest_path)); !status) return status.error();
     if (Status status = check_part(path, manifest_path); !status) return status.error();
     // A file without any record is none of an interrupted job.
     state.options.resume = state.options.resume && has_record(manifest_path);

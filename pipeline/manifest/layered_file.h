@@ -33,7 +33,7 @@ class LayeredFile {
   /// errors  kUsage: the files to resume belong to another job; a file or NAME.part is there that must not be replaced;
   ///         kOutput
   static Result<LayeredFile> open(LayeredFileOptions options, const ManifestHead& head, std::string_view start,
-                                  std::optional<write::Claim> claim = {});
+                                  std::optional<Claim> claim = {});
   LayeredFile(LayeredFile&&) noexcept;
   LayeredFile& operator=(LayeredFile&&) noexcept;
   ~LayeredFile();

@@ -97,7 +97,7 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
 
 bool has_record(const std::string& path) {
   std::error_code error;
-  return std::filesystem::exists(path, error) || has_manifest_head(write::part_of(path));
+  return std::filesystem::exists(path, error) || has_manifest_head(part_of(path));
 }
 
 Status check_begun_manifest(const std::string& part) {
@@ -112,7 +112,7 @@ std::uint8_t grey_level_of(std::uint32_t max_drops) {
   return max_drops <= 1 ? 1 : max_drops <= 3 ? 3 : max_drops <= 15 ? 15 : 255;
 }
 
-bool ManifestHead::grey_drops() const { return max_drops > 0 && write::find_level_format(format) != nullptr; }
+bool ManifestHead::grey_drops() const { return max_drops > 0 && formats::find_level_format(format) != nullptr; }
 
 std::uint8_t ManifestHead::full_level() const {
   if (grey_drops()) return grey_level_of(max_drops);
@@ -161,14 +161,14 @@ void add_line(const LayerRecord& record, const ManifestHead& head, bool first, s
 }  // namespace
 
 struct ManifestWriter::State {
-  write::File file;
+  File file;
   ManifestHead head;
   ManifestOptions options;
   std::string buffer;
   std::uint32_t next_layer = 0;
   bool first_line = true;
 
-  State(write::File opened, const ManifestHead& of, ManifestOptions chosen)
+  State(File opened, const ManifestHead& of, ManifestOptions chosen)
       : file(std::move(opened)), head(of), options(std::move(chosen)), next_layer(of.first_layer) {}
 
   void add(const LayerRecord& record) {
@@ -196,7 +196,7 @@ ManifestWriter::~ManifestWriter() = default;
 namespace {
 
 /// Appends head and kept records.
-Status begin(write::File& file, const ManifestHead& head, const std::vector<LayerRecord>& kept) {
+Status begin(File& file, const ManifestHead& head, const std::vector<LayerRecord>& kept) {
   std::string text = head_text(head);
   std::uint32_t next = head.first_layer;
   for (const LayerRecord& record : kept) {
@@ -215,15 +215,15 @@ Status begin(write::File& file, const ManifestHead& head, const std::vector<Laye
 
 Result<ManifestWriter> ManifestWriter::open(const std::string& path, const ManifestHead& head,
                                             const std::vector<LayerRecord>& kept_prefix, ManifestOptions options,
-                                            std::optional<write::Claim> claim) {
+                                            std::optional<Claim> claim) {
   if (!claim) {
-    auto taken = write::Claim::take(path, path);
+    auto taken = Claim::take(path, path);
     if (!taken) return taken.error();
     claim.emplace(std::move(*taken));
   }
-  write::FileOptions how{.lock = false, .follow = false};
-  if (options.sync == Sync::kOff) how.durable = write::Durable::kNo;
-  auto file = write::File::open(path, how);
+  FileOptions how{.lock = false, .follow = false};
+  if (options.sync == Sync::kOff) how.durable = Durable::kNo;
+  auto file = File::open(path, how);
   if (!file) return file.error();
   if (Status status = begin(*file, head, kept_prefix); !status) return status.error();
   claim->hand_over();

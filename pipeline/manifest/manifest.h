@@ -53,7 +53,7 @@ struct ManifestHead {
   std::string dialect, program_extension;  // of the print programs; empty without a machine
   Hash128 program_start, program_end;      // of program/start.* and end.*
   std::vector<JobMaterial> materials;      // if there are several
-  std::uint32_t max_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
+  std::uint32_t max_drops = 0;             // of a pixel; 0: no saturation was asked for, and set pixels get one
 
   std::uint32_t levels = 0;  // of shares of voxels; 0: pixels are set or not
   /// That a nozzle can fire on a pixel in one sweep, and does at the scan's speed.
@@ -153,7 +153,7 @@ class ManifestWriter {
   /// errors  kOutput: cannot be written, or another run is writing it
   static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
                                      const std::vector<LayerRecord>& kept_prefix, ManifestOptions options,
-                                     std::optional<write::Claim> claim = {});
+                                     std::optional<Claim> claim = {});
   static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
                                      const std::vector<LayerRecord>& kept_prefix) {
     return open(path, head, kept_prefix, ManifestOptions());

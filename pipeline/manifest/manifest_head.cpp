@@ -20,11 +20,11 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
-constexpr std::int64_t kMaxMicroseconds = 1'000'000'000'000;     // of a layer, as a replay counts them
-constexpr std::uint32_t kMaxDrops = 64;                          // of a pixel
+constexpr std::int64_t kMaxMicroseconds = 1'000'000'000'000;      // of a layer, as a replay counts them
+constexpr std::uint32_t kMaxDrops = 64;                           // of a pixel
 constexpr std::int64_t kMaxDots = 25'400, kMaxSpan = 1'000'000'000'000, kMinPixel = 1000;
 
-/// Of the letters that read::check_material allows.
+/// Of the letters that pipeline::check_material allows.
 bool is_material(std::string_view name) {
   return !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
@@ -51,7 +51,7 @@ PixelAxis possible_axis(std::int64_t dots, std::int64_t length, std::int64_t spa
 }
 
 std::string fault_of_images(const ManifestHead& head) {
-  const auto extension = write::extension_of(head.format);
+  const auto extension = formats::extension_of(head.format);
   if (!extension) return no_such("format", head.format);
   if (head.extension != *extension) return no_such("extension", head.extension);
   if (!head.file.empty()) return no_such("file", head.file);
@@ -63,7 +63,7 @@ std::string fault_of_images(const ManifestHead& head) {
   if (head.max_drops > kMaxDrops || (head.drops_of_materials() && head.materials.size() > kMaxVats)) {
     return no_such("max_drops", fmt::format("{}", head.max_drops));
   }
-  const bool grey = write::find_level_format(head.format) != nullptr;
+  const bool grey = formats::find_level_format(head.format) != nullptr;
   const bool right = head.levels == 2 || head.levels == 4 || head.levels == 16;
   const bool drops = head.max_drops > 0;  // also as grey, of a job with a machine
   if (head.levels > 0 ? !right || (!grey && !drops) : grey && !drops) {
@@ -78,13 +78,13 @@ std::string fault_of_images(const ManifestHead& head) {
   for (const JobMaterial& material : head.materials) {
     if (material.vat > 1) return no_such("vat", fmt::format("{}", material.vat));
   }
-  const auto* dialect = write::find_dialect(head.dialect);
+  const auto* dialect = program::find_dialect(head.dialect);
   if (dialect == nullptr) return no_such("dialect", head.dialect);
   return head.program_extension == dialect->extension ? "" : no_such("program_extension", head.program_extension);
 }
 
 std::string fault_of_contours(const ManifestHead& head) {
-  const auto* slice = write::find_slice_format(head.format);
+  const auto* slice = formats::find_slice_format(head.format);
   if (slice == nullptr) return no_such("format", head.format);
   const bool layer_files = head.file.empty() && !slice->extension.empty();
   if (head.extension != (layer_files && slice->layer_files ? slice->extension : ""))

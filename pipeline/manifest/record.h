@@ -48,7 +48,7 @@ struct PathFacts {
 
   // --- toolpaths of an extrusion printer
   std::uint64_t stored_points = 0;
-  write::MoveTotals totals;
+  formats::MoveTotals totals;
   DepositedSums deposited;
   /// By segmented range of heights, in a job whose layers can hold several; else empty, and not summed.
   std::vector<RangePores> by_range;
@@ -73,8 +73,8 @@ struct LayerRecord {
   // --- images of a job with a saturation, or of shares of voxels
   std::uint64_t dosed_pixels = 0;         // that are to be filled, whether or not drops fall on them; voxels' shares summed
   std::uint64_t drops = 0;                // of the images
-  std::uint64_t requested_drops = 0;          // by the wished saturation, rounded
-  std::uint32_t max_drops = 0;           // of any pixel
+  std::uint64_t requested_drops = 0;      // by the wished saturation, rounded
+  std::uint32_t max_drops = 0;            // of any pixel
   std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
   std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
   std::uint64_t half_far = 0;             // of them, those that are not beside a boundary of the image

@@ -50,19 +50,19 @@ struct OtherRuns {
 
 /// claim   of the job's own manifest, if it is held
 /// errors  kOutput: another run writes now; kUsage: what is there may not be replaced
-Result<OtherRuns> check_manifests(const Job& job, const write::Claim* claim) {
+Result<OtherRuns> check_manifests(const Job& job, const Claim* claim) {
   const std::string own = manifest_name(job);
   OtherRuns found;
   for (const ManifestFile& file : find_manifests(job.output)) {
-    const bool claimed = claim != nullptr && file.name == write::part_of(own);
+    const bool claimed = claim != nullptr && file.name == part_of(own);
     if (claimed && !claim->found()) continue;
-    const bool is_own = file.name == own || file.name == write::part_of(own);
+    const bool is_own = file.name == own || file.name == part_of(own);
     const auto refuse = [&](std::string_view what, std::string_view advice) {
       return Error{Fault::kUsage, fmt::format("{}/{}: {}; {}", job.output, file.name, what, advice)};
     };
     if (file.partial && !claimed && !joins(job, file)) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
-      if (Status busy = write::check_not_being_written(path); !busy) return busy.error();
+      if (Status busy = check_not_being_written(path); !busy) return busy.error();
     }
     found.begun |= is_own;
     if (joins(job, file)) {
@@ -125,18 +125,17 @@ Status check_shard_fits(const Job& job, const ManifestHead& head) {
   return {};
 }
 
-Result<write::Claim> claim_output(const Job& job, write::MadeFolders& made) {
+Result<Claim> claim_output(const Job& job, MadeFolders& made) {
   if (const std::error_code error = made.make(job.output)) return cannot(job.output, error.value());
-  auto claim = write::Claim::take(job.output + "/" + manifest_name(job), job.output);
+  auto claim = Claim::take(job.output + "/" + manifest_name(job), job.output);
   if (!claim) return claim.error();
-  if (Status status = check_begun_manifest(write::part_of(job.output + "/" + manifest_name(job))); !status)
-    return status.error();
+  if (Status status = check_begun_manifest(part_of(job.output + "/" + manifest_name(job))); !status) return status.error();
   const auto found = check_manifests(job, &*claim);
   if (!found) return found.error();
   return claim;
 }
 
-Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
+Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
   auto claim = claim_output(job, made);
   if (!claim) return claim.error();
   if (Status status = check_stays_inside(job.output); !status) return status.error();
@@ -159,7 +158,7 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
     return claim;
   }
   for (const ManifestFile& file : find_manifests(job.output)) {
-    if (joins(job, file) || file.name == write::part_of(manifest_name(job))) continue;  // the claim is in that name
+    if (joins(job, file) || file.name == part_of(manifest_name(job))) continue;  // the claim is in that name
     fs::remove(directory / file.name, error);
     if (error) return cannot(directory / file.name, error.value());
   }
@@ -169,8 +168,8 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
   return claim;
 }
 
-write::FileOptions layer_file_options(const Job& job) {
-  return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? write::Durable::kBytes : write::Durable::kNo};
+FileOptions layer_file_options(const Job& job) {
+  return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? Durable::kBytes : Durable::kNo};
 }
 
 Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,

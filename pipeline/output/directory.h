@@ -29,7 +29,7 @@ Result<bool> is_directory(const std::string& output);
 
 /// Creates the directory and claims it for the rest of the run, or for the job's shard of it. Fails if another run took it
 /// while this one loaded its parts. errors  kUsage, kOutput
-Result<write::Claim> claim_output(const Job& job, write::MadeFolders& made);
+Result<Claim> claim_output(const Job& job, MadeFolders& made);
 
 /// Fails if a manifest in a shard's directory belongs to another job. Of its own: a shard keeps all other layers and cannot
 /// distinguish other shards' layers from an earlier job's, so the user must clear the directory. Of another shard: the two
@@ -40,10 +40,10 @@ Status check_shard_fits(const Job& job, const ManifestHead& head);
 /// Call after check_output. Claims the directory and creates its layers/. With --overwrite, removes the output of an
 /// earlier job (a shard: only its own manifest), otherwise only the half-written files of an interrupted run.
 /// errors  those of claim_output; kOutput with the system's reason
-Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made);
+Result<Claim> prepare_output(const Job& job, MadeFolders& made);
 
 /// How a layer's file is written in a claimed directory.
-write::FileOptions layer_file_options(const Job& job);
+FileOptions layer_file_options(const Job& job);
 
 // --- finds the intact layers of an interrupted job.
 

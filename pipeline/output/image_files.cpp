@@ -31,7 +31,7 @@ ManifestHead image_head(const Plan& plan) {
   const Job& job = plan.job;
   ManifestHead head = plan_head(plan);
   head.format = job.format;
-  head.extension = write::extension_of(job.format).value_or("");
+  head.extension = formats::extension_of(job.format).value_or("");
   head.fill_rule = value_of("image", "fill", job);
   head.mirror = value_of("image", "mirror", job);
   head.grid = plan.images->grid;
@@ -42,8 +42,8 @@ ManifestHead image_head(const Plan& plan) {
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
-  if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
-  const std::string profile = read::kept_machine_text(machine);
+  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
+  const std::string profile = pipeline::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
   head.head_drops = plan.images->machine->grid.head_drops;
@@ -53,7 +53,7 @@ ManifestHead image_head(const Plan& plan) {
   return head;
 }
 
-write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
+formats::LayerTags tags_of(const Plan& plan, const Layer& layer) {
   constexpr std::string_view kAxes[] = {"", "x", "y", "xy"};
   const std::string_view axes = kAxes[static_cast<std::size_t>(plan.job.mirror)];
   // A job without a title is told by its pixels alone: the same image is the same file in any job and any place of it.
@@ -64,8 +64,8 @@ write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
 ImageFiles::ImageFiles(const Plan& plan)
     : plan_(plan),
       head_(image_head(plan)),
-      format_(write::find_image_format(plan.job.format)),
-      levels_(write::find_level_format(plan.job.format)) {
+      format_(formats::find_image_format(plan.job.format)),
+      levels_(formats::find_level_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                      layer_file_options(plan.job));
@@ -101,10 +101,10 @@ Status ImageFiles::open() {
   }
   std::vector<std::string> folders{job.output + "/layers"};
   if (program_) folders.push_back(job.output + "/program");
-  sync_ = write::FolderSync::of(folders);
+  sync_ = FolderSync::of(folders);
   const auto sync_names = [folders] {
     for (const std::string& folder : folders) {
-      if (const int reason = write::sync_folder(folder); reason != 0) return Status(write::write_failure(folder, reason));
+      if (const int reason = sync_folder(folder); reason != 0) return Status(write_failure(folder, reason));
     }
     return Status();
   };
@@ -120,12 +120,12 @@ Status ImageFiles::open() {
 
 std::uint64_t ImageFiles::FileWork::bytes() const {
   std::uint64_t total = bytes_held(file) + program.bytes();
-  for (const write::Bytes& one : files) total += bytes_held(one);
+  for (const formats::Bytes& one : files) total += bytes_held(one);
   return total;
 }
 
 Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord& record) const {
-  write::LayerTags tags = tags_of(plan_, record.layer);
+  formats::LayerTags tags = tags_of(plan_, record.layer);
   if (levels_ == nullptr) {
     if (!work.encoder) (work.encoder = format_->make_encoder())->use(plan_.job.isa);
     work.encoder->tag(tags);
@@ -154,7 +154,7 @@ Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord
 }
 
 Status ImageFiles::encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
-                              write::Bytes& file) const {
+                              formats::Bytes& file) const {
   file.clear();
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
   const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
@@ -165,10 +165,10 @@ Status ImageFiles::encode_one(const Runs& image, const Levels* levels, FileWork&
 
 Status ImageFiles::store(const LayerImages& images, FileWork& work, LayerRecord& record) const {
   const auto files = layer_images(head_, record);
-  const write::FileOptions how = layer_file_options(plan_.job);
+  const FileOptions how = layer_file_options(plan_.job);
   for (std::size_t m = 0; m < files.size() && !files[m].name.empty(); ++m) {
-    const write::Bytes& file = head_.named_images() == 0 ? work.file : work.files[m];
-    if (Status status = write::write_file(plan_.job.output + "/" + files[m].name, file, how); !status) return status;
+    const formats::Bytes& file = head_.named_images() == 0 ? work.file : work.files[m];
+    if (Status status = write_file(plan_.job.output + "/" + files[m].name, file, how); !status) return status;
   }
   return program(images, work, record);
 }

@@ -24,7 +24,7 @@ namespace lamina::pipeline {
 
 /// The manifest head for a plan of images, and what the files of a layer say of it.
 ManifestHead image_head(const Plan& plan);
-write::LayerTags tags_of(const Plan& plan, const Layer& layer);
+formats::LayerTags tags_of(const Plan& plan, const Layer& layer);
 
 /// The images of a layer that is to be written.
 struct LayerImages {
@@ -54,10 +54,10 @@ class ImageFiles {
 
   /// Scratch of a layer in flight; reused by later layers.
   struct FileWork {
-    std::unique_ptr<write::ImageEncoder> encoder;
-    std::unique_ptr<write::LevelEncoder> level_encoder;
-    write::Bytes file;
-    std::vector<write::Bytes> files;  // those that have names
+    std::unique_ptr<formats::ImageEncoder> encoder;
+    std::unique_ptr<formats::LevelEncoder> level_encoder;
+    formats::Bytes file;
+    std::vector<formats::Bytes> files;  // those that have names
     ProgramWork program;
     std::uint64_t bytes() const;
   };
@@ -84,19 +84,20 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void report_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record, write::Bytes& file) const;
+  Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
+                    formats::Bytes& file) const;
 
   const Plan& plan_;
   ManifestHead head_;
-  const write::ImageFormat* format_;  // null if levels_ is there
-  const write::LevelFormat* levels_;
+  const formats::ImageFormat* format_;  // null if levels_ is there
+  const formats::LevelFormat* levels_;
   std::optional<PrintProgram> program_;
   std::optional<ManifestWriter> manifest_;
-  std::optional<write::FolderSync> sync_;
+  std::optional<FolderSync> sync_;
   std::vector<std::uint32_t> todo_;
   std::vector<LayerRecord> kept_;
   std::size_t next_kept_ = 0;
-  write::MadeFolders made_;
+  MadeFolders made_;
 };
 
 }  // namespace lamina::pipeline

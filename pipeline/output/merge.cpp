@@ -46,7 +46,7 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
     for (const ManifestFile& file : files) {
       const std::string path = (fs::path(directory) / file.name).string();
       // An earlier merge into this directory was interrupted, or failed to remove the shards' manifests.
-      const bool of_merge = !file.shard && files.back().shard && write::same_file(directory, output);
+      const bool of_merge = !file.shard && files.back().shard && same_file(directory, output);
       if (of_merge && file.partial) continue;
       if (file.partial) return unmatched(fmt::format("{}: this shard is not finished; run it again with --resume", path));
       Result<Manifest> manifest = read_manifest(path);
@@ -88,7 +88,7 @@ Status check_coverage(std::vector<Shard>& shards) {
 }
 
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
-  const auto linked = write::bring_file(from.string(), to.string());
+  const auto linked = bring_file(from.string(), to.string());
   if (!linked) return linked.error();
   ++(*linked ? report.linked : report.copied);
   return {};
@@ -96,12 +96,12 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
 
 // Links every file of a shard into `output`.
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
-  const bool in_place = write::same_file(shard.directory, output);
+  const bool in_place = same_file(shard.directory, output);
   const ManifestHead& head = shard.manifest.head;
   const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
-    if (Status status = write::check_plain(from.string(), bytes); !status) return status;
+    if (Status status = check_plain(from.string(), bytes); !status) return status;
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
   for (const LayerRecord& record : shard.manifest.layers) {
@@ -116,7 +116,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   for (const std::string& name :
        {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
     const fs::path from = fs::path(shard.directory) / "program" / name;
-    if (Status status = write::check_plain(from.string()); !status) return status;
+    if (Status status = check_plain(from.string()); !status) return status;
     if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
   }
   return {};
@@ -124,7 +124,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
 
 /// Never replaces files of another job, nor of none: a merge that was killed left its begun manifest.
 /// returns  whether a finished manifest says so, of a shard or of all
-Result<bool> check_output(const std::string& output, const ManifestHead& head, const write::Claim& claim) {
+Result<bool> check_output(const std::string& output, const ManifestHead& head, const Claim& claim) {
   bool known = false, finished = false;
   for (const ManifestFile& file : find_manifests(output)) {
     const std::string path = (fs::path(output) / file.name).string();
@@ -155,7 +155,7 @@ Status remove_shard_manifests(const std::string& output) {
 /// Of a whole job, whose directory may be one to read only.
 Status end_earlier_merge(const std::string& output) {
   if (std::ranges::none_of(find_manifests(output), [](const ManifestFile& file) { return file.shard.has_value(); })) return {};
-  auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
+  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
   return claim ? remove_shard_manifests(output) : Status(claim.error());
 }
 
@@ -163,7 +163,7 @@ Status end_earlier_merge(const std::string& output) {
 /// have been interrupted while it removed the shards' manifests.
 std::optional<Shard> whole_job(const std::vector<std::string>& directories, const std::vector<Shard>& shards,
                                const std::string& output) {
-  const auto is_output = [&](const std::string& directory) { return write::same_file(directory, output); };
+  const auto is_output = [&](const std::string& directory) { return same_file(directory, output); };
   if (!std::ranges::all_of(directories, is_output)) return std::nullopt;
   const std::string path = (fs::path(output) / "manifest.json").string();
   auto manifest = read_manifest(path);
@@ -216,7 +216,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   std::error_code error;
   fs::create_directories(output, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", output, error.message())};
-  auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
+  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
   if (!claim) return claim.error();
   ManifestHead head = shards->front().manifest.head;
   const auto is_known = check_output(output, head, *claim);
@@ -228,7 +228,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   if (!head.machine.empty()) fs::create_directories(fs::path(output) / "program", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/program: {}", output, error.message())};
 
-  const auto sync = write::FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
+  const auto sync = FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
   report.shards = static_cast<std::uint32_t>(shards->size());
   head.first_layer = 0;
   head.last_layer = head.layer_count;

@@ -23,7 +23,7 @@ namespace lamina::pipeline {
 namespace fs = std::filesystem;
 
 SliceFiles::SliceFiles(const Plan& plan)
-    : plan_(plan), format_(*write::find_slice_format(plan.job.slice.format)), file_a_layer_(plan.job.slice.file_a_layer) {
+    : plan_(plan), format_(*formats::find_slice_format(plan.job.slice.format)), file_a_layer_(plan.job.slice.file_a_layer) {
   const SliceRequest& slice = plan.job.slice;
   head_.parts = plan.sections->names();
   head_.bounds = plan.sections->bounds();
@@ -64,23 +64,23 @@ Status SliceFiles::open() {
     bytes_ = kept_.bytes;
   }
   if (kept_.finished) {
-    write::remove_or_note(write::part_of(manifest_path));
+    remove_or_note(part_of(manifest_path));
     remove_waiting_layers(job);
     return {};
   }
   if (Status status = file_a_layer_ ? check_takes_layers(output()) : Status(); !status) return status;
   if (Status status = prepare_waiting_layers(job, !kept_.layers.empty()); !status) return status;
   if (one_file) {
-    auto package = write::Slice3mfWriter::make(head_);
+    auto package = formats::Slice3mfWriter::make(head_);
     if (!package) return package.error();
     package_.emplace(std::move(*package));
   }
   ManifestWriter::ManifestOptions options{job.sync};
   if (file_a_layer_) {
-    sync_ = write::FolderSync::of({waiting});
+    sync_ = FolderSync::of({waiting});
     options.sync_layers = [waiting] {
-      const int reason = write::sync_folder(waiting);
-      return reason == 0 ? Status() : Status(write::write_failure(waiting, reason));
+      const int reason = sync_folder(waiting);
+      return reason == 0 ? Status() : Status(write_failure(waiting, reason));
     };
   }
   auto manifest = ManifestWriter::open(manifest_path, head, kept_.layers, options, std::move(*claim));
@@ -90,7 +90,7 @@ Status SliceFiles::open() {
 }
 
 /// One text file of all layers.
-Status SliceFiles::open_single(const ManifestHead& head, write::Claim claim) {
+Status SliceFiles::open_single(const ManifestHead& head, Claim claim) {
   const Job& job = plan_.job;
   Buffer<char> start;
   encoder_->head(head_, start);
@@ -108,12 +108,12 @@ Status SliceFiles::keep() {
   return manifest_ ? manifest_->flush() : Status();
 }
 
-Status SliceFiles::encode(const write::SliceLayer& layer, Buffer<char>& text) const {
+Status SliceFiles::encode(const formats::SliceLayer& layer, Buffer<char>& text) const {
   text.clear();
   if (!encoder_) return {};
   if (Status status = encoder_->check(head_, layer); !status) return status;
   if (file_a_layer_) {
-    write::encode_alone(*encoder_, head_, layer, text);
+    formats::encode_alone(*encoder_, head_, layer, text);
   } else {
     encoder_->layer(head_, layer, text);
   }
@@ -127,10 +127,10 @@ Status SliceFiles::store(std::uint32_t index, const Buffer<char>& text, LayerRec
   record.hash = hash_bytes(bytes);
   if (!file_a_layer_) return {};
   const std::string path = waiting_layers(plan_.job) / fmt::format("{:06}{}", index, slice_extension(plan_.job));
-  return write::write_file(path, bytes, layer_file_options(plan_.job));
+  return write_file(path, bytes, layer_file_options(plan_.job));
 }
 
-Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record) {
+Status SliceFiles::record(const formats::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record) {
   if (file_) return file_->append({text.data(), text.size()}, record);
   if (package_) {
     if (Status status = package_->add(layer); !status) return status;
@@ -143,7 +143,7 @@ Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& te
 namespace {
 
 /// The job for lamina preview, which plans layers again, without settings that do not affect bytes.
-Result<write::File> write_plan(const Job& job) {
+Result<File> write_plan(const Job& job) {
   Job kept = job;
   kept.isa = Isa::kAuto;
   kept.threads = 0;
@@ -155,9 +155,9 @@ Result<write::File> write_plan(const Job& job) {
 
 }  // namespace
 
-Result<write::File> SliceFiles::write_package() {
-  write::FileOptions how{.hash = true, .replace = plan_.job.overwrite || plan_.job.resume};
-  if (plan_.job.sync == Sync::kOff) how.durable = write::Durable::kNo;
+Result<File> SliceFiles::write_package() {
+  FileOptions how{.hash = true, .replace = plan_.job.overwrite || plan_.job.resume};
+  if (plan_.job.sync == Sync::kOff) how.durable = Durable::kNo;
   return package_->write(output(), how);
 }
 
@@ -168,7 +168,7 @@ Result<std::uint64_t> SliceFiles::finish() {
   auto plan = write_plan(plan_.job);
   // Part names that a job file cannot hold are no error.
   if (!plan && plan.error().fault == Fault::kOutput) return plan.error();
-  std::optional<write::File> package;
+  std::optional<File> package;
   if (package_) {
     auto written = write_package();
     if (!written) return written.error();
@@ -176,7 +176,7 @@ Result<std::uint64_t> SliceFiles::finish() {
   }
   const auto take_names = [&, earlier = earlier_slices(plan_.job)]() -> Status {
     Status status = replace_slices(plan_.job, earlier);
-    for (write::File* file : {plan ? &*plan : nullptr, package ? &*package : nullptr}) {
+    for (File* file : {plan ? &*plan : nullptr, package ? &*package : nullptr}) {
       if (!status || file == nullptr) continue;
       const auto named = file->finish();
       if (!named) status = named.error();
@@ -227,7 +227,7 @@ Error cannot(const fs::path& path, const std::error_code& error) {
 }  // namespace
 
 std::string_view slice_extension(const Job& job) {
-  const std::string_view extension = write::find_slice_format(job.slice.format)->extension;
+  const std::string_view extension = formats::find_slice_format(job.slice.format)->extension;
   return extension.empty() ? ".cli" : extension;
 }
 
@@ -242,7 +242,7 @@ std::string slice_file_name(const Job& job) {
 Status check_slice_output(const Job& job) {
   if (const auto there = is_directory(job.output); !there || !*there) return there ? Status() : there.error();
   std::error_code error;
-  if (Status busy = write::check_not_being_written(job.output + "/manifest.json"); !busy) return busy;
+  if (Status busy = check_not_being_written(job.output + "/manifest.json"); !busy) return busy;
   const std::vector<ManifestFile> manifests = find_manifests(job.output);
   const OnRecord record = find_on_record(job.output);
   const bool replaces = job.overwrite || (job.resume && (record.finished || record.begun));
@@ -256,7 +256,7 @@ Status check_slice_output(const Job& job) {
   for (const std::string& name : {std::string("job.toml"), slice_file_name(job)}) {
     const fs::path file = fs::path(job.output) / name;
     for (const PartRequest& part : job.parts) {
-      if (write::same_file(file.string(), part.path)) {
+      if (same_file(file.string(), part.path)) {
         return Error{Fault::kUsage,
                      fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
       }
@@ -304,7 +304,7 @@ std::optional<fs::path> other_slice_file(const Job& job) {
   if (!head || head->file.empty() || (!job.slice.file_a_layer && head->file == slice_file_name(job))) return std::nullopt;
   const fs::path file = fs::path(job.output) / head->file;
   for (const PartRequest& part : job.parts) {
-    if (write::same_file(file.string(), part.path)) return std::nullopt;
+    if (same_file(file.string(), part.path)) return std::nullopt;
   }
   return file;
 }
@@ -336,7 +336,7 @@ Status replace_slices(const Job& job, const std::vector<fs::path>& earlier) {
 void remove_waiting_layers(const Job& job) {
   std::error_code error;
   fs::remove_all(waiting_layers(job), error);
-  if (error) write::note_left_behind(waiting_layers(job).string(), error.value());
+  if (error) note_left_behind(waiting_layers(job).string(), error.value());
 }
 
 }  // namespace lamina::pipeline

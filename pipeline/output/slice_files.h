@@ -42,12 +42,12 @@ class SliceFiles {
 
   // --- from many threads at once, each with its own text
   /// errors  kUsage: the format cannot hold the layer
-  Status encode(const write::SliceLayer& layer, Buffer<char>& text) const;
+  Status encode(const formats::SliceLayer& layer, Buffer<char>& text) const;
   /// Stores size and hash of the text in the record; writes the file if layers have their own. errors  kOutput
   Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
 
   // --- from one thread at a time, in layer order
-  Status record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
+  Status record(const formats::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
   /// returns  the bytes of all files
   Result<std::uint64_t> finish();
   Status keep();
@@ -56,20 +56,20 @@ class SliceFiles {
   bool keeps() const { return file_.has_value() || (file_a_layer_ && encoder_); }
 
  private:
-  Status open_single(const ManifestHead& head, write::Claim claim);
-  Result<write::File> write_package();
+  Status open_single(const ManifestHead& head, Claim claim);
+  Result<File> write_package();
 
   const Plan& plan_;
-  const write::SliceFormat& format_;
+  const formats::SliceFormat& format_;
   const bool file_a_layer_;
-  write::SliceHead head_;
-  std::unique_ptr<write::SliceEncoder> encoder_;  // of text formats
-  std::optional<write::Slice3mfWriter> package_;  // 3MF
-  std::optional<LayeredFile> file_;               // of one text file
-  std::optional<ManifestWriter> manifest_;        // of all others
-  std::optional<write::FolderSync> sync_;         // of files a layer
-  KeptJob kept_;                                  // of all others
-  write::MadeFolders made_;
+  formats::SliceHead head_;
+  std::unique_ptr<formats::SliceEncoder> encoder_;  // of text formats
+  std::optional<formats::Slice3mfWriter> package_;  // 3MF
+  std::optional<LayeredFile> file_;                 // of one text file
+  std::optional<ManifestWriter> manifest_;          // of all others
+  std::optional<FolderSync> sync_;                  // of files a layer
+  KeptJob kept_;                                    // of all others
+  MadeFolders made_;
   std::uint64_t bytes_ = 0;
   bool finished_ = false, waits_ = false;  // waits: files a layer stay where --resume finds them
 };

@@ -101,7 +101,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   }
   const bool requested = targets_.has_value();
   // Without a machine, formats that carry levels have those of the voxels.
-  if (requested || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
+  if (requested || (job.levels > 0 && (machine != nullptr || formats::find_level_format(job.format) == nullptr)))
     rules_.max_drops = 1;
   // Levels that are not dithered are drops to a head that fires several.
   if (machine != nullptr && machine->head.max_drops > 1 && rules_.full > 0 && !rules_.dithered && !requested)
@@ -143,7 +143,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
 }
 
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
-  write::warn_of_idle_care(machine, warnings);
+  program::warn_of_idle_care(machine, warnings);
   program::warn_of_fixed_joints(machine, grid, warnings);
 }
 
@@ -161,7 +161,7 @@ bool DosePlan::has_formula(const Layer& layer) const {
 }
 
 Result<dose::ZoneSums> DosePlan::saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
-                                               dose::DropWork& work) const {
+                                                    dose::DropWork& work) const {
   dose::Sheet sheet{grid_, mirror_ == Mirror::kX || mirror_ == Mirror::kXY, mirror_ == Mirror::kY || mirror_ == Mirror::kXY,
                     layer};
   sheet.limit = dose::Drops24{limit_ > 0 ? limit_ : 1} << dose::kDropBits;

@@ -17,11 +17,11 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/dose/budget.h"
+#include "stages/dose/covered_spans.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/edges/bleed.h"
 #include "stages/dose/edges/erode.h"
 #include "stages/dose/layer_drops.h"
-#include "stages/dose/covered_spans.h"
-#include "stages/dose/dose_target.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::pipeline {
@@ -118,7 +118,7 @@ class DosePlan {
  private:
   bool has_formula(const Layer& layer) const;
   Result<dose::ZoneSums> saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
-                                       dose::DropWork& work) const;
+                                            dose::DropWork& work) const;
 
   DoseZones zones_;
   dose::DropRules rules_;
@@ -127,7 +127,7 @@ class DosePlan {
   std::optional<dose::DoseTargets> targets_;
   dose::Binder binder_;
   std::uint32_t limit_ = 0, full_drops_ = 1;  // full_drops: of a full pixel without a wish
-  double min_percent_ = 0;                  // that binds, of a job that has to; 0: it has not
+  double min_percent_ = 0;                    // that binds, of a job that has to; 0: it has not
   Mirror mirror_;
   std::vector<std::vector<dose::ZoneBox>> copies_;  // of each zone with formulas of its own
   std::optional<dose::Budget> budget_;

@@ -17,8 +17,8 @@ Result<double> first_line_across(const infill::FillParameters& filling, MicroDeg
   turned.angle_base = (angle + kTurn / 4) % (kTurn / 2);
   turned.angle_step = 0;
   const auto [low, high] = segment::reach(part, segment::across(turned.angle_base));
-  const auto position = infill::first_position(turned, {layer, part},
-                                         {std::llround(low), std::llround(high - low), std::llround(low), std::llround(high)});
+  const auto position = infill::first_position(
+      turned, {layer, part}, {std::llround(low), std::llround(high - low), std::llround(low), std::llround(high)});
   if (!position) return position.error();
   return low + static_cast<double>(*position);
 }

@@ -199,7 +199,7 @@ class Planner {
       return usage(fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
                                mm(plan_.scene->height), machine.name, machine.bed.build_height_mm));
     }
-    const auto format = write::make_extrusion_format(machine);
+    const auto format = formats::make_extrusion_format(machine);
     for (std::uint32_t i = plan_.range[0]; i < plan_.range[1]; ++i) {
       if (Status status = format->check(schedule_.layers[i].layer); !status) return status;
     }
@@ -318,9 +318,9 @@ Result<Resolved> resolve(const Job& job, Product product) {
     if (!printer) return printer.error();
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
-    if (!write::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
+    if (!formats::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
     const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
-    if (write::find_level_format(job.format) != nullptr && !dosed) {
+    if (formats::find_level_format(job.format) != nullptr && !dosed) {
       return usage(
           fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
                       "--levels 2, 4 or 16, or --machine and --saturation",
@@ -330,7 +330,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
   }
   if (job.shard) return usage(fmt::format("run.shard: {}", kNoShards));
   if (product == Product::kContours) {
-    const auto* format = write::find_slice_format(job.slice.format);
+    const auto* format = formats::find_slice_format(job.slice.format);
     if (format == nullptr) return usage(fmt::format("unknown format '{}'", job.slice.format));
     if (!format->paths && fills(job)) {
       return usage(fmt::format("--format {}: holds contours only; leave out the filling, or choose svg", format->id));

@@ -179,7 +179,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
         part.material_ranges.empty()
             ? part.material
             : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm.value_or(0));
-    const bool images = read::names_images(part.path);
+    const bool images = formats::names_images(part.path);
     const LoadKey key{images         ? fmt::format("images {}", loaded.size())
                       : file.empty() ? part.path
                                      : file.string(),
@@ -252,8 +252,8 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
     const Loaded& part = *loaded[position.request];
     const std::int64_t bottom = bottom_of(job.parts[position.request], part);
     if (part.images) {
-      scene.images.push_back(
-          placed_images(*part.images, job.parts[position.request], *grid, position.x, position.y, scene.parts[position.request].notes));
+      scene.images.push_back(placed_images(*part.images, job.parts[position.request], *grid, position.x, position.y,
+                                           scene.parts[position.request].notes));
       scene.images.back().part = position.request;
     }
     positions_requested = positions_requested || job.parts[position.request].at_mm.has_value();
@@ -306,11 +306,11 @@ Status check_reach(const Machine& machine, const Scene& scene) {
                                               part, mm(outside->position.z), mm(outside->position.x), mm(outside->position.y),
                                               machine.name, machine.bed.build_height_mm)};
     }
-    return Error{
-        Fault::kUsage,
-        fmt::format("{}: reaches x {:.3f}, y {:.3f} mm at z {:.3f}, {:.3f} mm outside of the bed of {}; "
-                    "move, turn or scale the part",
-                    part, mm(outside->position.x), mm(outside->position.y), mm(outside->position.z), outside->beyond_mm, machine.name)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: reaches x {:.3f}, y {:.3f} mm at z {:.3f}, {:.3f} mm outside of the bed of {}; "
+                             "move, turn or scale the part",
+                             part, mm(outside->position.x), mm(outside->position.y), mm(outside->position.z),
+                             outside->beyond_mm, machine.name)};
   }
   for (const PlacedImages& images : scene.images) {
     const double top = mm(images.bottom + std::int64_t{images.thickness} * images.images->layers());

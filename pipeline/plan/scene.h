@@ -21,8 +21,8 @@ namespace lamina::pipeline {
 /// A copy of a part that is images, in whole pixels of the bed.
 struct PlacedImages {
   std::uint32_t part = 0;  // index into Scene::parts
-  std::shared_ptr<const read::LayerImages> images;
-  read::Placement position;
+  std::shared_ptr<const formats::LayerImages> images;
+  formats::Placement position;
   Nm bottom = 0, thickness = 0;  // of the first layer; of each
 
   /// The image whose heights hold the plane, if any.

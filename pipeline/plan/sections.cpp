@@ -129,7 +129,7 @@ double Sections::area_mm2(const Area& area, const Work& work) const {
 }
 
 Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                             slice::LayerContours& out) const {
+                                               slice::LayerContours& out) const {
   auto report = slicer.layer(scheduled.low, work.scratch, out);
   if (!report || containment_ == Containment::kAcross) return report;
   const auto high = slicer.layer(scheduled.high, work.scratch, work.highest);

@@ -100,7 +100,7 @@ class Sections {
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
   Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                     slice::LayerContours& out) const;
+                                       slice::LayerContours& out) const;
   ContoursView contours_of(const Area& area, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;

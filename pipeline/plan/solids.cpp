@@ -40,7 +40,7 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 
 /// What keeps a job from levels, and what to do; empty if nothing does.
 std::string_view against_shares(const Job& job, const Materials& materials, const DoseZones& zones) {
-  if (materials.several() && job.machine.profile.empty() && write::find_level_format(job.format) != nullptr)
+  if (materials.several() && job.machine.profile.empty() && formats::find_level_format(job.format) != nullptr)
     return "one material as grey, for several would lie in one voxel; choose a 1-bit format or name a machine";
   if (zones.bleeds().grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
@@ -104,9 +104,9 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   }
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material, std::uint32_t zone,
                        std::vector<std::uint32_t> instance) -> Status {
-    std::optional<cover::Coverage> coverage;
+    std::optional<coverage::Coverage> coverage;
     if (job.levels > 0 && !instances.empty()) {
-      auto covered = cover::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels, job.isa);
+      auto covered = coverage::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels, job.isa);
       if (!covered) return covered.error();
       coverage = std::move(*covered);
     }

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxBytes = 16'000'000;  // of a file that is looked at without being asked
-constexpr int kBins = 8;                           // about so many of a histogram
+constexpr int kBins = 8;                          // about so many of a histogram
 
 pores::Distribution histogram(const pores::PoreSizes& sizes, bool of_lengths) {
   double maximum = 0;
@@ -103,10 +103,10 @@ void add_to(const PoreAnalysis& analysis, Json& json) {
   for (std::size_t a = 0; a < 3; ++a) {
     const pores::Tortuosity& way = analysis.tortuosities[a];
     json["tortuosity"].push_back({{"along", std::string(1, "xyz"[a])},
-                            {"tortuosity", way.mean},
-                            {"min", way.minimum},
-                            {"max", way.maximum},
-                            {"throat_mm", analysis.throat_mm[a]}});
+                                  {"tortuosity", way.mean},
+                                  {"min", way.minimum},
+                                  {"max", way.maximum},
+                                  {"throat_mm", analysis.throat_mm[a]}});
   }
   const LayerSections& sections = analysis.sections;
   json["pores"] = {{"sections", sections.layers},
@@ -148,7 +148,7 @@ AnalysisPage analysis_page(const std::string& path) {
   if (!names_toolpaths(path) || !fs::is_regular_file(path, ignored) || fs::file_size(path, ignored) > kMaxBytes) return {};
   Plot sections;
   const Result<PrintAnalysis> print = analyse_print(path, 0, &sections);
-  return print ? AnalysisPage{as_text(*print), write::plot_svg(sections)} : AnalysisPage();
+  return print ? AnalysisPage{as_text(*print), formats::plot_svg(sections)} : AnalysisPage();
 }
 
 void add_pores(const std::string& path, Summary& summary) {
@@ -175,9 +175,10 @@ void add_pores(const std::string& path, Summary& summary) {
                           repeats[0] && repeats[1] && repeats[2] ? ", which repeat" : "", connected_text(analysis.connected)));
   std::string tortuosities = fmt::format("surface {:.2f} mm2 a mm3", print->pores.surface_per_mm);
   for (std::size_t a = 0; a < 3; ++a) {
-    tortuosities += analysis.tortuosities[a].reached == 0 ? fmt::format("; nothing leads along {}", "xyz"[a])
-                                      : fmt::format("; along {} ways {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
-                                                    analysis.tortuosities[a].mean, analysis.throat_mm[a]);
+    tortuosities += analysis.tortuosities[a].reached == 0
+                        ? fmt::format("; nothing leads along {}", "xyz"[a])
+                        : fmt::format("; along {} ways {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
+                                      analysis.tortuosities[a].mean, analysis.throat_mm[a]);
   }
   summary.results.emplace_back("tortuosity", std::move(tortuosities));
   const pores::PoreSizes& sizes = analysis.sections.sizes;

@@ -30,10 +30,11 @@ bead::DepositionRules rules_of(const Extruder& machine) {
 
 }  // namespace
 
-Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& beads, const std::string& machine) {
+Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& beads, const std::string& machine) {
   if (!beads.empty() && beads != "deposited" && beads != "spread" && beads != "stated")
     return Error{Fault::kUsage, fmt::format("--beads: '{}' is none of laid, spread, told", one_line(beads))};
-  const std::string reported = file.states_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
+  const std::string reported =
+      file.states_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
   if (beads == "stated" && !machine.empty())
     return Error{Fault::kUsage, "--machine does nothing beside --beads told; leave one out"};
   if (beads == "stated") return BeadRules{std::nullopt, reported};

@@ -113,8 +113,8 @@ class LayerBeads {
     if (rules != nullptr) rules_ = *rules;
   }
 
-  Status read(const read::GcodeFile& file, const Pile::PileLayer& layer) {
-    Result<read::GcodeLayer> found = file.layer(layer.index, rules_.has_value());
+  Status read(const formats::GcodeFile& file, const Pile::PileLayer& layer) {
+    Result<formats::GcodeLayer> found = file.layer(layer.index, rules_.has_value());
     if (!found) return found.error();
     beads_ = std::move(found->beads);
     height_ = layer.high - layer.low;
@@ -151,8 +151,8 @@ class LayerBeads {
   double left_out() const { return deposited_mm3_ > 0 ? left_out_mm3_ / deposited_mm3_ : 0; }
 
  private:
-  static constexpr Nm kNeighbours = 2'000'000;  // nm: what may push those that reach into the window
-  static constexpr double kMaxLineDensity = 50;       // mm of line a mm2: fifty lines a millimetre
+  static constexpr Nm kNeighbours = 2'000'000;   // nm: what may push those that reach into the window
+  static constexpr double kMaxLineDensity = 50;  // mm of line a mm2: fifty lines a millimetre
 
   /// nm: what the melt and the head have forgotten does not count
   std::int64_t memory(std::span<const BeadFeed> feeds) const {
@@ -199,11 +199,11 @@ class LayerBeads {
 
 }  // namespace
 
-Result<Pile> pile_of(const read::GcodeFile& file) {
+Result<Pile> pile_of(const formats::GcodeFile& file) {
   Pile pile;
   std::int64_t top = 0;
   for (std::uint32_t i = 0; i < file.count(); ++i) {
-    const Result<read::GcodeLayer> layer = file.layer(i);
+    const Result<formats::GcodeLayer> layer = file.layer(i);
     if (!layer) return layer.error();
     if (layer->beads.empty()) continue;
     if (layer->z < top + kMinLayer) {
@@ -216,8 +216,8 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
   return pile;
 }
 
-Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window, const bead::DepositionRules* rules,
-                               double* left_out) {
+Result<VoxelStack> bead_voxels(const formats::GcodeFile& file, const Pile& pile, const Window& window,
+                               const bead::DepositionRules* rules, double* left_out) {
   const Box& box = window.box;
   const std::array<std::int64_t, 3> side = {box.width(), box.depth(), box.height()};
   std::array<Nm, 3> edge{};
@@ -244,7 +244,7 @@ Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, co
   return stack;
 }
 
-Result<Repeat> find_repeat(const read::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer) {
+Result<Repeat> find_repeat(const formats::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer) {
   constexpr Nm kVoxel = 10'000, kMin = 150'000, kHalf = 4'500'000;  // nm
   constexpr std::uint32_t kMaxLayers = 8;
   constexpr double kMiss = 0.02;

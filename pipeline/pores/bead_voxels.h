@@ -32,18 +32,18 @@ struct Pile {
   std::uint32_t skipped = 0;  // layers with beads that do not lie above those before
 };
 /// cost  reads the file once; 24 bytes a layer
-Result<Pile> pile_of(const read::GcodeFile& file);
+Result<Pile> pile_of(const formats::GcodeFile& file);
 
 /// Cuts the voxels whose centres lie in a bead.
-/// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h, contacts.h); heights are those of the
-/// pile.
+/// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h, contacts.h); heights are those of
+/// the pile.
 ///         None: a bead is a stadium, as high as its layer and as wide as the file tells, with round ends; one that is narrower
 ///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap
 /// left_out  by rules, the share of what is laid about the window that finds no room beside its neighbours, and is left out
 /// errors  kUsage: a layer cannot be read; kInput: 2^32 runs and more
 /// cost    O(runs) and reading the window's layers; 8 bytes a run. By rules, 150 bytes for each 20 um of line about the window.
 /// y of the voxels rises as that of the bed does
-Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
+Result<VoxelStack> bead_voxels(const formats::GcodeFile& file, const Pile& pile, const Window& window,
                                const bead::DepositionRules* rules = nullptr, double* left_out = nullptr);
 
 /// What of a plan repeats, around a place where it does.
@@ -53,6 +53,6 @@ struct Repeat {
 };
 /// Looks at a square of 9 mm, or what there is of the part, in the middle layer, and at up to eight layers above it.
 /// errors  of bead_voxels
-Result<Repeat> find_repeat(const read::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer);
+Result<Repeat> find_repeat(const formats::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer);
 
 }  // namespace lamina::pipeline

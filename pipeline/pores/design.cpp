@@ -151,8 +151,8 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   best->runs = static_cast<std::uint32_t>(tries.size());
   best->known = std::move(known);
   best->widths = one_line(calibration.source);
-  best->toml.insert(
-      0, "# Made by lamina design. By its forward run: " + predicted_lines(best->forward) + ".\n" + std::string(kDesignedJobRuns));
+  best->toml.insert(0, "# Made by lamina design. By its forward run: " + predicted_lines(best->forward) + ".\n" +
+                           std::string(kDesignedJobRuns));
   return *best;
 }
 
@@ -186,7 +186,7 @@ double near_of(const std::vector<segment::TargetStep>& steps, double maximum) {
     const segment::PoreTarget &one = steps[i].target, &next = steps[i + 1].target;
     minimum =
         std::min(minimum, std::max({way(one.porosity, next.porosity), way(one.permeability_m2, next.permeability_m2),
-                                  way(one.pore_width_mm, next.pore_width_mm), way(one.pore_length_mm, next.pore_length_mm)}));
+                                    way(one.pore_width_mm, next.pore_width_mm), way(one.pore_length_mm, next.pore_length_mm)}));
   }
   return std::max(kMinNear, minimum / 4);
 }

@@ -75,7 +75,8 @@ Json step_json(const GradientStep& one) {
 std::string step_text(const GradientStep& one) {
   const segment::SegmentSettings& keys = one.found.design.settings;
   const ForwardRun& forward = one.found.forward;
-  std::string text = fmt::format("{}: wished {}\n", heights_text(one.step.from_mm, one.step.to_mm), target_text(one.step.target));
+  std::string text =
+      fmt::format("{}: wished {}\n", heights_text(one.step.from_mm, one.step.to_mm), target_text(one.step.target));
   text += one.found.met ? fmt::format("  is        {}; within {:.1f} %\n", predicted_lines(forward), 100 * one.found.miss)
                         : fmt::format("  nearest   {}; not reachable, misses the wish by {:.0f} %\n", predicted_lines(forward),
                                       100 * one.found.miss);

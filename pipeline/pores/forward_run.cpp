@@ -21,7 +21,7 @@ namespace {
 constexpr double kBlockMm = 12;  // a side: three periods and more, and walls around them
 
 /// One period around the middle of the block, moved across the lines.
-Window window_of(const read::GcodeFile& file, const Pile::PileLayer& layer, const segment::Segmentation& plan,
+Window window_of(const formats::GcodeFile& file, const Pile::PileLayer& layer, const segment::Segmentation& plan,
                  const ForwardGrid& grid, double share_of_voxel) {
   const double across = 2 * plan.spacing_sc_mm + (plan.continuous - 1.0) * plan.spacing_cc_mm;
   const std::int64_t x = std::llround(1e6 * across), y = std::llround(1e6 * (plan.thick_mm + plan.thin_mm));
@@ -42,8 +42,8 @@ Window window_of(const read::GcodeFile& file, const Pile::PileLayer& layer, cons
 /// Plans the block. returns  what is said of its pores
 Result<Json> print_block(Job job, double height_mm, const TemporaryFolder& folder) {
   if (const Status status = folder.status(); !status) return status.error();
-  const std::string block = write::stl::block({kBlockMm, kBlockMm, height_mm});
-  if (const Status status = write::write_file(folder.file("block.stl"), block); !status) return status.error();
+  const std::string block = formats::stl::block({kBlockMm, kBlockMm, height_mm});
+  if (const Status status = write_file(folder.file("block.stl"), block); !status) return status.error();
   job.parts = {{.path = folder.file("block.stl")}};
   job.output = folder.file("block.gcode");
   job.overwrite = job.quiet = true;
@@ -55,7 +55,7 @@ Result<Json> print_block(Job job, double height_mm, const TemporaryFolder& folde
 }
 
 /// Voxels of a region, looked at in each place.
-Result<ForwardRun> analyse_region(const read::GcodeFile& file, const Pile& pile, const Pile::PileLayer& layer,
+Result<ForwardRun> analyse_region(const formats::GcodeFile& file, const Pile& pile, const Pile::PileLayer& layer,
                                   const bead::DepositionRules* rules, const ForwardRegion& region, const ForwardGrid& grid,
                                   const std::function<bool(double)>& advance) {
   ForwardRun forward;
@@ -92,7 +92,7 @@ Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine,
   const TemporaryFolder folder("design");
   const auto pores = print_block(std::move(job), height_mm, folder);
   if (!pores) return pores.error();
-  const Result<read::GcodeFile> file = read::GcodeFile::open(folder.file("block.gcode"));
+  const Result<formats::GcodeFile> file = formats::GcodeFile::open(folder.file("block.gcode"));
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
   if (!pile) return pile.error();
@@ -101,7 +101,8 @@ Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine,
   std::vector<ForwardRun> all;
   for (const ForwardRegion& region : regions) {
     const std::int64_t z = std::llround(1e6 * region.middle_mm);
-    const auto layer = std::ranges::find_if(pile->layers, [&](const Pile::PileLayer& one) { return one.low <= z && z < one.high; });
+    const auto layer =
+        std::ranges::find_if(pile->layers, [&](const Pile::PileLayer& one) { return one.low <= z && z < one.high; });
     if (layer == pile->layers.end())
       return Error{Fault::kInternal, fmt::format("the block of a forward run has no layer at {:g} mm", region.middle_mm)};
     const double done = static_cast<double>(all.size()), count = static_cast<double>(regions.size());

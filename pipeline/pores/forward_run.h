@@ -15,7 +15,8 @@ namespace lamina::pipeline {
 /// Edges of voxels in um: pores are narrow across the lines, long along them.
 struct ForwardGrid {
   double across_um = 10, along_um = 20, height_um = 10;
-  std::uint32_t positions = 2;  // of the voxels across the lines, whose results are averaged: walls fall between voxels otherwise
+  std::uint32_t positions =
+      2;  // of the voxels across the lines, whose results are averaged: walls fall between voxels otherwise
 };
 
 /// Of one period of the plan.

@@ -81,7 +81,7 @@ Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head,
   const std::uint8_t full = head.full_level();
   if (full == 0 || head.grey_drops()) return std::move(picture->front());
   Levels levels;
-  auto image = read::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
+  auto image = formats::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
   if (!image) return image.error();
   min_level(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
   return std::move(image->runs);
@@ -129,10 +129,11 @@ bool has_manifest(const std::string& folder) {
 Result<ImageStack> open_stack(const std::string& folder, const StackRequest& request) {
   if (begun_by_lamina(folder + "/manifest.json")) return stack_of_job(folder);
   if (has_manifest(folder)) return Error{Fault::kInput, folder + ": the job is not finished; end it with --resume first"};
-  return read::stack_of_images(folder, request);
+  return formats::stack_of_images(folder, request);
 }
 
-Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection, const std::array<bool, 3>& periodic) {
+Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection,
+                                    const std::array<bool, 3>& periodic) {
   std::array<std::uint32_t, 3> factor{}, low{}, count{}, twice{};
   std::uint64_t voxels = 1;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -141,8 +142,8 @@ Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest
     const double requested_mm = selection.size_mm[a] > 0 ? selection.size_mm[a] : std::min(2.0, part_mm);
     const auto wanted = static_cast<std::uint32_t>(std::min(4e9, std::round(requested_mm * 1e6 / edge)));
     if (wanted > stack.part[a])
-      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the images have: {:.3f} mm", requested_mm,
-                                              "xyz"[a], part_mm)};
+      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the images have: {:.3f} mm",
+                                              requested_mm, "xyz"[a], part_mm)};
     // Whole blocks of those that the error is taken from.
     twice[a] = wanted >= 2 * factor[a] ? 2 : 1;
     count[a] = wanted / (twice[a] * factor[a]) * (twice[a] * factor[a]);
@@ -155,7 +156,7 @@ Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest
   }
   if (voxels > std::uint64_t{1} << 31)
     return Error{Fault::kUsage, "--window: has more than 2^31 voxels of the images; take a smaller one"};
-  Result<VoxelStack> box = read::cut_box(stack, low, count);
+  Result<VoxelStack> box = formats::cut_box(stack, low, count);
   if (!box) return box.error();
   box->periodic = periodic;
   StackWindow window;

@@ -11,8 +11,8 @@
 
 namespace lamina::pipeline {
 
-using read::ImageStack;
-using read::StackRequest;
+using formats::ImageStack;
+using formats::StackRequest;
 
 /// Whether a folder has a manifest that lamina began; one of another program says nothing of images.
 bool has_manifest(const std::string& folder);
@@ -29,6 +29,7 @@ struct StackWindow {
 /// wish      voxel_um 0: those of the stack, else as near as whole factors allow; size_mm 0: 2 mm, or the part
 /// periodic  what is said to repeat
 /// errors    kUsage: larger than the part, or more than 2^31 voxels; those of cut_box()
-Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection, const std::array<bool, 3>& periodic);
+Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection,
+                                    const std::array<bool, 3>& periodic);
 
 }  // namespace lamina::pipeline

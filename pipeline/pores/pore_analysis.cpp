@@ -20,7 +20,7 @@ constexpr std::int64_t kMaxSide = 9'000'000;       // nm, of a section
 constexpr double kVoxelUm = 10, kMaxVoxels = 8e6;  // of a window
 
 /// The middle of a layer, from the middle of the print as far as it goes.
-Window section_of(const read::GcodeFile& file, const Pile::PileLayer& layer) {
+Window section_of(const formats::GcodeFile& file, const Pile::PileLayer& layer) {
   const Box& print = file.box();
   const auto middle = print.middle();
   const auto half_x = static_cast<Nm>(std::clamp<std::int64_t>(print.width(), 1000, kMaxSide) / 2);
@@ -34,7 +34,7 @@ Window section_of(const read::GcodeFile& file, const Pile::PileLayer& layer) {
   return window;
 }
 
-Result<LayerSections> sections_of(const read::GcodeFile& file, const Pile& pile, const CutWindow& cut) {
+Result<LayerSections> sections_of(const formats::GcodeFile& file, const Pile& pile, const CutWindow& cut) {
   LayerSections sections;
   sections.layers = std::min(kMaxSections, static_cast<std::uint32_t>(pile.layers.size()));
   VoxelStack all;
@@ -55,7 +55,8 @@ Result<LayerSections> sections_of(const read::GcodeFile& file, const Pile& pile,
 
 }  // namespace
 
-Result<PoreAnalysis> analyse_deposited(const read::GcodeFile& file, const Pile& pile, const VoxelView& window, const CutWindow& cut) {
+Result<PoreAnalysis> analyse_deposited(const formats::GcodeFile& file, const Pile& pile, const VoxelView& window,
+                                       const CutWindow& cut) {
   PoreAnalysis analysis;
   const Pile::PileLayer& layer = pile.layers[pile.layers.size() / 2];
   analysis.connected = pores::connected(window, kBond, static_cast<Nm>(std::min((layer.high - layer.low) / 2, kMaxContact)));
@@ -76,7 +77,7 @@ bool names_toolpaths(const std::string& path) {
 }
 
 Result<PrintAnalysis> analyse_print(const std::string& path, double density_g_cm3, Plot* sections) {
-  const Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  const Result<formats::GcodeFile> file = formats::GcodeFile::open(path);
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
   if (!pile) return pile.error();

@@ -25,8 +25,8 @@ struct LayerSections {
 };
 
 struct PoreAnalysis {
-  pores::Connected connected;               // of the window
-  std::array<double, 3> throat_mm{};        // as in PoreReport
+  pores::Connected connected;                       // of the window
+  std::array<double, 3> throat_mm{};                // as in PoreReport
   std::array<pores::Tortuosity, 3> tortuosities{};  // along x, y, z
   LayerSections sections;
 };
@@ -37,7 +37,8 @@ using CutWindow = std::function<Result<VoxelStack>(const Window&)>;
 /// window  as cut
 /// errors  of cut
 /// cost    O(voxels of the window) some twenty times, 12 bytes a voxel; sections: O(runs) of eight slices of 9 mm
-Result<PoreAnalysis> analyse_deposited(const read::GcodeFile& file, const Pile& pile, const VoxelView& window, const CutWindow& cut);
+Result<PoreAnalysis> analyse_deposited(const formats::GcodeFile& file, const Pile& pile, const VoxelView& window,
+                                       const CutWindow& cut);
 
 /// What lamina permeability tells of a window beside the flow: lines that end with LF.
 std::string as_text(const PoreAnalysis& analysis);

@@ -49,7 +49,7 @@ std::string repeats_of(const std::array<bool, 3>& periodic) {
 }
 
 /// Tops of layers, and the middles of beads of the one that is cut.
-Status add_beads(const read::GcodeFile& file, const Pile& pile, const WindowChoice& choice, view::PorePicture& picture) {
+Status add_beads(const formats::GcodeFile& file, const Pile& pile, const WindowChoice& choice, view::PorePicture& picture) {
   const Box& box = choice.window.box;
   const double z = (picture.position[2] + 0.5) * mm(picture.solid.edge[2]);
   picture.solid_name = "beads";
@@ -58,10 +58,11 @@ Status add_beads(const read::GcodeFile& file, const Pile& pile, const WindowChoi
     picture.layer_tops_mm.push_back(mm(pile.layers[choice.first_layer + l].high - box.lo.z));
     if (picture.layer_tops_mm.back() <= z) ++cut;
   }
-  const Result<read::GcodeLayer> layer = file.layer(pile.layers[choice.first_layer + std::min(cut, choice.layers - 1)].index);
+  const Result<formats::GcodeLayer> layer =
+      file.layer(pile.layers[choice.first_layer + std::min(cut, choice.layers - 1)].index);
   if (!layer) return layer.error();
   const auto apart = [](Nm a, Nm b, Nm low, Nm high) { return std::max(a, b) < low || std::min(a, b) > high; };
-  for (const read::GcodeBead& bead : layer->beads)
+  for (const formats::GcodeBead& bead : layer->beads)
     if (!apart(bead.from.x, bead.to.x, box.lo.x, box.hi.x) && !apart(bead.from.y, bead.to.y, box.lo.y, box.hi.y))
       picture.lines.push_back({bead.from, bead.to});
   return {};
@@ -70,7 +71,7 @@ Status add_beads(const read::GcodeFile& file, const Pile& pile, const WindowChoi
 }  // namespace
 
 Result<Plot> draw_window(const std::string& source, const WindowChoice& choice, const PoreReport& report,
-                         const VoxelView& voxels, const read::GcodeFile* file, const Pile* pile) {
+                         const VoxelView& voxels, const formats::GcodeFile* file, const Pile* pile) {
   const int axis = report.section ? report.section->across.normal : 2;
   const VoxelStack through = pores::void_through(voxels, axis);
   view::PorePicture picture;

@@ -17,6 +17,6 @@ namespace lamina::pipeline {
 /// errors  of GcodeFile::layer()
 /// cost    of draw_pores() and void_through()
 Result<Plot> draw_window(const std::string& source, const WindowChoice& choice, const PoreReport& report,
-                         const VoxelView& voxels, const read::GcodeFile* file = nullptr, const Pile* pile = nullptr);
+                         const VoxelView& voxels, const formats::GcodeFile* file = nullptr, const Pile* pile = nullptr);
 
 }  // namespace lamina::pipeline

@@ -19,7 +19,7 @@ constexpr std::uint32_t kFluidAtEnds = 4 * kFiner;  // fine voxels before each e
 
 /// Where the cells of a turned box lie in the box as it is.
 stokes::CellPositions positions_in_box(const stokes::Canonical& canonical, std::uint32_t finer,
-                                 const std::array<std::uint32_t, 3>& turned_size, int axis) {
+                                       const std::array<std::uint32_t, 3>& turned_size, int axis) {
   stokes::CellPositions positions{stokes::cell_positions(canonical.view(), finer), {}, axis, stokes::Canonical::kAxis};
   for (std::array<std::uint32_t, 3>& at : positions.at) at = canonical.turn().in_box(at, turned_size);
   for (std::size_t c = 0; c < 3; ++c) positions.size[canonical.turn().from[c]] = turned_size[c];
@@ -56,8 +56,7 @@ Result<Darcy> flow_along(const VoxelView& box, std::uint32_t finer, int axis, co
   const double scaled = static_cast<double>(box.size()[a]) / used.size()[a];
   const std::array<double, 3> mean = canonical->in_box(flow->permeability);
   Darcy darcy;
-  for (std::size_t b = 0; b < 3; ++b)
-    darcy.k_m2[b] = mean[b] * (b == a ? scaled : 1) * grid->cells.unit_m * grid->cells.unit_m;
+  for (std::size_t b = 0; b < 3; ++b) darcy.k_m2[b] = mean[b] * (b == a ? scaled : 1) * grid->cells.unit_m * grid->cells.unit_m;
   darcy.tortuosity = flow->tortuosity;
   darcy.steps = flow->steps;
   darcy.residual = flow->residual;

@@ -16,7 +16,7 @@ double porosity_of(const VoxelView& box) {
 }
 
 /// The window in the middle of the print, in voxels as large as the scan's.
-Result<Window> window_of_plan(const read::GcodeFile& file, const Pile& pile, const ImageStack& scan,
+Result<Window> window_of_plan(const formats::GcodeFile& file, const Pile& pile, const ImageStack& scan,
                               const std::array<double, 3>& size_mm, std::uint32_t range) {
   Box print = file.box();
   const std::array<std::int64_t, 3> low{print.lo.x, print.lo.y, pile.layers.front().low};
@@ -49,7 +49,7 @@ Result<Window> window_of_plan(const read::GcodeFile& file, const Pile& pile, con
 
 }  // namespace
 
-Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile& pile, const ImageStack& scan,
+Result<ScanComparison> compare_with_scan(const formats::GcodeFile& file, const Pile& pile, const ImageStack& scan,
                                          const std::array<double, 3>& size_mm, std::uint32_t range,
                                          const bead::DepositionRules* rules) {
   const Result<Window> window = window_of_plan(file, pile, scan, size_mm, range);
@@ -67,7 +67,7 @@ Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile
     count[a] = window->count[a] + 2 * range;
     low[a] = (scan.size[a] - count[a]) / 2;
   }
-  const Result<VoxelStack> around = read::cut_box(scan, low, count);
+  const Result<VoxelStack> around = formats::cut_box(scan, low, count);
   if (!around) return around.error();
   ScanComparison comparison;
   comparison.window = *window;
@@ -77,7 +77,7 @@ Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile
     comparison.shift_mm[a] = comparison.match.shift[a] * scan.edge[a] * 1e-6;
     low[a] += static_cast<std::uint32_t>(static_cast<std::int64_t>(range) + comparison.match.shift[a]);
   }
-  const Result<VoxelStack> found = read::cut_box(scan, low, window->count);
+  const Result<VoxelStack> found = formats::cut_box(scan, low, window->count);
   if (!found) return found.error();
   comparison.plan_porosity = porosity_of(*plan);
   comparison.scan_porosity = porosity_of(*found);

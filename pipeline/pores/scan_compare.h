@@ -38,7 +38,7 @@ struct ScanComparison {
 /// rules    of bead_voxels()
 /// errors   kUsage: larger than the print, or than the scan less the range; those of bead_voxels() and cut_box()
 /// cost     of cut_box() and pores::find_shift()
-Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile& pile, const ImageStack& scan,
+Result<ScanComparison> compare_with_scan(const formats::GcodeFile& file, const Pile& pile, const ImageStack& scan,
                                          const std::array<double, 3>& size_mm, std::uint32_t range,
                                          const bead::DepositionRules* rules = nullptr);
 

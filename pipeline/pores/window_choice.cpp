@@ -25,7 +25,7 @@ constexpr std::int64_t kSameAllAlong = 150'000;  // nm: the least length that fi
 
 }  // namespace
 
-Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowRequest& selection) {
+Result<WindowChoice> choose_window(const formats::GcodeFile& file, const Pile& pile, const WindowRequest& selection) {
   const Box& print = selection.part ? *selection.part : file.box();
   const auto [bottom_layer, top_layer] = layers_of(pile, selection.part);
   const std::uint32_t middle_layer = bottom_layer + (top_layer - bottom_layer) / 2;
@@ -40,7 +40,7 @@ Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile
   for (std::size_t a = 0; a < 2; ++a) {
     choice.window.periodic[a] = !requested && repeat->length[a] > 0;
     const std::int64_t maximum = a == 0 ? print.width() : print.depth();
-    side[a] = requested                   ? std::llround(selection.size_mm[a] * 1e6)
+    side[a] = requested               ? std::llround(selection.size_mm[a] * 1e6)
               : repeat->length[a] > 0 ? repeat->length[a]
                                       : std::min<std::int64_t>(2'000'000, maximum);
     if (side[a] > maximum)

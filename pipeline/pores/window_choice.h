@@ -26,7 +26,7 @@ struct WindowChoice {
 /// it is one period of what repeats; along an axis where nothing does, 2 mm, or eight layers, or the print. pile    not empty
 /// errors  kUsage: larger than the print, or more than 2^31 voxels; kInput: a print without width; of find_repeat()
 /// cost    of find_repeat()
-Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowRequest& selection);
+Result<WindowChoice> choose_window(const formats::GcodeFile& file, const Pile& pile, const WindowRequest& selection);
 
 /// The same box in voxels twice as large, as near as whole numbers allow.
 Window with_half_as_many_voxels(Window window);

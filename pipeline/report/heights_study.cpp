@@ -90,8 +90,7 @@ std::string study_page(const StudiedParts& parts, const Study& study) {
     line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
   }
   line("flats", flats_line(study));
-  if (const std::string small = small_peaks_text(study.plan, study.options.min_flat_mm2); !small.empty())
-    line("peaks", small);
+  if (const std::string small = small_peaks_text(study.plan, study.options.min_flat_mm2); !small.empty()) line("peaks", small);
   if (study.plan.one_less_reaches >= 0) {
     line("proof", fmt::format("{} that keeps these steps and flats gets higher than {:.4f} mm",
                               study.options.time.on() ? "no table of less time" : "no table of a layer less",

@@ -71,7 +71,7 @@ class VanishObserver : public ImageObserver {
 
  private:
   const Plan& plan_;
-  inspect::VanishCount count_;
+  checks::VanishCount count_;
 };
 
 /// Pixels of blocked nozzles.
@@ -207,9 +207,9 @@ class SweepObserver : public ImageObserver {
     const program::DropSweeps sweeps{std::max(1u, plan_.images->dose.max_drops()), added_,
                                      static_cast<double>(added_microseconds_) * 1e-6};
     summary.results.emplace_back("sweeps", program::sweeps_text(plan_.images->machine->machine, grid, sweeps));
-    summary.facts["jetting"] = {{"head_drops", grid.head_drops},    {"sweep_drops", grid.sweep_drops},
+    summary.facts["jetting"] = {{"head_drops", grid.head_drops},   {"sweep_drops", grid.sweep_drops},
                                 {"pixel_drops", sweeps.max_drops}, {"sweeps_per_position", grid.sweeps_for(sweeps.max_drops)},
-                                {"added_sweeps", sweeps.added},     {"added_seconds", sweeps.added_seconds}};
+                                {"added_sweeps", sweeps.added},    {"added_seconds", sweeps.added_seconds}};
   }
 
  private:

@@ -14,7 +14,7 @@ namespace lamina::pipeline {
 /// What making the images of a layer found.
 struct ImageNotes {
   raster::LayerReport report;
-  inspect::VanishedPieces vanished;                 // by the bleed
+  checks::VanishedPieces vanished;                  // by the bleed
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
   std::vector<std::uint64_t> part_pixels;           // of each part before its dose, or shares of voxels; empty: not requested
 };

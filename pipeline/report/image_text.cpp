@@ -32,7 +32,8 @@ Json powder_json(const PowderDrops& powder, double drop_pl) {
 std::string binder_text(const dose::Budget& budget, const dose::BinderCount& count) {
   if (!budget.has_target()) {
     const auto [minimum, maximum] = budget.gets();
-    const std::string share = minimum == maximum ? fmt::format("{:.1f}", maximum) : fmt::format("{:.1f} to {:.1f}", minimum, maximum);
+    const std::string share =
+        minimum == maximum ? fmt::format("{:.1f}", maximum) : fmt::format("{:.1f} to {:.1f}", minimum, maximum);
     const double core = budget.jetting().core;
     const std::string thinned = core < 1 ? fmt::format(", of the core's {} %,", number_text(100 * core)) : "";
     const std::string pl = number_text(budget.binder().drop_pl);

@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace lamina::inspect {
+namespace lamina::pipeline {
 namespace {
 
 Json json_of(const Spot& spot) {
@@ -42,4 +42,4 @@ Json json_of(const Findings& findings, double min_mm) {
   return json;
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::pipeline

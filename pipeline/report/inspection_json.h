@@ -4,9 +4,9 @@
 #include "stages/checks/inspect.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::inspect {
+namespace lamina::pipeline {
 
 /// min_mm  least width of what is not thin
 Json json_of(const Findings& findings, double min_mm);
 
-}  // namespace lamina::inspect
+}  // namespace lamina::pipeline

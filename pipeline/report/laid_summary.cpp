@@ -63,7 +63,7 @@ std::string short_text(const ShortIntervals& shorts, const Extruder& machine) {
 }  // namespace
 
 void report_deposited(const DepositedSums& sums, const std::vector<DepositedRange>& ranges, const Extruder& machine,
-               std::uint64_t points_first_layer, Lines& lines, Json& facts) {
+                      std::uint64_t points_first_layer, Lines& lines, Json& facts) {
   const SegmentCounts& segments = sums.segments;
   const PlannedPorosity& porosity = sums.porosity;
   const ShortIntervals& shorts = sums.shorts;

@@ -26,7 +26,7 @@ using Lines = std::vector<std::pair<std::string, std::string>>;
 /// Adds stretches, porosity, pores and speeds that are not reached to a summary, and the same numbers to its object.
 /// sums    of the job. points_first_layer  of segmented lines in its first layer
 void report_deposited(const DepositedSums& sums, const std::vector<DepositedRange>& ranges, const Extruder& machine,
-               std::uint64_t points_first_layer, Lines& lines, Json& facts);
+                      std::uint64_t points_first_layer, Lines& lines, Json& facts);
 
 /// What 100 % of extrusion is, and how many layers are left out at the top, before anything is laid; as above.
 /// cut_at  "middle" or "top", the place of a layer that decides whether it is empty

@@ -28,8 +28,8 @@ std::string maintenance_text(const Machine& machine, const FullLayer& full) {
                     wipes = how_often(maintenance.wipe_layers, maintenance.wipe_seconds);
   std::string text = shots.empty() ? "" : "fired off the bed " + shots;
   if (!wipes.empty()) text += (text.empty() ? "wiped " : ", wiped ") + wipes;
-  return text +
-         fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.maintenance_seconds, full.spat_drops);
+  return text + fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.maintenance_seconds,
+                            full.spat_drops);
 }
 
 }  // namespace
@@ -80,8 +80,9 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
        fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of up to {} steps, {} bytes of vectors",
                    grid.image.columns(), grid.image.rows(), (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(),
                    grid.swaths(0), sweeps, grid.steps(), sweeps * grid.steps() * ((grid.nozzles + 7) / 8)));
-  line("speed", fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
-                            machine.head.highest_frequency_hz * grid.position_nm / kNmPerMm, machine.head.highest_frequency_hz));
+  line("speed",
+       fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
+                   machine.head.highest_frequency_hz * grid.position_nm / kNmPerMm, machine.head.highest_frequency_hz));
   if (grid.head_drops > 1) {
     line("drops", grid.sweep_drops == grid.head_drops
                       ? fmt::format("all {} of a pixel in one sweep at that speed, as {} bits", grid.head_drops, grid.drop_bits)
@@ -94,7 +95,8 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                                ? fmt::format(", {:.1f} s one of {} drops on every pixel", full->drops_seconds, grid.head_drops)
                                : "")
                     : "not told: the program of a full layer is too long");
-  if (full && (machine.maintenance.spits() || machine.maintenance.wipes())) line("maintenance", maintenance_text(machine, *full));
+  if (full && (machine.maintenance.spits() || machine.maintenance.wipes()))
+    line("maintenance", maintenance_text(machine, *full));
   line("dialect", machine.dialect);
   return text;
 }

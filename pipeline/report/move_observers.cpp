@@ -29,7 +29,7 @@ class BeadObserver : public MoveObserver {
     paths_.report(plan_.sections->fills(), sums_.totals.part_moves(), summary.layers_planned, warnings);
   }
   void report(Summary& summary) const override {
-    const write::MoveTotals& totals = sums_.totals;
+    const formats::MoveTotals& totals = sums_.totals;
     summary.volume_mm3 = totals.volume_mm3 - totals.auxiliary_mm3;
     summary.results.emplace_back(
         "beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
@@ -38,10 +38,11 @@ class BeadObserver : public MoveObserver {
     const char* none = plan_.moves->profile.machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
                        : plan_.range[0] > 0 ? "none: --layers leaves the first layer out"
                                             : "none: no room on the bed";
-    summary.results.emplace_back("skirt", totals.auxiliary_moves == 0
-                                              ? std::string(none)
-                                              : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts",
-                                                            totals.adjacent_mm, totals.auxiliary_mm3, totals.auxiliary_filament_mm));
+    summary.results.emplace_back(
+        "skirt", totals.auxiliary_moves == 0
+                     ? std::string(none)
+                     : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts", totals.adjacent_mm,
+                                   totals.auxiliary_mm3, totals.auxiliary_filament_mm));
   }
 
  private:
@@ -79,7 +80,8 @@ class SegmentObserver : public MoveObserver {
     if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
   }
   void report(Summary& summary) const override {
-    report_deposited(sums_.deposited, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results, summary.facts);
+    report_deposited(sums_.deposited, ranges_, plan_.moves->profile.machine, first_layer_points_, summary.results,
+                     summary.facts);
   }
 
  private:
@@ -91,7 +93,7 @@ class SegmentObserver : public MoveObserver {
   const Plan& plan_;
   const PathFacts& sums_;
   decltype(std::declval<SegmentPlan>().segmented()) segmented_;
-  bool by_layer_;                  // records have the pores of each range
+  bool by_layer_;                       // records have the pores of each range
   std::vector<DepositedRange> ranges_;  // of segmented_, and one of layers of an earlier build
   std::uint64_t first_layer_points_ = 0;
 };
@@ -102,13 +104,13 @@ class FilamentObserver : public MoveObserver {
   FilamentObserver(const Plan& plan, const PathFacts& sums) : plan_(plan), sums_(sums) {}
   void layer(const LayerRecord&, const void*) override {}
   void report(Summary& summary) const override {
-    const write::MoveTotals& totals = sums_.totals;
+    const formats::MoveTotals& totals = sums_.totals;
     const auto& material = plan_.moves->profile.machine.material;
     const double filament_cm3 = totals.filament_mm * material.mm3_of_e() / 1000;
     const double filament_g = filament_cm3 * material.density_g_cm3;
     summary.results.emplace_back("filament",
                                  fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
-    summary.results.emplace_back("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
+    summary.results.emplace_back("printing", fmt::format("about {}", formats::gcode::time_text(totals.seconds)));
     Json& facts = summary.facts;
     facts["moves"] = totals.part_moves();
     facts["travels"] = totals.travels;
@@ -152,7 +154,7 @@ void report_move_plan(const Plan& plan, Summary& summary) {
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
   report_bead(plan.moves->profile.machine, plan.moves->left_out,
-            plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
+              plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
   summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",
                                                                        number_text(tolerance_um))

@@ -247,7 +247,8 @@ Json as_json(const Diagnosis& found) {
   for (const Kind& kind : kKinds) {
     const auto& finding = found.*kind.finding;
     Json positions = Json::array();
-    for (const auto& position : finding.first) positions.push_back({{"triangle", position.triangle + 1}, {"at_mm", as_json(position.at)}});
+    for (const auto& position : finding.first)
+      positions.push_back({{"triangle", position.triangle + 1}, {"at_mm", as_json(position.at)}});
     mesh[kind.key] = {{"count", finding.count}, {"first", positions}};
   }
   return mesh;

@@ -24,9 +24,9 @@ std::vector<std::string> totals_text(const Totals& totals) {
                                 readable_count(totals.moved), readable_count(totals.lost)));
   }
   if (count.max_per_position > 1) {
-    lines.push_back(
-        fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency", count.max_per_position) +
-        (count.added > 0 ? fmt::format(", which adds {} sweeps", readable_count(count.added)) : ""));
+    lines.push_back(fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency",
+                                count.max_per_position) +
+                    (count.added > 0 ? fmt::format(", which adds {} sweeps", readable_count(count.added)) : ""));
   }
   lines.push_back(
       fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",

@@ -32,7 +32,7 @@ Lines timing_lines(const Timing& timing) {
   phase_line("all", timing.whole());
   add(fmt::format("{:<12}{:>10}{:>14}", "node", "busy, s", "processor, s"));
   for (const auto& [name, busy, processor] : timing.nodes) add(fmt::format("{:<12}{:>10.4f}{:>14.4f}", name, busy, processor));
-  const write::Floor& floor = timing.floor;
+  const formats::Floor& floor = timing.floor;
   if (!timing.not_measured.empty()) {
     add("limit       not measured: " + timing.not_measured);
     return lines;
@@ -54,7 +54,7 @@ Json timing_json(const Timing& timing) {
   for (const auto& [name, busy, processor] : timing.nodes) {
     nodes[std::string(name)] = {{"busy", busy}, {"processor", processor}};
   }
-  const write::Floor& floor = timing.floor;
+  const formats::Floor& floor = timing.floor;
   Json limit = {{"read_bytes", floor.bytes_read}, {"read_seconds", floor.read},   {"write_bytes", floor.bytes_written},
                 {"write_files", floor.files},     {"write_seconds", floor.write}, {"crossings", floor.crossings},
                 {"touch_seconds", floor.touch},   {"seconds", floor.seconds()}};

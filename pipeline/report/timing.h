@@ -23,7 +23,7 @@ struct Timing {
   std::vector<Phase> phases;    // one after the other; together the run. Of "start", what the process did before, the
                                 // processor's time stands for both, in a batch with that of other jobs
   std::vector<NodeTime> nodes;  // of the graph that makes the layers, at the same time
-  write::Floor floor;
+  formats::Floor floor;
   std::string not_measured;  // why the limit is not; else empty
 
   Elapsed whole() const;

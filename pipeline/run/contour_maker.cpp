@@ -95,7 +95,7 @@ class ContourMaker : public Maker {
   }
 
  private:
-  static write::SliceLayer view_of(const Layer& layer, const Sections::Work& work) {
+  static formats::SliceLayer view_of(const Layer& layer, const Sections::Work& work) {
     return {layer, work.contours.contours, work.contours.body, work.paths, work.path_body};
   }
 

@@ -164,7 +164,7 @@ class ImageMaker : public Maker {
   struct Work {
     ImageWork images;
     ImageFiles::FileWork files;
-    inspect::LayerInspection layer_inspection;
+    checks::LayerInspection layer_inspection;
   };
   struct Made {
     LayerRecord record;

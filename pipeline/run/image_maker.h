@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/maker.h"
 #include "pipeline/run/job_checks.h"
+#include "pipeline/run/maker.h"
 
 namespace lamina::pipeline {
 

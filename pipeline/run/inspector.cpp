@@ -50,7 +50,7 @@ void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   }
   std::vector<std::string> names;
   for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  inspect::report(inspection_->finish(), names, min_mm_, reports_);
+  checks::report(inspection_->finish(), names, min_mm_, reports_);
   warnings.insert(warnings.end(), reports_.begin(), reports_.end());
 }
 

@@ -19,9 +19,11 @@ class Inspector : public ImageObserver {
   bool on() const { return inspection_.has_value(); }
 
   /// Those of layers in flight, from any thread, are its const functions. Of an idle one there is none.
-  const inspect::Inspection& inspection() const { return *inspection_; }
+  const checks::Inspection& inspection() const { return *inspection_; }
   /// In layer order.
-  void record(const Layer& layer, const inspect::LayerInspection& layer_inspection) { inspection_->add(layer, layer_inspection); }
+  void record(const Layer& layer, const checks::LayerInspection& layer_inspection) {
+    inspection_->add(layer, layer_inspection);
+  }
   /// Beside the looks at layers.
   std::uint64_t bytes() const { return on() ? inspection_->bytes() : 0; }
 
@@ -45,7 +47,7 @@ class Inspector : public ImageObserver {
   bool whole() const;
 
   const Plan& plan_;
-  std::optional<inspect::Inspection> inspection_;
+  std::optional<checks::Inspection> inspection_;
   std::vector<Warning> reports_;
   double min_mm_ = 0;
   bool kept_ = false;

@@ -56,14 +56,15 @@ checks::Sampling sampling_of(const Job& job, const PixelGrid* grid) {
 }
 
 std::function<Result<double>(std::uint32_t)> union_in(const Scene& scene, const checks::Tally& tally,
-                                                       const std::atomic<bool>* cancel, checks::GroupUnion::Again again) {
+                                                      const std::atomic<bool>* cancel, checks::GroupUnion::Again again) {
   const auto volume = [cancel](std::span<const Mesh> meshes, std::span<const Instance> members) -> Result<double> {
     const Error interrupted{Fault::kInterrupted, "interrupted"};
     if (cancel != nullptr && *cancel) return interrupted;
     const double mm3 = load::union_mm3(meshes, members, slice::surplus_areas);
     return cancel != nullptr && *cancel ? Result<double>(interrupted) : mm3;
   };
-  const auto merged = std::make_shared<checks::GroupUnion>(scene.meshes, scene.instances, tally.solids(), volume, std::move(again));
+  const auto merged =
+      std::make_shared<checks::GroupUnion>(scene.meshes, scene.instances, tally.solids(), volume, std::move(again));
   return [merged](std::uint32_t group) { return merged->mm3(group); };
 }
 

@@ -24,8 +24,8 @@ checks::Sampling sampling_of(const Job& job, const PixelGrid* grid);
 
 /// What the solids of a group hold together (stages/checks/judge.h). Scene, tally and cancel must outlive it.
 std::function<Result<double>(std::uint32_t)> union_in(const Scene& scene, const checks::Tally& tally,
-                                                       const std::atomic<bool>* cancel = nullptr,
-                                                       checks::GroupUnion::Again again = {});
+                                                      const std::atomic<bool>* cancel = nullptr,
+                                                      checks::GroupUnion::Again again = {});
 
 /// Counts while layers are made. Layers that --resume keeps are known by their records alone: then solids are not judged.
 class JobChecks {

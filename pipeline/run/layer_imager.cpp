@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "stages/dose/edges/dilate.h"
-#include "stages/formats/images/placed.h"
 #include "stages/formats/image_format.h"
+#include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
 #include "stages/raster/mirror.h"
@@ -61,13 +61,13 @@ Status LayerImager::position(const Layer& layer, const PlacedImages& part, Image
   if (const std::uint8_t full = images.dose.full(); full > 0) {
     const auto levels = part.images->levels(number, full);
     if (!levels) return levels.error();
-    read::position(*levels, part.position, work.drops.zones);
+    formats::position(*levels, part.position, work.drops.zones);
     min_level(work.drops.zones, 1, work.section);
     filled = sum_of_levels(work.drops.zones);
   } else {
     const auto read = part.images->read(number);
     if (!read) return read.error();
-    read::position(*read, part.position, work.section);
+    formats::position(*read, part.position, work.section);
     filled = set_pixels(work.section);
   }
   const auto outside =
@@ -214,7 +214,7 @@ dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) 
   sizes.runs = of_images;
   for (const Solid& solid : images.solids.all()) {
     if (!solid.coverage) continue;
-    const cover::LayerBound bound = solid.coverage->bound(layer);
+    const coverage::LayerBound bound = solid.coverage->bound(layer);
     sizes.runs += bound.runs, sizes.edges += bound.edges;
     voxels += bound.voxels;
   }
@@ -257,7 +257,7 @@ bool LayerImager::shares_voxels() const {
   return plan_.job.levels > 0 && (plan_.images->materials.several() || plan_.images->dose.zones().several());
 }
 
-cover::CoverageReport LayerImager::levels(const Layer& layer, cover::CoverageScratch& scratch, Levels& image) const {
+coverage::CoverageReport LayerImager::levels(const Layer& layer, coverage::CoverageScratch& scratch, Levels& image) const {
   const Solid& solid = plan_.images->solids.all().front();
   if (solid.coverage) return solid.coverage->layer(layer, scratch, image);
   image.start(plan_.images->grid.columns());  // no mesh
@@ -296,7 +296,7 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes
   const std::uint64_t minimum = min_vanished();
   if (shares || minimum > 0) work.third = work.runs;
   zones.bleeds().remove(layer, work.runs, work.zones.image, work.bleed);
-  if (minimum > 0) notes.vanished = inspect::vanished_pieces(work.third, work.runs, minimum, work.vanish);
+  if (minimum > 0) notes.vanished = checks::vanished_pieces(work.third, work.runs, minimum, work.vanish);
   if (shares) empty_removed(work.third, shares_voxels(), work);
   return check_grown(layer, work);
 }
@@ -332,11 +332,11 @@ Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const
   if (!images.machine || !images.dose.zones().bleeds().grows()) return {};
   const auto outside = program::first_outside(images.machine->machine, images.grid, work.runs);
   if (!outside) return {};
-  return Error{
-      Fault::kUsage,
-      fmt::format("dose.bleed_um: layer {} grows to x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed "
-                  "of {}; move the parts away from its edge",
-                  layer.index, mm(outside->position.x), mm(outside->position.y), outside->beyond_mm, images.machine->machine.name)};
+  return Error{Fault::kUsage,
+               fmt::format("dose.bleed_um: layer {} grows to x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed "
+                           "of {}; move the parts away from its edge",
+                           layer.index, mm(outside->position.x), mm(outside->position.y), outside->beyond_mm,
+                           images.machine->machine.name)};
 }
 
 void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
@@ -413,14 +413,14 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
     record.drops = images.dose.max_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
     record.max_drops = images.dose.max_drops() > 1 ? highest(work.drops.levels) : record.drops > 0 ? 1 : 0;
     // Of one drop a pixel the image alone was made.
-    const bool levels = write::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
+    const bool levels = formats::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
     if (levels && images.dose.max_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
   } else if (plan_.job.levels > 0) {
     min_level(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
-  const bool grey = write::find_level_format(plan_.job.format) != nullptr, drops = images.dose.max_drops() > 1;
+  const bool grey = formats::find_level_format(plan_.job.format) != nullptr, drops = images.dose.max_drops() > 1;
   if (images.materials.several() && (shares_voxels() || drops || grey))
     dose::drops_of_materials(images.dose.max_drops(), shares_voxels(), work.materials.image, work.drops);
   const bool counted = images.dose.saturates() && images.dose.max_drops() <= 1;
@@ -432,7 +432,7 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
 }
 
 std::span<const Runs> LayerImager::several(const ImageWork& work) const {
-  const bool drops = plan_.images->dose.max_drops() > 1 && write::find_level_format(plan_.job.format) == nullptr;
+  const bool drops = plan_.images->dose.max_drops() > 1 && formats::find_level_format(plan_.job.format) == nullptr;
   if (!drops) return work.materials.image;
   return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
 }

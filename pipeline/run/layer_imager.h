@@ -26,11 +26,11 @@ struct ImageWork {
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
   dose::DropWork drops;  // if a saturation or shares of voxels are asked for
-  cover::CoverageScratch coverage;
+  coverage::CoverageScratch coverage;
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
   dose::BleedWork bleed;
-  inspect::VanishScratch vanish;    // if edges move inwards
+  checks::VanishScratch vanish;     // if edges move inwards
   std::unique_ptr<BeadWork> beads;  // if beads fill parts
 
   /// Capacity of its buffers.
@@ -67,7 +67,7 @@ class LayerImager {
 
   /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
   /// The plan's job asks for levels.
-  cover::CoverageReport levels(const Layer& layer, cover::CoverageScratch& scratch, Levels& image) const;
+  coverage::CoverageReport levels(const Layer& layer, coverage::CoverageScratch& scratch, Levels& image) const;
 
   static constexpr std::uint64_t kUnknown = UINT64_MAX;
   /// Upper bound of the bytes for scratch and runs of a layer.

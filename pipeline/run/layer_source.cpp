@@ -101,7 +101,7 @@ Result<PlannedImages> LayerSource::images(std::uint32_t index) const {
   return images;
 }
 
-write::LayerTags LayerSource::tags(std::uint32_t index) const { return tags_of(state_->plan, layer(index)); }
+formats::LayerTags LayerSource::tags(std::uint32_t index) const { return tags_of(state_->plan, layer(index)); }
 
 Result<Contours> LayerSource::contours(std::uint32_t index) const {
   const auto sections = state_->sections();
@@ -131,13 +131,13 @@ Result<std::vector<Layer>> layers_of(const Job& job) {
 
 Result<Part> load_part(const Job& job, const PartRequest& part) { return load::load(part.path, load_options(job, part)); }
 
-Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y, const write::ImageFormat& format,
-                  const write::LayerTags& tags) {
-  write::Bytes file;
+Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y,
+                  const formats::ImageFormat& format, const formats::LayerTags& tags) {
+  formats::Bytes file;
   const auto encoder = format.make_encoder();
   encoder->tag(tags);
   if (Status status = encoder->encode(image, dpi_x, dpi_y, file); !status) return status;
-  return write::write_file(path, file);
+  return write_file(path, file);
 }
 
 }  // namespace lamina::pipeline

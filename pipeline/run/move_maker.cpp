@@ -114,7 +114,8 @@ class MoveMaker : public Maker {
     made.facts.area_mm2 = checks_.add_contours(made.record.layer, work.contours);
     work.text.clear();
     const auto out = file_.layer(made.record.layer, work.text);
-    const std::size_t maximum = plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
+    const std::size_t maximum =
+        plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
     const auto deposited = deposit_moves(plan_, layer, work, {work.text, maximum, [] { return false; }}, *out, made.facts);
     if (!deposited) return deposited.error();
     made.waits = *deposited;

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "pipeline/report/job_cost.h"
-#include "pipeline/run/layer_imager.h"
 #include "pipeline/run/job_checks.h"
+#include "pipeline/run/layer_imager.h"
 #include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {

@@ -20,7 +20,7 @@ namespace lamina::pipeline {
 namespace {
 
 /// Lays the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one, with beads or not.
-void deposit_skirt(const Plan& plan, const Layer& layer, write::LayerMoves& out) {
+void deposit_skirt(const Plan& plan, const Layer& layer, formats::LayerMoves& out) {
   const Extruder& machine = plan.moves->profile.machine;
   const FillSettings& fill = plan.job.fill.all;
   const auto width = static_cast<Nm>(nm_of(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm));
@@ -127,7 +127,7 @@ PathFacts facts_of(const Sections::Work& work) {
 }
 
 Result<bool> deposit_moves(const Plan& plan, std::uint32_t index, const Sections::Work& work, const TextBuffer& buffer,
-                       write::LayerMoves& out, PathFacts& facts) {
+                           formats::LayerMoves& out, PathFacts& facts) {
   const Layer layer = plan.sections->layers()[index].own();
   DepositedSums deposited;
   deposited.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
@@ -151,8 +151,10 @@ Result<bool> deposit_moves(const Plan& plan, std::uint32_t index, const Sections
     const bool even = range.settings.on && range.settings.even_starts && machine.material.lag_s > 0;
     if (!even) starts.forget();
     const auto deposit = [&](const BeadMove& move) { return even ? starts.deposit(move, write) : write(move); };
-    if (!by_range.take(range, deposited.pores, [&] { return segment::for_each_move(paths, *cut, table, deposited, deposit); })) return false;
-    if (RangePores* reported = by_range.find(range)) reported->area_mm2 += plan.sections->area_mm2(plan.sections->areas()[a], work);
+    if (!by_range.take(range, deposited.pores, [&] { return segment::for_each_move(paths, *cut, table, deposited, deposit); }))
+      return false;
+    if (RangePores* reported = by_range.find(range))
+      reported->area_mm2 += plan.sections->area_mm2(plan.sections->areas()[a], work);
   }
   facts.totals = out.finish();
   if (plan.segments->crosses()) {

@@ -20,7 +20,7 @@ PathFacts facts_of(const Sections::Work& work);
 /// The text buffer of a writer, with a callback at a size limit.
 struct TextBuffer {
   Buffer<char>& text;
-  std::size_t maximum;             // bytes; `grown` is called after each move beyond this size
+  std::size_t maximum;          // bytes; `grown` is called after each move beyond this size
   std::function<bool()> grown;  // drains the text, or returns false to abandon the layer
 };
 
@@ -28,6 +28,6 @@ struct TextBuffer {
 /// facts    receives the sums of the moves unless the layer is abandoned
 /// returns  false if `room.grown` abandons the layer
 Result<bool> deposit_moves(const Plan& plan, std::uint32_t layer, const Sections::Work& work, const TextBuffer& buffer,
-                       write::LayerMoves& out, PathFacts& facts);
+                           formats::LayerMoves& out, PathFacts& facts);
 
 }  // namespace lamina::pipeline

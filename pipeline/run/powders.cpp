@@ -35,7 +35,8 @@ void add_intervals(const PartMaterial& part, std::int64_t bottom, std::int64_t t
 std::int64_t reach_of_layers(const Plan& plan) {
   if (plan.job.heights.containment == Containment::kAcross && plan.job.levels == 0) return 0;
   std::int64_t maximum = 0;
-  for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i) maximum = std::max<std::int64_t>(maximum, plan.layer(i).thickness);
+  for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i)
+    maximum = std::max<std::int64_t>(maximum, plan.layer(i).thickness);
   return maximum;
 }
 

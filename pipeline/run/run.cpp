@@ -18,9 +18,9 @@
 #include "pipeline/report/timing.h"
 #include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"
+#include "pipeline/run/job_checks.h"
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
-#include "pipeline/run/job_checks.h"
 #include "stages/checks/records.h"
 
 namespace lamina::pipeline {
@@ -179,7 +179,8 @@ std::shared_ptr<Timing> timing_of(const Plan& plan, const Elapsed& before) {
 }
 
 /// Measures the least that any program would need for the same.
-void report_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary, Timing& timing) {
+void report_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary,
+                  Timing& timing) {
   std::vector<std::string> parts;
   for (const PartSummary& part : plan.scene->parts) parts.push_back(part.path);
   timing.floor.bytes_written = summary.bytes_written;
@@ -188,7 +189,7 @@ void report_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>&
   std::error_code error;
   const bool is_folder = std::filesystem::is_directory(plan.job.output, error);
   const std::string neighbour = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
-  if (Status status = write::measure_floor(parts, neighbour, cancel, timing.floor); !status)
+  if (Status status = formats::measure_floor(parts, neighbour, cancel, timing.floor); !status)
     timing.not_measured = status.error().message;
 }
 

@@ -12,10 +12,10 @@
 #include "pipeline/job/file.h"
 #include "pipeline/report/job_cost.h"
 #include "pipeline/show/report_cast.h"
-#include "pipeline/show/report_warnings.h"
 #include "pipeline/show/report_head.h"
 #include "pipeline/show/report_places.h"
 #include "pipeline/show/report_source.h"
+#include "pipeline/show/report_warnings.h"
 #include "stages/geometry/coverage.h"
 #include "stages/support/hash/hash.h"
 #include "stages/view/depth.h"
@@ -26,10 +26,10 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using write::report::HeldLayers;
-using write::report::ReportLayers;
-using write::report::PageData;
-using write::report::ShownView;
+using view::report::HeldLayers;
+using view::report::PageData;
+using view::report::ReportLayers;
+using view::report::ShownView;
 
 constexpr std::uint32_t kChunk = 64;  // layers read in parallel
 
@@ -72,7 +72,7 @@ Result<std::vector<ShownView>> views_of_parts(const Scene& scene) {
   for (const auto& [name, picture] :
        {std::pair{"top", &(*pictures)[0]}, {"front", &(*pictures)[1]}, {"side", &(*pictures)[2]}}) {
     views.push_back({name, picture->width, picture->height, 0, picture->width_mm, picture->height_mm,
-                     write::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
+                     view::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
   }
   return views;
 }
@@ -81,7 +81,7 @@ std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
   std::vector<ShownView> shown;
   for (const view::DepthView& view : views.views()) {
     shown.push_back({view.name, view.width, view.height, view.maximum, view.width_mm, view.height_mm,
-                     write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
+                     view::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
   }
   return shown;
 }
@@ -101,7 +101,7 @@ Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& repo
         const RunsView runs = layer.runs.view();
         report_warnings.inspect(source.manifest.layers[position].layer, runs);
         first.window = window_of(runs);
-        if (held.wants(position)) first.code = write::report::pack_runs(runs);
+        if (held.wants(position)) first.code = view::report::pack_runs(runs);
         for (std::size_t i = 0; i < runs.change.size(); i += 2) first.set += runs.change[i + 1] - runs.change[i];
         first.seconds = layer.seconds;
       },
@@ -124,7 +124,9 @@ Result<std::vector<ShownView>> build_up(const ReportSource& source, const PixelW
   view::ThreeViews built(source.grid, window, lowest.bottom, highest.bottom + highest.thickness);
   const Status status = each_layer<std::vector<std::uint8_t>>(
       source, false,
-      [&](std::uint32_t, const ReportLayer& layer, std::vector<std::uint8_t>& cells) { built.inspect(layer.runs.view(), cells); },
+      [&](std::uint32_t, const ReportLayer& layer, std::vector<std::uint8_t>& cells) {
+        built.inspect(layer.runs.view(), cells);
+      },
       [&](std::uint32_t position, const std::vector<std::uint8_t>& cells) { built.add(layers[position].layer, cells); });
   if (!status) return status.error();
   return views_of_layers(built);
@@ -162,7 +164,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   auto detected = see_layers(*source, report_warnings, held);
   if (!detected) return detected.error();
-  write::report::add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
+  view::report::add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
   detected->deposited = options.deposited;
   detected->deposited_svg = options.deposited_svg;
   if (source->machine) {
@@ -178,15 +180,15 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
     if (!built) return built.error();
     views = std::move(*built);
   }
-  const std::string head = write::report::head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file},
-                                                    source->grid, *detected, held, views);
+  const std::string head = view::report::head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file},
+                                                   source->grid, *detected, held, views);
   std::vector<PageData> data;
   for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
   for (auto& [position, code] : held.layers()) data.push_back({fmt::format("r{}", position), std::move(code)});
   report.layers = static_cast<std::uint32_t>(manifest.layers.size());
   report.held = static_cast<std::uint32_t>(held.layers().size());
   report.stride = held.stride();
-  report.page = write::report::make_page("lamina: " + write::report::page_title(manifest.head), head, data);
+  report.page = view::report::make_page("lamina: " + view::report::page_title(manifest.head), head, data);
   return report;
 }
 

@@ -38,7 +38,7 @@ void ReportBleed::inspect(const Layer& layer) {
 }
 
 void ReportBleed::report(std::vector<Warning>& warnings) const {
-  inspect::VanishCount count;
+  checks::VanishCount count;
   for (std::size_t i = 0; i < layers_.size(); ++i) count.add(layers_[i], vanished_[i]);
   count.report(plan_.images->grid, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror), warnings);
 }

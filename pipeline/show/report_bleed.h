@@ -27,7 +27,7 @@ class ReportBleed {
 
   Plan plan_;
   std::vector<Layer> layers_;
-  std::vector<inspect::VanishedPieces> vanished_;  // by layer
+  std::vector<checks::VanishedPieces> vanished_;  // by layer
   tbb::enumerable_thread_specific<ImageWork> work_;
 };
 

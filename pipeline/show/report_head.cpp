@@ -6,7 +6,7 @@
 #include "stages/support/text/escape.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::write::report {
+namespace lamina::pipeline::report {
 namespace {
 
 Json part_json(const PartSummary& part) {
@@ -104,4 +104,4 @@ std::string head_json(const Manifest& manifest, const ReportManifest& file, cons
   return json_text(json);
 }
 
-}  // namespace lamina::write::report
+}  // namespace lamina::pipeline::report

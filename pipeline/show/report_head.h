@@ -13,7 +13,7 @@
 #include "stages/support/hash/hash.h"
 #include "stages/view/report/held_layers.h"
 
-namespace lamina::write::report {
+namespace lamina::pipeline::report {
 
 /// A view in the page: its entry in the head, and its pixels.
 struct ShownView {
@@ -42,8 +42,8 @@ struct ReportLayers {
   std::vector<Warning> warnings;
   std::vector<ReportLocation> positions;
   std::string sweeps;                           // what drops of a pixel take of a head that fires several
-  std::string deposited;                             // lines on what toolpaths leave open
-  std::string deposited_svg;                         // a picture of it; "" for none
+  std::string deposited;                        // lines on what toolpaths leave open
+  std::string deposited_svg;                    // a picture of it; "" for none
   std::vector<std::vector<std::string>> quote;  // rows of a table of costs; empty for none
 };
 
@@ -62,4 +62,4 @@ std::string page_title(const ManifestHead& head);
 std::string head_json(const Manifest& manifest, const ReportManifest& file, const PixelGrid& grid, const ReportLayers& detected,
                       HeldLayers& held, const std::vector<ShownView>& views);
 
-}  // namespace lamina::write::report
+}  // namespace lamina::pipeline::report

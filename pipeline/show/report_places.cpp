@@ -7,7 +7,7 @@
 #include "pipeline/manifest/inspection_file.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::write::report {
+namespace lamina::pipeline::report {
 namespace {
 
 struct Shown {
@@ -82,4 +82,4 @@ void add_inspection(const std::string& directory, const ManifestHead& head, bool
   detected.positions = std::move(with.positions);
 }
 
-}  // namespace lamina::write::report
+}  // namespace lamina::pipeline::report

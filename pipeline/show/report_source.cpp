@@ -100,12 +100,12 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
   if (digest->bytes != manifest.file.bytes || digest->hash != manifest.file.hash) {
     return wrong(path, "is not the file of its manifest; lamina verify tells more");
   }
-  auto opened = read::GcodeFile::open(path);
+  auto opened = formats::GcodeFile::open(path);
   if (!opened) return opened.error();
   if (opened->count() != manifest.layers.size()) {
     return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), manifest.layers.size()));
   }
-  const auto file = std::make_shared<const read::GcodeFile>(std::move(*opened));
+  const auto file = std::make_shared<const formats::GcodeFile>(std::move(*opened));
   source.grid = raster::bead_grid(file->box());
   std::vector<double> seconds;
   for (const LayerRecord& record : manifest.layers) seconds.push_back(record.paths ? record.paths->totals.seconds : 0);

@@ -36,10 +36,10 @@ class ReportWarnings {
 
   const Manifest& manifest_;
   Job job_;
-  std::vector<Warning> reports_;           // by the plan and the records of layers, as lamina jet tells them
+  std::vector<Warning> reports_;        // by the plan and the records of layers, as lamina jet tells them
   std::unique_ptr<ReportBleed> bleed_;  // null: it takes nothing, or the parts are not there
   std::unique_ptr<checks::Tally> tally_;
-  std::vector<std::uint8_t> crossed_;                        // by layer: whether it may not be empty
+  std::vector<std::uint8_t> crossed_;                       // by layer: whether it may not be empty
   std::function<Result<double>(std::uint32_t)> union_mm3_;  // of a group; empty without the parts
 };
 

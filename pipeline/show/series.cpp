@@ -14,8 +14,8 @@
 namespace lamina::pipeline {
 namespace {
 
-Result<LayerShapes> gcode_shapes(const read::GcodeFile& file, const std::string& name, std::uint32_t index) {
-  const Result<read::GcodeLayer> layer = file.layer(index);
+Result<LayerShapes> gcode_shapes(const formats::GcodeFile& file, const std::string& name, std::uint32_t index) {
+  const Result<formats::GcodeLayer> layer = file.layer(index);
   if (!layer) return layer.error();
   LayerShapes shapes;
   shapes.index = index;
@@ -68,16 +68,15 @@ Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
 
 }  // namespace
 
-Result<view::LayerSeries> gcode_series(const std::string& path, const read::GcodeOptions& options) {
-  auto file = read::GcodeFile::open(path, options);
+Result<view::LayerSeries> gcode_series(const std::string& path, const formats::GcodeOptions& options) {
+  auto file = formats::GcodeFile::open(path, options);
   if (!file) return file.error();
   view::LayerSeries series;
   series.name = std::filesystem::path(path).filename().string();
   series.last = series.count = file->count();
   for (const std::string& note : file->notes()) series.notes.push_back(path + ": " + note);
-  series.layer = [file = std::make_shared<const read::GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
-    return gcode_shapes(*file, name, index);
-  };
+  series.layer = [file = std::make_shared<const formats::GcodeFile>(std::move(*file)),
+                  name = series.name](std::uint32_t index) { return gcode_shapes(*file, name, index); };
   return series;
 }
 

@@ -21,12 +21,12 @@ struct PreviewRequest {
   bool whole_bed = false;              // images: the whole bed instead of the set pixels' window
   bool swath = false;                  // images: the layer during its print program
   std::optional<std::uint32_t> swath_number, step;
-  read::GcodeOptions gcode;  // for G-code alone
+  formats::GcodeOptions gcode;  // for G-code alone
 };
 
 struct Preview {
-  Buffer<std::byte> bytes;               // of the file
-  std::string said;                      // what is drawn, one line
+  Buffer<std::byte> bytes;                 // of the file
+  std::string said;                        // what is drawn, one line
   std::vector<std::string> warnings = {};  // what it lacks, or may have wrong, and why; a line each
 };
 

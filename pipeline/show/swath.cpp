@@ -31,7 +31,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   step.planes = std::max(1u, head.max_drops);
   const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), step, head.grid);
   if (!jetting) return jetting.error();
-  write::picture::SwathView view;
+  view::picture::SwathView view;
   view.grid = head.grid;
   view.width = width;
   const Levels requested = times_set(*image);
@@ -45,7 +45,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", jetting->fired, jetting->drops,
                              jetting->firing, jetting->nozzles.size());
   if (view.maximum > 1) view.caption += fmt::format("; darkest {} drops", view.maximum);
-  return write::picture::swath_picture(view);
+  return view::picture::swath_picture(view);
 }
 
 }  // namespace lamina::pipeline

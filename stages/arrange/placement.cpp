@@ -21,8 +21,8 @@ std::optional<Error> too_large(const BoxRequest& box, std::int64_t bed_width, st
 
 }  // namespace
 
-Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
-                                       std::int64_t gap, bool bed_of_machine) {
+Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
+                                               std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine) {
   std::vector<BoxPosition> positions;
   std::int64_t x = 0, y = 0, row_depth = 0, block_width = 0;
   bool begun = false;

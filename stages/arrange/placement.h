@@ -35,7 +35,7 @@ struct BoxPosition {
 ///
 /// errors  kUsage if a copy does not lie within the bed: which, by how much, and what would help
 /// cost    O(copies)
-Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
-                                       std::int64_t gap, bool bed_of_machine = false);
+Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
+                                               std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine = false);
 
 }  // namespace lamina::arrange

@@ -168,7 +168,8 @@ class ContactFinder {
 
 }  // namespace
 
-double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides, Buffer<PieceClearance>* clearances) {
+double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
+                     Buffer<PieceClearance>* clearances) {
   Buffer<PieceClearance> own;
   Buffer<PieceClearance>& into = clearances != nullptr ? *clearances : own;
   sides.resize(pieces.size());

@@ -11,9 +11,9 @@
 namespace lamina::bead {
 namespace {
 
-constexpr double kFarthest = 1.5;                       // mm: what is wider than 3 mm spreads so far
-constexpr double kWidest = 3;                           // mm
-constexpr double kMaxPrimed = 4;                       // times the flow of a line: what is primed beyond that is a purge
+constexpr double kFarthest = 1.5;                    // mm: what is wider than 3 mm spreads so far
+constexpr double kWidest = 3;                        // mm
+constexpr double kMaxPrimed = 4;                     // times the flow of a line: what is primed beyond that is a purge
 constexpr double kMinSpeed = 0.01, kMaxSpeed = 1e4;  // mm/s: a file may say anything
 
 double length_of(const DepositedBead& bead) {
@@ -27,7 +27,8 @@ class DepositedLine {
 
   /// flow     mm3/s with which the line before ended; below 0: not known
   /// returns  that with which this one ends
-  double deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, double flow, Buffer<DepositedPiece>& out);
+  double deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, double flow,
+                 Buffer<DepositedPiece>& out);
 
  private:
   double first_flow(double fed_mm3_s, double max_mm3_s, double flow) const;
@@ -99,7 +100,8 @@ double DepositedLine::first_flow(double fed, double maximum, double flow) const 
   return primed >= 0 && primed <= kMaxPrimed * std::max(maximum, flow) ? primed : fed;
 }
 
-double DepositedLine::deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, double flow, Buffer<DepositedPiece>& out) {
+double DepositedLine::deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, double flow,
+                              Buffer<DepositedPiece>& out) {
   beads_ = beads;
   feeds_ = feeds;
   here_ = 0;
@@ -138,7 +140,8 @@ double DepositedLine::deposit(std::span<const DepositedBead> beads, std::span<co
 
 }  // namespace
 
-void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, const DepositionRules& rules, Buffer<DepositedPiece>& out) {
+void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, const DepositionRules& rules,
+             Buffer<DepositedPiece>& out) {
   out.clear();
   DepositedLine line(rules);
   double flow = -1;

@@ -36,6 +36,7 @@ struct DepositedPiece {
 /// beads, feeds  of one layer, in the order of printing, as many of each
 /// out           pieces in the same order, no wider than 3 mm
 /// cost          with spread, two thousand numbers from a table for a mm of line
-void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, const DepositionRules& rules, Buffer<DepositedPiece>& out);
+void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, const DepositionRules& rules,
+             Buffer<DepositedPiece>& out);
 
 }  // namespace lamina::bead

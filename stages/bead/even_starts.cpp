@@ -10,10 +10,10 @@ namespace lamina::bead {
 namespace {
 
 constexpr double kMin = 1e-3;      // mm3 that the melt holds too little or too much: a hundredth of a mm of a bead
-constexpr double kWay = 0.2;         // mm, of the first piece
+constexpr double kWay = 0.2;       // mm, of the first piece
 constexpr double kMinFeed = 0.05;  // times that of the line: a move without a feed is a travel
 constexpr double kMaxFeed = 3;
-constexpr double kTolerance = 1;       // mm of width: nobody looks at widths here
+constexpr double kTolerance = 1;     // mm of width: nobody looks at widths here
 constexpr double kMinLength = 1e-3;  // mm, of a piece
 
 double length_of(const BeadMove& move) { return std::hypot(mm(move.to.x - move.from.x), mm(move.to.y - move.from.y)); }

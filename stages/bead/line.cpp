@@ -187,8 +187,8 @@ void BeadLine::deposit(const Phase& phase, const TakePiece& take) {
     if (!std::isfinite(a)) a = mean;  // the head stands
     if (!std::isfinite(b)) b = mean;
     const bool pressed = pressed_ && may_stay_pressed(fed, height_);
-    take({position_ + s, position_ + next, a, b, width_of(a, pressed, height_), width_of(b, pressed, height_), volume - deposited,
-          pressed});
+    take({position_ + s, position_ + next, a, b, width_of(a, pressed, height_), width_of(b, pressed, height_),
+          volume - deposited, pressed});
     pressed_ = stays_pressed(b, fed, pressed_, height_);
     deposited = volume;
     s = next;

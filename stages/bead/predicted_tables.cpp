@@ -16,7 +16,7 @@ constexpr double kForgotten = 10;     // lags, after which a line is as if nothi
 /// The widths about a thin stretch between two thick ones that are long enough to forget.
 struct LongInterval {
   double minimum, largest;  // mm, of the thin one and of what follows
-  double stable_mm;       // from where it begins, until it is as wide as before
+  double stable_mm;         // from where it begins, until it is as wide as before
 };
 
 LongInterval deposit_long(const BeadMachine& machine, double height_mm, double speed, double thin_area, double thin_speed) {

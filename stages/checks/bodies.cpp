@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 void Pieces::find(const RunsView& image, bool diagonal) {
   const std::size_t runs = image.change.size() / 2;
@@ -62,4 +62,4 @@ void Follower::keep(const RunsView& image) {
   below_.change.assign(image.change.begin(), image.change.end());
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

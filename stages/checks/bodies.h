@@ -19,7 +19,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 /// Columns and image rows, ends exclusive.
 struct PixelBox {
@@ -201,4 +201,4 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   keep(image);
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -4,7 +4,7 @@
 #include "stages/checks/inspect.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 namespace {
 
 std::string at(const Spot& spot) {
@@ -53,13 +53,12 @@ void report(const Findings& findings, std::span<const std::string> part, double 
         hollows.spot));
   }
   if (thin.count > 0) {
-    warnings.push_back(
-        warning("thin",
-                fmt::format("{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may not hold; make "
-                            "them thicker, or tell a smaller --min-wall",
-                            of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest,
-                            at(thin.spot)),
-                thin.spot));
+    warnings.push_back(warning(
+        "thin",
+        fmt::format("{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may not hold; make "
+                    "them thicker, or tell a smaller --min-wall",
+                    of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)),
+        thin.spot));
   }
   for (const Findings::Touching& pair : touching) {
     const std::string parts = pair.part == pair.other
@@ -91,4 +90,4 @@ void report(const Findings& findings, std::span<const std::string> part, double 
   }
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace lamina::inspect {
+namespace lamina::checks {
 namespace {
 
 /// About what looking at a layer takes that is not looked at: it is enough, with as many bodies below as in it.
@@ -79,7 +79,8 @@ struct Inspection::Powder {
   }
 };
 
-Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm, std::uint64_t max_bytes)
+Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
+                       std::uint64_t max_bytes)
     : grid_(grid),
       placed_parts_(std::move(placed_parts)),
       stencils_(grid, min_nm),
@@ -217,7 +218,8 @@ void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const PixelBox&
   for (const PixelBox& window : {window_[a], window_[b]}) {
     if (window.meets(box)) box = box.common(window);
   }
-  const std::uint32_t part = std::min(placed_parts_[a].part, placed_parts_[b].part), other = std::max(placed_parts_[a].part, placed_parts_[b].part);
+  const std::uint32_t part = std::min(placed_parts_[a].part, placed_parts_[b].part),
+                      other = std::max(placed_parts_[a].part, placed_parts_[b].part);
   auto& noted = findings_.touching;
   const bool known = std::ranges::any_of(noted, [&](const auto& pair) { return pair.part == part && pair.other == other; });
   if (!known && noted.size() < Findings::kMax) noted.push_back({part, other, spot(box, layer.index, layer.bottom)});
@@ -294,8 +296,8 @@ void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
   solid_.find(image);
   complement(image, all_, between_);
   powder_.find(between_);
-  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + inspection.thin.bytes + solid_.need(image) +
-                              between_.view().change.size_bytes() + powder_.need(between_);
+  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + inspection.thin.bytes +
+                              solid_.need(image) + between_.view().change.size_bytes() + powder_.need(between_);
   if (bytes > max_bytes_) return stop(layer, bytes);
   layer_ = layer;
   // The first layer that holds anything is the bottom of what it holds.
@@ -326,4 +328,4 @@ const Findings& Inspection::finish() {
   return findings_;
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -27,7 +27,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 /// Where something is: the middle of its box.
 struct Spot {
@@ -46,13 +46,13 @@ struct Location {
 
 /// Some of one kind.
 struct Found {
-  std::uint64_t count = 0;    // pieces or bodies
-  double amount = 0;          // of all: mm2, or mm3 of bodies
-  double largest = 0;         // the same of the largest
-  Spot spot;                  // of the largest, the first of equals
-  std::uint32_t layers = 0;   // that hold them; of bodies none
-  std::vector<Location> locations;  // the largest, at most kMax: the largest first, equal ones from the bottom up; thin ones that
-                              // lie upon each other are one, as large as in the layer where most of it is thin
+  std::uint64_t count = 0;          // pieces or bodies
+  double amount = 0;                // of all: mm2, or mm3 of bodies
+  double largest = 0;               // the same of the largest
+  Spot spot;                        // of the largest, the first of equals
+  std::uint32_t layers = 0;         // that hold them; of bodies none
+  std::vector<Location> locations;  // the largest, at most kMax: the largest first, equal ones from the bottom up; thin ones
+                                    // that lie upon each other are one, as large as in the layer where most of it is thin
 
   static constexpr std::size_t kMax = 20;
   void note_location(const Location& position);
@@ -163,4 +163,4 @@ class Inspection {
 /// One warning for each kind. part  names of files
 void report(const Findings& findings, std::span<const std::string> part, double min_mm, std::vector<Warning>& warnings);
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -279,8 +279,8 @@ std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span
   return crossed;
 }
 
-GroupUnion::GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
-               Again again)
+GroupUnion::GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids,
+                       Volume volume, Again again)
     : meshes_(meshes), volume_(std::move(volume)), again_(std::move(again)) {
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (members_.size() <= solids[i].group) members_.resize(std::size_t{solids[i].group} + 1);
@@ -319,4 +319,4 @@ Result<double> GroupUnion::mm3(std::uint32_t group) {
   return found != known_.end() ? found->second : known_.emplace(std::move(key), compute(members)).first->second;
 }
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

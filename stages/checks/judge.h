@@ -79,7 +79,7 @@ class GroupUnion {
   /// solids  one for each instance; both must outlive this object
   /// again   where the triangles of the meshes are gone: asked once, when the first volume is
   GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
-         Again again = {});
+             Again again = {});
 
   /// errors  of `again` and `volume`; kInput: a mesh of the group has changed since
   /// cost    `volume` once for all groups that hold the same meshes in the same places relative to each other
@@ -98,4 +98,4 @@ class GroupUnion {
   std::map<Key, Result<double>> known_;
 };
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

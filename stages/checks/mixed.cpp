@@ -36,4 +36,4 @@ std::vector<LayerRange> mixed_layers(std::vector<PowderInterval> intervals, std:
   return ranges;
 }
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

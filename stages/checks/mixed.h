@@ -23,6 +23,7 @@ using LayerRange = std::array<std::uint32_t, 2>;
 /// or lie under others there: such a layer can have pixels of one material alone.
 /// planes  of the layers, increasing
 /// cost    sorts the stretches, then one step a layer and a stretch; independent of meshes
-std::vector<LayerRange> mixed_layers(std::vector<PowderInterval> intervals, std::uint32_t materials, std::span<const Nm> planes);
+std::vector<LayerRange> mixed_layers(std::vector<PowderInterval> intervals, std::uint32_t materials,
+                                     std::span<const Nm> planes);
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

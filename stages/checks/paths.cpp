@@ -38,4 +38,4 @@ void PathWarnings::report(bool fills, std::uint64_t moves, std::uint32_t layers,
   }
 }
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

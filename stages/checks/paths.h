@@ -36,4 +36,4 @@ struct PathWarnings {
   void report(bool fills, std::uint64_t moves, std::uint32_t layers, std::vector<Warning>& warnings) const;
 };
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

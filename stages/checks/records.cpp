@@ -84,4 +84,4 @@ Status refuse_warnings(std::span<const Warning> warnings) {
   return Error{Fault::kVerification, text};
 }
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

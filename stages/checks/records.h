@@ -49,4 +49,4 @@ void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings);
 /// Refuses the warnings of a strict job. errors  kVerification with all of them on one line
 Status refuse_warnings(std::span<const Warning> warnings);
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

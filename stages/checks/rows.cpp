@@ -8,8 +8,8 @@ bool RowWarnings::note(Rows& reported, const Layer& layer, std::uint32_t rows, s
   if (rows == 0) return false;
   const bool is_first = reported.rows == 0;
   if (is_first) {
-    reported.position = fmt::format("in layer {} at y {:.3f} mm, z {:.3f} mm (image row {})", layer.index, mm(grid.y.centre(first)),
-                             mm(layer.plane()), grid.rows() - 1 - first);
+    reported.position = fmt::format("in layer {} at y {:.3f} mm, z {:.3f} mm (image row {})", layer.index,
+                                    mm(grid.y.centre(first)), mm(layer.plane()), grid.rows() - 1 - first);
     reported.layer = layer.index;
     reported.z_mm = mm(layer.plane());
   }
@@ -37,4 +37,4 @@ void RowWarnings::report(const std::string& part, std::vector<Warning>& warnings
   }
 }
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

@@ -43,4 +43,4 @@ class RowWarnings {
   std::uint32_t instance_ = 0;
 };
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

@@ -130,4 +130,4 @@ void Tally::add_area(std::uint32_t group, const Layer& layer, double area_mm2) {
                             std::memory_order_relaxed);
 }
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

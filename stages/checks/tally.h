@@ -27,9 +27,9 @@ struct Solid {
 /// Solids that layers cannot tell apart.
 struct Group {
   Box box;
-  std::uint32_t part = 0;              // of the first solid
+  std::uint32_t part = 0;           // of the first solid
   double min_mm3 = 0, max_mm3 = 0;  // between these lies the union of its solids, as far as their meshes tell
-  bool closed = true;                  // all of them
+  bool closed = true;               // all of them
 };
 
 /// Of images, some rows of each group and layer are counted, others in each layer: a part of 100 layers is known within a
@@ -84,8 +84,8 @@ class Tally {
   const PixelGrid* grid_ = nullptr;
   std::vector<ImageWindow> solid_window_, group_window_;
   std::vector<std::atomic<std::uint8_t>> detected_;  // by solid
-  std::vector<Sum> planned_, left_;              // by group
+  std::vector<Sum> planned_, left_;                  // by group
   std::atomic<bool> bleeds_{false};
 };
 
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

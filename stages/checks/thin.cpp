@@ -5,7 +5,7 @@
 
 #include "stages/geometry/combine.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 // A stencil grows by a column where its width in nm passes a whole number of them, and so by a row. Where it does both, two of
 // three times or so it grows along a diagonal: a regular octagon has 2 - sqrt(2) of its width there, about 41 of 70.
@@ -150,7 +150,9 @@ std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t mi
 
 /// Puts the largest in front, and no more than so many.
 void keep_largest(std::vector<ThinRegion>& locations, std::size_t maximum) {
-  const auto order = [](const ThinRegion& position) { return std::tuple(~position.pixels, position.box.top, position.box.left); };
+  const auto order = [](const ThinRegion& position) {
+    return std::tuple(~position.pixels, position.box.top, position.box.left);
+  };
   std::ranges::stable_sort(locations, {}, order);
   locations.resize(std::min(locations.size(), maximum));
 }
@@ -232,4 +234,4 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
   return locations;
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

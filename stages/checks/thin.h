@@ -9,7 +9,7 @@
 #include "stages/data/grid.h"
 #include "stages/data/runs.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 // --- eight-sided discs of pixels, one for each width up to a least one.
 //
@@ -60,9 +60,9 @@ struct ThinRegion {
 /// What a layer holds of thin places.
 struct ThinRegions {
   std::uint32_t count = 0;
-  std::uint64_t pixels = 0;        // of all
+  std::uint64_t pixels = 0;         // of all
   std::vector<ThinRegion> largest;  // at most kMax, the largest first; equal ones from the top, then from the left
-  std::uint64_t bytes = 0;         // that finding them took
+  std::uint64_t bytes = 0;          // that finding them took
   static constexpr std::size_t kMax = 20;
 };
 
@@ -84,4 +84,4 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
 /// The pixels between the runs of `image`, in rows and columns [first, last) of the window; nothing beyond it.
 void complement(const RunsView& image, const PixelBox& window, Runs& result);
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch) {
   VanishedPieces found;
@@ -62,4 +62,4 @@ void VanishCount::report(const PixelGrid& grid, bool mirrored_x, bool mirrored_y
        z});
 }
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

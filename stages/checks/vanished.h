@@ -13,7 +13,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 /// Of a layer.
 struct VanishedPieces {
@@ -58,4 +58,4 @@ class VanishCount {
   LayerSpan worst_;
 };
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -14,7 +14,7 @@
 #include "stages/geometry/interval_table.h"
 #include "stages/geometry/isa.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// A mesh, and what was found out about it once.
@@ -177,13 +177,13 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
   out.start(state.grid.columns());
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
   const BandSlab slab{state.grid.x,
-                  state.grid.y,
-                  state.x,
-                  state.rule,
-                  {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
-                  bottom,
-                  top,
-                  scratch.facets};
+                      state.grid.y,
+                      state.x,
+                      state.rule,
+                      {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
+                      bottom,
+                      top,
+                      scratch.facets};
   scratch.maker.start(slab, state.isa);
   for (std::uint32_t band = state.bands(); band-- > 0;) {
     for (std::uint32_t k = scratch.begins[band]; k < scratch.begins[band + 1]; ++k) {
@@ -243,4 +243,4 @@ std::uint64_t Coverage::index_bytes() const {
 
 const PixelGrid& Coverage::grid() const { return state_->grid; }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -29,7 +29,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 // --- memory of one layer in flight.
 
@@ -96,4 +96,4 @@ class Coverage {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -6,7 +6,7 @@
 
 #include "stages/coverage/slab_facet.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 mpq_class rational(std::int64_t whole) { return mpq_class(static_cast<long>(whole)); }
@@ -54,4 +54,4 @@ std::uint32_t exact_level(const Voxel& voxel, std::int64_t winding, std::span<co
   return below > top_level ? top_level : static_cast<std::uint32_t>(below.get_ui());
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -6,12 +6,12 @@
 
 #include "stages/geometry/blocks/cluster.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 constexpr double kUnit = 1024;
 constexpr std::int64_t kMaxParts = 8;  // of a facet along z, each of one number a slab
-constexpr double kUsualPixels = 4;      // that layers are thick: decides alone which of two bounds a facet goes to
+constexpr double kUsualPixels = 4;     // that layers are thick: decides alone which of two bounds a facet goes to
 
 double along_z(const Triangle& t) {
   return std::abs((static_cast<double>(t.b.x) - t.a.x) * (static_cast<double>(t.c.y) - t.a.y) -
@@ -169,4 +169,4 @@ HeldBound::HeldCount HeldBound::at(std::int64_t bottom, std::int64_t top) const 
   return {facets, voxels, runs, std::min(2 * runs, whole(static_cast<double>(sum.rows)) + kCorners * facets)};
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

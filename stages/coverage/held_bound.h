@@ -9,7 +9,7 @@
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMaxSlabs; 112 bytes a slab.
 ///
@@ -70,4 +70,4 @@ class HeldBound {
   std::vector<Slab> slab_;  // one more before the lowest, and one behind the highest
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 using Wide = __int128;
@@ -63,8 +63,7 @@ void Samples::cross(const SlabFacet& facet, const Strip& strip, const PixelAxis&
 }
 
 void Samples::count(const Strip& strip, const PixelAxis& columns, const Edges& edges, std::int64_t winding, FillRule fill,
-                    std::span<const SlabFacet> facets, std::span<const RowFacet> span, std::uint32_t first,
-                    std::uint32_t end) {
+                    std::span<const SlabFacet> facets, std::span<const RowFacet> span, std::uint32_t first, std::uint32_t end) {
   first_ = first;
   end_ = end;
   crossing_.clear();
@@ -98,4 +97,4 @@ void Samples::count(const Strip& strip, const PixelAxis& columns, const Edges& e
   }
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

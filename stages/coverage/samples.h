@@ -9,7 +9,7 @@
 #include "stages/coverage/voxel.h"
 #include "stages/data/buffer.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// Counts a stretch of columns at once; keeps its buffers.
 class Samples {
@@ -47,4 +47,4 @@ class Samples {
   Buffer<SampleCount> count_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

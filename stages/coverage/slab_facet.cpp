@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::int64_t top, const Edges& rows,
                 SlabFacet& out) {
@@ -62,4 +62,4 @@ double volume_behind(const SlabFacet& facet, double end) {
   return sum;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

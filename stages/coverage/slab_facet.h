@@ -9,7 +9,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 // --- what lies behind a piece of a facet, in doubles for all voxels and in rationals for the few that
 // doubles do not decide.
@@ -122,4 +122,4 @@ double volume_behind(const SlabFacet& facet, double end);
 /// Fills in everything; false if nothing of the facet lies between the heights, or it has no area at all.
 bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::int64_t top, const Edges& rows, SlabFacet& out);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -57,7 +57,7 @@ struct Chart {
   std::vector<ChartDash> dashes;
   std::vector<ChartBar> bars;
   std::vector<ChartWedge> wedges;
-  std::vector<ChartBox> stitches;        // full blocks over the joints before swath 1, 2 ...; their height tells gaps
+  std::vector<ChartBox> stitches;      // full blocks over the joints before swath 1, 2 ...; their height tells gaps
   std::vector<ChartVernier> verniers;  // none where the bed has no room
   bool operator==(const Chart&) const = default;
 };

@@ -61,7 +61,7 @@ struct Extruder {
   struct Skirt {
     std::uint32_t loops = 1;  // around all parts; 0: none
     double distance_mm = 5;   // from the parts' box to the nearest loop
-    double min_mm = 100;    // loops are added until they are so long in all
+    double min_mm = 100;      // loops are added until they are so long in all
   } skirt;
 
   struct Fan {

@@ -111,7 +111,8 @@ inline void min_level(const LevelsView& image, std::uint8_t minimum, Runs& plane
   for (std::uint32_t r = 0; r < rows; ++r) {
     const std::uint32_t first = image.row_offset[r], last = image.row_offset[r + 1];
     const std::size_t maximum = used + 2 * std::size_t{last - first} + 1;
-    if (plane.change.size() < maximum) plane.change.resize(maximum < plane.change.capacity() ? plane.change.capacity() : 2 * maximum);
+    if (plane.change.size() < maximum)
+      plane.change.resize(maximum < plane.change.capacity() ? plane.change.capacity() : 2 * maximum);
     std::uint32_t* change = plane.change.data() + used;
     std::uint32_t set = 0, end = 0;  // 1: the run before is taken; where it ends
     for (std::uint32_t i = first; i < last; ++i) {

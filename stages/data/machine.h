@@ -49,8 +49,8 @@ struct Machine {
     std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
     double highest_frequency_hz = 5000;    // of one nozzle
     double drop_pl = 50;
-    std::uint32_t max_drops = 1;        // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
-    std::uint32_t max_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
+    std::uint32_t max_drops = 1;         // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
+    std::uint32_t max_drop_sweeps = 0;   // over one place, for several drops a pixel; 0: not stated
     std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;
     std::array<double, 2> dot_gain_um{0, 0};  // how far edges of full ink stand out of their pixels along x, y; as measured
@@ -105,9 +105,9 @@ struct Machine {
     double base_layer_mm = 0.1;                            // thickness of each
     double dry_s = 0;                                      // pause of the program behind the last sweep of each layer
     std::vector<std::string> dry_on_lines, dry_off_lines;  // the machine's own around it: a lamp
-    double roller_rpm = 0;                // of a roller that turns against its way while it spreads; 0: not told
-    double packing = 0.6;                 // share of the powder bed that is solid
-    double evaporates_percent = 0;        // of the jetted binder, before the next layer is spread
+    double roller_rpm = 0;              // of a roller that turns against its way while it spreads; 0: not told
+    double packing = 0.6;               // share of the powder bed that is solid
+    double evaporates_percent = 0;      // of the jetted binder, before the next layer is spread
     double min_saturation_percent = 0;  // of the voids, that binds; 0: not stated
   } powder;
 

@@ -19,7 +19,7 @@ namespace lamina {
 struct HeadGrid {
   PixelGrid image;
   ScanAxis scan_axis = ScanAxis::kX;
-  bool lines_from_end = false;   // line 0 is the last image row (x) or column (y)
+  bool lines_from_end = false;      // line 0 is the last image row (x) or column (y)
   bool positions_from_end = false;  // place 0 is at the right (x) or at the back (y), else at the left or at the front
   std::uint32_t lines = 0, positions = 0;
   std::uint32_t nozzles = 0, passes = 1, overlap = 0, joint_shift = 0, steps_per_pixel = 1;
@@ -36,8 +36,8 @@ struct HeadGrid {
 
   // --- for reports and positions
   double line_nm = 0, position_nm = 0;              // pitch of pixels across and along the scan
-  double angle_deg = 90;                         // between the row of nozzles and the scan
-  double lag_pixels = 0;                         // from one nozzle to the next, exactly
+  double angle_deg = 90;                            // between the row of nozzles and the scan
+  double lag_pixels = 0;                            // from one nozzle to the next, exactly
   double worst_position_nm = 0, worst_line_nm = 0;  // how far a drop lands from the centre of its pixel, at most
 
   double step_nm() const { return position_nm / steps_per_pixel; }

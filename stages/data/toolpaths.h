@@ -167,7 +167,7 @@ struct PoreCounts {
 /// Stretches that end before the machine has reached their speed.
 struct ShortIntervals {
   std::uint64_t count = 0;
-  double shortest_mm = 0;                  // of them; 0 without any
+  double shortest_mm = 0;                       // of them; 0 without any
   double reached_mm_s = 0, commanded_mm_s = 0;  // of the one that becomes fastest: its speed, and the one it is told
 
   void add(const ShortIntervals& other) {

@@ -96,13 +96,12 @@ class NearField {
     constexpr std::uint32_t kReach = static_cast<std::uint32_t>(kGaussReach);
     const std::uint32_t first_x = (column - kReach) & kMask, first_y = (row - kReach) & kMask;
     for (std::uint32_t y = first_y / kBlock * kBlock; y <= first_y + 2 * kReach; y += kBlock) {
-      for (std::uint32_t x = first_x / kBlock * kBlock; x <= first_x + 2 * kReach; x += kBlock) inspection(x & kMask, y & kMask);
+      for (std::uint32_t x = first_x / kBlock * kBlock; x <= first_x + 2 * kReach; x += kBlock)
+        inspection(x & kMask, y & kMask);
     }
   }
   /// The pixel of least energy that is not set; the first one of equals within the first block of equals.
-  std::uint32_t largest_void() const {
-    return at_[static_cast<std::size_t>(std::ranges::min_element(min_) - min_.begin())];
-  }
+  std::uint32_t largest_void() const { return at_[static_cast<std::size_t>(std::ranges::min_element(min_) - min_.begin())]; }
 
  private:
   static constexpr std::uint32_t kSet = ~0u;

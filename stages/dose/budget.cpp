@@ -142,7 +142,8 @@ void Budget::inspect_field(const Layer& layer, std::uint32_t zone, bool core) {
     return dose;
   };
   const LayerDose minimum = of(range.minimum);
-  if (made_ && minimum.gets < min_percent_ * (1 - 1e-6)) thin_.add(layer, minimum.requested, minimum.gets, 0, minimum.gets < thin_.gets);
+  if (made_ && minimum.gets < min_percent_ * (1 - 1e-6))
+    thin_.add(layer, minimum.requested, minimum.gets, 0, minimum.gets < thin_.gets);
   check_dose(layer, zone, of(range.maximum), core, wanted.formula.empty() ? cut_ : peaks_);
 }
 
@@ -150,8 +151,8 @@ void Budget::warn_of_none(std::vector<Warning>& warnings) const {
   for (const auto& [of, fault] : none_) {
     warnings.push_back({"no-drop", fmt::format("{}: {} % is {:.2f} drops a pixel, which rounds to none in {}; leave out "
                                                "--no-dither, or ask for more",
-                                               key_of(of.first, *targets_, of.second), number_text(fault.requested), fault.drops,
-                                               where(fault.where))});
+                                               key_of(of.first, *targets_, of.second), number_text(fault.requested),
+                                               fault.drops, where(fault.where))});
   }
   for (const auto& [zone, jetted] : jetted_) {
     if (!jetted) warnings.push_back({"no-drop", "part.saturation_percent: 0: that part stays loose powder"});

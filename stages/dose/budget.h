@@ -10,9 +10,9 @@
 
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/dose/field.h"
 #include "stages/dose/covered_spans.h"
 #include "stages/dose/dose_target.h"
+#include "stages/dose/field.h"
 
 namespace lamina::dose {
 
@@ -26,7 +26,7 @@ struct LayerSpan {
 struct DoseFault {
   std::vector<LayerSpan> where;
   double requested = 0, gets = 0, drops = 0;  // per cent and drops a pixel, of the worst
-  bool alike = true;                      // all get the same
+  bool alike = true;                          // all get the same
   /// worse  whether this is worse than what was found so far
   void add(const Layer& layer, double requested_percent, double gets_percent, double requested_drops, bool worse);
 };
@@ -87,7 +87,7 @@ class Budget {
   Jetting jetting_;
   CoveredSpans spans_;
   std::pair<double, double> gets_{0, 0};
-  bool any_ = false, made_ = true;                         // made: the layer that is looked at
+  bool any_ = false, made_ = true;                          // made: the layer that is looked at
   std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by place of the wish and thickness
   DoseFault peaks_;                                         // as cut_, of formulas in boxes of parts
   DoseFault cut_, unbound_, thin_;                          // thin: by places of a formula, of which none need be in a part
@@ -105,8 +105,8 @@ class Budget {
 class BinderCount {
  public:
   /// dosed_pixels, drops, requested_drops, max_drops  of the layer's record; lost  drops that no nozzle fires
-  void add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops, std::uint64_t requested_drops,
-           std::uint64_t lost, std::uint32_t max_drops = 0);
+  void add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops,
+           std::uint64_t requested_drops, std::uint64_t lost, std::uint32_t max_drops = 0);
 
   std::uint64_t drops() const { return drops_; }
   /// Of any pixel; a dithered wish plans for one more than a small part may get.

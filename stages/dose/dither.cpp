@@ -101,7 +101,8 @@ constexpr SetBits kSetBits = [] {
   }
   return table;
 }();
-/// Write the columns `begin` + i of all bits i that are set, and up to kPadding more that do not count. return  one past the last
+/// Write the columns `begin` + i of all bits i that are set, and up to kPadding more that do not count. return  one past the
+/// last
 std::uint32_t* put_columns(std::uint32_t* change, std::uint32_t begin, std::uint64_t bits) {
   for (; bits != 0; bits &= bits - 1) *change++ = begin + static_cast<std::uint32_t>(std::countr_zero(bits));
   return change;

@@ -21,8 +21,8 @@ struct DitherScratch {
   /// The pixels of a level that get a drop: in all rows the same word, or those of the tile.
   struct Bits {
     const std::uint64_t* words;
-    std::uint32_t stride;  // 0: the word is of all rows
-    std::uint32_t maximum;    // pixels of a run that matter: one where all are equal
+    std::uint32_t stride;   // 0: the word is of all rows
+    std::uint32_t maximum;  // pixels of a run that matter: one where all are equal
   };
   std::vector<Extra> of_level;
   std::vector<Bits> bits_of;  // a level, of dither_one()

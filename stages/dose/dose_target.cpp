@@ -31,12 +31,13 @@ bool DoseTargets::has_core() const {
 }
 
 bool DoseTargets::has_formula() const {
-  return all.has_formula() || std::ranges::any_of(ranges, [](const DoseTargetRange& range) { return range.target.has_formula(); }) ||
+  return all.has_formula() ||
+         std::ranges::any_of(ranges, [](const DoseTargetRange& range) { return range.target.has_formula(); }) ||
          std::ranges::any_of(own, [](const std::optional<DoseTarget>& target) { return target && target->has_formula(); });
 }
 
-LayerDose dose_of(const Layer& layer, const DoseTargets& targets, const Binder& binder, const PixelGrid& grid, std::uint32_t maximum,
-                  std::uint32_t zone) {
+LayerDose dose_of(const Layer& layer, const DoseTargets& targets, const Binder& binder, const PixelGrid& grid,
+                  std::uint32_t maximum, std::uint32_t zone) {
   const DoseTarget& target = targets.of(layer, zone);
   LayerDose dose;
   dose.requested = target.percent.percent;

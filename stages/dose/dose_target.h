@@ -50,12 +50,12 @@ struct DoseTargets {
 
 /// What a layer gets, of numbers: of a formula 0.
 struct LayerDose {
-  Drops24 shell = 0, core = 0;                // a pixel, at most as many as may be jetted
+  Drops24 shell = 0, core = 0;                        // a pixel, at most as many as may be jetted
   Drops24 requested_shell = 0, requested_inside = 0;  // however many
   double requested = 0, requested_core = 0;           // per cent
-  double gets = 0, gets_core = 0;             // per cent, by these drops
-  bool cut = false;                           // more drops were asked for than may be jetted
-  std::uint32_t maximum() const {                // drops of any pixel
+  double gets = 0, gets_core = 0;                     // per cent, by these drops
+  bool cut = false;                                   // more drops were asked for than may be jetted
+  std::uint32_t maximum() const {                     // drops of any pixel
     return static_cast<std::uint32_t>(((shell > core ? shell : core) + kOneDrop - 1) >> kDropBits);
   }
 };
@@ -71,7 +71,7 @@ inline LayerDose one_drop(std::uint32_t drops = 1) {
 }
 
 /// most  drops a pixel, 1 .. kMaxDrops; of numbers
-LayerDose dose_of(const Layer& layer, const DoseTargets& targets, const Binder& binder, const PixelGrid& grid, std::uint32_t maximum,
-                  std::uint32_t zone = 0);
+LayerDose dose_of(const Layer& layer, const DoseTargets& targets, const Binder& binder, const PixelGrid& grid,
+                  std::uint32_t maximum, std::uint32_t zone = 0);
 
 }  // namespace lamina::dose

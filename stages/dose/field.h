@@ -15,8 +15,8 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/dose/saturation.h"
 #include "stages/dose/covered_spans.h"
+#include "stages/dose/saturation.h"
 #include "stages/support/text/formula.h"
 
 namespace lamina::dose {
@@ -35,7 +35,7 @@ struct Sheet {
   bool mirror_x = false, mirror_y = false;  // columns, rows run the other way
   Layer layer{};
   DropScale scale{};
-  Drops24 limit = 0;  // of a pixel
+  Drops24 limit = 0;    // of a pixel
   Drops24 minimum = 0;  // full pixels that get less are a fault
   double min_percent = 0;
   bool dithered = true;  // else what a pixel gets is rounded to whole drops

@@ -130,8 +130,9 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   return {pixels, static_cast<std::uint64_t>((sum + kOneDrop / 2) >> kDropBits)};
 }
 
-Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet, std::span<const std::array<DropRequest, 2>> requests,
-                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work) {
+Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
+                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials, Runs& image,
+                                    Runs& second, DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
   const bool shell = !rules.shell.half_width.empty();
   if (shell) erode(image, rules.shell, second);

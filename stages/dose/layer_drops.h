@@ -9,11 +9,11 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/dose/dither.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/edges/erode.h"
 #include "stages/dose/field.h"
 #include "stages/dose/pour.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/dose_target.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::dose {
@@ -46,9 +46,9 @@ struct DropWork {
 
 /// Common to the layers of a job.
 struct DropRules {
-  std::uint8_t full = 0;         // level of a full voxel in DropWork::shares; 0: pixels of the image are full
-  bool dithered = true;          // else drops are rounded to whole ones
-  Reach shell;                   // empty: all is core
+  std::uint8_t full = 0;        // level of a full voxel in DropWork::shares; 0: pixels of the image are full
+  bool dithered = true;         // else drops are rounded to whole ones
+  Reach shell;                  // empty: all is core
   std::uint32_t max_drops = 0;  // of any pixel of the job
 };
 
@@ -95,8 +95,9 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
 /// materials  whose drops are told apart in work.of_material: of a voxel's drops the first are those of the first material, so
 ///            that each gets them in proportion to its share over many voxels
 /// errors     of pour()
-Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet, std::span<const std::array<DropRequest, 2>> requests,
-                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work);
+Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
+                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials, Runs& image,
+                                    Runs& second, DropWork& work);
 
 /// The planes of each material's drops, work.material_planes, after any of the functions above.
 /// shared  drops_of_deposited() has told the drops apart; else all drops of a pixel are of the material that it is of

@@ -49,7 +49,8 @@ Wide one_of(const Binder& binder) {
 
 }  // namespace
 
-Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm, std::uint32_t maximum) {
+Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm,
+                  std::uint32_t maximum) {
   const Drops24 limit = Drops24{maximum} << kDropBits;
   const std::int64_t target = target_of(percent), voids = voids_of(binder);
   if (target == 0 || voids == 0) return 0;

@@ -13,7 +13,7 @@
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// Sums over what was written; those of layers add up to those of the file.
 struct MoveTotals {
@@ -111,4 +111,4 @@ inline std::unique_ptr<ExtrusionFormat> make_extrusion_format(const Extruder& ma
   return machine.format == "sml" ? make_sml_format(machine) : make_gcode_format(machine, switches);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

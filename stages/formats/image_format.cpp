@@ -12,7 +12,7 @@
 #include "stages/formats/png/png_format.h"
 #include "stages/formats/tiff/tiff.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 using Count = std::uint64_t;
@@ -98,4 +98,4 @@ std::optional<std::string_view> extension_of(std::string_view id) {
   return format != nullptr ? std::optional(format->extension) : std::nullopt;
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -16,7 +16,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 using Bytes = Buffer<std::byte>;
 
@@ -103,4 +103,4 @@ const LevelFormat* find_level_format(std::string_view id);
 /// Of a format of one bit or of levels; nothing if there is none with this id.
 std::optional<std::string_view> extension_of(std::string_view id);
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -5,7 +5,7 @@
 #include "stages/formats/cli/cli.h"
 #include "stages/formats/svg/svg.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 using Options = SliceFormatOptions;
@@ -40,4 +40,4 @@ void encode_alone(const SliceEncoder& encoder, const SliceHead& head, const Slic
   encoder.tail(own, out);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -16,7 +16,7 @@
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// The whole file, known before the first layer.
 struct SliceHead {
@@ -68,4 +68,4 @@ const SliceFormat* find_slice_format(std::string_view id);
 /// A file of one layer on its own.
 void encode_alone(const SliceEncoder& encoder, const SliceHead& head, const SliceLayer& layer, Buffer<char>& out);
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -25,7 +25,8 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
   for (std::uint32_t part = 0; part < index.parts.size(); ++part) {
     const auto own = std::span(index.parts).subspan(part, 1);
     const Buffer<Steepness> cells = steepest_in_cells(index, own, candidate_heights);
-    const Buffer<Steepness> angles = nominal ? steepest_in_cells(index, own, candidate_heights, Slope::kAngles) : Buffer<Steepness>();
+    const Buffer<Steepness> angles =
+        nominal ? steepest_in_cells(index, own, candidate_heights, Slope::kAngles) : Buffer<Steepness>();
     for (std::size_t i = 0; i < count; ++i) {
       of_steps[i] = std::max(of_steps[i], cells[i]);
       const Steepness slope = nominal ? angles[i] : cells[i];

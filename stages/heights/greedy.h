@@ -1,8 +1,8 @@
 // stages/heights/greedy.h: the ways that decide one layer after the other, from the bottom up.
 #pragma once
 
-#include "stages/heights/heights.h"
 #include "stages/heights/candidate_heights.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::heights {
 

@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "stages/heights/greedy.h"
 #include "stages/heights/candidate_heights.h"
+#include "stages/heights/greedy.h"
 #include "stages/heights/optimal.h"
 
 namespace lamina::heights {
@@ -71,7 +71,8 @@ Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options) {
     plan.table = LayerTable::uniform(index.top, options.set.minimum());
     return plan;
   }
-  const Result<CandidateHeights> candidate_heights = CandidateHeights::reachable(options.set, std::int64_t{index.top} + options.set.maximum());
+  const Result<CandidateHeights> candidate_heights =
+      CandidateHeights::reachable(options.set, std::int64_t{index.top} + options.set.maximum());
   if (!candidate_heights) return candidate_heights.error();
   switch (options.mode) {
     case Mode::kAngle: return plan_by_angle(index, options, *candidate_heights);

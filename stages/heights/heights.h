@@ -13,8 +13,8 @@
 
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
-#include "stages/heights/flats.h"
 #include "stages/heights/candidate_heights.h"
+#include "stages/heights/flats.h"
 #include "stages/heights/settings.h"
 #include "stages/heights/surface.h"
 #include "stages/heights/table.h"
@@ -38,12 +38,12 @@ struct Options {
   double adapt_angle_deg = 45;  // angle: slopes at least this flat get thinner layers
   SurfaceOptions surface;
   Facets facets = Facets::kRange;  // angle, cusp, stepwise
-  double min_flat_mm2 = 1;       // smaller flats are not aimed at
+  double min_flat_mm2 = 1;         // smaller flats are not aimed at
   Peaks peaks = Peaks::kFlats;     // angle
   bool cover_top = false;          // angle, optimal: the last layer ends at or above the top, within the flat tolerance
   bool flats = true;               // optimal: end layers on flats and on tops and bottoms of parts
   TimeModel time;                  // optimal
-  bool estimates_time = false;         // evaluate: by kPlainTime if no model is given
+  bool estimates_time = false;     // evaluate: by kPlainTime if no model is given
   std::int64_t slab = 0;           // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
                                    // nearer below the top than the least thickness
 };

@@ -26,10 +26,11 @@ constexpr Cost unreached() {
 
 // The highest rung to which the steps allow a layer from each rung. Both ends only move up: if a layer keeps the limit,
 // one inside of it does.
-Buffer<std::uint32_t> highest_by_cusp(const CandidateHeights& candidate_heights, const Buffer<Steepness>& cells, std::int64_t cusp,
-                                      std::int64_t maximum) {
+Buffer<std::uint32_t> highest_by_cusp(const CandidateHeights& candidate_heights, const Buffer<Steepness>& cells,
+                                      std::int64_t cusp, std::int64_t maximum) {
   Buffer<std::uint32_t> highest(candidate_heights.candidates());
-  Buffer<std::uint32_t> window(candidate_heights.cells());  // cells of decreasing steepness, the first is the steepest in the window
+  Buffer<std::uint32_t> window(
+      candidate_heights.cells());  // cells of decreasing steepness, the first is the steepest in the window
   std::uint32_t front = 0, back = 0, end = 0;
   for (std::uint32_t candidate = 0; candidate < candidate_heights.candidates(); ++candidate) {
     const std::int64_t bottom = candidate_heights[candidate];
@@ -50,10 +51,15 @@ Buffer<std::uint32_t> highest_by_cusp(const CandidateHeights& candidate_heights,
 class Solver {
  public:
   Solver(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights)
-      : index_(index), options_(options), candidate_heights_(candidate_heights), set_(options.set), tolerance_(options.surface.flat_tolerance) {
+      : index_(index),
+        options_(options),
+        candidate_heights_(candidate_heights),
+        set_(options.set),
+        tolerance_(options.surface.flat_tolerance) {
     // Where every height is within the tolerance of a rung, the rung that is nearest has to be met.
     hit_ = candidate_heights.step() > 0 ? std::min<std::int64_t>(tolerance_, candidate_heights.step() / 2) : tolerance_;
-    highest_ = highest_by_cusp(candidate_heights, steepest_in_cells(index, index.parts, candidate_heights), options.cusp, set_.maximum());
+    highest_ = highest_by_cusp(candidate_heights, steepest_in_cells(index, index.parts, candidate_heights), options.cusp,
+                               set_.maximum());
     if (options.flats) {
       for (const Flat& flat : find_flats(index, tolerance_, options.min_flat_mm2)) {
         if (flat.height < index.top) flats_.push_back(flat.height);
@@ -106,7 +112,9 @@ class Solver {
   template <class Visit>
   void for_each_layer(std::uint32_t candidate, const Visit& visit) const {
     for (std::uint32_t i = 0; i < set_.size(); ++i) {
-      const std::uint32_t up = strides_.empty() ? candidate_heights_.candidates_up_to(candidate_heights_[candidate] + set_.values[i]) - 1 : candidate + strides_[i];
+      const std::uint32_t up = strides_.empty()
+                                   ? candidate_heights_.candidates_up_to(candidate_heights_[candidate] + set_.values[i]) - 1
+                                   : candidate + strides_[i];
       if (up > limit_[candidate]) return;
       visit(i, up);
     }
@@ -139,14 +147,16 @@ class Solver {
   Cost weight(std::uint32_t candidate, std::size_t first_flat, std::uint32_t up) const {
     Cost cost = weights_.empty() ? Cost{1} : static_cast<Cost>(weights_[candidate]);
     if constexpr (sizeof(Cost) > 8) {
-      for_each_miss(first_flat, candidate_heights_[candidate], candidate_heights_[up], [&](std::int64_t miss) { cost += Cost{miss} << 64; });
+      for_each_miss(first_flat, candidate_heights_[candidate], candidate_heights_[up],
+                    [&](std::int64_t miss) { cost += Cost{miss} << 64; });
     }
     return cost;
   }
   template <class Cost>
   Cost end_cost(std::uint32_t candidate) const {
     std::int64_t missed = counted(std::abs(candidate_heights_[candidate] - index_.top));
-    for (std::size_t i = first_flat_above(candidate_heights_[candidate]); i < flats_.size(); ++i) missed += counted(flats_[i] - candidate_heights_[candidate]);
+    for (std::size_t i = first_flat_above(candidate_heights_[candidate]); i < flats_.size(); ++i)
+      missed += counted(flats_[i] - candidate_heights_[candidate]);
     return static_cast<Cost>(static_cast<__int128>(missed) << 64);
   }
   // Nothing is built upon an end, but where ends are missed the next rung may be nearer.
@@ -176,7 +186,8 @@ class Solver {
   Buffer<Cost> costs_by_windows() const {
     Buffer<Cost> cost(candidate_heights_.candidates(), unreached<Cost>());
     cost[0] = 0;
-    Buffer<std::uint32_t> window(candidate_heights_.candidates());  // of increasing cost of what is built on them, the first is the cheapest
+    Buffer<std::uint32_t> window(
+        candidate_heights_.candidates());  // of increasing cost of what is built on them, the first is the cheapest
     Buffer<Cost> built(candidate_heights_.candidates());
     std::uint32_t front = 0, back = 0;
     for (std::uint32_t up = strides_.front(); up < candidate_heights_.candidates(); ++up) {
@@ -240,7 +251,8 @@ class Solver {
     for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
       if (worst[candidate] == unreached<std::int64_t>()) continue;
       const std::int64_t bottom = candidate_heights_[candidate];
-      if (candidate > 0 && covers(bottom)) best = std::min(best, std::max(worst[candidate], counted(std::abs(bottom - index_.top))));
+      if (candidate > 0 && covers(bottom))
+        best = std::min(best, std::max(worst[candidate], counted(std::abs(bottom - index_.top))));
       if (bottom >= index_.top) continue;
       const std::size_t flat = first_flat_above(bottom);
       for_each_layer(candidate, [&](std::uint32_t, std::uint32_t up) {
@@ -263,7 +275,8 @@ class Solver {
     if (via.empty()) via = fewest_steps_by_layers(cost, below, end);
     std::vector<std::uint32_t> thicknesses;
     for (std::uint32_t candidate = 0; candidate != end; candidate = via[candidate]) {
-      const auto value = std::ranges::lower_bound(set_.values, candidate_heights_[via[candidate]] - candidate_heights_[candidate]);
+      const auto value =
+          std::ranges::lower_bound(set_.values, candidate_heights_[via[candidate]] - candidate_heights_[candidate]);
       thicknesses.push_back(static_cast<std::uint32_t>(value - set_.values.begin()));
     }
     return thicknesses;
@@ -300,7 +313,8 @@ class Solver {
       const auto flat = std::ranges::lower_bound(flats_, top - tolerance_);
       if (flat != flats_.end() && *flat <= top + tolerance_) return LayerReason::kFlat;
     }
-    const bool limited = candidate_heights_[highest_[candidate_heights_.candidates_up_to(bottom) - 1]] < bottom + set_.values[i + 1];
+    const bool limited =
+        candidate_heights_[highest_[candidate_heights_.candidates_up_to(bottom) - 1]] < bottom + set_.values[i + 1];
     return limited || !options_.flats ? LayerReason::kCusp : LayerReason::kFlat;
   }
 
@@ -402,7 +416,7 @@ class Search {
   Buffer<double> steps_;  // mm2 times rungs, from a rung to the end
   Buffer<std::uint32_t> via_;
   Buffer<std::uint32_t> candidates_, begin_;  // rungs by number of layers below them, with the offset of each number
-  Buffer<std::uint32_t> columns_;        // rungs of one layer more from which the end is reached
+  Buffer<std::uint32_t> columns_;             // rungs of one layer more from which the end is reached
   Buffer<Row> rows_;
 };
 

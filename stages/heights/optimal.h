@@ -5,8 +5,8 @@
 #include <span>
 
 #include "stages/data/buffer.h"
-#include "stages/heights/heights.h"
 #include "stages/heights/candidate_heights.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::heights {
 
@@ -37,7 +37,7 @@ struct Stacks {
   std::span<const std::int32_t> layers;  // the fewest of any stack that ends on each rung; above that of `end`: none does
   std::span<const std::uint32_t> limit;  // by rung; r or less where no layer starts, else it only grows
   std::span<const double> below;         // mm2 of slopes below each rung; only grows
-  std::uint32_t minimum;                   // rungs
+  std::uint32_t minimum;                 // rungs
   std::uint32_t end;                     // the rung on which the stack ends
 };
 

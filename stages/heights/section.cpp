@@ -22,7 +22,8 @@ Buffer<double> section_at_candidates(const SurfaceIndex& index, const CandidateH
   double flat = 0;
   std::size_t next = 0;
   for (std::uint32_t candidate = 0; candidate < candidate_heights.candidates(); ++candidate) {
-    for (; next < faces.size() && faces[next].first <= candidate_heights[candidate] + tolerance; ++next) flat += faces[next].second;
+    for (; next < faces.size() && faces[next].first <= candidate_heights[candidate] + tolerance; ++next)
+      flat += faces[next].second;
     section[candidate] = std::max(0.0, -flat - section[candidate]);
   }
   return section;

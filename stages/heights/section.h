@@ -2,8 +2,8 @@
 #pragma once
 
 #include "stages/data/buffer.h"
-#include "stages/heights/heights.h"
 #include "stages/heights/candidate_heights.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::heights {
 

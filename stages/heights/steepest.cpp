@@ -111,8 +111,8 @@ struct Spread {
     }
     const double density = mm2 / (static_cast<double>(hi) - lo);
     const auto share = [&](std::uint32_t cell) {
-      return density *
-             static_cast<double>(std::min<std::int64_t>(hi, candidate_heights[cell + 1]) - std::max<std::int64_t>(lo, candidate_heights[cell]));
+      return density * static_cast<double>(std::min<std::int64_t>(hi, candidate_heights[cell + 1]) -
+                                           std::max<std::int64_t>(lo, candidate_heights[cell]));
     };
     within[first] += share(first);
     if (last - first < 2) return;
@@ -129,22 +129,23 @@ struct Spread {
 
 }  // namespace
 
-Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts, const CandidateHeights& candidate_heights,
-                                    Slope slope) {
+Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts,
+                                    const CandidateHeights& candidate_heights, Slope slope) {
   return steepest_by(index, parts, candidate_heights.cells(), slope, [&](Nm lo, Nm hi) {
     const auto [first, last] = candidate_heights.cells_between(lo, hi);
     return FacetRange{first, last};
   });
 }
 
-Buffer<Steepness> steepest_at_candidates(const SurfaceIndex& index, std::span<const PartSurface> parts, const CandidateHeights& candidate_heights,
-                                    Slope slope) {
+Buffer<Steepness> steepest_at_candidates(const SurfaceIndex& index, std::span<const PartSurface> parts,
+                                         const CandidateHeights& candidate_heights, Slope slope) {
   return steepest_by(index, parts, candidate_heights.candidates(), slope, [&](Nm lo, Nm hi) {
     return FacetRange{candidate_heights.candidates_up_to(lo), candidate_heights.candidates_up_to(hi)};
   });
 }
 
-Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const CandidateHeights& candidate_heights, Sign sign) {
+Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts,
+                               const CandidateHeights& candidate_heights, Sign sign) {
   const std::uint32_t shares = worthwhile_shares(index, parts, 4 * candidate_heights.candidates());  // doubles of two arrays
   std::vector<std::optional<Spread>> spreads(shares);
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
@@ -164,7 +165,8 @@ Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSu
   double density = 0;
   for (std::uint32_t cell = 0; cell < candidate_heights.cells(); ++cell) {
     density += all.slope[cell];
-    below[cell + 1] = below[cell] + all.within[cell] + density * static_cast<double>(candidate_heights[cell + 1] - candidate_heights[cell]);
+    below[cell + 1] =
+        below[cell] + all.within[cell] + density * static_cast<double>(candidate_heights[cell + 1] - candidate_heights[cell]);
   }
   return below;
 }

@@ -40,7 +40,7 @@ struct SurfaceOptions {
   double peak_angle_deg = 90;      // facets at least as flat as this are horizontal
   double normal_tolerance = 1e-3;  // of |n_z|, for all comparisons of angles
   Nm flat_tolerance = 1000;        // nm: a horizontal facet may be that much out of level
-  double min_facet_mm2 = 0;      // smaller facets ask for nothing
+  double min_facet_mm2 = 0;        // smaller facets ask for nothing
   bool nominal_cusps = false;      // steps as they are left on the part once it has shrunk, not as printed
 };
 

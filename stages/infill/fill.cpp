@@ -89,8 +89,8 @@ Result<std::uint64_t> bound_curves(const ContoursView& region, const FillContext
   for (std::size_t k = 0; k < curves; k += step) {
     ContoursView here = region;
     if (k > 0) {
-      auto next =
-          offset_contours(k == step ? region : ContoursView(inner), (k == step ? *depth : positions.at[k - step]) - positions.at[k]);
+      auto next = offset_contours(k == step ? region : ContoursView(inner),
+                                  (k == step ? *depth : positions.at[k - step]) - positions.at[k]);
       if (!next) return next.error();
       inner = std::move(*next);
       here = inner;

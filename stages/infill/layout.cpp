@@ -58,7 +58,7 @@ Result<std::int64_t> region_depth(const FillContext& context, const FillParamete
 }
 
 Result<LinePositions> positions_across(const ContoursView& region, const Frame& frame, const FillContext& context,
-                                const FillParameters& parameters) {
+                                       const FillParameters& parameters) {
   Extent extent = sides_of(context.part, frame);
   for (const Point2 p : region.point) {
     extent.low = std::min<std::int64_t>(extent.low, p.y);
@@ -74,7 +74,8 @@ Result<LinePositions> positions_across(const ContoursView& region, const Frame& 
   return line_positions(own, context, extent);
 }
 
-Result<LinePositions> positions_inwards(const ContoursView& region, const FillContext& context, const FillParameters& parameters) {
+Result<LinePositions> positions_inwards(const ContoursView& region, const FillContext& context,
+                                        const FillParameters& parameters) {
   const auto depth = region_depth(context, parameters);
   if (!depth) return depth.error();
   NumberRange x, y;

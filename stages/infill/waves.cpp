@@ -14,7 +14,7 @@ namespace lamina::infill {
 namespace {
 
 constexpr std::int64_t kMaxPeriods = 1'000'000;  // of a wave
-constexpr int kCosineSteps = 48;                  // a period; off by less than 0.4 % of the wave's height
+constexpr int kCosineSteps = 48;                 // a period; off by less than 0.4 % of the wave's height
 
 Nm side_length(const FillParameters& parameters) {
   return static_cast<Nm>(std::llround(parameters.cell / std::numbers::sqrt3));
@@ -61,8 +61,9 @@ void append_pieces(const Contours& pieces, const FillParameters& parameters, con
     const bool turned = points.front().x > points.back().x;
     order.push_back({line_of(positions, height, points), std::min(points.front().x, points.back().x), c, turned});
   }
-  std::ranges::sort(
-      order, [](const WavePiece& a, const WavePiece& b) { return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index); });
+  std::ranges::sort(order, [](const WavePiece& a, const WavePiece& b) {
+    return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index);
+  });
   Buffer<Point2> whole, own;
   for (std::size_t i = 0; i < order.size();) {
     // Pieces that meet end to end are one.
@@ -117,7 +118,8 @@ WaveBound bound_waves(const ContoursView& region, const FillParameters& paramete
       const Point2 low = p.y <= q.y ? p : q, high = p.y <= q.y ? q : p;
       p = q;
       const auto begin_of_strips = positions.at.begin();
-      const auto first = std::lower_bound(begin_of_strips, positions.at.end(), std::int64_t{low.y} - height - 1) - begin_of_strips;
+      const auto first =
+          std::lower_bound(begin_of_strips, positions.at.end(), std::int64_t{low.y} - height - 1) - begin_of_strips;
       const auto last = std::upper_bound(begin_of_strips, positions.at.end(), std::int64_t{high.y} + 1) - begin_of_strips;
       const auto u_at = [&](std::int64_t v) {
         if (v <= low.y || low.y == high.y) return static_cast<double>(low.x);
@@ -164,7 +166,8 @@ Status append_waves(const ContoursView& region, const FillParameters& parameters
     for (std::int64_t k = floor_div<std::int64_t>(low - start_u, length) - 1; start_u + k * length <= high; ++k) {
       for (const Point2 p : period) {
         const std::int64_t at_u = std::clamp<std::int64_t>(start_u + k * length + p.x, -kNmReach, kNmReach);
-        const std::int64_t at_v = std::clamp<std::int64_t>(positions.at[i] + (mirrored ? height - p.y : p.y), -kNmReach, kNmReach);
+        const std::int64_t at_v =
+            std::clamp<std::int64_t>(positions.at[i] + (mirrored ? height - p.y : p.y), -kNmReach, kNmReach);
         waves.point.push_back({static_cast<Nm>(at_u), static_cast<Nm>(at_v)});
       }
     }

@@ -34,7 +34,7 @@ struct PlannedVolumes {
 /// How much may be sliced for one volume.
 struct Effort {
   double max_crossed = 1.5e7;  // facets that all planes together may cross: some seconds
-  double fewest_planes = 16;    // with less than these it is not integrated
+  double fewest_planes = 16;   // with less than these it is not integrated
 };
 
 /// Volume by the rule `nonzero`. Shells that lie apart add up, exactly. What overlaps, or may, is the signed volume and the

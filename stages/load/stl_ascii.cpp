@@ -246,8 +246,9 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
         {true, fmt::format("{} facet{} with coordinates that are not finite dropped", dropped, dropped == 1 ? "" : "s")});
   if (solids > 1) facets.notes.push_back({false, fmt::format("{} solids are planned as one part", solids)});
   if (ends < solids)
-    facets.warning = ReadWarning{"the last solid has no 'endsolid', but its facets close",
-                         "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
+    facets.warning =
+        ReadWarning{"the last solid has no 'endsolid', but its facets close",
+                    "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
   return facets;
 }
 

@@ -169,8 +169,9 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     facets.warning =
         ReadWarning{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacetBytes, claimed)};
   } else if (claimed > held) {
-    facets.warning = ReadWarning{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
-                         cut_short(source, claimed, held), 0, ""};
+    facets.warning =
+        ReadWarning{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
+                    cut_short(source, claimed, held), 0, ""};
   }
   if (count > options.triangle_limit)
     return source.error(fmt::format("{} facets are more than the limit of {}", count, options.triangle_limit));

@@ -218,7 +218,9 @@ Buffer<std::uint8_t> adjacent_parts(const VoxelView& set, const Parts& parts, co
         if (own.front() == 0 && same.back() == set.nx) mark(0);
         if (own.back() == set.nx && same.front() == 0) mark(own.size() / 2 - 1);
       }
-      const auto inspection = [&](std::uint32_t at_y, std::uint32_t at_z) { for_each_overlap(own, other.row(at_y, at_z), mark); };
+      const auto inspection = [&](std::uint32_t at_y, std::uint32_t at_z) {
+        for_each_overlap(own, other.row(at_y, at_z), mark);
+      };
       if (y > 0 || set.periodic[1]) inspection(y > 0 ? y - 1 : set.ny - 1, z);
       if (y + 1 < set.ny || set.periodic[1]) inspection(y + 1 < set.ny ? y + 1 : 0, z);
       if (z > 0 || set.periodic[2]) inspection(y, z > 0 ? z - 1 : set.nz - 1);

@@ -88,8 +88,8 @@ bool better(const Candidate& a, const Candidate& b) {
 }
 
 /// The best of all shifts that are at most `reach` from a place, and within the range.
-Match best_around(const VoxelView& small, const VoxelView& large, std::uint32_t range, const std::array<std::int32_t, 3>& position,
-                  std::int32_t reach, std::uint32_t side) {
+Match best_around(const VoxelView& small, const VoxelView& large, std::uint32_t range,
+                  const std::array<std::int32_t, 3>& position, std::int32_t reach, std::uint32_t side) {
   const std::int32_t row = 2 * reach + 1, maximum = static_cast<std::int32_t>(range);
   Buffer<Candidate> found(static_cast<std::size_t>(row) * row * row);
   tbb::parallel_for(std::int32_t{0}, row * row * row, [&](std::int32_t i) {

@@ -110,7 +110,7 @@ class PathSearch {
   // In each of the eight corners around a voxel, whose bits tell along which axes a neighbour lies.
   std::uint64_t leave(std::size_t at, std::uint32_t way) {
     const VoxelIndex from{static_cast<std::uint32_t>(at % n_[0]), static_cast<std::uint32_t>(at / stride_[1] % n_[1]),
-                     static_cast<std::uint32_t>(at / stride_[2])};
+                          static_cast<std::uint32_t>(at / stride_[2])};
     std::uint64_t count = 0;
     for (int corner = 0; corner < 8; ++corner) {
       std::array<std::ptrdiff_t, 3> by{};

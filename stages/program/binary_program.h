@@ -7,7 +7,7 @@
 
 #include "stages/program/dialect.h"
 
-namespace lamina::write {
+namespace lamina::program {
 
 /// Appends a whole number, lowest byte first.
 template <class Integer>
@@ -85,4 +85,4 @@ inline std::int64_t across_nm(const Machine& machine, const HeadGrid& grid, std:
   return static_cast<std::int64_t>(nm + (nm < 0 ? -0.5 : 0.5));
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::program

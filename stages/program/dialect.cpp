@@ -13,7 +13,7 @@
 #include "stages/program/planes/planes.h"
 #include "stages/program/raw/raw.h"
 
-namespace lamina::write {
+namespace lamina::program {
 namespace {
 
 constexpr std::array<Dialect, 7> kDialects = {{
@@ -73,4 +73,4 @@ Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadG
                                           dialect.id, dialect.max_nozzles, grid.nozzles)};
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::program

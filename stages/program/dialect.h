@@ -12,7 +12,7 @@
 #include "stages/data/program.h"
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina::program {
 
 using ProgramBytes = Buffer<std::byte>;
 
@@ -84,4 +84,4 @@ const Dialect* find_dialect(std::string_view id);
 /// Whether a dialect can speak to a machine. errors  kUsage: too many nozzles, ...
 Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid);
 
-}  // namespace lamina::write
+}  // namespace lamina::program

@@ -226,7 +226,8 @@ Status Builder::aim_nozzles() {
   std::vector<std::int64_t> steps(head.nozzles);
   for (std::uint32_t i = 0; i < head.nozzles; ++i) {
     steps[i] = static_cast<std::int64_t>(round_half_down((behind[i] - minimum) / step));
-    grid_.worst_position_nm = std::max(grid_.worst_position_nm, std::abs((behind[i] - minimum) - static_cast<double>(steps[i]) * step));
+    grid_.worst_position_nm =
+        std::max(grid_.worst_position_nm, std::abs((behind[i] - minimum) - static_cast<double>(steps[i]) * step));
     if (steps[i] > 100'000'000) return wrong(machine_, "head.row_offset_um", "a nozzle lags behind by metres");
   }
   for (const std::int64_t lag : steps) {

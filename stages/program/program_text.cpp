@@ -1,6 +1,6 @@
 #include "stages/program/program_text.h"
 
-namespace lamina::write {
+namespace lamina::program {
 namespace {
 
 /// The build vat goes to the depth of a layer, the vats feed it, the roller spreads and returns.
@@ -34,4 +34,4 @@ void put_powder_cycle(const Machine& machine, const LayerCycle& cycle, ProgramBy
   });
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::program

@@ -13,7 +13,7 @@
 #include "stages/program/dialect.h"
 #include "stages/support/text/gcode_number.h"
 
-namespace lamina::write {
+namespace lamina::program {
 
 /// Appends formatted text to bytes.
 template <class... Values>
@@ -91,4 +91,4 @@ void for_each_vector(const Sweep& sweep, const SweepVectors& vectors, const Visi
   }
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::program

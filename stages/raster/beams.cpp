@@ -208,8 +208,8 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
     std::size_t end = begin + 1;
     while (end < order.size() && placed[order[end]].mesh == placed[order[begin]].mesh) ++end;
     const PlacedMesh& first = placed[order[begin]];
-    BeamSource& source =
-        state.sources.emplace_back(BeamSource{&first, HeightRuns(first.mesh->bounds), end - begin > 1, order[begin], half_band});
+    BeamSource& source = state.sources.emplace_back(
+        BeamSource{&first, HeightRuns(first.mesh->bounds), end - begin > 1, order[begin], half_band});
     if (!source.shared) {
       state.attach_runs(state.scene, source);
     } else {

@@ -32,7 +32,8 @@ void keep_beads(Runs& image, BeadRaster& beads, const Runs* inner, Runs& scratch
   Runs kept, shell;  // of a band
   beads.for_each_band([&](std::uint32_t first, const RunsView& deposited) {
     const auto band_of = [&](const Runs& whole) {
-      return RunsView{whole.columns, std::span(whole.row_offset).subspan(first, std::size_t{deposited.rows()} + 1), whole.change};
+      return RunsView{whole.columns, std::span(whole.row_offset).subspan(first, std::size_t{deposited.rows()} + 1),
+                      whole.change};
     };
     const RunsView part = band_of(image);
     if (inner == nullptr) return append_combined(part, deposited, SetOperation::kIntersection, scratch);

@@ -71,7 +71,7 @@ class ScanConverter {
   void report_caps(const Segments& segments, std::span<const PlacedMesh> placed, std::uint32_t first_row, std::uint32_t rows,
                    LayerReport& report);
 
-  Buffer<std::uint32_t> position_;          // per geometry row of the band: where its next crossing goes
+  Buffer<std::uint32_t> position_;       // per geometry row of the band: where its next crossing goes
   Buffer<std::uint32_t> crossing_;       // column * 2 + (1 if it enters), row by row
   std::size_t crossings_ = 0;            // of the band; crossing_ is longer
   Buffer<std::uint8_t> capped_;          // per geometry row of the band

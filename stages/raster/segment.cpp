@@ -30,7 +30,7 @@ void Segments::ensure_capacity(std::size_t more) {
   const std::size_t capacity = size + more + (size + more) / 8;
   const auto lengthen = [&](auto& array) {
     if (size == 0) array.clear();  // nothing is worth moving
-    array.reserve(capacity);           // resize() alone would double, beyond what layers are said to need
+    array.reserve(capacity);       // resize() alone would double, beyond what layers are said to need
     array.resize(capacity);
   };
   lengthen(origin), lengthen(rows), lengthen(columns_per_nm);

@@ -19,7 +19,7 @@ inline constexpr double kMaxSeconds = 1e6;
 struct Count {
   std::uint64_t drops = 0, vectors = 0;
   std::uint32_t sweeps = 0;
-  std::uint32_t max_per_position = 0;                       // drops that a nozzle fires there in one sweep
+  std::uint32_t max_per_position = 0;                    // drops that a nozzle fires there in one sweep
   std::uint32_t added = 0;                               // sweeps beyond those that the head's own drops would take
   double scan_mm = 0, travel_mm = 0;                     // of the head
   std::int64_t microseconds = 0;                         // of the machine; whole, so that sums of layers are exact

@@ -96,7 +96,8 @@ bool Axes::paths_are_clear(const GcodeLine& line) {
     reader_.fault("moves two of head, roller and vats at a time");
     return false;
   }
-  if (head + roller + vat == 1) printing_.check_way(head ? MovingPart::kHead : roller ? MovingPart::kRoller : MovingPart::kVat, feed_mm_s_);
+  if (head + roller + vat == 1)
+    printing_.check_way(head ? MovingPart::kHead : roller ? MovingPart::kRoller : MovingPart::kVat, feed_mm_s_);
   return true;
 }
 
@@ -152,7 +153,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
   if (head_squared > 0) printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
   if (head) {  // where it stands already, too
     printing_.head_is_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]],
-                             line.command == "G1" && !scanning ? feed_mm_s_ : 0);
+                         line.command == "G1" && !scanning ? feed_mm_s_ : 0);
   }
   return true;
 }

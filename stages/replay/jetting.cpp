@@ -25,7 +25,8 @@ Levels levels_of_drops(std::vector<VirtualMachine::Drop>& drops, std::uint32_t c
   for (std::uint32_t row = 0; row < rows; ++row) {
     while (next != drops.end() && next->row == row) {
       const std::uint32_t column = next->column;
-      const auto end = std::find_if(next, drops.end(), [&](const auto& drop) { return position(drop) != std::pair(row, column); });
+      const auto end =
+          std::find_if(next, drops.end(), [&](const auto& drop) { return position(drop) != std::pair(row, column); });
       levels.append(column, column + 1, static_cast<std::uint8_t>(std::min<std::ptrdiff_t>(end - next, 255)));
       next = end;
     }

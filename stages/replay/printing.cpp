@@ -285,7 +285,8 @@ void Printing::state_heights(std::optional<double> bottom_mm, double thickness_m
 
 void Printing::state_sweep(std::uint32_t of) {
   if (backward_ && !profile().motion.both_directions) fault("runs back, and the profile's head fires on the way there alone");
-  if (swaths_stated_ && *swaths_stated_ != of) fault(fmt::format("is one of {} swaths, those before of {}", of, *swaths_stated_));
+  if (swaths_stated_ && *swaths_stated_ != of)
+    fault(fmt::format("is one of {} swaths, those before of {}", of, *swaths_stated_));
   swaths_stated_ = of;
 }
 
@@ -310,8 +311,8 @@ void Printing::check_numbers(std::span<const RunsView> planes) {
   const std::int64_t swaths = left <= lines ? 1 : 1 + (left - lines + stride - 1) / stride;
   const std::int64_t per_position = sweeps_per_position(), of = swaths * mount.passes * per_position;
   if (*swaths_stated_ != of)
-    return fail(
-        fmt::format("layer {}, before its first swath: is told to have {} swaths, and has {}", layer_.index, *swaths_stated_, of));
+    return fail(fmt::format("layer {}, before its first swath: is told to have {} swaths, and has {}", layer_.index,
+                            *swaths_stated_, of));
   const bool further = profile().head.blocked_rule == BlockedRule::kSecondPass && !profile().head.blocked.empty();
   for (const Sweep& sweep : sweeps_) {
     if (sweep.number >= of) {
@@ -319,7 +320,8 @@ void Printing::check_numbers(std::span<const RunsView> planes) {
       return fail(fmt::format("layer {}, swath {}, before its first step: is beyond the {} that the layer has", layer_.index,
                               sweep.number, of));
     }
-    const std::int64_t position = sweep.number / per_position, at = first + position / mount.passes * stride + position % mount.passes;
+    const std::int64_t position = sweep.number / per_position,
+                       at = first + position / mount.passes * stride + position % mount.passes;
     if (sweep.first_line == at) continue;
     return fail(
         fmt::format("layer {}, swath {}, before its first step: begins at line {}, and the swath of that number at line {}",
@@ -742,7 +744,8 @@ void Printing::check_cycle() {
   const auto& powder = profile().powder;
   const Layer& layer = layer_;
   const auto wrong = [&](const std::string& what) { wrong_cycle(what); };
-  if (const AxisPositions next = axis_positions(); head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
+  if (const AxisPositions next = axis_positions();
+      head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
     wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
                       (*head_mm_)[1], next.x_mm, next.y_mm));
   }

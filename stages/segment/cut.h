@@ -22,7 +22,7 @@ struct LineCut {
   CutRule rule = CutRule::kAligned;
   std::int64_t thin = 1'500'000, thick = 1'500'000;  // > 0
   std::int64_t origin = 0;                           // where a thin stretch of the grid begins; any of them
-  std::int64_t min_end = 0;                        // no thin stretch is nearer to the end of a line; not used by kGrid
+  std::int64_t min_end = 0;                          // no thin stretch is nearer to the end of a line; not used by kGrid
 
   /// The same cuts for lines that are walked the other way, in coordinates with the sign changed.
   LineCut mirrored() const {

@@ -138,9 +138,7 @@ struct GradientUnit {
   const char* name;
 };
 GradientUnit unit_of(double max_pa_m) {
-  return max_pa_m >= 1e6   ? GradientUnit{1e6, "MPa/m"}
-         : max_pa_m >= 1e3 ? GradientUnit{1e3, "kPa/m"}
-                            : GradientUnit{1, "Pa/m"};
+  return max_pa_m >= 1e6 ? GradientUnit{1e6, "MPa/m"} : max_pa_m >= 1e3 ? GradientUnit{1e3, "kPa/m"} : GradientUnit{1, "Pa/m"};
 }
 
 /// Grid lines with their numbers, from 0 to the largest value of each axis.

@@ -133,10 +133,8 @@ class SpeedCounter {
   double entry_ = 0, length_ = 0, speed_ = 0;
 };
 
-/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives what the move has laid, a DepositedMove, or
-/// nothing to stop: no further move is laid.
-/// sums     what was laid is added
-/// returns  false if `lay` stopped
+/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives what the move has laid, a
+/// DepositedMove, or nothing to stop: no further move is laid. sums     what was laid is added returns  false if `lay` stopped
 template <class Deposit>
 bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& table, DepositedSums& sums, Deposit&& deposit) {
   bool goes_on = true;

@@ -41,7 +41,8 @@ Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const F
 /// Where a gas is measured, which expands on its way through the medium. Pa, absolute.
 struct GasPressures {
   double outlet_pa = 101325;
-  double reference_pa = 101325;  // at which velocities and density are told: those of the outlet, of a flow meter, of a standard
+  double reference_pa =
+      101325;  // at which velocities and density are told: those of the outlet, of a flow meter, of a standard
 };
 
 /// The gradients that make the law of gases linear in the coefficients as the one above:

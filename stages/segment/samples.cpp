@@ -54,7 +54,9 @@ Result<std::vector<DropsFit>> fit_drops(const std::string& path, const DropsSett
     fit.group = std::move(group);
     fit.pressures = settings.gas;
     const std::string position = fit.group.name.empty() ? "" : fit.group.name + ": ";
-    const auto at = [&](const Error& error) { return Error{error.fault, fmt::format("{}: {}{}", path, position, error.message)}; };
+    const auto at = [&](const Error& error) {
+      return Error{error.fault, fmt::format("{}: {}{}", path, position, error.message)};
+    };
     const auto take = [&](const char* form, Result<GroupFit> found, std::optional<GroupFit>& target) {
       target = std::move(*found);
       for (const std::string& line : target->left_out)

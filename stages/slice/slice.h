@@ -101,7 +101,8 @@ class Slicer {
     std::uint32_t source;
     Point2 by;
   };
-  void loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed, SectionReport& report) const;
+  void loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
+                SectionReport& report) const;
   Status clean(Contours& contours, SectionScratch& scratch, SectionReport& report) const;
 
   std::span<const Mesh> meshes_;

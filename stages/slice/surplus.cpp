@@ -24,7 +24,8 @@ struct SharedMesh {
   std::vector<Point2> by;
 };
 
-std::vector<SharedMesh> sources_of(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Nm> planes) {
+std::vector<SharedMesh> sources_of(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                   std::span<const Nm> planes) {
   std::vector<SharedMesh> sources;
   std::map<std::pair<std::uint32_t, Nm>, std::size_t> known;
   std::vector<std::int64_t> own_planes(planes.size());

@@ -64,8 +64,8 @@ void join_rows(std::span<const CoveredSpans::CellSpan> lower, std::span<const Co
   }
 }
 
-void join_along_x(std::span<const CoveredSpans::CellSpan> row, std::uint32_t nx, bool periodic, const Buffer<std::uint32_t>& number,
-                  Cells& cells) {
+void join_along_x(std::span<const CoveredSpans::CellSpan> row, std::uint32_t nx, bool periodic,
+                  const Buffer<std::uint32_t>& number, Cells& cells) {
   for (const auto& [begin, end, first] : row) {
     for (std::uint32_t i = first; i + 1 < first + (end - begin); ++i) {
       cells.neighbour[number[i]][1] = number[i + 1];

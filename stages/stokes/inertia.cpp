@@ -13,7 +13,7 @@
 namespace lamina::stokes {
 namespace {
 
-constexpr std::size_t kMax = 16;     // vectors of a Krylov space
+constexpr std::size_t kMax = 16;      // vectors of a Krylov space
 constexpr double kInexact = 0.1;      // what is left of Newton's equations, relative
 constexpr double kOfCreeping = 0.02;  // the same of the creeping flows within, relative
 

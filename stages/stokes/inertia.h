@@ -13,7 +13,7 @@
 namespace lamina::stokes {
 
 struct InertiaOptions {
-  double tolerance = 1e-4;         // of the velocities: what a creeping flow would change, relative
+  double tolerance = 1e-4;        // of the velocities: what a creeping flow would change, relative
   std::uint32_t max_rounds = 40;  // where it does not settle, the flow may have no steady state
   std::function<bool(std::uint32_t round, double change)> progress;  // false ends the work; may be empty
 };

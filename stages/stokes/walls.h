@@ -36,7 +36,9 @@ class Walls {
   std::array<std::int64_t, 3> below_face(const CellIndex& at, int face) const;
   bool film_within(const CellIndex& at, int axis, const CellIndex& below) const;
   double distance(const CellIndex& at, int face, int along, bool up) const;
-  std::size_t index(const CellIndex& at) const { return at[0] + std::size_t{size_[0]} * (at[1] + std::size_t{size_[1]} * at[2]); }
+  std::size_t index(const CellIndex& at) const {
+    return at[0] + std::size_t{size_[0]} * (at[1] + std::size_t{size_[1]} * at[2]);
+  }
   bool solid(std::array<std::int64_t, 3> at) const;
   bool step(CellIndex& at, int axis, bool up) const;
   std::uint32_t voids(std::array<std::int64_t, 3> from, int along, bool up) const;

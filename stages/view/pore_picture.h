@@ -20,7 +20,7 @@ struct PorePicture {
   std::string solid_name = "solid";
   int axis = 2;                              // of the flow
   int normal = 1;                            // of the section along it
-  std::array<std::uint32_t, 3> position{};      // where sections meet, in voxels of the solid
+  std::array<std::uint32_t, 3> position{};   // where sections meet, in voxels of the solid
   std::array<double, 3> corner_mm{};         // where the box begins
   VoxelView solid, through;                  // of one size; void that leads through along the axis
   const Plane* across = nullptr;             // velocity along the axis / its mean, none: no flow; over the whole box

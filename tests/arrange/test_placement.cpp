@@ -8,7 +8,8 @@
 namespace lamina::arrange {
 namespace {
 
-std::vector<BoxPosition> placed(const std::vector<BoxRequest>& boxes, std::int64_t width, std::int64_t depth, std::int64_t gap) {
+std::vector<BoxPosition> placed(const std::vector<BoxRequest>& boxes, std::int64_t width, std::int64_t depth,
+                                std::int64_t gap) {
   const auto positions = arrange_boxes(boxes, width, depth, gap);
   EXPECT_TRUE(positions.ok()) << positions.error().message;
   return positions.ok() ? *positions : std::vector<BoxPosition>{};

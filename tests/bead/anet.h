@@ -44,8 +44,8 @@ struct Width {
 };
 
 /// Widths along a line between two places, in order: at the ends of pieces, or of cells after spreading.
-inline std::vector<Width> deposit(const BeadMachine& machine, const std::vector<LineSegment>& intervals, const Joint& from, double to,
-                              bool spread) {
+inline std::vector<Width> deposit(const BeadMachine& machine, const std::vector<LineSegment>& intervals, const Joint& from,
+                                  double to, bool spread) {
   std::vector<Width> widths;
   BeadLine line(machine, kHeight, 1e-4);
   BeadSpread pen(kHeight);
@@ -80,7 +80,8 @@ inline double mean_width(const std::vector<Width>& widths, double begin, double 
 
 /// Thick and thin stretches of 1.5 mm in turn (Tables 13 to 16) in their steady state: six periods, of which the fourth begins
 /// at 9.
-inline std::vector<Width> deposit_repeated(const BeadMachine& machine, double extrusion_percent, double thick_speed, bool spread) {
+inline std::vector<Width> deposit_repeated(const BeadMachine& machine, double extrusion_percent, double thick_speed,
+                                           bool spread) {
   const double area = machine.area_mm2 * extrusion_percent / 100;
   const std::vector<LineSegment> period{{1.5, area, thick_speed}, {1.5, area, 30}};
   std::vector<LineSegment> intervals;

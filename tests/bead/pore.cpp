@@ -35,14 +35,15 @@ double length_above(const Buffer<ProfilePiece>& gaps, std::size_t middle, double
 
 }  // namespace
 
-BeadPore adjacent_pore(const BeadMachine& machine, double height_mm, const Pattern& pattern, double spacing_mm, double adjacent_mm,
-                     double bond_gap_mm, bool spread) {
+BeadPore adjacent_pore(const BeadMachine& machine, double height_mm, const Pattern& pattern, double spacing_mm,
+                       double adjacent_mm, double bond_gap_mm, bool spread) {
   const double middle = pattern.thick_mm + pattern.thin_mm / 2;
   Buffer<ProfilePiece> gaps;  // widths of the gap
   std::size_t at = 0;
   double widest = 0;
   steady_profile(machine, height_mm, pattern, spread, [&](const ProfilePiece& p) {
-    const double begin = spacing_mm - (p.begin_width_mm + adjacent_mm) / 2, end = spacing_mm - (p.end_width_mm + adjacent_mm) / 2;
+    const double begin = spacing_mm - (p.begin_width_mm + adjacent_mm) / 2,
+                 end = spacing_mm - (p.end_width_mm + adjacent_mm) / 2;
     if (p.begin_mm <= middle) at = gaps.size();
     widest = std::max({widest, begin, end});
     gaps.push_back({p.begin_mm, p.end_mm, begin, end});

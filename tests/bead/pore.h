@@ -19,7 +19,7 @@ struct BeadPore {
 /// spacing     mm, centre to centre
 /// beside      mm, width of the line beside it
 /// bond_gap    mm: beads that are no further apart bond
-BeadPore adjacent_pore(const BeadMachine& machine, double height_mm, const Pattern& pattern, double spacing_mm, double adjacent_mm,
-                     double bond_gap_mm, bool spread);
+BeadPore adjacent_pore(const BeadMachine& machine, double height_mm, const Pattern& pattern, double spacing_mm,
+                       double adjacent_mm, double bond_gap_mm, bool spread);
 
 }  // namespace lamina::bead

@@ -78,7 +78,8 @@ TEST(DepositedBeads, AWayRoundCornersKeepsItsVolumeAndSlowsDownThere) {
     if (p.from.y > 1'000'000 && p.from.y < 9'999'000) widest_slow = std::max(widest_slow, p.width_mm);
   for (const DepositedPiece& p : free)
     if (p.from.y > 1'000'000 && p.from.y < 9'999'000) widest_free = std::max(widest_free, p.width_mm);
-  EXPECT_GT(widest_slow, 1.05 * bead_width(kDepositedArea, kDepositedHeight)) << "melt that was on its way comes while the head brakes";
+  EXPECT_GT(widest_slow, 1.05 * bead_width(kDepositedArea, kDepositedHeight))
+      << "melt that was on its way comes while the head brakes";
   EXPECT_GT(widest_slow, 1.01 * widest_free);
   // It ends as it began, slowly: what is held is the same.
   EXPECT_NEAR(volume_of_pieces(slow), 40 * kDepositedArea, 1e-4);
@@ -92,7 +93,8 @@ TEST(DepositedBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
     way.add(0, 3 * i + 1.5, 0, 3 * i + 3, 30, kDepositedArea, true);
   }
   for (const bool spread : {false, true}) {
-    const PatternWidths steady = steady_widths({kDepositedArea, kDepositedLag, 400}, kDepositedHeight, {1.5, 1.5, 100, 11.25, 30}, spread);
+    const PatternWidths steady =
+        steady_widths({kDepositedArea, kDepositedLag, 400}, kDepositedHeight, {1.5, 1.5, 100, 11.25, 30}, spread);
     double minimum = 1, maximum = 0;
     for (const DepositedPiece& piece : pieces_of(way, deposition_rules(400, spread))) {
       if (piece.from.y < 15'000'000 || piece.to.y > 18'000'000) continue;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/bead/even_starts.h"
 #include "stages/bead/deposition.h"
+#include "stages/bead/even_starts.h"
 #include "stages/geometry/bead_section.h"
 
 namespace lamina::bead {

@@ -23,7 +23,7 @@ struct DepositedLine {
 };
 
 DepositedLine deposit_line(const BeadMachine& machine, const std::vector<LineSegment>& intervals, Joint from, double to,
-                  double tolerance = 0.001) {
+                           double tolerance = 0.001) {
   DepositedLine result;
   BeadLine line(machine, kLayer, tolerance);
   const auto take = [&](const BeadPiece& piece) { result.pieces.push_back(piece); };
@@ -107,7 +107,7 @@ TEST(BeadLine, WithoutLagTheCommandedAreaIsDepositedRegardlessOfTheSpeed) {
 TEST(BeadLine, AShortLagAndAHighAccelerationComeToTheirLimits) {
   const std::vector<LineSegment> intervals{{3, 0.1, 15}, {3, 0.1, 30}, {3, 0.05, 15}};
   const DepositedLine none = deposit_line({0.1, 0, 400}, intervals, {15, 1.5}, 15),
-                 little = deposit_line({0.1, 1e-6, 400}, intervals, {15, 1.5}, 15);
+                      little = deposit_line({0.1, 1e-6, 400}, intervals, {15, 1.5}, 15);
   const DepositedLine at_once = deposit_line({0.1, 0.05, kInfinite}, intervals, {15, 1.5}, 15);
   const DepositedLine fast = deposit_line({0.1, 0.05, 1e9}, intervals, {15, 1.5}, 15);
   for (double position = 0.2; position < 9; position += 0.37) {
@@ -156,7 +156,8 @@ TEST(BeadLine, ItDoesNotMatterHowAnIntervalIsDivided) {
     EXPECT_NEAR(b.deposited / a.deposited, 1, 1e-12);
     EXPECT_NEAR(b.seconds / a.seconds, 1, 1e-12);
     EXPECT_NEAR(b.end.flow_mm3_s / a.end.flow_mm3_s, 1, 1e-9);
-    for (double position = 0.111; position < 60; position += 0.731) EXPECT_NEAR(area_at(a, position), area_at(b, position), 1e-3);
+    for (double position = 0.111; position < 60; position += 0.731)
+      EXPECT_NEAR(area_at(a, position), area_at(b, position), 1e-3);
   }
 }
 
@@ -165,7 +166,7 @@ TEST(BeadLine, WidthsBetweenTheEndsOfAPieceAreWithinTheTolerance) {
     const BeadMachine machine{0.1, 0.05, 400};
     const auto intervals = random_intervals(9);
     const DepositedLine coarse = deposit_line(machine, intervals, {5, 1}, 5, tolerance),
-                   fine = deposit_line(machine, intervals, {5, 1}, 5, 1e-7);
+                        fine = deposit_line(machine, intervals, {5, 1}, 5, 1e-7);
     std::size_t i = 0;
     double worst = 0;
     for (const BeadPiece& p : fine.pieces) {
@@ -193,7 +194,7 @@ TEST(BeadLine, ALineThatBeginsWithTheFlowThatItKeepsIsRightAtOnce) {
   const BeadMachine machine{0.1, 0.053, kInfinite};
   const double left = 1.5 * std::exp(-0.1 / machine.tau_s);  // a travel of a tenth of a second
   const DepositedLine late = deposit_line(machine, {{20, 0.1, 15}}, {15, left}, 15),
-                 right = deposit_line(machine, {{20, 0.1, 15}}, {15, 1.5}, 15);
+                      right = deposit_line(machine, {{20, 0.1, 15}}, {15, 1.5}, 15);
   EXPECT_NEAR(right.deposited - late.deposited, missing_at_start(left, 1.5, machine.tau_s), 1e-9);
   EXPECT_LT(late.pieces.front().begin_area_mm2, 0.02);
   EXPECT_NEAR(late.pieces.back().end_area_mm2, 0.1, 1e-9);

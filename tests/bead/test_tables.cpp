@@ -29,7 +29,7 @@ struct Extremes {
 Extremes deposit_long(const BeadMachine& machine, double thin_area, double thin_speed, bool spread) {
   const double area = machine.area_mm2;
   const auto widths = deposit(machine, {{10, area, kReference}, {30, thin_area, thin_speed}, {10, area, kReference}},
-                          {kReference, kReference * area}, kReference, spread);
+                              {kReference, kReference * area}, kReference, spread);
   Extremes result{9, 0};
   for (const Width& w : widths) {
     if (w.position < 5 || w.position > 45) continue;
@@ -56,7 +56,8 @@ struct Readings {
 Readings errors_of_tables_13_to_15(const BeadMachine& machine, bool spread) {
   Rms mean, middle;
   for (const Repeated& sample : repeated_samples()) {
-    const PatternWidths deposited = steady_widths(machine, kHeight, {1.5, 1.5, sample.extrusion, sample.thick_speed, 30}, spread);
+    const PatternWidths deposited =
+        steady_widths(machine, kHeight, {1.5, 1.5, sample.extrusion, sample.thick_speed, 30}, spread);
     mean.add(deposited.thick.mean - sample.thick);
     mean.add(deposited.thin.mean - sample.thin);
     middle.add(deposited.thick.middle - sample.thick);
@@ -114,7 +115,8 @@ TEST(Tables, WidthsOfThinIntervalsByExtrusion) {  // Table 12
         Rms error;
         for (const auto& row : table(12)) {
           const double thin_area = area * number(row, "thin_extrusion_percent") / 100;
-          error.add(deposit_long(anet(area, acceleration), thin_area, kReference, spread).thin - number(row, "thin_width_min_mm"));
+          error.add(deposit_long(anet(area, acceleration), thin_area, kReference, spread).thin -
+                    number(row, "thin_width_min_mm"));
         }
         EXPECT_LT(error.value(), 0.025);
       }

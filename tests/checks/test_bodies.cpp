@@ -9,7 +9,7 @@
 #include "stages/checks/bodies.h"
 #include "tests/checks/volume.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 namespace {
 
 Volume random_volume(std::uint32_t seed, double share) {
@@ -121,4 +121,4 @@ TEST(Bodies, BoxesHeightsAndVolumesAreThoseOfTheirVoxels) {
 }
 
 }  // namespace
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

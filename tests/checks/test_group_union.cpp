@@ -95,4 +95,4 @@ TEST(GroupUnion, APartThatIsGoneGivesNoWarningAndAStopIsPassedOn) {
 }
 
 }  // namespace
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

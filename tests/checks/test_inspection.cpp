@@ -11,7 +11,7 @@
 #include "stages/checks/inspect.h"
 #include "tests/checks/volume.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 namespace {
 
 constexpr std::uint32_t kSide = 200, kLayers = 12;
@@ -59,7 +59,7 @@ class BoundedInspection : public testing::Test {
   const PixelGrid grid_{PixelAxis(254, 20 * kNmPerMm), PixelAxis(254, 20 * kNmPerMm)};
   const Volume volume_ = noisy_plate();
   std::vector<std::uint64_t> held_;  // after each layer
-  std::uint64_t inspected_ = 0;         // by the look at any layer
+  std::uint64_t inspected_ = 0;      // by the look at any layer
 };
 
 TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
@@ -123,4 +123,4 @@ TEST_F(BoundedInspection, GetsFurtherWithWhatItRequests) {
 }
 
 }  // namespace
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -63,4 +63,4 @@ TEST(MixedLayers, AreNamedShortly) {
 }
 
 }  // namespace
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

@@ -113,4 +113,4 @@ TEST(LaneResolver, PartsInTheAir) {
 }
 
 }  // namespace
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

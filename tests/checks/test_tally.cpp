@@ -117,4 +117,4 @@ TEST(Tally, SumsAreasOfContours) {
 }
 
 }  // namespace
-}  // namespace lamina::sanity
+}  // namespace lamina::checks

@@ -11,7 +11,7 @@
 #include "stages/checks/thin.h"
 #include "tests/checks/volume.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 namespace {
 
 using Pixel = std::pair<std::int64_t, std::int64_t>;  // column, row
@@ -244,4 +244,4 @@ TEST(ThinRegions, OfTurnedBodiesAreTheirFins) {
 }
 
 }  // namespace
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

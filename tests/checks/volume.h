@@ -6,7 +6,7 @@
 
 #include "stages/data/runs.h"
 
-namespace lamina::inspect {
+namespace lamina::checks {
 
 struct Volume {
   std::uint32_t columns, rows, layers;
@@ -29,4 +29,4 @@ struct Volume {
   }
 };
 
-}  // namespace lamina::inspect
+}  // namespace lamina::checks

@@ -335,15 +335,15 @@ TEST_F(EveryOutput, WhileAnotherRunWritesTheCallIsRefused) {
   for (const Row& row : kRows) {
     const std::string target = target_of(row, "x");
     if (row.directory) fs::create_directory(directory_ / target);
-    std::optional<write::Claim> claim;
-    std::optional<write::File> file;
+    std::optional<Claim> claim;
+    std::optional<File> file;
     const std::string locked = directory_ / (target + row.lock);
     if (std::string_view(row.lock) == "/manifest.json") {
-      auto taken = write::Claim::take(locked, locked);
+      auto taken = Claim::take(locked, locked);
       ASSERT_TRUE(taken.ok());
       claim.emplace(std::move(*taken));
     } else if (row.command != "batch") {
-      auto opened = write::File::open(locked);
+      auto opened = File::open(locked);
       ASSERT_TRUE(opened.ok());
       file.emplace(std::move(*opened));
     }

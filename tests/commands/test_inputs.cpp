@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kPatienceMs = 60'000;                // hashing 6 GiB on a slow machine is no hang
+constexpr int kPatienceMs = 60'000;               // hashing 6 GiB on a slow machine is no hang
 constexpr std::uint64_t kMaxKilobytes = 700'000;  // resident; the program itself takes some 60,000
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kMemoryIsMeasurable = false;

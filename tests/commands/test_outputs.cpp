@@ -184,7 +184,8 @@ TEST_F(Outputs, DevicesAndPipesStayWhatTheyAre) {
          {"heights part.stl --layer 1 --plot " + position + ".svg", "heights part.stl --layer 1 --plot " + position + ".png",
           "permeability drops.csv --convention dinisio2022 --plot " + position,
           "jet part.stl --layer 1 --dry-run --overwrite --save-job " + position, "machines --target " + position,
-          "calibrate --machine anet-a8 --measured widths.csv -o " + position, "report out --overwrite -o " + position + ".html"}) {
+          "calibrate --machine anet-a8 --measured widths.csv -o " + position,
+          "report out --overwrite -o " + position + ".html"}) {
       refused(line, 4, "is a device or a pipe, not a file; name another one");
     }
   }

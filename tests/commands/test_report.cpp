@@ -54,7 +54,7 @@ TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
   for (int i = 0; i < 60; ++i) {
     const auto columns = static_cast<std::uint32_t>(1 + random() % 3000), rows = static_cast<std::uint32_t>(1 + random() % 60);
     const Runs runs = random_runs(random, columns, rows);
-    Buffer<std::byte> packed = write::report::pack_runs(runs);
+    Buffer<std::byte> packed = view::report::pack_runs(runs);
     const Result<Runs> back = unpack_runs(packed, columns, rows);
     ASSERT_TRUE(back.ok());
     ASSERT_TRUE(equal(runs, *back));
@@ -63,13 +63,13 @@ TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
     for (int k = 0; k < 20; ++k) {
       Buffer<std::byte> code(1 + random() % 40);  // any code, within a whole zlib stream
       for (std::byte& byte : code) byte = static_cast<std::byte>(random() % (k < 10 ? 256 : 5));
-      const Result<Runs> any = unpack_runs(write::report::deflate_bytes(code), columns, rows);
+      const Result<Runs> any = unpack_runs(view::report::deflate_bytes(code), columns, rows);
       if (!any) continue;
       for (const std::uint32_t change : any->change) EXPECT_LE(change, columns);
     }
   }
   const Runs empty = {9, {0, 0, 0}, {}};
-  EXPECT_TRUE(equal(empty, *unpack_runs(write::report::pack_runs(empty), 9, 2)));
+  EXPECT_TRUE(equal(empty, *unpack_runs(view::report::pack_runs(empty), 9, 2)));
 }
 
 TEST(RunCode, Base64IsThatOfRfc4648) {
@@ -110,7 +110,7 @@ class JobsReported : public ::testing::Test {
   Runs layer(int index) {
     char name[32];
     std::snprintf(name, sizeof name, "out/layers/%06d.tif", index);
-    const auto image = read::image(directory_ / name);
+    const auto image = formats::image(directory_ / name);
     EXPECT_TRUE(image.ok());
     return image->runs;
   }

@@ -61,7 +61,8 @@ TEST_F(ReportedWarnings, ArePowdersDropsNozzlesAndMaintenanceOfTheJob) {
       directory_ / "idle.toml",
       "inherits = \"nuferbj\"\n[machine]\nname = \"idle\"\n[head]\nblocked = [10, 11, 12, 13]\nblocked_rule = \"neighbour\"\n"
       "max_drop_sweeps = 1\n[powder]\nleast_saturation_percent = 60\n[maintenance]\nspit_mm = [-40, 5]\n");
-  expect_alike("a.stl --machine idle.toml --layer 0.1 --saturation 40 --allow-unbound", {"maintenance", "saturation", "lost-pixels"});
+  expect_alike("a.stl --machine idle.toml --layer 0.1 --saturation 40 --allow-unbound",
+               {"maintenance", "saturation", "lost-pixels"});
 }
 
 TEST_F(ReportedWarnings, OfPartsWithoutDropsAreThoseOfTheDose) {

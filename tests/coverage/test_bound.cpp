@@ -20,11 +20,11 @@ struct BoundSums {
   double facets = 0, reported_facets = 0, runs = 0, reported_runs = 0, bytes = 0, reported_bytes = 0;
 };
 
-void expect_layer_within(const cover::Coverage& coverage, const Layer& layer, std::uint32_t levels, BoundSums& sums) {
-  cover::CoverageScratch scratch;  // of this layer alone
+void expect_layer_within(const coverage::Coverage& coverage, const Layer& layer, std::uint32_t levels, BoundSums& sums) {
+  coverage::CoverageScratch scratch;  // of this layer alone
   Levels image;
-  const cover::CoverageReport report = coverage.layer(layer, scratch, image);
-  const cover::LayerBound bound = coverage.bound(layer);
+  const coverage::CoverageReport report = coverage.layer(layer, scratch, image);
+  const coverage::LayerBound bound = coverage.bound(layer);
   SCOPED_TRACE(testing::Message() << "layer " << layer.index << " of " << layer.thickness << " nm, " << levels << " levels");
   EXPECT_LE(report.facets, bound.facets);
   EXPECT_LE(report.held_voxels, bound.voxels);
@@ -46,7 +46,7 @@ void expect_layer_within(const cover::Coverage& coverage, const Layer& layer, st
 void expect_layers_within(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid, Nm height,
                           Nm thickness, std::uint32_t max_layers, BoundSums& sums) {
   for (const std::uint32_t levels : {2u, 4u, 16u}) {
-    auto coverage = cover::Coverage::build(meshes, instances, grid, FillRule::kNonzero, levels);
+    auto coverage = coverage::Coverage::build(meshes, instances, grid, FillRule::kNonzero, levels);
     ASSERT_TRUE(coverage.ok()) << coverage.error().message;
     const auto layers = static_cast<std::uint32_t>(height / thickness + 2);
     const std::uint32_t step = std::max(1u, layers / max_layers);

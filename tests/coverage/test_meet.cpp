@@ -15,7 +15,7 @@
 #include "stages/geometry/isa.h"
 #include "tests/program/machines.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 struct Vector {
@@ -157,4 +157,4 @@ TEST(Meet, KernelsPartOnlyFacetsThatDoNotMeetBeyondWhatTheyShare) {
 }
 
 }  // namespace
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

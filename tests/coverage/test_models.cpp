@@ -114,10 +114,10 @@ TEST(CoverageModels, RealPartsHaveTheLevelsOfTheContract) {
     if (model.grid.columns() > 4000 || model.grid.rows() > 4000) continue;
     SCOPED_TRACE(file.string());
     const auto begun = std::chrono::steady_clock::now();
-    auto coverage = cover::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 16);
+    auto coverage = coverage::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 16);
     ASSERT_TRUE(coverage.ok());
     const std::chrono::duration<double> built = std::chrono::steady_clock::now() - begun;
-    cover::CoverageScratch scratch;
+    coverage::CoverageScratch scratch;
     Levels image;
     std::mt19937 random(5);
     const Nm thickness = 100'000;
@@ -150,9 +150,9 @@ TEST(CoverageModels, SharesOfAllLayersAddUpToTheVolumeOfThePart) {
     ASSERT_TRUE(load_model(std::string(folder) + "/" + name, 200, model)) << name;
     double whole = 0, sum = 0;
     for (const Mesh& mesh : model.meshes) whole += mesh.volume_mm3;
-    auto coverage = cover::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 4);
+    auto coverage = coverage::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 4);
     ASSERT_TRUE(coverage.ok());
-    cover::CoverageScratch scratch;
+    coverage::CoverageScratch scratch;
     Levels image;
     const Nm thickness = 178'000;
     for (std::uint32_t i = 0; static_cast<Nm>(i) * thickness < model.height; ++i) {

@@ -36,9 +36,9 @@ Reported expect_levels(const Triangles& triangles, const PixelGrid& grid, const 
     for (const std::uint32_t levels : {2u, 4u, 16u}) {
       Mesh mesh = make_mesh(triangles);
       const Instance instance{0, {0, 0, 0}};
-      auto coverage = cover::Coverage::build({&mesh, 1}, {&instance, 1}, grid, rule, levels);
+      auto coverage = coverage::Coverage::build({&mesh, 1}, {&instance, 1}, grid, rule, levels);
       EXPECT_TRUE(coverage.ok());
-      cover::CoverageScratch scratch;
+      coverage::CoverageScratch scratch;
       Levels image;
       for (std::size_t l = 0; l < layers.size(); ++l) {
         const Layer& layer = layers[l];
@@ -224,7 +224,8 @@ TEST(CoverageShapes, CavitiesAndWhatLiesInThemAreExact) {
 }
 
 TEST(CoverageShapes, AShellInsideOutIsSampled) {
-  const Reported reported = expect_levels(reversed(ball({800'000, 350'000, 300'000}, 250'000, 12)), kSmall, layers_of(200'000, 3));
+  const Reported reported =
+      expect_levels(reversed(ball({800'000, 350'000, 300'000}, 250'000, 12)), kSmall, layers_of(200'000, 3));
   EXPECT_GT(reported.sampled, 0u);
 }
 
@@ -265,9 +266,9 @@ TEST(CoverageShapes, CopiesThatOverlapAreSampledOnlyWhereTheirBoxesMeet) {
   Mesh mesh = make_mesh(part), joined_mesh = make_mesh(all);
   const Instance only{0, {0, 0, 0}};
   for (const FillRule rule : {FillRule::kNonzero, FillRule::kEvenOdd}) {
-    auto copies = cover::Coverage::build({&mesh, 1}, instances, grid, rule, 16);
-    auto together = cover::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, rule, 16);
-    cover::CoverageScratch scratch;
+    auto copies = coverage::Coverage::build({&mesh, 1}, instances, grid, rule, 16);
+    auto together = coverage::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, rule, 16);
+    coverage::CoverageScratch scratch;
     Levels of_copies, of_all;
     std::uint64_t held = 0, inspected = 0, sampled = 0;
     for (const Layer& layer : layers_of(90'000, 8, 20'000)) {
@@ -309,9 +310,9 @@ TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyNextToItsBoundary) {
   const Triangles part = ball({4'000'000, 4'000'000, 3'000'000}, 2'900'000, 60);
   Mesh of_voxels = make_mesh(part);
   const Instance instance{0, {0, 0, 0}};
-  auto coverage = cover::Coverage::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, 2);
+  auto coverage = coverage::Coverage::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, 2);
   auto rasterizer = raster::Rasterizer::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, false, true);
-  cover::CoverageScratch scratch;
+  coverage::CoverageScratch scratch;
   raster::LayerScratch of_pixels;
   Levels levels;
   Runs pixels, full;
@@ -341,7 +342,7 @@ TEST(CoverageShapes, AnOpenMeshIsRefused) {
   Mesh mesh = make_mesh(box({100'000, 100'000, 0}, {200'000, 200'000, 200'000}));
   mesh.closed = false;
   const Instance instance{0, {0, 0, 0}};
-  auto coverage = cover::Coverage::build({&mesh, 1}, {&instance, 1}, kSmall, FillRule::kNonzero, 4);
+  auto coverage = coverage::Coverage::build({&mesh, 1}, {&instance, 1}, kSmall, FillRule::kNonzero, 4);
   ASSERT_FALSE(coverage.ok());
   EXPECT_EQ(coverage.error().fault, Fault::kInput);
 }

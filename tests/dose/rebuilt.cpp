@@ -11,9 +11,9 @@
 #include "stages/data/layer.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
-#include "stages/dose/dose_target.h"
 #include "stages/raster/raster.h"
 #include "tests/raster/shapes.h"
 
@@ -44,10 +44,11 @@ DropStack::DropStack(const std::vector<Triangle>& part, const DropWay& way, doub
   const Instance instance{0, {0, 0, 0}};
   const auto rasterizer =
       raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kNonzero, false, true, Isa::kPlain);
-  const auto coverage = cover::Coverage::build({&other, 1}, {&instance, 1}, grid, FillRule::kNonzero, std::max(2u, way.levels));
+  const auto coverage =
+      coverage::Coverage::build({&other, 1}, {&instance, 1}, grid, FillRule::kNonzero, std::max(2u, way.levels));
   if (!rasterizer.ok() || !coverage.ok()) std::abort();
   raster::LayerScratch of_pixels;
-  cover::CoverageScratch of_voxels;
+  coverage::CoverageScratch of_voxels;
   Runs image, second;
   dose::DropWork work;
   const std::uint32_t full = way.levels > 0 && !way.dithered ? way.levels - 1 : 1;  // drops of a full voxel
@@ -128,8 +129,8 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
   double sum = 0;
   for (const SurfacePoint& point : points) {
     const auto is_solid = [&](double by) {
-      return solid(
-          ClusterSlot{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1], point.at[2] + by * point.normal[2]});
+      return solid(ClusterSlot{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1],
+                               point.at[2] + by * point.normal[2]});
     };
     const bool here = is_solid(0);
     bool outwards = here, inwards = here, lost = true;

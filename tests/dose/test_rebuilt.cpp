@@ -55,8 +55,8 @@ TEST(Rebuilt, FollowsItsTwoRulesByHand) {
 TEST(Rebuilt, Table) {
   if (std::getenv("LAMINA_REBUILT") == nullptr) GTEST_SKIP() << "LAMINA_REBUILT is not set: the table was NOT made";
   const DropWay paths[] = {{300, 300'000, 0}, {300, 100'000, 0},  {300, 50'000, 0},         {300, 300'000, 2},
-                          {300, 300'000, 4}, {300, 300'000, 16}, {300, 300'000, 16, true}, {600, 300'000, 0},
-                          {600, 50'000, 0},  {600, 300'000, 4},  {600, 300'000, 16},       {600, 300'000, 16, true}};
+                           {300, 300'000, 4}, {300, 300'000, 16}, {300, 300'000, 16, true}, {600, 300'000, 0},
+                           {600, 50'000, 0},  {600, 300'000, 4},  {600, 300'000, 16},       {600, 300'000, 16, true}};
   for (const RebuiltShape& shape : rebuilt_shapes(1500)) {
     for (const DropWay& way : paths) {
       const DropStack stack(shape.part, way, shape.bed_mm, shape.height_mm);

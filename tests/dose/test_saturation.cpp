@@ -10,11 +10,11 @@
 
 #include "stages/dose/blue_noise.h"
 #include "stages/dose/budget.h"
+#include "stages/dose/covered_spans.h"
 #include "stages/dose/dither.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/covered_spans.h"
-#include "stages/dose/dose_target.h"
 #include "stages/support/hash/hash.h"
 #include "tests/program/machines.h"
 
@@ -384,8 +384,7 @@ TEST(CoveredSpans, AreThoseOfBoxesAndOfCoresOfPartsThatTouch) {
   const CoveredSpans spans(boxes, 2, 5'000'000, 30'000);
   const auto detected = [&](std::uint32_t zone) {
     std::string text;
-    for (std::uint32_t i = 0; i < 6; ++i)
-      text += spans.core(zone, tenth(i)) ? 'c' : spans.any(zone, tenth(i)) ? 's' : '.';
+    for (std::uint32_t i = 0; i < 6; ++i) text += spans.core(zone, tenth(i)) ? 'c' : spans.any(zone, tenth(i)) ? 's' : '.';
     return text;
   };
   EXPECT_EQ(detected(0), "cc....");

@@ -10,12 +10,12 @@
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/share_count.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/dose_target.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -191,7 +191,7 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
       limited.dithered = dithered;
       limited.limit = Drops24{4} << kDropBits;
       const std::vector<std::array<DropRequest, 2>> requests{{DropRequest{kOneDrop * 7 / 2}, DropRequest{kOneDrop * 7 / 2}},
-                                                 {DropRequest{kOneDrop * 2}, DropRequest{kOneDrop * 2}}};
+                                                             {DropRequest{kOneDrop * 2}, DropRequest{kOneDrop * 2}}};
       Runs image, second;
       ASSERT_TRUE(drops_of_deposited(rules, limited, requests, 3, image, second, work).ok());
       std::vector<Runs> own(3);

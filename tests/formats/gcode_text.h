@@ -16,10 +16,10 @@ namespace lamina::test {
 inline constexpr double kPi = std::numbers::pi;
 
 /// `text` as a file, read.
-inline Result<read::GcodeFile> gcode_file(const Directory& directory, const std::string& text,
-                                          const read::GcodeOptions& options = {}) {
+inline Result<formats::GcodeFile> gcode_file(const Directory& directory, const std::string& text,
+                                             const formats::GcodeOptions& options = {}) {
   write_text(directory.path() / "part.gcode", text);
-  return read::GcodeFile::open(directory / "part.gcode", options);
+  return formats::GcodeFile::open(directory / "part.gcode", options);
 }
 
 /// mm of filament for a bead, written out: a rectangle with half circles at its sides (Slic3r's manual, flow math).

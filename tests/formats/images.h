@@ -11,7 +11,7 @@
 #include "stages/data/runs.h"
 #include "stages/formats/image_format.h"
 
-namespace lamina::write::testing {
+namespace lamina::formats::testing {
 
 using Row = std::vector<std::uint32_t>;  // changes, as in data/runs.h
 
@@ -125,4 +125,4 @@ inline std::vector<const ImageFormat*> file_formats() {
   return formats;
 }
 
-}  // namespace lamina::write::testing
+}  // namespace lamina::formats::testing

@@ -4,7 +4,7 @@
 #include "stages/formats/images/image.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 TEST(ReadImage, AFileCutOffAtAnyLengthIsAnErrorInOneLine) {
@@ -14,7 +14,7 @@ TEST(ReadImage, AFileCutOffAtAnyLengthIsAnErrorInOneLine) {
     const std::string path = folder / ("cut" + std::string(format->extension));
     for (std::size_t length = 0; length < file.size(); ++length) {
       testing::save(path, std::span(file).first(length));
-      const auto image = read::image(path);
+      const auto image = formats::image(path);
       ASSERT_FALSE(image.ok()) << format->id << " cut off after " << length << " of " << file.size();
       EXPECT_EQ(image.error().fault, Fault::kVerification);
       EXPECT_EQ(image.error().message.find(path), 0u) << image.error().message;
@@ -43,7 +43,7 @@ void expect_survival(const ImageFormat& format, const Bytes& file, std::uint32_t
       }
     }
     testing::save(path, damaged);
-    const auto image = read::image(path);
+    const auto image = formats::image(path);
     if (!image.ok()) {
       ASSERT_EQ(image.error().message.find('\n'), std::string::npos) << image.error().message;
       continue;
@@ -111,7 +111,7 @@ TEST(ReadImage, ATiffThatPromisesMorePixelsThanItsBytesCanHoldIsRefusedAtOnce) {
       file[rows_per_strip - 6] = std::byte{4};
       put_long(file, rows_per_strip, rows);
       testing::save(path, file);
-      EXPECT_FALSE(read::image(path).ok()) << id << " " << rows;
+      EXPECT_FALSE(formats::image(path).ok()) << id << " " << rows;
     }
   }
 }
@@ -124,7 +124,7 @@ TEST(ReadImage, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
         std::string("P4\n0 1\nx"), std::string("P4\n1 0\n"), std::string("P4\n-8 1\nx"), std::string("P4\n8 1\nxy"),
         std::string("P4#"), std::string("P4\n8 1"), std::string("P1\n1 1\n1")}) {
     testing::save(pbm, std::as_bytes(std::span(text)));
-    EXPECT_FALSE(read::image(pbm).ok()) << text;
+    EXPECT_FALSE(formats::image(pbm).ok()) << text;
   }
   // A whole PNG of 2,000,000 x 2,000,000 white pixels cannot be this short; CRC of this IHDR computed for the test.
   Bytes file = testing::encoded(*find_image_format("png"), testing::image_of(9, {{1, 5}, {}}));
@@ -134,7 +134,7 @@ TEST(ReadImage, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
     file[29 + i] = std::byte{sum[i]};
   }
   testing::save(png, file);
-  EXPECT_FALSE(read::image(png).ok());
+  EXPECT_FALSE(formats::image(png).ok());
 }
 
 TEST(ReadImage, WhatIsNoImageIsAnError) {
@@ -142,11 +142,11 @@ TEST(ReadImage, WhatIsNoImageIsAnError) {
   const std::string text = folder / "text.tif", none = folder / "none.tif";
   const std::string words = "not an image at all";
   testing::save(text, std::as_bytes(std::span(words)));
-  EXPECT_FALSE(read::image(text).ok());
-  EXPECT_FALSE(read::image(none).ok());
-  EXPECT_FALSE(read::image(folder / ".").ok());
-  EXPECT_FALSE(read::image("/dev/zero").ok());
+  EXPECT_FALSE(formats::image(text).ok());
+  EXPECT_FALSE(formats::image(none).ok());
+  EXPECT_FALSE(formats::image(folder / ".").ok());
+  EXPECT_FALSE(formats::image("/dev/zero").ok());
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -6,7 +6,7 @@
 #include "stages/geometry/combine.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 /// The share of each part by looking at every pixel, in floating point.
@@ -105,4 +105,4 @@ TEST(PixelWindow, HoldsAllThatIsSetAndNoMore) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -20,7 +20,7 @@
 #include "stages/formats/images/image.h"
 #include "stages/geometry/bits.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 class G4Test : public ::testing::Test {
@@ -127,7 +127,7 @@ TEST_F(G4Test, ImagesOfEveryWidthFillOrderStripAndPhotometricAreThoseOfLibtiff) 
     save(tags, mixed_image(random, columns, tags.rows));
     const auto expected = by_libtiff(tags);
     ASSERT_TRUE(expected.has_value());
-    const auto image = read::image(path_.string());
+    const auto image = formats::image(path_.string());
     ASSERT_TRUE(image.ok()) << image.error().message;
     ASSERT_TRUE(same(image->runs, *expected)) << columns << " columns";
   }
@@ -135,7 +135,7 @@ TEST_F(G4Test, ImagesOfEveryWidthFillOrderStripAndPhotometricAreThoseOfLibtiff) 
 
 /// The coded bytes of an image without what stands behind its last row.
 std::vector<std::uint8_t> coded_by_encoder(const Runs& runs) {
-  write::g4::Encoder encoder;
+  formats::g4::Encoder encoder;
   Buffer<std::byte> file;
   const std::size_t end = encoder.encode(runs, file, 0);
   std::vector<std::uint8_t> bytes(end);
@@ -215,4 +215,4 @@ TEST_F(G4Test, WhatIsTakenOfBrokenCodeIsWhatLibtiffTakes) {
 }
 
 }  // namespace
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -11,7 +11,7 @@
 #include "stages/support/text/decimal.h"
 #include "tests/segment/gcode_reader.h"
 
-namespace lamina::write::gcode {
+namespace lamina::formats::gcode {
 namespace {
 
 TEST(GcodeNumber, IsTheExactDecimalWithoutTrailingZeros) {
@@ -171,4 +171,4 @@ TEST(Gcode, EveryWidthIsReportedInBothTagsAndTheHeadSaysHow) {
 }
 
 }  // namespace
-}  // namespace lamina::write::gcode
+}  // namespace lamina::formats::gcode

@@ -42,7 +42,7 @@ struct PlantedArc {
 std::complex<double> complex_mm(Point2 p) { return {mm(p.x), mm(p.y)}; }
 
 /// Ends on the circle, middles within 5 um of it, all of the sweep in its direction, and no more chords than that takes.
-void expect_on_circle(const PlantedArc& arc, const read::GcodeLayer& layer) {
+void expect_on_circle(const PlantedArc& arc, const formats::GcodeLayer& layer) {
   const std::complex<double> centre(100, 90);
   ASSERT_GE(layer.beads.size(), 1u);
   EXPECT_LE(std::abs(complex_mm(layer.beads.front().from) - arc.at(arc.start)), 2e-6);
@@ -102,7 +102,7 @@ TEST(GcodeArcs, FilamentAndHeightAreSharedEvenlyAmongChords) {
   const auto layer = file->layer(0);
   ASSERT_TRUE(layer);
   double length = 0;
-  for (const read::GcodeBead& bead : layer->beads) {
+  for (const formats::GcodeBead& bead : layer->beads) {
     EXPECT_EQ(bead.width, 450'000);
     length += std::abs(complex_mm(bead.to) - complex_mm(bead.from));
   }

@@ -20,7 +20,7 @@ TEST(GcodeFeeds, VolumeSpeedAndCornersAreThoseOfTheCommands) {
                                "G2 X30 Y30 I0 J10 E3\nG1 X30 Y30\nG1 X30 Y40 E1\nG1 X30 Y41\nG1 X30 Y42 E1\n");
   ASSERT_TRUE(file.ok());
   EXPECT_EQ(file->machine(), "Some Printer");
-  const Result<read::GcodeLayer> layer = file->layer(0, true);
+  const Result<formats::GcodeLayer> layer = file->layer(0, true);
   ASSERT_TRUE(layer.ok());
   ASSERT_EQ(layer->feeds.size(), layer->beads.size());
   ASSERT_GT(layer->feeds.size(), 9u);

@@ -100,7 +100,7 @@ TEST(GcodeFilament, AProfileThatInflatesWithoutEndIsCutOff) {
   // 40 MB of zeros, deflated by Python: 40 kB; the start of the stream is enough to fill what is kept.
   std::string zeros = "eJzt";
   zeros.append(60'000, 'A');
-  EXPECT_EQ(read::cura_profile_number(zeros, "filament_diameter"), 0);
+  EXPECT_EQ(formats::cura_profile_number(zeros, "filament_diameter"), 0);
 }
 
 TEST(GcodeFilament, ThinBeadsAreReportedAndAGivenDiameterWins) {
@@ -156,12 +156,12 @@ struct BeadsOfType {
   double width() const { return area / length; }
 };
 
-std::map<std::string, BeadsOfType> measured(const read::GcodeFile& file, std::uint32_t first, std::uint32_t last) {
+std::map<std::string, BeadsOfType> measured(const formats::GcodeFile& file, std::uint32_t first, std::uint32_t last) {
   std::map<std::string, BeadsOfType> types;
   for (std::uint32_t k = first; k < last; ++k) {
     const auto layer = file.layer(k);
     if (!layer) return {};
-    for (const read::GcodeBead& bead : layer->beads) {
+    for (const formats::GcodeBead& bead : layer->beads) {
       const double length = std::hypot(mm(std::int64_t{bead.to.x} - bead.from.x), mm(std::int64_t{bead.to.y} - bead.from.y));
       types[file.types()[bead.type]].length += length;
       types[file.types()[bead.type]].area += length * mm(bead.width);
@@ -173,7 +173,7 @@ std::map<std::string, BeadsOfType> measured(const read::GcodeFile& file, std::ui
 TEST(ThirdPartyGcode, CuraFor285mmHasBeadsAsWideAsItsNozzle) {
   const std::string path = test::third_party_gcode("cura14_filament_2.85.gcode");
   if (path.empty()) GTEST_SKIP() << "LAMINA_MODELS is not set: no file of Cura 14 was read";
-  const auto file = read::GcodeFile::open(path);
+  const auto file = formats::GcodeFile::open(path);
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->filament_mm(), 2.85);  // in its CURA_PROFILE_STRING
   EXPECT_TRUE(file->notes().empty());
@@ -182,7 +182,7 @@ TEST(ThirdPartyGcode, CuraFor285mmHasBeadsAsWideAsItsNozzle) {
   for (const auto& [type, beads] : measured(*file, 1, 60)) {
     EXPECT_NEAR(beads.width(), 0.42, 0.03) << type;
   }
-  const auto thin = read::GcodeFile::open(path, {.filament_mm = 1.75});
+  const auto thin = formats::GcodeFile::open(path, {.filament_mm = 1.75});
   ASSERT_EQ(thin->notes().size(), 1u);
   EXPECT_NE(thin->notes()[0].find("check --filament"), std::string::npos);
 }
@@ -203,7 +203,7 @@ std::string arcs_alone(const std::string& text, bool no_widths) {
 TEST(ThirdPartyGcode, ArcsOfPrusaSlicerAreAsLongAsWhatIsFedForThem) {
   const std::string path = test::third_party_gcode("prusaslicer_arcs.gcode");
   if (path.empty()) GTEST_SKIP() << "LAMINA_MODELS is not set: no file of PrusaSlicer was read";
-  const auto whole = read::GcodeFile::open(path);
+  const auto whole = formats::GcodeFile::open(path);
   ASSERT_TRUE(whole) << whole.error().message;
   EXPECT_TRUE(whole->notes().empty());
   EXPECT_TRUE(whole->states_widths());
@@ -211,7 +211,7 @@ TEST(ThirdPartyGcode, ArcsOfPrusaSlicerAreAsLongAsWhatIsFedForThem) {
   const Directory directory;
   const std::string text = test::read_text(path);
   test::write_text(directory.path() / "tagged.gcode", arcs_alone(text, false));
-  const auto tagged = read::GcodeFile::open(directory / "tagged.gcode");
+  const auto tagged = formats::GcodeFile::open(directory / "tagged.gcode");
   const auto fed = gcode_file(directory, arcs_alone(text, true));
   ASSERT_TRUE(tagged && fed);
   EXPECT_FALSE(fed->states_widths());

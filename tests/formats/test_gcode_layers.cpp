@@ -23,9 +23,9 @@ Point2 at(double x_mm, double y_mm) { return {static_cast<Nm>(nm_of(x_mm)), stat
 std::string nut() { return std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl"; }
 
 /// `text` as a file, read.
-Result<read::GcodeFile> file_of(const Directory& directory, const std::string& text) {
+Result<formats::GcodeFile> file_of(const Directory& directory, const std::string& text) {
   test::write_text(directory.path() / "part.gcode", text);
-  return read::GcodeFile::open(directory / "part.gcode");
+  return formats::GcodeFile::open(directory / "part.gcode");
 }
 
 TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
@@ -37,7 +37,7 @@ TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
     ASSERT_EQ(planned.code, 0) << planned.err;
     const auto expected = test::read_gcode(test::read_text(directory.path() / "part.gcode"));
     ASSERT_EQ(expected.error, "");
-    const auto file = read::GcodeFile::open(directory / "part.gcode");
+    const auto file = formats::GcodeFile::open(directory / "part.gcode");
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_TRUE(file->states_widths());
     ASSERT_EQ(file->count(), expected.layers.size());
@@ -53,7 +53,7 @@ TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
       ASSERT_EQ(layer->beads.size(), wanted.size()) << "layer " << k;
       EXPECT_TRUE(wanted.empty() || layer->z == nm_of(expected.layers[k].z));
       for (std::size_t i = 0; i < wanted.size(); ++i) {
-        const read::GcodeBead& bead = layer->beads[i];
+        const formats::GcodeBead& bead = layer->beads[i];
         EXPECT_EQ(bead.from, at(wanted[i].x0, wanted[i].y0));
         EXPECT_EQ(bead.to, at(wanted[i].x1, wanted[i].y1));
         EXPECT_EQ(bead.width, nm_of(wanted[i].width));
@@ -132,7 +132,7 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePosition) {
     EXPECT_NE(file.error().message.find(reported), std::string::npos) << file.error().message;
     EXPECT_EQ(file.error().message.find('\n'), std::string::npos);
   }
-  EXPECT_FALSE(read::GcodeFile::open(directory / "none.gcode"));
+  EXPECT_FALSE(formats::GcodeFile::open(directory / "none.gcode"));
 }
 
 TEST(GcodeLayers, TagsWithoutEndAreRefusedWithTheLine) {
@@ -141,9 +141,9 @@ TEST(GcodeLayers, TagsWithoutEndAreRefusedWithTheLine) {
   for (int i = 0; i < 6; ++i) text += ";LAYER:0\nG1 X" + std::to_string(i + 1) + " E1\n";
   test::write_text(directory.path() / "part.gcode", text + "M107\n");
   for (const std::uint32_t maximum : {5u, 6u}) {
-    read::GcodeOptions options;
+    formats::GcodeOptions options;
     options.max_layers = maximum;
-    const auto file = read::GcodeFile::open(directory / "part.gcode", options);
+    const auto file = formats::GcodeFile::open(directory / "part.gcode", options);
     EXPECT_EQ(file.ok(), maximum == 6u);
     if (file) continue;
     EXPECT_NE(file.error().message.find("line 12: more than 5 layers"), std::string::npos) << file.error().message;

@@ -62,7 +62,7 @@ TEST(GcodeSpirals, EachTurnIsALayerOfItsWidth) {
       ASSERT_TRUE(layer);
       EXPECT_NEAR(static_cast<double>(layer->beads.size()), it.steps, 0.04 * it.steps);
       EXPECT_NEAR(mm(layer->z), 0.2 + it.pitch * k, 0.3 * it.pitch);
-      for (const read::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.025) << k;
+      for (const formats::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.025) << k;
     }
     // Nothing is lost: all beads are in some layer.
     std::size_t beads = 0;
@@ -93,7 +93,7 @@ TEST(GcodeSpirals, AGivenHeightCutsThem) {
     EXPECT_TRUE(file->notes().empty());
     const auto layer = file->layer(3);
     ASSERT_TRUE(layer);
-    for (const read::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.02) << "turns are 0.2 mm high";
+    for (const formats::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.02) << "turns are 0.2 mm high";
   }
   // Of a file with tags as well, without what start code lays.
   const auto tagged = gcode_file(directory, "M83\nG1 Z5\nG1 X9 E1\n;LAYER:0\n" + text, {.layer_height_mm = 2});
@@ -114,7 +114,7 @@ TEST(GcodeSpirals, FlatLayersWithinAGivenHeightKeepTheirOwn) {
   for (std::uint32_t k = 0; k < 4; ++k) {
     const auto layer = file->layer(k);
     ASSERT_TRUE(layer && layer->beads.size() == 5);
-    for (const read::GcodeBead& bead : layer->beads) EXPECT_EQ(bead.width, 400'000);
+    for (const formats::GcodeBead& bead : layer->beads) EXPECT_EQ(bead.width, 400'000);
   }
 }
 
@@ -176,7 +176,7 @@ TEST(GcodeSpirals, TaggedTurnsHaveTheirWidthsFromTheirStart) {
   for (std::uint32_t k = 0; k < 8; ++k) {
     const auto layer = file->layer(k);
     ASSERT_TRUE(layer && layer->beads.size() == 60);
-    for (const read::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.02);
+    for (const formats::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.02);
   }
 }
 

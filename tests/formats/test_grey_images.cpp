@@ -21,7 +21,7 @@
 #include "stages/geometry/combine.h"
 #include "tests/commands/program.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 using Pixels = std::vector<std::vector<unsigned>>;
@@ -351,4 +351,4 @@ TEST(StackInfo, ReportsWhatAFolderHolds) {
 }
 
 }  // namespace
-}  // namespace lamina::read
+}  // namespace lamina::formats

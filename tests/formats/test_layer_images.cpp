@@ -16,7 +16,7 @@
 #include "stages/formats/images/placed.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 namespace fs = std::filesystem;
@@ -40,16 +40,16 @@ class LayerImagesTest : public ::testing::Test {
     return runs;
   }
   void save(const std::string& name, const Runs& runs, std::string_view format) {
-    write::Bytes bytes;
-    ASSERT_TRUE(write::find_image_format(format)->make_encoder()->encode(runs, 600, 300, bytes));
-    ASSERT_TRUE(write::write_file((folder_ / name).string(), bytes));
+    formats::Bytes bytes;
+    ASSERT_TRUE(formats::find_image_format(format)->make_encoder()->encode(runs, 600, 300, bytes));
+    ASSERT_TRUE(write_file((folder_ / name).string(), bytes));
   }
 
   fs::path folder_;
 };
 
 TEST_F(LayerImagesTest, ReadsEveryFormatThatIsWritten) {
-  for (const auto& format : write::image_formats()) {
+  for (const auto& format : formats::image_formats()) {
     if (format.extension.empty()) continue;
     fs::remove_all(folder_);
     fs::create_directories(folder_);
@@ -104,7 +104,7 @@ TEST_F(LayerImagesTest, ReducedPagesAreNoLayers) {
   save("a1.tif", square(20, 5), "tiff-g4");
   const std::string path = (folder_ / "pages.tif").string();
   fs::rename(folder_ / "a1.tif", path);
-  EXPECT_EQ(read::pages_of(path)->size(), 1u);
+  EXPECT_EQ(formats::pages_of(path)->size(), 1u);
   TIFF* tiff = TIFFOpen(path.c_str(), "a");
   ASSERT_NE(tiff, nullptr);
   TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, FILETYPE_REDUCEDIMAGE);
@@ -115,7 +115,7 @@ TEST_F(LayerImagesTest, ReducedPagesAreNoLayers) {
   unsigned char row = 0xff;
   TIFFWriteScanline(tiff, &row, 0, 0);
   TIFFClose(tiff);
-  const auto pages = read::pages_of(path);
+  const auto pages = formats::pages_of(path);
   ASSERT_TRUE(pages.ok()) << pages.error().message;
   EXPECT_EQ(pages->size(), 1u);
 }
@@ -162,4 +162,4 @@ TEST(PlacedImage, TakesThePixelThatTheCentreLiesIn) {
 }
 
 }  // namespace
-}  // namespace lamina::read
+}  // namespace lamina::formats

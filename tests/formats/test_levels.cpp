@@ -13,7 +13,7 @@
 #include "stages/formats/images/image.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 constexpr std::uint8_t kFullLevels[] = {1, 3, 15};
@@ -54,7 +54,7 @@ TEST_P(LevelFiles, GiveTheLevelsBack) {
       EXPECT_LE(file.size(), format().max_bytes(columns, 40, image.change.size()));
       testing::save(path(), file);
       Levels back;
-      const auto read = read::levels(path(), full, back);
+      const auto read = formats::levels(path(), full, back);
       ASSERT_TRUE(read.ok()) << read.error().message;
       EXPECT_NEAR(read->dpi_x, 600, 0.01);
       EXPECT_NEAR(read->dpi_y, 300, 0.01);
@@ -68,14 +68,14 @@ TEST_P(LevelFiles, GiveTheLevelsBack) {
 
 // What lamina's own reader of images of others makes of them by the threshold of 128: voxels half full or more.
 TEST_P(LevelFiles, AreHalvesToAReaderThatTakesTheDarkPixels) {
-  if (format().id == "tiff-4") return;  // read::dark_pixels takes 1, 8 and 16 bits
+  if (format().id == "tiff-4") return;  // formats::dark_pixels takes 1, 8 and 16 bits
   const auto encoder = format().make_encoder();
   Bytes file;
   for (const std::uint8_t full : kFullLevels) {
     const Levels image = random_levels(full, 90, 20, full, 4);
     ASSERT_TRUE(encoder->encode(image, full, 600, 600, file).ok());
     testing::save(path(), file);
-    const auto read = read::dark_pixels(path(), 128);
+    const auto read = formats::dark_pixels(path(), 128);
     ASSERT_TRUE(read.ok()) << read.error().message;
     Runs half;
     lower_bound(image, static_cast<std::uint8_t>((full + 1) / 2), half);
@@ -92,19 +92,19 @@ TEST_P(LevelFiles, RefuseOtherLevelsAndImagesOfOneBit) {
   ASSERT_TRUE(encoder->encode(image, 15, 600, 600, file).ok());
   testing::save(path(), file);
   Levels back;
-  const auto read = read::levels(path(), 3, back);
+  const auto read = formats::levels(path(), 3, back);
   ASSERT_FALSE(read.ok());
   EXPECT_NE(read.error().message.find("a value is no level"), std::string::npos) << read.error().message;
-  EXPECT_FALSE(read::image(path()).ok());
+  EXPECT_FALSE(formats::image(path()).ok());
   for (std::size_t cut : {file.size() / 2, file.size() - 3}) {
     Bytes part = file;
     part.resize(cut);
     testing::save(path(), part);
-    EXPECT_FALSE(read::levels(path(), 15, back).ok());
+    EXPECT_FALSE(formats::levels(path(), 15, back).ok());
   }
   testing::save(path(), testing::encoded(*find_image_format(format().extension == ".png" ? "png" : "tiff-none"),
                                          testing::image_of(9, {{1, 5}, {}})));
-  EXPECT_FALSE(read::levels(path(), 15, back).ok());
+  EXPECT_FALSE(formats::levels(path(), 15, back).ok());
 }
 
 // As in test_metadata.cpp: LAMINA_WRITE_GOLDEN writes them again.
@@ -129,4 +129,4 @@ TEST_P(LevelFiles, AreTheBytesThatTheyAlwaysWere) {
 INSTANTIATE_TEST_SUITE_P(All, LevelFiles, ::testing::Values("tiff-4", "tiff-8", "png-8"));
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

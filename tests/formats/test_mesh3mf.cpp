@@ -15,7 +15,7 @@ namespace lamina::test {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace lamina::write;
+using namespace lamina::formats;
 
 class Mesh3mf : public ::testing::Test {
  protected:

@@ -10,7 +10,7 @@
 #include "stages/formats/png/coloured.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 /// 20 x 4 pixels, every polarity and bit order visible: a run from column 0, one to the last column, one across bytes,
@@ -185,7 +185,7 @@ TEST(Pbm, OtherWritersHeadersAreRead) {
   for (const std::string& head : {std::string("P4 8 1\n"), std::string("P4#x\n#y\r\n 8 #z\n\t1 "), std::string("P4\n8\n1\n")}) {
     const std::string text = head + "\x3C";
     testing::save(path, std::as_bytes(std::span(text)));
-    const auto image = read::image(path);
+    const auto image = formats::image(path);
     ASSERT_TRUE(image.ok()) << head << ": " << image.error().message;
     EXPECT_EQ(image->dpi_x, 0);
     ASSERT_EQ(image->runs.change.size(), 2u);
@@ -255,4 +255,4 @@ TEST(Golden, TheG4CodeWordsAreThoseFoundByHand) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -9,7 +9,7 @@
 #include "stages/geometry/bits.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 using testing::Row;
@@ -163,4 +163,4 @@ TEST(PngData, NoiseGrowsLittleBeyondItsBits) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

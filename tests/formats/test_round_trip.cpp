@@ -10,12 +10,12 @@
 #include "stages/geometry/bits.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 using testing::Row;
 
-::testing::AssertionResult same(const read::Image& image, const Runs& runs) {
+::testing::AssertionResult same(const formats::Image& image, const Runs& runs) {
   if (image.runs.columns != runs.columns) return ::testing::AssertionFailure() << image.runs.columns << " columns";
   if (image.runs.row_offset.size() != runs.row_offset.size()) {
     return ::testing::AssertionFailure() << image.runs.row_offset.size() << " offsets";
@@ -36,7 +36,7 @@ void expect_round_trip(const testing::Folder& folder, const Runs& runs, const st
     const Bytes file = testing::encoded(*format, runs);
     ASSERT_FALSE(file.empty());
     testing::save(path, file);
-    const auto image = read::image(path);
+    const auto image = formats::image(path);
     ASSERT_TRUE(image.ok()) << image.error().message;
     ASSERT_TRUE(same(*image, runs));
     EXPECT_NEAR(image->dpi_x, 1200, 0.02);  // PNG has whole pixels a metre
@@ -141,7 +141,7 @@ TEST(G4, ARunOfEveryLengthInBothColoursComesBack) {
   const Runs runs = testing::image_of(columns, rows);
   const std::string path = folder / "runs.tif";
   testing::save(path, testing::encoded(*find_image_format("tiff-g4"), runs));
-  const auto image = read::image(path);
+  const auto image = formats::image(path);
   ASSERT_TRUE(image.ok()) << image.error().message;
   EXPECT_TRUE(same(*image, runs));
 }
@@ -167,7 +167,7 @@ TEST(G4, EveryPairOfNeighbouringRowsOfNinePixelsComesBack) {
   const Runs runs = testing::image_of(kColumns, rows);
   const std::string path = folder / "pairs.tif";
   testing::save(path, testing::encoded(*find_image_format("tiff-g4"), runs));
-  const auto image = read::image(path);
+  const auto image = formats::image(path);
   ASSERT_TRUE(image.ok()) << image.error().message;
   EXPECT_TRUE(same(*image, runs));
 }
@@ -279,4 +279,4 @@ TEST(G4, ManyEmptyRowsAreOneBitEach) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -25,12 +25,12 @@ Runs random_runs(std::uint32_t columns, std::uint32_t rows, double density, unsi
 }
 
 TEST(ImageFormats, NoFileIsLargerThanItsBound) {
-  for (const write::ImageFormat& format : write::image_formats()) {
+  for (const formats::ImageFormat& format : formats::image_formats()) {
     const auto encoder = format.make_encoder();
     for (const std::uint32_t columns : {1u, 63u, 700u, 20'000u}) {
       for (const double density : {0.0, 0.001, 0.05, 0.5, 1.0}) {
         const Runs runs = random_runs(columns, 300, density, columns);
-        write::Bytes file;
+        formats::Bytes file;
         ASSERT_TRUE(encoder->encode(runs, 600, 600, file).ok());
         const std::uint64_t maximum = format.max_bytes(columns, 300, runs.change.size());
         EXPECT_LE(file.size(), maximum) << format.id << ", " << columns << " columns, density " << density;

@@ -26,7 +26,7 @@ namespace lamina::test {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace lamina::write;
+using namespace lamina::formats;
 
 constexpr Nm kMm = 1'000'000;
 

@@ -15,7 +15,7 @@
 namespace lamina::test {
 namespace {
 
-using namespace lamina::write;
+using namespace lamina::formats;
 
 constexpr Nm kMillimetre = 1'000'000;
 

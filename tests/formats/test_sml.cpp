@@ -2,7 +2,7 @@
 
 #include "stages/formats/extrusion_format.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 TEST(Sml, PdLinesFollowTheThicknessOfTheLayerAndTheUseOfThePath) {
@@ -33,4 +33,4 @@ TEST(Sml, PdLinesFollowTheThicknessOfTheLayerAndTheUseOfThePath) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -6,7 +6,7 @@
 #include "stages/formats/image_format.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 /// Rows of changes that far apart in the middle.
@@ -39,4 +39,4 @@ TEST(TiffEnding, FilesOfOneEncoderAreThoseOfNewOnes) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

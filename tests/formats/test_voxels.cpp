@@ -15,7 +15,7 @@
 #include "tests/commands/program.h"
 #include "tests/pores/boxes.h"
 
-namespace lamina::write::voxels {
+namespace lamina::formats::voxels {
 namespace {
 
 using pores::testing::stack_of;
@@ -154,4 +154,4 @@ TEST(VoxelSurface, OfNothingIsAnErrorAndNoFile) {
 }
 
 }  // namespace
-}  // namespace lamina::write::voxels
+}  // namespace lamina::formats::voxels

@@ -9,18 +9,18 @@ namespace {
 bool read_gcode(std::string_view text) {
   static MemoryFile memory("part.gcode");
   Dice dice(text);
-  read::GcodeOptions options;
+  formats::GcodeOptions options;
   options.max_beads = 200'000;
   if (dice.below(2) == 0) options.filament_mm = 2.85;
   if (dice.below(3) == 0) options.layer_height_mm = 0.25;
-  const auto file = read::GcodeFile::open(memory.hold(text), options);
+  const auto file = formats::GcodeFile::open(memory.hold(text), options);
   if (!file) return check_error(file.error()), false;
   law(file->count() > 0 && !file->box().empty(), "no layer");
   for (std::uint32_t i = 0; i < std::min(file->count(), 6u); ++i) {
     const auto layer = file->layer(i);
     law(layer.ok(), layer.ok() ? "" : layer.error().message.c_str());
     law(layer->beads.size() <= options.max_beads, "more beads than allowed");
-    for (const read::GcodeBead& bead : layer->beads) {
+    for (const formats::GcodeBead& bead : layer->beads) {
       law(bead.type < file->types().size(), "a bead of no type");
       law(bead.width > 0, "a bead without width");
       for (const Point2 end : {bead.from, bead.to}) {

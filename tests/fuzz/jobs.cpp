@@ -44,7 +44,7 @@ bool set_keys(std::string_view lines) {
     at = end + 1;
   }
   if (!any || Dice(lines).below(8) != 0) return all;  // a hundred times as long as setting a key
-  const auto position = [](std::string& path) {          // a job file means paths from its folder
+  const auto position = [](std::string& path) {       // a job file means paths from its folder
     if (!path.empty()) path = "/parts/" + path;
   };
   for (pipeline::PartRequest& part : job.parts) position(part.path);

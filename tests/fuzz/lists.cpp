@@ -9,10 +9,10 @@ namespace {
 
 bool read_list(std::string_view text) {
   static MemoryFile file("jobs.txt");
-  const auto entries = read::read_batch({file.hold(text)}, {"jet"}, load::is_part_name);
+  const auto entries = pipeline::read_batch({file.hold(text)}, {"jet"}, load::is_part_name);
   if (!entries) return check_error(entries.error()), false;
   law(!entries->empty(), "a batch without jobs");
-  for (const read::BatchEntry& entry : *entries) {
+  for (const pipeline::BatchEntry& entry : *entries) {
     law(!entry.words.empty(), "a job without a command");
     law(entry.source.find(":") != std::string::npos, "a job of no line");
     // Quoted again, the words are the same.

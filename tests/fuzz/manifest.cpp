@@ -82,7 +82,7 @@ std::vector<std::string> seeds_of(bool ended) {
     if (kind >= 3) {
       head.machine = "nuferbj";
       head.dialect = "nuferbj";
-      head.program_extension = write::find_dialect("nuferbj")->extension;
+      head.program_extension = program::find_dialect("nuferbj")->extension;
     }
     if (kind == 4) {
       head.materials.resize(2);

@@ -50,7 +50,7 @@ constexpr int kBlock[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1
 std::string corner(int i) { return std::string(i & 1 ? "10" : "0") + (i & 2 ? " 20" : " 0") + (i & 4 ? " 5.5" : " 0"); }
 
 std::vector<std::string> binary_seeds() {
-  const std::string block = write::stl::block({10, 20, 5}), other = write::stl::block({3, 3, 30});
+  const std::string block = formats::stl::block({10, 20, 5}), other = formats::stl::block({3, 3, 30});
   std::string open = block.substr(0, 84 + 50 * 11), two = block + other.substr(84);
   open[80] = 11;
   two[80] = 24;

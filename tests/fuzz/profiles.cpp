@@ -9,10 +9,10 @@ namespace {
 bool read_machine(std::string_view text) {
   const Result<Machine> machine = pipeline::read_machine(text, "printer.toml");
   if (!machine) return check_error(machine.error()), false;
-  const std::string written = read::machine_text(*machine);
+  const std::string written = pipeline::machine_text(*machine);
   const Result<Machine> again = pipeline::read_machine(written, "again.toml");
   law(again.ok(), again.ok() ? "" : again.error().message.c_str());
-  law(read::machine_text(*again) == written, "a machine that was written reads back as another one");
+  law(pipeline::machine_text(*again) == written, "a machine that was written reads back as another one");
   if (const auto resolved = pipeline::resolve_profile(*machine); !resolved) check_error(resolved.error());
   return true;
 }
@@ -20,39 +20,39 @@ bool read_machine(std::string_view text) {
 bool read_extruder(std::string_view text) {
   const Result<ExtruderProfile> profile = pipeline::read_extruder(text, "printer.toml");
   if (!profile) return check_error(profile.error()), false;
-  const std::string written = read::extruder_text(*profile);
+  const std::string written = pipeline::extruder_text(*profile);
   const Result<ExtruderProfile> again = pipeline::read_extruder(written, "again.toml");
   law(again.ok(), again.ok() ? "" : again.error().message.c_str());
-  law(read::extruder_text(*again) == written, "an extruder that was written reads back as another one");
+  law(pipeline::extruder_text(*again) == written, "an extruder that was written reads back as another one");
   return true;
 }
 
 bool read_changes(std::string_view text) {
-  read::ProfileChanges changes;
-  const std::string wrong = read::read_changes(text, changes);
+  pipeline::ProfileChanges changes;
+  const std::string wrong = pipeline::read_changes(text, changes);
   if (!wrong.empty()) return check_line(wrong), false;
-  const std::string written = read::changes_text(changes);
+  const std::string written = pipeline::changes_text(changes);
   const auto tree = read_toml("set = " + (written.empty() ? "{}" : written), "set");
   law(tree.ok(), tree.ok() ? "" : tree.error().message.c_str());
   TextPosition at;
-  read::ProfileChanges again;
-  const std::string what = read::read_changes(*tree->find("set"), again, at);
+  pipeline::ProfileChanges again;
+  const std::string what = pipeline::read_changes(*tree->find("set"), again, at);
   law(what.empty(), what.c_str());
-  law(read::changes_text(again) == written, "changes that were written read back as others");
+  law(pipeline::changes_text(again) == written, "changes that were written read back as others");
   return true;
 }
 
 std::vector<std::string> machine_seeds() {
   std::vector<std::string> seeds;
   for (const auto& shipped : pipeline::shipped_machines()) seeds.emplace_back(shipped.text);
-  seeds.push_back(read::machine_text(*pipeline::read_machine(seeds.front(), "first")));
+  seeds.push_back(pipeline::machine_text(*pipeline::read_machine(seeds.front(), "first")));
   return seeds;
 }
 
 std::vector<std::string> extruder_seeds() {
   std::vector<std::string> seeds;
   for (const auto& shipped : pipeline::shipped_extruders()) seeds.emplace_back(shipped.text);
-  seeds.push_back(read::extruder_text(*pipeline::read_extruder(seeds.front(), "first")));
+  seeds.push_back(pipeline::extruder_text(*pipeline::read_extruder(seeds.front(), "first")));
   return seeds;
 }
 

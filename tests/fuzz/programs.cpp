@@ -27,7 +27,7 @@ Bench make_bench(std::string_view dialect) {
     // A bed of so many of its own pixels.
     const PixelGrid grid = pipeline::resolve_profile(machine)->grid.image;
     machine.bed.size_mm = {60 / grid.x.pixels_per_nm() / 1e6, 50 / grid.y.pixels_per_nm() / 1e6};
-    if (!write::find_dialect(dialect)->has_motion) {  // records of care are bytes too
+    if (!program::find_dialect(dialect)->has_motion) {  // records of care are bytes too
       machine.maintenance.spit_layers = machine.maintenance.wipe_layers = 7;
       machine.maintenance.spit_mm = {{-200, -200}};
       machine.maintenance.wipe_mm = {{-200, -300, -200, -250}};
@@ -72,13 +72,13 @@ bool replay_program(std::string_view dialect, std::string_view text) {
 
 std::vector<std::string> program_seeds(std::string_view dialect) {
   const Bench& bench = bench_of(dialect);
-  const auto writer = write::find_dialect(dialect)->make_writer(bench.resolved.machine, bench.resolved.grid);
+  const auto writer = program::find_dialect(dialect)->make_writer(bench.resolved.machine, bench.resolved.grid);
   LayerCycle cycle;
   cycle.layer = kLayer.index;
   cycle.layers = 9;
   cycle.bottom_nm = kLayer.bottom;
   cycle.thickness_nm = kLayer.thickness;
-  write::ProgramBytes bytes;
+  program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   writer->maintenance_of_layer(cycle, bytes);
   program::CompileScratch scratch;

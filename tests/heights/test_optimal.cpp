@@ -322,8 +322,7 @@ TEST(OptimalHeights, OfAllTablesOfTheFewestLayersTheOneFoundHasTheMinimalMeanSte
     ASSERT_TRUE(plan.ok());
     ASSERT_EQ(verdict_of(index, *plan, options, hit), all.best()) << "round " << round;
     choices += all.best().largest_miss == 0 && options.set.size() > 1;
-    EXPECT_NEAR(evaluate(index, boundaries_of(plan->table), options).mean_cusp, all.min_mean_cusp(),
-                1e-6 * all.min_mean_cusp())
+    EXPECT_NEAR(evaluate(index, boundaries_of(plan->table), options).mean_cusp, all.min_mean_cusp(), 1e-6 * all.min_mean_cusp())
         << "round " << round;
   }
   EXPECT_GT(choices, 40);

@@ -79,7 +79,8 @@ TEST(HeightSurface, PlanesCutWhatBeginsBelowThemAndReachesThem) {
   const Buffer<Steepness> at = steepest_at_candidates(index, index.parts, *candidate_heights);
   const double low = 0.5 / std::hypot(0.5, 1.0), high = 2.5 / std::hypot(2.5, 1.0);
   const double expected[] = {0, low, low, 0, 0, high, high};
-  for (std::size_t candidate = 0; candidate < 7; ++candidate) EXPECT_NEAR(at[candidate], expected[candidate] * kHorizontal, 1.5) << candidate;
+  for (std::size_t candidate = 0; candidate < 7; ++candidate)
+    EXPECT_NEAR(at[candidate], expected[candidate] * kHorizontal, 1.5) << candidate;
 }
 
 TEST(HeightSurface, AnglesComeFromTheCornersAndDownwardFacesCountAsUpwardOnes) {
@@ -154,13 +155,13 @@ TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
   options.set = set_of({0.178, 0.254});
   options.facets = Facets::kPlane;
   const Result<Plan> plan = plan_heights(test::index_of_file(test::reference("case1_plane.stl")), options);
-  std::vector<write::rp3::LayerSetting> layers;
+  std::vector<formats::rp3::LayerSetting> layers;
   for (std::uint32_t i = 0; i < plan->table.size(); ++i) {
     layers.push_back({mm(plan->table[i].thickness), angle_of(plan->inspected[i])});
   }
-  write::rp3::Settings settings;
+  formats::rp3::Settings settings;
   settings.shrink = {1.007, 1.007, 1};
-  const std::string text = write::rp3::text_of(layers, settings);
+  const std::string text = formats::rp3::text_of(layers, settings);
   // The printed file: its head, its summary, its rows; but for -0.00, which the document prints for walls.
   std::ifstream rows(test::reference("appendix_b.rp3.tsv")), head(test::reference("appendix_b.header.txt"));
   std::string expected, line;
@@ -214,7 +215,8 @@ TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetRequests) {
   for_each_slope(index, index.parts[0], 0, 1, [&](Nm lo, Nm hi, Steepness steepness, double projected) {
     for (std::uint32_t i = 0; i < candidate_heights->candidates(); ++i) {
       const std::int64_t bottom = (*candidate_heights)[i];
-      if (i < candidate_heights->cells() && lo < (*candidate_heights)[i + 1] && hi > bottom) cells[i] = std::max(cells[i], steepness);
+      if (i < candidate_heights->cells() && lo < (*candidate_heights)[i + 1] && hi > bottom)
+        cells[i] = std::max(cells[i], steepness);
       if (lo < bottom && hi >= bottom) candidates[i] = std::max(candidates[i], steepness);
       const double share = std::clamp((static_cast<double>(bottom) - lo) / (static_cast<double>(hi) - lo), 0.0, 1.0);
       below[i] += std::abs(projected) * share;
@@ -223,7 +225,8 @@ TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetRequests) {
   EXPECT_EQ(steepest_in_cells(index, index.parts, *candidate_heights), cells);
   EXPECT_EQ(steepest_at_candidates(index, index.parts, *candidate_heights), candidates);
   const Buffer<double> found = projected_below(index, index.parts, *candidate_heights, Sign::kBoth);
-  for (std::uint32_t i = 0; i < candidate_heights->candidates(); ++i) EXPECT_NEAR(found[i], below[i], 1e-9 * (1 + below[i])) << i;
+  for (std::uint32_t i = 0; i < candidate_heights->candidates(); ++i)
+    EXPECT_NEAR(found[i], below[i], 1e-9 * (1 + below[i])) << i;
 }
 
 }  // namespace

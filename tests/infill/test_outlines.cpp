@@ -111,7 +111,8 @@ TEST(MergeShortEdges, ContoursThatWouldTouchKeepTheirPoints) {
     return Point2{static_cast<Nm>(std::lround(radius * std::cos(turn + by))),
                   static_cast<Nm>(std::lround(radius * std::sin(turn + by)))};
   };
-  for (const Point2 p : {position(at + 100, 0), position(at + 900'000, 0.2), position(at + 900'000, -0.2)}) close.point.push_back(p);
+  for (const Point2 p : {position(at + 100, 0), position(at + 900'000, 0.2), position(at + 900'000, -0.2)})
+    close.point.push_back(p);
   if (doubled_area(std::span(close.point).subspan(40)) < 0) std::swap(close.point[41], close.point[42]);
   close.close();
   Contours merged = close;

@@ -71,8 +71,8 @@ void add_counts(std::vector<BrokenFile>& files) {
   files.push_back({"count all ones.stl", binary_stl(nut, "", 0xffffffff), nut, Ends::kSolid});
   files.push_back({"count of the first of two bodies.stl", binary_stl(joined(box, moved(nut, 40, 0, 0)), "", 12),
                    joined(box, moved(nut, 40, 0, 0)), Ends::kSolid});
-  files.push_back(
-      {"count half, a facet missing.stl", binary_stl(Facets(nut.begin() + 1, nut.end()), "", count / 2), nut, Ends::kReportedOr});
+  files.push_back({"count half, a facet missing.stl", binary_stl(Facets(nut.begin() + 1, nut.end()), "", count / 2), nut,
+                   Ends::kReportedOr});
   files.push_back({"count half, jitter 4 um.stl", binary_stl(jittered(nut, random, 4), "", count / 2), nut, Ends::kSolid});
   files.push_back({"zeros behind.stl", plain + std::string(50000, '\0'), nut, Ends::kSolid});
   files.push_back({"rubbish behind.stl", plain + std::string(5000, '\x41'), nut, Ends::kSolid});

@@ -149,7 +149,8 @@ TEST(Read3mfRoles, InsideOutWithinAnotherObjectIsAVoid) {
   const auto assembled = [&](const std::string& position, const std::string& mirror = "") {
     return loaded(roles_file(model(outer + inner + components(3, component(1) + component(2, position)), item(3, mirror))));
   };
-  const std::string within = "1 0 0 0 1 0 0 0 1 3 3 3", neighbour = "1 0 0 0 1 0 0 0 1 20 3 3", across = "1 0 0 0 1 0 0 0 1 8 3 3";
+  const std::string within = "1 0 0 0 1 0 0 0 1 3 3 3", neighbour = "1 0 0 0 1 0 0 0 1 20 3 3",
+                    across = "1 0 0 0 1 0 0 0 1 8 3 3";
   const Part part = assembled(within);
   EXPECT_EQ(cubic_mm(part), 1000 - 64);
   EXPECT_CONTAINS(notes_of(part), "object 2 \"pore\" is inside out within another object of its build item: it is a void");

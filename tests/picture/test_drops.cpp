@@ -170,14 +170,18 @@ TEST_F(DropPictures, ASwathShowsThoseRequestedAndThoseThatFell) {
       const Rgb& pixel = picture.at(24 + c, 58 + r);
       if (requested == 0 || std::ranges::find(kNozzles, pixel) != std::end(kNozzles)) continue;
       int fallen = requested;
-      const auto is = [&](const Rgb& ground) { return alike(pixel, over(over(ground, kRequested, requested), kFallen, fallen)); };
+      const auto is = [&](const Rgb& ground) {
+        return alike(pixel, over(over(ground, kRequested, requested), kFallen, fallen));
+      };
       while (fallen >= 0 && std::ranges::none_of(kGrounds, is)) --fallen;
-      ASSERT_GE(fallen, 0) << c << ", " << r << ": " << requested << " drops, " << pixel[0] << ' ' << pixel[1] << ' ' << pixel[2];
+      ASSERT_GE(fallen, 0) << c << ", " << r << ": " << requested << " drops, " << pixel[0] << ' ' << pixel[1] << ' '
+                           << pixel[2];
       ++detected[static_cast<std::size_t>(requested)][static_cast<std::size_t>(fallen)];
     }
   }
   for (const auto& [requested, fallen] : {std::pair{1, 0}, {1, 1}, {kMax, 0}, {kMax, kMax}})
-    EXPECT_GT(detected[static_cast<std::size_t>(requested)][static_cast<std::size_t>(fallen)], 20) << requested << " " << fallen;
+    EXPECT_GT(detected[static_cast<std::size_t>(requested)][static_cast<std::size_t>(fallen)], 20)
+        << requested << " " << fallen;
   EXPECT_TRUE(std::ranges::find(picture.pixel, kGrounds[2]) != picture.pixel.end()) << "where the head passes now";
 }
 

@@ -10,7 +10,7 @@
 #include "stages/formats/image_format.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 /// One grey byte a pixel, black 0; the file's resolution in dpi goes to `dpi`.
@@ -101,4 +101,4 @@ TEST(OpenImageIO, SeesLevelsAsGreyInEveryFormatThatCarriesThem) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

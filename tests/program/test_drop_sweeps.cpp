@@ -178,10 +178,10 @@ TEST(DropSweeps, BothDirectionsToTheVectorsAgree) {
 }
 
 TEST(DropSweeps, AreRefusedOfADialectOfOneDrop) {
-  for (const write::Dialect& dialect : write::dialects()) {
+  for (const program::Dialect& dialect : program::dialects()) {
     Machine machine = head_of(3, 5000);
     const HeadGrid grid = grid_of_head(machine);
-    const Status status = write::check_dialect(dialect, machine, grid);
+    const Status status = program::check_dialect(dialect, machine, grid);
     const bool says = dialect.id == "planes" || dialect.id == "raw";
     EXPECT_EQ(status.ok(), says) << dialect.id;
     if (says) continue;

@@ -25,13 +25,13 @@ struct Program {
 };
 
 inline Program program_of(const pipeline::ResolvedMachine& resolved, const RunsView& image) {
-  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
   LayerCycle cycle;
   cycle.layer = kLayer.index;
   cycle.layers = 9;
   cycle.bottom_nm = kLayer.bottom;
   cycle.thickness_nm = kLayer.thickness;
-  write::ProgramBytes bytes;
+  program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   writer->maintenance_of_layer(cycle, bytes);
   program::CompileScratch scratch;

@@ -28,13 +28,13 @@ Levels random_drops(const PixelGrid& grid, std::uint32_t seed) {
 
 printed_parts::Program program_of_drops(const pipeline::ResolvedMachine& resolved, std::span<const RunsView> planes,
                                         std::vector<std::uint32_t>& numbers) {
-  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
   LayerCycle cycle;
   cycle.layer = printed_parts::kLayer.index;
   cycle.layers = 9;
   cycle.bottom_nm = printed_parts::kLayer.bottom;
   cycle.thickness_nm = printed_parts::kLayer.thickness;
-  write::ProgramBytes bytes;
+  program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   program::CompileScratch scratch;
   const auto count =
@@ -213,9 +213,9 @@ TEST(GreyPrograms, OfPlanesAreSpeltByHand) {
   const std::vector<std::uint32_t> rows{3, 1, 1, 4, 1u << 31, 1u << 29, (1u << 31) | (1u << 29), 0};
   for (std::size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(word_at(text, grey + 4 * (6 + i)), rows[i]) << i;
   EXPECT_EQ(word_at(text, grey + 4 * 14), 0x4C03u);
-  write::ProgramBytes start;
+  program::ProgramBytes start;
   const auto resolved = six_drops("planes");
-  write::find_dialect("planes")->make_writer(resolved.machine, resolved.grid)->start(9, start);
+  program::find_dialect("planes")->make_writer(resolved.machine, resolved.grid)->start(9, start);
   const std::string begin(reinterpret_cast<const char*>(start.data()), start.size());
   EXPECT_EQ(begin.size(), 4u * 10);
   for (const auto& [word, value] : {std::pair{0u, 0x4C04u}, {1u, 8u}, {2u, 2u}, {3u, 9u}, {9u, 4u}})

@@ -21,8 +21,8 @@ struct Framed {
       : resolved(printed_parts::shipped(name, change)),
         machine(*replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows(),
                                                kFramedLayers)) {
-    const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
-    write::ProgramBytes bytes;
+    const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+    program::ProgramBytes bytes;
     writer->start(kFramedLayers, bytes);
     start.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     bytes.clear();

@@ -283,8 +283,8 @@ TEST(Maintenance, TheBaseIsSpreadLayerByLayerBelowTheFirst) {
       m.powder.base_layer_mm = 0.2;
     });
     const Machine& m = bench.resolved.machine;
-    write::ProgramBytes bytes;
-    const auto writer = write::find_dialect(m.dialect)->make_writer(m, bench.resolved.grid);
+    program::ProgramBytes bytes;
+    const auto writer = program::find_dialect(m.dialect)->make_writer(m, bench.resolved.grid);
     LayerCycle cycle;
     cycle.layers = 9;
     cycle.thickness_nm = first.thickness;
@@ -348,7 +348,8 @@ TEST(Maintenance, ProfilesThatCannotBeKeptAreRefused) {
          m.maintenance.spit_seconds = 0.5, m.maintenance.spit_mm = {{-45, 0}};
        }},
       {"nuferbj", "powder.refill: pauses need powder.vat_depth_mm", [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
-      {"nuferbj", "maintenance.wipe_lines: M816 is a command of programs", [](Machine& m) { m.maintenance.wipe_lines = {"M816 N4"}; }},
+      {"nuferbj", "maintenance.wipe_lines: M816 is a command of programs",
+       [](Machine& m) { m.maintenance.wipe_lines = {"M816 N4"}; }},
       {"nuferbj", "powder.dry_off_lines: there is no pause", [](Machine& m) { m.powder.dry_off_lines = {"M107"}; }},
       {"nuferbj", "powder.dry_off_lines: M812 is a command of programs",
        [](Machine& m) {
@@ -360,7 +361,8 @@ TEST(Maintenance, ProfilesThatCannotBeKeptAreRefused) {
        [](Machine& m) { m.powder.dry_s = 1, m.powder.dry_on_lines = {"M00"}; }},
       {"reprap-inkjet", "powder.dry_on_lines: M112.0: give the command's number",
        [](Machine& m) { m.powder.dry_s = 1, m.powder.dry_on_lines = {"M112.0"}; }},
-      {"reprap-inkjet", "maintenance.wipe_lines: M+2: give the command's number", [](Machine& m) { m.maintenance.wipe_lines = {"M+2"}; }},
+      {"reprap-inkjet", "maintenance.wipe_lines: M+2: give the command's number",
+       [](Machine& m) { m.maintenance.wipe_lines = {"M+2"}; }},
       {"nuferbj", "powder.dry_s: 0.0004 is written as 0", [](Machine& m) { m.powder.dry_s = 4e-4; }},
       {"nuferbj", "powder.roller_rpm: 1e-05 is written as 0", [](Machine& m) { m.powder.roller_rpm = 1e-5; }},
       {"brundlefab", "maintenance.spit_mm: the ink bar runs from its home along Y; give 0 for y",
@@ -399,7 +401,8 @@ TEST(Maintenance, ProfilesThatCannotBeKeptAreRefused) {
          m.maintenance.spit_layers = 1, m.maintenance.spit_mm = {{50, 50}};
        }},
       {"brundlefab", "maintenance.wipe_seconds: programs", [](Machine& m) { m.maintenance.wipe_seconds = 9; }},
-      {"hp45", "maintenance.wipe_lines: programs of the dialect hp45", [](Machine& m) { m.maintenance.wipe_lines = {"M42 P4 S1"}; }},
+      {"hp45", "maintenance.wipe_lines: programs of the dialect hp45",
+       [](Machine& m) { m.maintenance.wipe_lines = {"M42 P4 S1"}; }},
       {"hp45", "powder.dry_s: programs of the dialect hp45 cannot say it", [](Machine& m) { m.powder.dry_s = 1; }},
       {"hp45", "powder.roller_rpm: ", [](Machine& m) { m.powder.roller_rpm = 100; }},
       {"reprap-inkjet", "maintenance.spit_seconds: 6 s, and a sweep ends up to",
@@ -428,13 +431,13 @@ TEST(Maintenance, EveryKeyIsReadAndKept) {
       "wipe_mm = [-40, 20, -40, 60]\nwipe_speed_mm_s = 25\nwipe_lines = [\"M42 P4 S1\"]\ncap_mm = [-45, 5]\n";
   const auto machine = pipeline::read_machine(text, "kept.toml");
   ASSERT_TRUE(machine.ok()) << machine.error().message;
-  const std::string kept = read::kept_machine_text(*machine);
+  const std::string kept = pipeline::kept_machine_text(*machine);
   const std::string tail = text.substr(text.find("vat_depth_mm"));
   std::string lines = kept.substr(kept.find("vat_depth_mm")), wanted = tail;
   std::erase(lines, '\n');
   std::erase(wanted, '\n');
   EXPECT_EQ(lines, wanted);
-  EXPECT_EQ(read::kept_machine_text(*pipeline::read_machine(kept, "again.toml")), kept);
+  EXPECT_EQ(pipeline::kept_machine_text(*pipeline::read_machine(kept, "again.toml")), kept);
   for (const char* line : {"G1 X3", "M42 p4", "M42  P4", "M", "42", "M42 P4;S1", "M42 Pnan"}) {
     const auto wrong =
         pipeline::read_machine(fmt::format("[machine]\nname = \"a\"\n[maintenance]\nwipe_lines = [\"{}\"]\n", line), "a.toml");

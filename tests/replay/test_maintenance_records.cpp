@@ -139,8 +139,8 @@ TEST_P(MaintenanceRecords, VatsAreFilledUnderTheCapAndTheBaseIsReported) {
   });
   const Machine& m = bench.resolved.machine;
   const PixelGrid& grid = bench.resolved.grid.image;
-  write::ProgramBytes bytes;
-  const auto writer = write::find_dialect(m.dialect)->make_writer(m, bench.resolved.grid);
+  program::ProgramBytes bytes;
+  const auto writer = program::find_dialect(m.dialect)->make_writer(m, bench.resolved.grid);
   LayerCycle cycle;
   cycle.layers = 9;
   cycle.thickness_nm = 100'000;
@@ -189,14 +189,14 @@ TEST_P(MaintenanceRecords, AreTimedWithoutVectors) {
     const HeadGrid& grid = bench.resolved.grid;
     const auto built = replay::VirtualMachine::build(machine, grid.image.columns(), grid.image.rows());
     replay::Timer timer(*built);
-    const auto writer = write::find_dialect(machine.dialect)->make_writer(machine, grid);
+    const auto writer = program::find_dialect(machine.dialect)->make_writer(machine, grid);
     LayerCycle cycle;
     cycle.layer = printed_parts::kLayer.index;
     cycle.layers = 9;
     cycle.bottom_nm = printed_parts::kLayer.bottom;
     cycle.thickness_nm = printed_parts::kLayer.thickness;
     timer.begin(printed_parts::kLayer);
-    write::ProgramBytes bytes;
+    program::ProgramBytes bytes;
     const auto report = [&] {
       timer.maintenance(bytes);
       bytes.clear();
@@ -359,11 +359,11 @@ TEST(Maintenance, TheBrundleFabSpreadsABaseBinByBin) {
   });
   const Machine& m = bench.resolved.machine;
   const PixelGrid& grid = bench.resolved.grid.image;
-  const auto writer = write::find_dialect("brundlefab")->make_writer(m, bench.resolved.grid);
+  const auto writer = program::find_dialect("brundlefab")->make_writer(m, bench.resolved.grid);
   const auto built = replay::VirtualMachine::build(m, grid.columns(), grid.rows());
   const Runs empty = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 0)));
   for (const std::uint32_t layer : {0u, 1u}) {
-    write::ProgramBytes bytes;
+    program::ProgramBytes bytes;
     LayerCycle cycle;
     cycle.layer = layer;
     cycle.layers = 9;

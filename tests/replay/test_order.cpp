@@ -77,7 +77,8 @@ TEST(Order, OfRollerHeadAndVatsIsHeld) {
     expect_in(Reordered(bench).insert("G1 Z0.9 F300\nG1 Z0.8 F300\n", home).reported(), "a vat moves while the roller is at");
     expect_in(Reordered(bench).insert(fmt::format("{}9 Y9 F{:.0f}\n", travel, m.motion.travel_speed_mm_s * 60), far).reported(),
               "the roller moves while the head is at 9, 9 mm");
-    expect_in(Reordered(bench).insert(back + bench.pieces[bench.find(far)], home).reported(), "powder cycle: the roller spreads ");
+    expect_in(Reordered(bench).insert(back + bench.pieces[bench.find(far)], home).reported(),
+              "powder cycle: the roller spreads ");
     // Down and up again between the sweeps: each layer would end well.
     const std::string sweep = host ? "BCL" : m.dialect == "nuferbj" ? "M812" : "G0 X", wait = host ? "G4 P0\n" : "";
     expect_in(Reordered(bench).insert("G1 Z1.8 F300\n" + wait, sweep, m.dialect == "nuferbj" ? 1 : 3).reported(),
@@ -126,8 +127,9 @@ TEST(Order, CountsAreThoseOfTheLayer) {
             "to have 3 swaths, and has 2");
   expect_in(Reordered(bench).replace("M812 S1 T2", "M812 S1 T3").reported(), "is one of 3 swaths, those before of 2");
   expect_in(Reordered(bench).replace("M812 S1", "M812 S2").reported(), "beyond the 2 that the layer has");
-  expect_in(Reordered(bench).replace("M812 S1", "M812 S7").replace("M812 S0", "M812 S1").replace("M812 S7", "M812 S0").reported(),
-            "and the swath of that number at line");
+  expect_in(
+      Reordered(bench).replace("M812 S1", "M812 S7").replace("M812 S0", "M812 S1").replace("M812 S7", "M812 S0").reported(),
+      "and the swath of that number at line");
   TamperBench both = bench;
   both.resolved.machine.motion.both_directions = false;
   expect_in(both.reported(both.program.text), "fires on the way there alone");
@@ -141,7 +143,8 @@ TEST(Order, SpeedsAreThoseOfTheProfile) {
     const auto& powder = bench.resolved.machine.powder;
     const auto faster = [&](const std::string& begin, double mm_s) {
       const std::string line = bench.pieces[bench.find(begin)];
-      return bench.reported(bench.with(bench.find(begin), line.substr(0, line.find(" F")) + fmt::format(" F{:.0f}\n", mm_s * 120)));
+      return bench.reported(
+          bench.with(bench.find(begin), line.substr(0, line.find(" F")) + fmt::format(" F{:.0f}\n", mm_s * 120)));
     };
     expect_in(faster("G1 Z", powder.vat_speed_mm_s), "a vat moves at");
     expect_in(faster("G1 U", powder.roller_speed_mm_s), "the roller moves at");

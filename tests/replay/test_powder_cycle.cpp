@@ -70,8 +70,8 @@ TEST(PowderCycle, PowderThatIsSpreadOverTheDropsIsFound) {
     LayerCycle cycle;
     cycle.bottom_nm = printed_parts::kLayer.bottom;
     cycle.thickness_nm = printed_parts::kLayer.thickness;
-    write::ProgramBytes bytes;
-    write::put_powder_cycle(bench.resolved.machine, cycle, bytes);
+    program::ProgramBytes bytes;
+    program::put_powder_cycle(bench.resolved.machine, cycle, bytes);
     const std::string moves(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     std::string text = bench.program.text;
     const std::size_t at = text.find(moves);

@@ -128,8 +128,8 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedProfile) {
       const double dots = 25.4e6 / resolved.grid.line_nm;
       AxisPositions axis_positions =
           scaled(*part, std::min(kSideMm * 1200 / dots, 0.6 * resolved.machine.bed.size_mm[0]), resolved.machine);
-      const auto rasterizer =
-          raster::Rasterizer::build(axis_positions.meshes, axis_positions.instances, resolved.grid.image, FillRule::kNonzero, false, true);
+      const auto rasterizer = raster::Rasterizer::build(axis_positions.meshes, axis_positions.instances, resolved.grid.image,
+                                                        FillRule::kNonzero, false, true);
       ASSERT_TRUE(rasterizer.ok());
       raster::LayerScratch scratch;
       Runs runs;
@@ -151,8 +151,8 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedProfile) {
 TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
   for (std::uint32_t seed = 0; seed < 120; ++seed) {
     Random random(seed);
-    const auto dialects = write::dialects();
-    const write::Dialect& dialect = dialects[seed % dialects.size()];
+    const auto dialects = program::dialects();
+    const program::Dialect& dialect = dialects[seed % dialects.size()];
     Machine machine = program::testing::small_machine(std::min(2 + random() % 140, dialect.max_nozzles), 90, 100, 100);
     machine.dialect = dialect.id;
     const bool x = random() % 2 == 0;
@@ -191,7 +191,7 @@ bool names_the_position(const std::string& fault) {
 
 TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
   std::vector<ResolvedMachine> machines;
-  for (const write::Dialect& dialect : write::dialects()) {
+  for (const program::Dialect& dialect : program::dialects()) {
     Machine machine = program::testing::small_machine(12, 90, 100, 100);
     machine.dialect = dialect.id;
     program::testing::fit_firmware(machine);
@@ -227,7 +227,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     ASSERT_FALSE(printed.ok());
     EXPECT_TRUE(names_the_position(printed.error().message)) << printed.error().message;
     EXPECT_NE(printed.error().message.find("column 40, row 20"), std::string::npos) << name << ": " << printed.error().message;
-    if (number < write::dialects().size()) {
+    if (number < program::dialects().size()) {
       EXPECT_NE(printed.error().message.find("layer 7, swath 1, step 40: "), std::string::npos) << printed.error().message;
     }
     // Any byte of the vectors changed: never a crash, hardly ever unnoticed, and the place told.

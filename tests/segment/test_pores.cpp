@@ -124,8 +124,9 @@ TEST(Crossing, OnlyTheThinIntervalsThatLieUnderOneAreCounted) {
   });
   std::uint64_t meet = 0;
   for (const Thin& a : lower) {
-    meet += std::ranges::any_of(
-        upper, [&](const Thin& b) { return a.low <= b.position && b.position <= a.high && b.low <= a.position && a.position <= b.high; });
+    meet += std::ranges::any_of(upper, [&](const Thin& b) {
+      return a.low <= b.position && b.position <= a.high && b.low <= a.position && a.position <= b.high;
+    });
   }
   PoreCounts counts;
   count_crossed(paths, cut, above, over, counts);

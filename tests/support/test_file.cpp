@@ -17,7 +17,7 @@
 
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina {
 namespace {
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
@@ -452,4 +452,4 @@ TEST(File, WhatIsDiscardedIsGone) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina

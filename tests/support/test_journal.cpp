@@ -8,7 +8,7 @@
 namespace lamina::test {
 namespace {
 
-std::vector<std::string> lines_of(write::Journal& journal) {
+std::vector<std::string> lines_of(Journal& journal) {
   std::vector<std::string> lines;
   EXPECT_TRUE(journal.read([&](const std::string& line) { lines.push_back(line); }).ok());
   return lines;
@@ -18,7 +18,7 @@ TEST(Journal, LinesAreThereAgainAndATornOneIsAlone) {
   const Directory directory;
   const std::string path = directory / "journal";
   {
-    auto journal = write::Journal::open(path, "held");
+    auto journal = Journal::open(path, "held");
     ASSERT_TRUE(journal.ok());
     EXPECT_TRUE(journal->empty());
     ASSERT_TRUE(journal->append("one\n").ok());
@@ -26,7 +26,7 @@ TEST(Journal, LinesAreThereAgainAndATornOneIsAlone) {
     EXPECT_FALSE(journal->empty());
   }
   write_text(path, read_text(path) + "tor");
-  auto journal = write::Journal::open(path, "held");
+  auto journal = Journal::open(path, "held");
   ASSERT_TRUE(journal.ok());
   EXPECT_EQ(lines_of(*journal), (std::vector<std::string>{"one", "two", "tor"}));
   ASSERT_TRUE(journal->append("three\n").ok());
@@ -37,12 +37,12 @@ TEST(Journal, LinesAreThereAgainAndATornOneIsAlone) {
 
 TEST(Journal, OneProcessHoldsItAndTheOtherIsReported) {
   const Directory directory;
-  const auto first = write::Journal::open(directory / "journal", "is held");
+  const auto first = Journal::open(directory / "journal", "is held");
   ASSERT_TRUE(first.ok());
-  const auto second = write::Journal::open(directory / "journal", "is held");
+  const auto second = Journal::open(directory / "journal", "is held");
   ASSERT_FALSE(second.ok());
   EXPECT_EQ(second.error().message, (directory / "journal") + ": is held");
-  EXPECT_FALSE(write::Journal::open(directory / "absent/journal", "is held").ok());
+  EXPECT_FALSE(Journal::open(directory / "absent/journal", "is held").ok());
 }
 
 }  // namespace

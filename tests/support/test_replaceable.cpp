@@ -14,9 +14,9 @@ TEST(Replaceable, AFileIsWhatItsHeadSays) {
   constexpr std::array<std::string_view, 3> marks = {"^made here", "drawn by us", ""};
   const auto replaceable = [&](const std::string& text) {
     write_text(directory / "file", text);
-    return write::is_replaceable(directory / "file", marks);
+    return is_replaceable(directory / "file", marks);
   };
-  EXPECT_TRUE(write::is_replaceable(directory / "absent", marks));
+  EXPECT_TRUE(is_replaceable(directory / "absent", marks));
   EXPECT_TRUE(replaceable(""));
   EXPECT_TRUE(replaceable("made here, today"));
   EXPECT_FALSE(replaceable("not made here"));
@@ -28,13 +28,13 @@ TEST(Replaceable, LinksLeadToTheSameFileAndDevicesAreStreams) {
   const Directory directory;
   write_text(directory / "file", "text");
   std::filesystem::create_symlink(directory / "file", directory / "link");
-  EXPECT_TRUE(write::same_file(directory / "file", directory / "link"));
-  EXPECT_FALSE(write::same_file(directory / "file", directory / "absent"));
-  EXPECT_TRUE(write::is_file(directory / "link"));
-  EXPECT_FALSE(write::is_file("/dev/null"));
-  EXPECT_TRUE(write::is_stream("/dev/null"));
-  EXPECT_TRUE(write::is_stream("-"));
-  EXPECT_FALSE(write::is_stream(directory / "file"));
+  EXPECT_TRUE(same_file(directory / "file", directory / "link"));
+  EXPECT_FALSE(same_file(directory / "file", directory / "absent"));
+  EXPECT_TRUE(is_file(directory / "link"));
+  EXPECT_FALSE(is_file("/dev/null"));
+  EXPECT_TRUE(is_stream("/dev/null"));
+  EXPECT_TRUE(is_stream("-"));
+  EXPECT_FALSE(is_stream(directory / "file"));
 }
 
 }  // namespace

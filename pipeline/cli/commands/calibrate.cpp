@@ -121,7 +121,7 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
   }
   const auto made = calibrate_profile(request, arguments.text("--measured"), gap, arguments.has("--exact-spacing"));
   if (!made) return made.error();
-  if (Status status = write::write_file(request.directory, made->toml); !status) return status;
+  if (Status status = write_file(request.directory, made->toml); !status) return status;
   return say_profile(*made, arguments, context);
 }
 

@@ -47,12 +47,12 @@ Outcome weigh(const ChartRequest& request, double mass_mg, const Arguments& argu
   auto machine = find_machine(request.machine);
   if (!machine) return machine.error();
   const double before = machine->head.drop_pl;
-  machine->head.drop_pl = chart::drop_pl_of(mass_mg, density, static_cast<double>(request.drops));
+  machine->head.drop_pl = calibration::drop_pl_of(mass_mg, density, static_cast<double>(request.drops));
   const auto profile = measured_profile(*machine);
   if (!profile)
     return at_option("--weighed-mg",
                      fmt::format("{} of {} drops: {}", arguments.text("--weighed-mg"), request.drops, profile.error().message));
-  if (Status status = write::write_file(request.directory, *profile); !status) return status;
+  if (Status status = write_file(request.directory, *profile); !status) return status;
   if (!arguments.has("--quiet"))
     context.say_text(fmt::format("drop      {:.4g} pl, was {:.4g}\nprofile   {}\n", machine->head.drop_pl, before,
                                  one_line(request.directory)));
@@ -65,7 +65,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
   auto machine = find_machine(request.machine);
   if (!machine) return machine.error();
   const std::string chart =
-      write::is_file(arguments.text("--chart")) ? arguments.text("--chart") : arguments.text("--chart") + "/chart.json";
+      is_file(arguments.text("--chart")) ? arguments.text("--chart") : arguments.text("--chart") + "/chart.json";
   const auto text = read_file(chart, {.fault = Fault::kInput, .missing = "no such chart; lamina calibrate -o DIR writes one"});
   const auto deposited = text ? read_chart(*text, chart) : text.error();
   if (!deposited) return deposited.error();
@@ -79,7 +79,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
   if (!lines) return lines.error();
   const auto profile = measured_profile(*machine);
   if (!profile) return profile.error();
-  if (Status status = write::write_file(request.directory, *profile); !status) return status;
+  if (Status status = write_file(request.directory, *profile); !status) return status;
   if (!arguments.has("--quiet")) {
     for (const std::string& line : *lines) context.say(line);
     context.say("profile   " + request.directory);

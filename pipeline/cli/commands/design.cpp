@@ -162,7 +162,7 @@ Outcome give_found(const Found& found, const std::string& missed, const Argument
   if (!arguments.has("--quiet")) context.say_text(as_text(found));
   const bool enough = found.met || arguments.has("--nearest"), written = !output.empty() && enough;
   if (written) {
-    if (const Status status = write::write_file(output, found.toml); !status) return status;
+    if (const Status status = write_file(output, found.toml); !status) return status;
   }
   if (arguments.has("--json")) {
     if (const Status status = context.give(as_json(found, written ? output : "")); !status) return status;

@@ -52,7 +52,7 @@ CommandSpec heights_spec() {
 }
 
 Status report(const std::string& path, const std::string& text, Context& context) {
-  return path.empty() ? context.print(text) : write::write_file(path, text, {.stream = true});
+  return path.empty() ? context.print(text) : write_file(path, text, {.stream = true});
 }
 
 /// The job as asked, and with what the command sets by itself.
@@ -92,12 +92,12 @@ Status check_one_table(const Job& job, const Arguments& arguments) {
 }
 
 std::string rp3_text(const Job& job, const heights::Study& study) {
-  std::vector<write::rp3::LayerSetting> layers;
+  std::vector<formats::rp3::LayerSetting> layers;
   for (std::size_t i = 0; i < study.layers(); ++i) layers.push_back({mm(study.thickness(i)), angle(study, i)});
-  write::rp3::Settings settings;
+  formats::rp3::Settings settings;
   settings.shrink = job.parts.front().shrink;
   settings.rotation_deg = job.parts.front().rotate_deg;
-  return write::rp3::text_of(layers, settings);
+  return formats::rp3::text_of(layers, settings);
 }
 
 std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies) {

@@ -71,16 +71,17 @@ Status report_print(const std::string& path, double density_g_cm3, const Argumen
 Status report_images(const std::string& path, int threshold, const Arguments& arguments, Context& context) {
   const auto reported = images_on_record(path);
   if (!reported) return reported.error();
-  const Result<read::StackInfo> info = read::inspect_stack(reported->path, threshold);
+  const Result<formats::StackInfo> info = formats::inspect_stack(reported->path, threshold);
   if (!info) return info.error();
-  Json json = read::as_json(*info);
-  std::string text = read::as_text(*info);
+  Json json = formats::as_json(*info);
+  std::string text = formats::as_text(*info);
   if (reported->thickness > 0) {
-    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers", number_text(mm(reported->thickness)),
-                        number_text(mm(reported->bottom)),
+    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers",
+                        number_text(mm(reported->thickness)), number_text(mm(reported->bottom)),
                         reported->levels > 0 ? fmt::format("; shares of voxels in {} levels", reported->levels) : "",
                         reported->mirror.empty() || reported->mirror == "none" ? "" : "; mirrored " + reported->mirror);
-    json["layers"] = {{"thickness_mm", mm(reported->thickness)}, {"bottom_mm", mm(reported->bottom)}, {"levels", reported->levels}};
+    json["layers"] = {
+        {"thickness_mm", mm(reported->thickness)}, {"bottom_mm", mm(reported->bottom)}, {"levels", reported->levels}};
   } else {
     text +=
         fmt::format("  {:<12}no manifest of lamina tells how thick they are; jet wants --layer or part.layer_mm\n", "layers");
@@ -95,10 +96,10 @@ Status report_images(const std::string& path, int threshold, const Arguments& ar
 /// errors  kUsage: an option that is of none of the operands
 Status check_flags(const Arguments& arguments) {
   const auto any = [&](auto names) { return std::ranges::any_of(arguments.operands, names); };
-  const bool parts = any([](const std::string& path) { return !names_toolpaths(path) && !read::names_images(path); });
+  const bool parts = any([](const std::string& path) { return !names_toolpaths(path) && !formats::names_images(path); });
   if (arguments.has("--density") && !any(names_toolpaths))
     return at_option("--density", "is of toolpaths; parts have no filament");
-  if (arguments.has("--threshold") && !any(read::names_images))
+  if (arguments.has("--threshold") && !any(formats::names_images))
     return at_option("--threshold", "is of layer images; leave it out");
   for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld"})
     if (arguments.has(flag) && !parts) return at_option(flag, "is of parts, not of toolpaths or images");
@@ -123,7 +124,7 @@ Outcome run_info(const Arguments& arguments, Context& context) {
         code = std::max(code, context.complain(status.error()));
       continue;
     }
-    if (read::names_images(part.path)) {
+    if (formats::names_images(part.path)) {
       if (Status status = report_images(part.path, static_cast<int>(threshold), arguments, context); !status)
         code = std::max(code, context.complain(status.error()));
       continue;

@@ -144,9 +144,9 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
   if (!powder) {
     const auto extrusion = find_extruder(name);
     if (!extrusion) return powder.error();
-    return whole ? read::extruder_text(*extrusion) : explain(*extrusion);
+    return whole ? pipeline::extruder_text(*extrusion) : explain(*extrusion);
   }
-  if (whole) return read::sourced_text(read::machine_text(*powder), *files);
+  if (whole) return pipeline::sourced_text(pipeline::machine_text(*powder), *files);
   const auto resolved = resolve_profile(*powder);
   if (!resolved) return resolved.error();
   const auto full = time_full_layer(*resolved);
@@ -157,7 +157,7 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
 Outcome run_machines(const Arguments& arguments, Context& context) {
   if (arguments.has("--target")) {
     const auto part = program::orientation_target();
-    if (Status status = write::write_file(arguments.text("--target"), part); !status) return status.error();
+    if (Status status = write_file(arguments.text("--target"), part); !status) return status.error();
     context.say(
         fmt::format("{}: an F of 20 x 30 mm: its stem lies along +y, its arms point to +x, a step of 1 mm on top lies at its "
                     "foot; read mirrored or turned, so is the machine",
@@ -166,9 +166,10 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
   }
   std::string text;
   std::vector<std::string> presets;
-  if (Status status = arguments.read("--preset", read::read_presets, presets); !status) return status;
+  if (Status status = arguments.read("--preset", pipeline::read_presets, presets); !status) return status;
   if (arguments.has("--dialects")) {
-    for (const write::Dialect& dialect : write::dialects()) text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
+    for (const program::Dialect& dialect : program::dialects())
+      text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
   }
   for (const std::string& name : arguments.all("--show")) {
     const auto profile = printer_text(name, presets, true);
@@ -190,7 +191,7 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     }
     text += "\n--preset:\n";
     for (const ShippedProfile& shipped : shipped_presets()) text += fmt::format("{}\n", shipped.name);
-    const read::Library library = profile_library();
+    const pipeline::Library library = profile_library();
     if (!library.own_names().empty()) text += fmt::format("\nin {}:\n", one_line(library.folder()));
     for (const std::string& name : library.own_names()) text += one_line(name) + "\n";
     text += "\nlamina extrude:\n";

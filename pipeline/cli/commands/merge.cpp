@@ -51,7 +51,7 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
   }
   if (!arguments.has("--json")) return {};
   Json reported = {{"command", "merge"},       {"directory", report->output}, {"shards", report->shards},
-               {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
+                   {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
   if (report->microseconds > 0) reported["print_seconds"] = 1e-6 * static_cast<double>(report->microseconds);
   if (!sweeps.empty()) reported["sweeps"] = sweeps;
   reported["warnings"] = warnings_json(report->warnings);

@@ -102,7 +102,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
     if (arguments.has("--job")) left = notes_on_defaults(arguments.text("--job"), resolved->job);
   }
-  std::optional<write::File> file;  // takes its name once the job is planned
+  std::optional<File> file;  // takes its name once the job is planned
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
     if (saved.bed_mm || saved.machine.profile.empty()) saved.bed_mm = resolved->bed.size_mm;
@@ -159,8 +159,8 @@ const OptionSpec kJetSwitches[] = {
 
 std::string jet_closing() {
   std::string text = "Formats:\n";
-  for (const auto& format : write::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
-  for (const auto& format : write::level_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
+  for (const auto& format : formats::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
+  for (const auto& format : formats::level_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
   return text +
          "\nLengths are mm, angles degrees. Part options hold for every part; a job file sets them for each.\n\n"
          "Examples:\n"
@@ -199,7 +199,7 @@ PlanCommand jet_row() {
 
 // --- lamina slice
 
-const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "placement",        "image.fill", "load",
+const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "placement",    "image.fill", "load",
                               "run.output",      "run.threads", "run.memory", "run.sync",     "run.layers", "run.strict",
                               "run.allow_empty", "slice",       "fill",       "segment.fill", "part"};
 

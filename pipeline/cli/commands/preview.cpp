@@ -37,7 +37,7 @@ CommandSpec preview_spec() {
   return spec;
 }
 
-Outcome run_preview(const Arguments& arguments, Context&) { return write::hand_over("lamina-preview", arguments.given); }
+Outcome run_preview(const Arguments& arguments, Context&) { return hand_over("lamina-preview", arguments.given); }
 
 }  // namespace
 

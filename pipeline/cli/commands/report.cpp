@@ -64,13 +64,13 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   options.deposited_svg = std::move(deposited.svg);
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
-  if (Status status = write::write_file(output, report->page); !status) return status.error();
+  if (Status status = write_file(output, report->page); !status) return status.error();
   Answer answer(arguments, context);
   answer.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
                          readable_bytes(report->page.size())));
   if (const std::uint64_t bytes = report->page.size(); bytes > options.size_limit && !arguments.has("--quiet"))
-    context.say(fmt::format("note: {} takes {}, more than --max-bytes; no page of this job is smaller", output,
-                            readable_bytes(bytes)));
+    context.say(
+        fmt::format("note: {} takes {}, more than --max-bytes; no page of this job is smaller", output, readable_bytes(bytes)));
   if (!report->without_parts.empty()) answer.say("views are of the layers: " + report->without_parts);
   return answer.status();
 }

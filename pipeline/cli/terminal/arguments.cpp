@@ -16,7 +16,7 @@
 #include "stages/support/text/readable.h"
 #include "stages/support/text/terminal.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 
 const OptionSpec* CommandSpec::find(std::string_view flag) const {
   for (const OptionSpec& option : options) {
@@ -107,4 +107,4 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   return read;
 }
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

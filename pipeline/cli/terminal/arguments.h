@@ -10,7 +10,7 @@
 #include "stages/data/status.h"
 #include "stages/support/text/value.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 
 /// One option of a command. A switch takes no value.
 struct OptionSpec {
@@ -71,4 +71,4 @@ std::string help_text(const CommandSpec& spec, int columns);
 /// errors  kUsage: unknown option (with the nearest name), missing value
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

@@ -8,7 +8,7 @@
 #include "stages/support/text/escape.h"
 #include "stages/support/text/number_text.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 namespace {
 
 constexpr std::string_view kAnyFile = "*", kDirectory = "/";
@@ -205,4 +205,4 @@ end
   return script;
 }
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

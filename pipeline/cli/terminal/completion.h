@@ -7,10 +7,10 @@
 
 #include "pipeline/cli/terminal/arguments.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 
 std::string bash_completion(std::span<const CommandSpec> commands);
 std::string zsh_completion(std::span<const CommandSpec> commands);
 std::string fish_completion(std::span<const CommandSpec> commands);
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

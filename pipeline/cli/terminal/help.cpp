@@ -6,7 +6,7 @@
 #include "pipeline/cli/terminal/arguments.h"
 #include "stages/support/text/number_text.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 namespace {
 
 constexpr std::size_t kMeaningColumn = 28;
@@ -74,4 +74,4 @@ std::string help_text(const CommandSpec& spec, int columns) {
   return text;
 }
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

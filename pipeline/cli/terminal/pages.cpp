@@ -9,7 +9,7 @@
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/version.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 namespace {
 
 /// Pages of docs/ related to a command.
@@ -131,4 +131,4 @@ std::string markdown_page(const CommandSpec& spec) {
   return text + "\nExit codes are those of [every command](../../README.md#use).\n";
 }
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

@@ -6,7 +6,7 @@
 
 #include "pipeline/cli/terminal/arguments.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 
 /// The manual page of the program.
 std::string man_page(std::span<const CommandSpec> commands);
@@ -17,4 +17,4 @@ std::string man_page(const CommandSpec& command);
 /// further documentation.
 std::string markdown_page(const CommandSpec& command);
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

@@ -4,7 +4,7 @@
 
 #include "stages/support/text/readable.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 
 std::string Progress::rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds) {
   std::string text = fmt::format("{}/{} layers", done, total);
@@ -45,4 +45,4 @@ std::string Progress::report(std::uint32_t done, std::uint32_t total) {
   return bar ? draw(text, total > 0 ? static_cast<double>(done) / total : 1) : text + "\n";
 }
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

@@ -8,7 +8,7 @@
 
 #include "stages/support/text/terminal.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 
 /// A bar on a terminal, redrawn at most every 100 ms; elsewhere a plain line per tenth of the layers, at most once a
 /// second, and every 5 s. Returns the text to write, mostly empty, and writes nothing itself.
@@ -41,4 +41,4 @@ class Progress {
   Clock::time_point started_ = Clock::now(), reports_ = started_;
 };
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 namespace {
 
 struct SlicerAlias {
@@ -90,4 +90,4 @@ std::string slicer_alias(std::string_view flag, const CommandSpec& spec) {
   return {};
 }
 
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

@@ -10,7 +10,7 @@
 #include "stages/support/text/readable.h"
 #include "stages/support/text/shell_words.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
@@ -126,4 +126,4 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
   return entries;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

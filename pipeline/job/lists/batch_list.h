@@ -8,7 +8,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 /// One job as written in its source.
 struct BatchEntry {
@@ -32,4 +32,4 @@ using IsPart = std::function<bool(std::string_view name)>;
 Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with,
                                            const IsPart& is_part);
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

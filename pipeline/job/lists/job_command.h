@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 inline constexpr std::string_view kJobCommandBefore = "# A job of lamina. Run it with: lamina ", kJobCommandAfter = " --job ";
 
@@ -23,4 +23,4 @@ inline std::string_view command_in(std::string_view line) {
   return is_word && line.substr(word.size()).starts_with(kJobCommandAfter) ? word : std::string_view();
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

@@ -11,7 +11,7 @@
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
@@ -129,4 +129,4 @@ Status check_nameable(const std::string& folder, const std::string& profile, con
   return {};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

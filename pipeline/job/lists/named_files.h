@@ -9,7 +9,7 @@
 #include "stages/data/status.h"
 #include "stages/support/text/toml.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 /// Profiles that a job file names and that are not there, with what to say of each.
 using MissingProfiles = std::vector<std::pair<std::string, std::string>>;
@@ -32,4 +32,4 @@ Status check_there(const MissingProfiles& missing, const std::string& profile, c
 /// Whether a job file in `folder` can name them. errors  kUsage: a path that is not UTF-8, a preset's with a comma
 Status check_nameable(const std::string& folder, const std::string& profile, const std::vector<std::string>& presets);
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

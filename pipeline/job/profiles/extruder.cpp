@@ -10,7 +10,7 @@
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 namespace {
 
 using Text = std::string_view;
@@ -288,4 +288,4 @@ std::string changes_text(const ProfileChanges& changes) {
   return text.empty() ? text : fmt::format("{{ {} }}", text);
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

@@ -11,7 +11,7 @@
 #include "stages/data/status.h"
 #include "stages/support/text/toml.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 /// Reads a profile; refuses unknown keys. Does not check the tables of its calibration, see segment::check.
 /// files    at least one
@@ -39,4 +39,4 @@ std::string read_changes(std::string_view text, ProfileChanges& changes);
 /// "{ fan.from_layer = 2 }", empty if there are none.
 std::string changes_text(const ProfileChanges& changes);
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

@@ -12,7 +12,7 @@
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
@@ -190,4 +190,4 @@ Status Library::add(const std::string& name_or_path, ProfileFiles& files) const 
   return add(name_or_path, "", chain, files);
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

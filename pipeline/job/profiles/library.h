@@ -15,7 +15,7 @@
 #include "stages/data/status.h"
 #include "stages/support/text/toml.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 /// A profile that is part of the program.
 struct ShippedProfile {
@@ -75,4 +75,4 @@ class Library {
   std::string folder_;
 };
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

@@ -10,7 +10,7 @@
 #include "stages/support/text/names.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 namespace {
 
 using Text = std::string_view;
@@ -46,8 +46,7 @@ constexpr auto kCost = &Machine::cost;
 using Cost = decltype(Machine::cost);
 
 constexpr double kMax = 1e9;
-constexpr Limits kAny{-kMax, kMax}, kDpi{0, 25'400}, kLength{kMinMm, kMaxMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"},
-    kPrice{0, 1e6};
+constexpr Limits kAny{-kMax, kMax}, kDpi{0, 25'400}, kLength{kMinMm, kMaxMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"}, kPrice{0, 1e6};
 
 constexpr std::size_t kLongestMaterial = 40;
 
@@ -206,7 +205,8 @@ constexpr Key<Machine> kKeys[] = {
     field<kMaintenance, &Maintenance::wipe_seconds>({"maintenance", "wipe_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
     field<kMaintenance, &Maintenance::wipe_mm>({"maintenance", "wipe_mm"}, kAny).unsaid_at(""),
     field<kMaintenance, &Maintenance::wipe_speed_mm_s>({"maintenance", "wipe_speed_mm_s"}, kSpeed).unsaid_at("50"),
-    custom<Machine, read_own_lines, join, kMaintenance, &Maintenance::wipe_lines>({"maintenance", "wipe_lines"}, Form::kStrings).unsaid_at(""),
+    custom<Machine, read_own_lines, join, kMaintenance, &Maintenance::wipe_lines>({"maintenance", "wipe_lines"}, Form::kStrings)
+        .unsaid_at(""),
     field<kMaintenance, &Maintenance::cap_mm>({"maintenance", "cap_mm"}, kAny).unsaid_at(""),
 
     text<check_currency, kCost, &Cost::currency>({"cost", "currency"}).unsaid_at("EUR"),
@@ -272,4 +272,4 @@ std::string kept_machine_text(const Machine& machine) {
   });
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

@@ -1,4 +1,5 @@
-// pipeline/job/profiles/printer.h: profiles of powder printers as TOML (pipeline/machine/shipped/printers/*.toml, docs/machines.md).
+// pipeline/job/profiles/printer.h: profiles of powder printers as TOML (pipeline/machine/shipped/printers/*.toml,
+// docs/machines.md).
 #pragma once
 
 #include <span>
@@ -10,7 +11,7 @@
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 /// Reads a profile from its files, at least one. Every key has a default; unknown keys are refused.
 /// dialects  the available dialects of print programs: the profile names one or uses the default
@@ -34,4 +35,4 @@ std::string check_material(std::string_view name);
 /// The same of two materials of a job, whose names may not differ in case alone.
 std::string check_case(std::string_view one, std::string_view other);
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

@@ -12,7 +12,7 @@
 #include "stages/support/text/key.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 
 inline std::string read_name(std::string_view text, std::string& name) {
   name = one_line(text);
@@ -35,4 +35,4 @@ Status read_sections(const ProfileFiles& files, std::span<const Key<Profile>> ke
   return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", files.back().where)};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

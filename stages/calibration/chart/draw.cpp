@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace lamina::chart {
+namespace lamina::calibration {
 namespace {
 
 struct Run {
@@ -101,7 +101,8 @@ Result<DropLayers> layout_drops(const Machine& machine, const HeadGrid& grid, st
   const std::uint32_t swath = grid.swath_lines(), first = (line + swath - 1) / swath * swath;
   if (grid.first_swath == FirstSwath::kBed && first + swath <= line_end) line = first;
   if (line + swath <= line_end) line_end = line + (line_end - line) / swath * swath;
-  DropLayers wanted{.drops = drops, .a_layer = std::uint64_t{line_end - line} * (position_end - position), .layers = 0, .box = {}};
+  DropLayers wanted{
+      .drops = drops, .a_layer = std::uint64_t{line_end - line} * (position_end - position), .layers = 0, .box = {}};
   if (wanted.a_layer == 0)
     return Error{Fault::kUsage, fmt::format("bed.size_mm: the bed of {} has no room for drops", machine.name)};
   const std::uint64_t layers = (drops + wanted.a_layer - 1) / wanted.a_layer;
@@ -131,4 +132,4 @@ Runs draw_drops(const DropLayers& wanted, const HeadGrid& grid, std::uint32_t la
   return image_of(runs, grid.image.columns(), grid.image.rows());
 }
 
-}  // namespace lamina::chart
+}  // namespace lamina::calibration

@@ -9,7 +9,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::chart {
+namespace lamina::calibration {
 
 /// The image of a chart. cost  O(rows of all boxes)
 Runs draw(const Chart& chart);
@@ -32,4 +32,4 @@ Runs draw_drops(const DropLayers& wanted, const HeadGrid& grid, std::uint32_t la
 /// Volume of a drop in pl from the mass of many. mass in mg, density in g/ml
 constexpr double drop_pl_of(double mass_mg, double density, double drops) { return mass_mg / density / drops * 1e6; }
 
-}  // namespace lamina::chart
+}  // namespace lamina::calibration

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace lamina::chart {
+namespace lamina::calibration {
 namespace {
 
 constexpr double kNmPerMmReal = 1e6;
@@ -144,7 +144,8 @@ class Layout {
     const std::uint32_t comb = tiers * step + pitch_.positions(kApartMm);
     first_position_ = free_.position + mark_positions();
     vernier_position_ = first_position_ + kRepeats * comb;
-    strip_position_ = vernier_position_ + (verniers ? vernier_positions() + pitch_.positions(kApartMm) : 0) + 3 * pitch_.positions(kApartMm);
+    strip_position_ =
+        vernier_position_ + (verniers ? vernier_positions() + pitch_.positions(kApartMm) : 0) + 3 * pitch_.positions(kApartMm);
     end_position_ = strip_position_ + strip_positions() + mark_positions();
     if (end_position_ > free_.position_end) return false;
     chart_.between_mm = tiers * nozzle_mm;
@@ -216,7 +217,8 @@ class Layout {
   void add_marks() {
     const std::uint32_t positions = pitch_.positions(2 * kMarkMm), lines = pitch_.lines(2 * kMarkMm);
     const std::uint32_t far = free_.line + lines_ - lines, end = end_position_ - positions;
-    for (const auto& [line, position] : {std::array{free_.line, free_.position}, {free_.line, end}, {far, end}, {far, free_.position}})
+    for (const auto& [line, position] :
+         {std::array{free_.line, free_.position}, {free_.line, end}, {far, end}, {far, free_.position}})
       chart_.marks.push_back(box({line, line + lines, position, position + positions}));
     // Whether lines and places fall, or are columns and rows, decides the sense of rotation; the ring stays the first.
     const auto middle = [](const ChartBox& b) { return std::array{0.5 * (b.left + b.right), 0.5 * (b.top + b.bottom)}; };
@@ -246,4 +248,4 @@ Machine chart_machine(Machine machine, bool drops) {
 
 Result<Chart> layout_chart(const Machine& machine, const HeadGrid& grid) { return Layout(machine, grid).make(); }
 
-}  // namespace lamina::chart
+}  // namespace lamina::calibration

@@ -11,7 +11,7 @@
 #include "stages/data/program.h"
 #include "stages/data/status.h"
 
-namespace lamina::chart {
+namespace lamina::calibration {
 
 /// The machine as it prints charts: every nozzle fires what lies under it, once. Swaths share no lines, no nozzle counts as
 /// blocked. drops  for a counted number of them: other nozzles fire those of blocked ones
@@ -21,4 +21,4 @@ Machine chart_machine(Machine machine, bool drops = false);
 /// together. returns  its boxes, all of them on the bed errors   kUsage: the bed is too small for a chart of this head
 Result<Chart> layout_chart(const Machine& machine, const HeadGrid& grid);
 
-}  // namespace lamina::chart
+}  // namespace lamina::calibration

@@ -5,7 +5,7 @@
 
 #include "stages/calibration/within.h"
 
-namespace lamina::chart {
+namespace lamina::calibration {
 namespace {
 
 double middle_of(std::vector<double> values) {
@@ -54,9 +54,9 @@ std::vector<std::optional<Located>> rows_of(const std::vector<std::optional<Loca
     const auto mean = mean_of(of_row[r]);
     if (mean)
       reported[r] = Located{mean->um - first->um, std::hypot(mean->error_um, first->error_um),
-                        std::hypot(mean->within_um, first->within_um)};
+                            std::hypot(mean->within_um, first->within_um)};
   }
   return reported;
 }
 
-}  // namespace lamina::chart
+}  // namespace lamina::calibration

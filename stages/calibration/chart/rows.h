@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-namespace lamina::chart {
+namespace lamina::calibration {
 
 /// A length with its standard error, um. within_um  99 in 100 of them lie nearer to the truth (stages/calibration/within.h)
 struct Located {
@@ -19,4 +19,4 @@ struct Located {
 /// cost     O(nozzles log nozzles)
 std::vector<std::optional<Located>> rows_of(const std::vector<std::optional<Located>>& nozzles, std::uint32_t rows);
 
-}  // namespace lamina::chart
+}  // namespace lamina::calibration

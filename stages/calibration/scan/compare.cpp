@@ -10,13 +10,13 @@
 #include "stages/calibration/scan/robust.h"
 #include "stages/geometry/least_squares.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr double kMaxTurnDeg = 6;
 constexpr double kMinMissingMm = 0.2;
 constexpr double kAwayMm = 0.5, kMinMm2 = 1, kMinShare = 0.5;  // of extra ink; the last of full ink
-constexpr double kMaxCells = 2000;                                // along an axis of the image, where it is looked for
+constexpr double kMaxCells = 2000;                             // along an axis of the image, where it is looked for
 
 /// The layer in cells as large as pixels of the photograph: the share of each that is set.
 struct LayerCells {
@@ -78,7 +78,7 @@ struct PictureMatch {
 };
 
 PictureMatch best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<double>& turns,
-                 const std::vector<double>& scales) {
+                        const std::vector<double>& scales) {
   const int side =
       cv::getOptimalDFTSize(std::max({photo.cols, photo.rows, cells.cols, cells.rows}) + std::max(cells.cols, cells.rows) / 2);
   cv::Mat padded = cv::Mat::zeros(side, side, CV_32F), photo_waves;
@@ -234,7 +234,8 @@ cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, doub
 }
 
 /// Stripes of cells along the scan that are much brighter than ink. full  cells that are to be printed, away from edges
-std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full, const LayerCells& layer, bool along_x, double ink) {
+std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full, const LayerCells& layer, bool along_x,
+                                       double ink) {
   constexpr int kMinCells = 15;
   const int count = along_x ? dark.rows : dark.cols, length = along_x ? dark.cols : dark.rows;
   std::vector<double> ratio(static_cast<std::size_t>(count), 1);
@@ -434,4 +435,4 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
   return comparison;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -8,7 +8,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// What was to be printed. Lengths in mm of the image, from its upper left corner.
 struct ExpectedLayer {
@@ -47,4 +47,4 @@ struct Comparison {
 /// cost    a second for a million pixels
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -8,7 +8,7 @@
 #include "stages/calibration/scan/marks.h"
 #include "stages/geometry/least_squares.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 Shape::Shape(double reach, double step)
     : step_(step), sum_(static_cast<std::size_t>(std::ceil(reach / step)) + 2, 0), weight_(sum_.size(), 0) {}
@@ -86,7 +86,7 @@ struct DashWindow {
 
 /// Local, linear: a window is a millimetre wide.
 bool inspection(const Photo& photo, const View& view, const Spot& middle, bool along_x, double half_along, double half_across,
-          DashWindow& w) {
+                DashWindow& w) {
   const double e = 0.05;
   const Spot c = view.at(middle.x, middle.y), x = view.at(middle.x + e, middle.y), y = view.at(middle.x, middle.y + e);
   const Spot dx{(x.x - c.x) / e, (x.y - c.y) / e}, dy{(y.x - c.x) / e, (y.y - c.y) / e};
@@ -289,7 +289,7 @@ void check_dashes(const Photo& photo, const Chart& chart, std::vector<DashReadin
 }  // namespace
 
 std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
-                                 std::optional<DashShapes>& shapes) {
+                                    std::optional<DashShapes>& shapes) {
   constexpr double kStray = 0.2;  // of the way to the next dash: how far a nozzle's own offset is followed
   std::vector<DashReading> detected;
   detected.reserve(chart.dashes.size());
@@ -307,7 +307,7 @@ std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, cons
     // places alone, and keeps each dash there. By chance, as a nozzle's dashes come at even distances.
     const double dx = strewn(), dy = strewn();
     detected.push_back(inspection.see(dash, {m.x + shift.x + std::clamp(offset.x, -maximum, maximum) + dx,
-                                   m.y + shift.y + std::clamp(offset.y, -maximum, maximum) + dy}));
+                                             m.y + shift.y + std::clamp(offset.y, -maximum, maximum) + dy}));
   }
   check_dashes(photo, chart, detected);
   shapes = inspection.shapes();
@@ -326,4 +326,4 @@ std::vector<double> stripe(const Photo& photo, const View& view, const Spot& mid
   return line;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

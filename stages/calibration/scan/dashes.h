@@ -8,7 +8,7 @@
 #include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/chart.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 // --- profiles that look alike, and where one of them lies: by their common shape, not by a level
 // or a centre.
@@ -51,7 +51,7 @@ ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, do
 struct DashReading {
   double mass = 0;      // darkness across the dash, summed: mm of full black
   double ground = 0;    // darkness beside it
-  Spot position;           // of its middle; meaningful if it is there
+  Spot position;        // of its middle; meaningful if it is there
   bool there = false;   // it was printed
   bool hidden = false;  // too dark for a dash, or out of the picture: nothing can be told
   double misfit = 0;    // from the common shape, as a share of its height
@@ -68,10 +68,10 @@ struct DashShapes {
 /// returns  one for each dash of the chart
 /// cost     some thousand samples a dash
 std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
-                                 std::optional<DashShapes>& shapes);
+                                    std::optional<DashShapes>& shapes);
 
 /// Darkness along a line, averaged over a stripe about it: from -reach to reach, evenly; empty if it leaves the picture.
 /// reach, half  mm, of the line on either side of the middle and of the stripe's width
 std::vector<double> stripe(const Photo& photo, const View& view, const Spot& middle, bool along_x, double reach, double half);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -8,7 +8,7 @@
 #include "stages/calibration/scan/marks.h"
 #include "stages/calibration/scan/robust.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 /// What is known of each line of the image from the dash on it.
@@ -49,8 +49,8 @@ struct BarReading {
   std::vector<double> profile;
 };
 
-std::vector<BarReading> see_bars(const Photo& photo, const Chart& chart, const View& view, const std::vector<LineReading>& lines,
-                              bool along) {
+std::vector<BarReading> see_bars(const Photo& photo, const Chart& chart, const View& view,
+                                 const std::vector<LineReading>& lines, bool along) {
   const bool axis_x = along == chart.scan_along_x;  // of the width
   std::vector<BarReading> bars;
   for (const ChartBar& bar : chart.bars) {
@@ -130,4 +130,4 @@ InkReading read_inks(const Photo& photo, const Chart& chart, const SheetFit& fit
   return reading;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

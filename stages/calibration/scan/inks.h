@@ -11,12 +11,12 @@
 #include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/chart.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 struct InkReading {
   double gain_along_um = 0, gain_across_um = 0;   // how far an edge stands out of its pixels
   std::uint32_t bars_along = 0, bars_across = 0;  // that the gains are from
-  std::uint32_t bars_detected = 0;                    // along the scan, that lie in the photograph
+  std::uint32_t bars_detected = 0;                // along the scan, that lie in the photograph
   double full = 0;                                // darkness of full ink, as the widest bars show; 0: not seen
   std::vector<std::pair<double, double>> wedges;  // per cent of pixels, per cent of full ink that is seen
 };
@@ -27,4 +27,4 @@ InkReading read_inks(const Photo& photo, const Chart& chart, const SheetFit& fit
 /// never is. What gaps lie between them does not count, and blur moves neither.
 double width_of(const std::vector<double>& profile, double reach, double full);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

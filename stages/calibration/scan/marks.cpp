@@ -7,7 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr double kFaintDash = 0.15;  // of full ink: the contrast of a dash that is blurred and looked at beside its middle
@@ -120,7 +120,8 @@ struct Guess {
 };
 
 /// seen  of the marks but the missing one, in their order
-void add_guess(const Chart& chart, std::size_t missing, const std::array<const Patch*, 3>& detected, std::vector<Guess>& guesses) {
+void add_guess(const Chart& chart, std::size_t missing, const std::array<const Patch*, 3>& detected,
+               std::vector<Guess>& guesses) {
   constexpr double kMaxAspect = 1.35, kMaxSize = 1.8;
   std::array<std::size_t, 3> marks{};
   for (std::size_t i = 0, m = 0; m < 4; ++m) {
@@ -204,7 +205,7 @@ Best search_fourth(const Photo& photo, const Chart& chart, Guess guess) {
 
 Result<View> find_marks(const Photo& photo, const Chart& chart) {
   constexpr double kMinOfFour = 0.3, kClear = 0.8, kMinOfThree = 0.65;  // shares of dashes
-  constexpr double kFaintest = 0.04;                                        // darkness
+  constexpr double kFaintest = 0.04;                                    // darkness
   constexpr std::size_t kMaxGuesses = 60;
   if (photo.ink < kFaintest)
     return Error{Fault::kInput, "shows nothing dark: photograph the chart on a sheet that its ink darkens"};
@@ -312,4 +313,4 @@ void add_patches(const Patches& more, Patches& patches) {
   add_others(more.rings, patches.rings);
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -8,7 +8,7 @@
 #include "stages/data/chart.h"
 #include "stages/data/status.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// The middle of a box, in mm of the image from its upper left corner.
 inline Spot middle_of(const ChartBox& box, const Chart& chart) {
@@ -43,4 +43,4 @@ Patches find_patches(const Photo& photo, double level, int close);
 /// Adds patches of another level; those that are there already stay as they are.
 void add_patches(const Patches& more, Patches& patches);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

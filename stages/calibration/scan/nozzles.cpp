@@ -10,7 +10,7 @@
 #include "stages/calibration/scan/robust.h"
 #include "stages/calibration/within.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr double kReportedPixels = 0.1, kErrors = 4;
@@ -40,8 +40,8 @@ struct NozzleTally {
   std::array<std::vector<double>, 2> um;
 };
 
-std::vector<NozzleTally> tallies_of(const Chart& chart, const std::vector<DashReading>& detected, const std::vector<bool>& printed,
-                              const SheetFit& fit) {
+std::vector<NozzleTally> tallies_of(const Chart& chart, const std::vector<DashReading>& detected,
+                                    const std::vector<bool>& printed, const SheetFit& fit) {
   std::vector<NozzleTally> tallies(chart.nozzles);
   for (std::size_t d = 0; d < detected.size(); ++d) {
     const ChartDash& dash = chart.dashes[d];
@@ -174,14 +174,14 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashRea
   for (std::size_t d = 0; d < detected.size(); ++d) {
     const ChartDash& dash = chart.dashes[d];
     if (!detected[d].there || detected[d].hidden || detected[d].marred || !printed[dash.swath]) continue;
-    sightings.push_back(
-        {middle_of(dash.box, chart), view.at(detected[d].position.x, detected[d].position.y), dash.swath, dash.nozzle, dash.repeat});
+    sightings.push_back({middle_of(dash.box, chart), view.at(detected[d].position.x, detected[d].position.y), dash.swath,
+                         dash.nozzle, dash.repeat});
   }
   return sightings;
 }
 
 HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detected, const std::vector<bool>& printed,
-                       const SheetFit& fit, bool lens) {
+                      const SheetFit& fit, bool lens) {
   HeadReading head;
   head.nozzle.assign(chart.nozzles, std::nullopt);
   const std::vector<NozzleTally> tallies = tallies_of(chart, detected, printed, fit);
@@ -233,4 +233,4 @@ HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detect
   return head;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

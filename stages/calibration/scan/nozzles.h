@@ -9,7 +9,7 @@
 #include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/chart.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// A length with its standard error. within_um  99 in 100 of them lie nearer to the truth (stages/calibration/within.h)
 /// told  four standard errors are at most a tenth of a pixel of the layer
@@ -25,7 +25,7 @@ struct Offset {
 
 struct HeadReading {
   std::vector<std::uint32_t> blocked, weak;   // nozzles: never seen, seen by times
-  std::vector<std::uint32_t> unreadable;          // nozzles whose dashes are all hidden
+  std::vector<std::uint32_t> unreadable;      // nozzles whose dashes are all hidden
   std::vector<std::optional<Offset>> nozzle;  // against the head's line, of those that were seen
   std::vector<std::optional<Offset>> swath;   // against the first one, along the head's line; absent: not printed
 };
@@ -44,6 +44,6 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashRea
 /// two parts: the scatter of dashes, and the line's own error, which the middle nozzle brings to all: found by moving nozzles
 /// by their errors. fit      of these dashes printed  as printed_swaths() has it, one at least
 HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detected, const std::vector<bool>& printed,
-                       const SheetFit& fit, bool lens);
+                      const SheetFit& fit, bool lens);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

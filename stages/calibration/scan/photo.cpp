@@ -11,7 +11,7 @@
 
 #include "stages/support/text/readable.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr std::int64_t kMaxPixels = 1 << 27;
@@ -126,4 +126,4 @@ Result<std::string> png_of(const cv::Mat& bgr) {
   return std::string(file.begin(), file.end());
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -9,7 +9,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// Darkness of each pixel, 0 as bright as its surroundings, 1 black: 1 - light / light of the blank sheet there.
 struct Photo {
@@ -42,4 +42,4 @@ inline double darkness_at(const cv::Mat& darkness, double x, double y) {
 /// A colour picture of the photograph in memory as PNG. bgr  CV_8UC3. errors  kOutput
 Result<std::string> png_of(const cv::Mat& bgr);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

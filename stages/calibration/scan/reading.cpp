@@ -8,7 +8,7 @@
 
 #include "stages/calibration/scan/marks.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr std::size_t kFewest = 30, kEnoughForLens = 200;  // dashes
@@ -82,8 +82,8 @@ cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& r
     const Spot m = middle_of(box, chart), a{box.left * 1e-6 * chart.pixel_x_nm - m.x, box.top * 1e-6 * chart.pixel_y_nm - m.y};
     const Spot half = chart.scan_along_x ? Spot{a.x, 0} : Spot{0, a.y};
     const cv::Scalar& colour = detected.hidden ? orange : detected.there ? green : red;
-    cv::line(picture, at({detected.position.x + half.x, detected.position.y + half.y}), at({detected.position.x - half.x, detected.position.y - half.y}),
-             colour, detected.there ? 1 : 2, cv::LINE_AA);
+    cv::line(picture, at({detected.position.x + half.x, detected.position.y + half.y}),
+             at({detected.position.x - half.x, detected.position.y - half.y}), colour, detected.there ? 1 : 2, cv::LINE_AA);
   }
   for (const ChartBox& mark : chart.marks) {
     const Spot m = middle_of(mark, chart);
@@ -92,4 +92,4 @@ cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& r
   return picture;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -6,19 +6,19 @@
 
 #include "stages/calibration/scan/dashes.h"
 #include "stages/calibration/scan/inks.h"
-#include "stages/calibration/scan/stitches.h"
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/sheet_fit.h"
+#include "stages/calibration/scan/stitches.h"
 #include "stages/data/chart.h"
 #include "stages/data/status.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 struct ChartReading {
   SheetFit fit;
   std::vector<DashReading> dashes;  // in the order of the chart
-  double pixels_a_mm = 0;        // of the photograph
-  double scatter_um = 0;         // median distance of dashes from where the fit puts them
+  double pixels_a_mm = 0;           // of the photograph
+  double scatter_um = 0;            // median distance of dashes from where the fit puts them
   HeadReading head;
   InkReading inks;
   std::vector<JointReading> stitches;
@@ -32,4 +32,4 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart);
 /// The photograph with a sign on every dash: green seen, red not seen, orange hidden; the marks in blue.
 cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& reading);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// Of an even number, the mean of the two in the middle; 0 of none.
 inline double median_of(std::vector<double> values) {
@@ -54,4 +54,4 @@ inline SettledMean settled_mean(const std::vector<double>& values, double scatte
   return settled;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -9,12 +9,12 @@
 #include "stages/calibration/scan/robust.h"
 #include "stages/geometry/least_squares.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr std::size_t kViewUnknowns = 9;
-constexpr double kSmall = 1e-6;   // step of slopes
-constexpr double kKeptSmall = 1;  // pixels^2 / mm^2: an offset of 50 um weighs as much as a twentieth of a pixel of one dash
+constexpr double kSmall = 1e-6;     // step of slopes
+constexpr double kKeptSmall = 1;    // pixels^2 / mm^2: an offset of 50 um weighs as much as a twentieth of a pixel of one dash
 constexpr double kMinScale = 0.02;  // pixels
 
 double& unknown(View& view, std::size_t i) { return i < 8 ? view.h[i] : view.lens; }
@@ -26,7 +26,8 @@ struct Slopes {
 
 Slopes slopes_at(const View& view, const Spot& at, const Spot& detected) {
   const Spot x = view.at(at.x + kSmall, at.y), y = view.at(at.x, at.y + kSmall);
-  return {{(x.x - detected.x) / kSmall, (x.y - detected.y) / kSmall}, {(y.x - detected.x) / kSmall, (y.y - detected.y) / kSmall}};
+  return {{(x.x - detected.x) / kSmall, (x.y - detected.y) / kSmall},
+          {(y.x - detected.x) / kSmall, (y.y - detected.y) / kSmall}};
 }
 
 class Fitter {
@@ -184,4 +185,4 @@ HeadLine line_of(const std::vector<std::pair<double, double>>& values) {
   return line;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -8,7 +8,7 @@
 
 #include "stages/calibration/scan/view.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// A dash: where it should lie on the sheet in mm, and where the photograph has it, in pixels.
 struct Sighting {
@@ -40,4 +40,4 @@ struct HeadLine {
 };
 HeadLine line_of(const std::vector<std::pair<double, double>>& values);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

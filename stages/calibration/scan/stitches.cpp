@@ -7,7 +7,7 @@
 #include "stages/calibration/scan/marks.h"
 #include "stages/calibration/scan/robust.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 namespace {
 
 constexpr double kAgreeAlong = 0.25, kAgreeAcross = 1;  // pixels
@@ -150,7 +150,7 @@ std::optional<double> across_um(const Photo& photo, const Chart& chart, const Sh
 }  // namespace
 
 std::vector<JointReading> read_stitches(const Photo& photo, const Chart& chart, const SheetFit& fit, const HeadReading& head,
-                                      const InkReading& inks) {
+                                        const InkReading& inks) {
   std::vector<JointReading> stitches;
   if (chart.stitches.empty() && chart.verniers.empty()) return stitches;
   const std::vector<LineOffset> lines = line_offsets(chart, head);
@@ -174,4 +174,4 @@ std::vector<JointReading> read_stitches(const Photo& photo, const Chart& chart, 
   return stitches;
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

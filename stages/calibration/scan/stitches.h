@@ -1,5 +1,5 @@
-// stages/calibration/scan/stitches.h: what verniers and blocks over the joints of swaths tell, beside what all dashes tell of the
-// swaths.
+// stages/calibration/scan/stitches.h: what verniers and blocks over the joints of swaths tell, beside what all dashes tell of
+// the swaths.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 #include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/chart.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 /// How far a swath lies from the one before, the offsets of the nozzles that print its joint taken off; in um, positive as
 /// offsets are.
@@ -25,6 +25,6 @@ struct JointReading {
 
 /// Of all joints between swaths that were printed.
 std::vector<JointReading> read_stitches(const Photo& photo, const Chart& chart, const SheetFit& fit, const HeadReading& head,
-                                      const InkReading& inks);
+                                        const InkReading& inks);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

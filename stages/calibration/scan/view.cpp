@@ -2,7 +2,7 @@
 
 #include "stages/geometry/least_squares.h"
 
-namespace lamina::scan {
+namespace lamina::calibration {
 bool view_of(const std::array<Spot, 4>& positions, const std::array<Spot, 4>& pixels, double width, double height, View& view) {
   view = View();
   for (const Spot& position : positions) view.middle = {view.middle.x + position.x / 4, view.middle.y + position.y / 4};
@@ -20,4 +20,4 @@ bool view_of(const std::array<Spot, 4>& positions, const std::array<Spot, 4>& pi
   return equations.solve(view.h);
 }
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

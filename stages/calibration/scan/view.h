@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace lamina::scan {
+namespace lamina::calibration {
 
 struct Spot {
   double x = 0, y = 0;
@@ -36,4 +36,4 @@ struct View {
 /// The view, without a lens, that takes four places to four pixels. False if three of either lie on a line.
 bool view_of(const std::array<Spot, 4>& positions, const std::array<Spot, 4>& pixels, double width, double height, View& view);
 
-}  // namespace lamina::scan
+}  // namespace lamina::calibration

@@ -12,7 +12,7 @@
 #define LAMINA_TARGET LAMINA_AVX2
 #define LAMINA_LANES LAMINA_AVX2 __attribute__((always_inline)) inline
 
-namespace lamina::cover::avx2 {
+namespace lamina::coverage::avx2 {
 namespace {
 
 using Part = __m256d;
@@ -26,13 +26,13 @@ LAMINA_LANES std::uint32_t signs_of(Part a) { return static_cast<std::uint32_t>(
 
 }  // namespace
 
-LAMINA_AVX2 void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-                     BandSums& sums) {
+LAMINA_AVX2 void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
+                         ColumnReach& reach, BandSums& sums) {
   add_body(piece, rows, columns, cells, reach, sums);
 }
 LAMINA_AVX2 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
 
-}  // namespace lamina::cover::avx2
+}  // namespace lamina::coverage::avx2
 
 #undef LAMINA_LANES
 #undef LAMINA_TARGET

@@ -14,7 +14,7 @@
 
 LAMINA_AVX512_BEGIN
 
-namespace lamina::cover::avx512 {
+namespace lamina::coverage::avx512 {
 namespace {
 
 using Eight = __m512d;
@@ -82,13 +82,13 @@ LAMINA_LANES void note_changes(std::uint64_t levels, std::uint32_t columns, std:
 
 }  // namespace
 
-LAMINA_AVX512 void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-                       BandSums& sums) {
+LAMINA_AVX512 void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
+                           ColumnReach& reach, BandSums& sums) {
   add_body(piece, rows, columns, cells, reach, sums);
 }
 LAMINA_AVX512 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
 
-}  // namespace lamina::cover::avx512
+}  // namespace lamina::coverage::avx512
 
 LAMINA_AVX512_END
 #undef LAMINA_LANES

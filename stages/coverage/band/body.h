@@ -75,8 +75,8 @@ LAMINA_LANES void add_lanes(double* to, std::uint32_t begin, std::uint32_t end, 
 
 LAMINA_LANES Eight along(double at, double per_y, Eight from) { return plus(all(at), times(from, all(per_y))); }
 
-LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-                           BandSums& sums) {
+LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
+                           ColumnReach& reach, BandSums& sums) {
   const Eight low = maximum(less(load(rows.y.data()), all(piece.from_y)), all(piece.low));
   const Eight high = minimum(less(load(rows.y.data() + 1), all(piece.from_y)), all(piece.high));
   const Mask has_height = below(low, high);

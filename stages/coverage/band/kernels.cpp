@@ -2,18 +2,21 @@
 
 #include "stages/geometry/targets.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 namespace plain {
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach, BandSums& sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums);
 void sweep(const RowTask& row, Changes& changes);
 }  // namespace plain
 namespace avx2 {
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach, BandSums& sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums);
 void sweep(const RowTask& row, Changes& changes);
 }  // namespace avx2
 namespace avx512 {
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach, BandSums& sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums);
 void sweep(const RowTask& row, Changes& changes);
 }  // namespace avx512
 
@@ -27,4 +30,4 @@ const BandKernels& band_kernels_for([[maybe_unused]] Isa isa) {
   return kPlain;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -11,7 +11,7 @@
 #include "stages/coverage/band/trapezoid.h"
 #include "stages/data/choices.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// Rows of a band: row `first` + lane lies between y[lane] and y[lane + 1], nm on the bed.
 struct BandRows {
@@ -83,11 +83,11 @@ struct Changes {
 
 struct BandKernels {
   void (*deposit)(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-              BandSums& sums);
+                  BandSums& sums);
   void (*sweep)(const RowTask& row, Changes& changes);
 };
 
 /// isa  one that this processor has (geometry/isa.h), not kAuto
 const BandKernels& band_kernels_for(Isa isa);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -3,7 +3,7 @@
 #include "stages/coverage/coverage.h"
 #include "stages/coverage/edges.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// A facet's piece in the layer has five corners at most, and one trapezoid less.
@@ -114,4 +114,4 @@ void BandMaker::make(const BandSlab& slab, std::uint32_t first, std::uint32_t ro
   std::erase_if(active_, [&](const Trapezoid& piece) { return piece.first_row >= first; });
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

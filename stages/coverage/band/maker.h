@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <span>
 
-#include "stages/coverage/band/resolver.h"
 #include "stages/coverage/band/kernels.h"
+#include "stages/coverage/band/resolver.h"
 #include "stages/data/buffer.h"
 #include "stages/data/levels.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 struct CoverageReport;
 
@@ -44,11 +44,11 @@ class BandMaker {
   const BandKernels* kernels_ = nullptr;
   BandRows rows_;
   BandCells cells_;
-  Buffer<Trapezoid> active_;  // that reach the band, or one below it
-  Buffer<ColumnReach> reach_;       // of each active one
+  Buffer<Trapezoid> active_;   // that reach the band, or one below it
+  Buffer<ColumnReach> reach_;  // of each active one
   Buffer<std::uint32_t> column_;
   Buffer<std::uint8_t> level_;
   RowResolver resolver_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

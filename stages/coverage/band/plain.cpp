@@ -12,7 +12,7 @@
 #define LAMINA_TARGET
 #define LAMINA_LANES __attribute__((always_inline)) inline
 
-namespace lamina::cover::plain {
+namespace lamina::coverage::plain {
 namespace {
 
 #if defined(__SSE2__)
@@ -33,12 +33,13 @@ LAMINA_LANES std::uint32_t signs_of(Part a) { return (std::signbit(a[0]) ? 1u : 
 
 }  // namespace
 
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach, BandSums& sums) {
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums) {
   add_body(piece, rows, columns, cells, reach, sums);
 }
 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
 
-}  // namespace lamina::cover::plain
+}  // namespace lamina::coverage::plain
 
 #undef LAMINA_LANES
 #undef LAMINA_TARGET

@@ -6,7 +6,7 @@
 #include "stages/coverage/coverage.h"
 #include "stages/coverage/exact_level.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// Half a unit in the last place of 1.
@@ -27,7 +27,8 @@ double spoilt_share(const BandSlab& slab, double depth, double scale, double add
   return kRoundings * kEpsilon * margin / (slab.edges.narrowest() * depth * height) * scale + 2 * kEpsilon * added * maximum;
 }
 
-void RowResolver::start(const BandSlab& slab, BandPieces pieces, std::uint32_t row, std::uint32_t first, CoverageReport& report) {
+void RowResolver::start(const BandSlab& slab, BandPieces pieces, std::uint32_t row, std::uint32_t first,
+                        CoverageReport& report) {
   slab_ = &slab;
   report_ = &report;
   pieces_ = pieces;
@@ -145,4 +146,4 @@ void RowResolver::free(std::int64_t winding, std::uint32_t begin, std::uint32_t 
   report_->volume_mm3 += reported * (slab_->edges[end] - slab_->edges[begin]) * strip_.area();
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

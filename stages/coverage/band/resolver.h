@@ -1,4 +1,5 @@
-// stages/coverage/band/resolver.h: levels of voxels that doubles do not decide, and of those that facets share which meet others.
+// stages/coverage/band/resolver.h: levels of voxels that doubles do not decide, and of those that facets share which meet
+// others.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "stages/coverage/voxel.h"
 #include "stages/data/buffer.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 struct CoverageReport;
 
@@ -67,4 +68,4 @@ class RowResolver final : public LaneResolver {
   Samples samples_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

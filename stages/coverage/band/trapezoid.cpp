@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// By how much a corner may lie off, of the facet's size (docs/coverage.md).
@@ -32,7 +32,8 @@ void take_edge(const SlabFacet& facet, std::uint32_t next, Way& way) {
 double x_at(const Trapezoid::TrapezoidSide& side, double y) { return side.x + (y - side.y) * side.dx; }
 
 /// The piece between two sides, which has height.
-void bound(const Trapezoid::TrapezoidSide& on, const Trapezoid::TrapezoidSide& back, double low, double high, Trapezoid& piece) {
+void bound(const Trapezoid::TrapezoidSide& on, const Trapezoid::TrapezoidSide& back, double low, double high,
+           Trapezoid& piece) {
   piece.on = on;
   piece.back = back;
   piece.low = low;
@@ -98,4 +99,4 @@ void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& ro
   append();
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

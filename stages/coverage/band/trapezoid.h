@@ -10,7 +10,7 @@
 #include "stages/coverage/slab_facet.h"
 #include "stages/data/buffer.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// nm, from the lowest corner of the facet's box.
 struct Trapezoid {
@@ -18,10 +18,10 @@ struct Trapezoid {
   struct TrapezoidSide {
     double y, x, z, dx, dz;
   };
-  TrapezoidSide on, back;                      // in the order of the facet's corners downwards, and against it
+  TrapezoidSide on, back;             // in the order of the facet's corners downwards, and against it
   double low, high;                   // y at its ends
   double left, right;                 // x that it reaches
-  double slope_margin;                  // by which x of a chord may be off
+  double slope_margin;                // by which x of a chord may be off
   double from_x, from_y;              // the lowest corner, on the bed
   double size;                        // of the facet
   std::uint32_t facet;                // its index in the layer
@@ -33,4 +33,4 @@ struct Trapezoid {
 /// facet has none.
 void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& rows, Buffer<Trapezoid>& to);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -6,7 +6,7 @@
 #include "stages/coverage/meet/triangles_meet.h"
 #include "stages/geometry/targets.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// Roundings of a plane's value: two of each coordinate of its normal, one of a difference, one of a product, three of sums;
@@ -77,4 +77,4 @@ const PairKernels& pair_kernels_for([[maybe_unused]] Isa isa) {
   return kPlain;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -7,7 +7,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/mesh.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 inline constexpr std::uint32_t kGroupSize = 16;
 
@@ -48,7 +48,7 @@ struct FoundPairs {
   };
   static constexpr std::size_t kMax = kGroupSize * kGroupSize;
   std::array<FacetEdges, 9 * kMax> edge;
-  std::array<Pair, kMax> uncertain;   // may meet beyond what they share
+  std::array<Pair, kMax> uncertain;  // may meet beyond what they share
   std::array<Pair, 9 * kMax> alike;  // walk an edge the same way
   std::uint32_t edges = 0, uncertain_count = 0, alikes = 0;
 };
@@ -80,4 +80,4 @@ std::uint32_t touching(const BoxLanes& boxes, const Box& box);
 void pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundPairs& found);
 }  // namespace avx512
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -9,7 +9,7 @@
 
 #include "stages/coverage/meet/triangles_meet.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 constexpr std::uint64_t kNoFacet = UINT64_MAX;
@@ -144,4 +144,4 @@ void FacetOrder::bound(const MeshBlocks& mesh) {
   }
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

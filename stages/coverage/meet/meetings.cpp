@@ -15,7 +15,7 @@
 #include "stages/coverage/meet/triangles_meet.h"
 #include "stages/geometry/isa.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 using Wide = __int128;
@@ -108,8 +108,8 @@ class GroupBuffer {
   std::vector<std::uint32_t> number_;
 };
 
-void test_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a, const Box& around_b,
-                   const PairKernels& kernels, FoundPairs& found, Findings& findings) {
+void test_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a, const Box& around_b, const PairKernels& kernels,
+                FoundPairs& found, Findings& findings) {
   Box around = around_a;
   around.add(around_b);
   if (std::max({around.width(), around.depth(), around.height()}) > kWidestPair) return far_pairs(a, b, findings);
@@ -287,4 +287,4 @@ Suspects find_suspects(const MeshBlocks& mesh, const IntervalTable<Nm>& index, I
   return suspects;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -8,7 +8,7 @@
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/interval_table.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// A bit a facet: lane i of cluster c is suspect if bit i of suspects[c] is set.
 using Suspects = Buffer<std::uint16_t>;
@@ -24,4 +24,4 @@ using Suspects = Buffer<std::uint16_t>;
 ///       box touches more than 4096 others is suspect as a whole, and so is what lies apart once 65,536 rays are shot
 Suspects find_suspects(const MeshBlocks& mesh, const IntervalTable<Nm>& index, Isa isa = Isa::kAuto);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

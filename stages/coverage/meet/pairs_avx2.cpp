@@ -7,7 +7,7 @@
 
 #define LAMINA_LANES LAMINA_AVX2 __attribute__((always_inline)) inline
 
-namespace lamina::cover::avx2 {
+namespace lamina::coverage::avx2 {
 namespace {
 
 constexpr std::uint32_t kLanes = 8;
@@ -39,6 +39,6 @@ LAMINA_AVX2 void pairs(const FacetGroup& a, const FacetGroup& b, const Box& arou
   pairs_body(a, b, around_b, found);
 }
 
-}  // namespace lamina::cover::avx2
+}  // namespace lamina::coverage::avx2
 #undef LAMINA_LANES
 #endif

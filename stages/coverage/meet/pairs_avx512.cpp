@@ -9,7 +9,7 @@
 
 LAMINA_AVX512_BEGIN
 
-namespace lamina::cover::avx512 {
+namespace lamina::coverage::avx512 {
 namespace {
 
 constexpr std::uint32_t kLanes = 16;
@@ -40,7 +40,7 @@ LAMINA_AVX512 void pairs(const FacetGroup& a, const FacetGroup& b, const Box& ar
   pairs_body(a, b, around_b, found);
 }
 
-}  // namespace lamina::cover::avx512
+}  // namespace lamina::coverage::avx512
 
 LAMINA_AVX512_END
 #undef LAMINA_LANES

@@ -33,7 +33,8 @@ LAMINA_LANES Corners one_of(const FacetGroup& group, std::uint32_t lane) {
 LAMINA_LANES std::uint32_t touching_lanes(const BoxLanes& boxes, std::uint32_t first, const Nm* low, const Nm* high) {
   std::uint32_t touch = (1u << kLanes) - 1;
   for (int axis = 0; axis < 3; ++axis) {
-    touch &= not_above(load(boxes.low[axis] + first), all(high[axis])) & not_above(all(low[axis]), load(boxes.high[axis] + first));
+    touch &=
+        not_above(load(boxes.low[axis] + first), all(high[axis])) & not_above(all(low[axis]), load(boxes.high[axis] + first));
   }
   return touch;
 }

@@ -5,7 +5,7 @@
 
 #define LAMINA_LANES inline
 
-namespace lamina::cover::plain {
+namespace lamina::coverage::plain {
 namespace {
 
 constexpr std::uint32_t kLanes = 1;
@@ -36,5 +36,5 @@ void pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundP
   pairs_body(a, b, around_b, found);
 }
 
-}  // namespace lamina::cover::plain
+}  // namespace lamina::coverage::plain
 #undef LAMINA_LANES

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 using Wide = __int128;
@@ -175,4 +175,4 @@ bool triangles_meet(const Plane& f, const Plane& g, int& shared) {
   return !apart_by_edges(f.facet, g.facet);
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

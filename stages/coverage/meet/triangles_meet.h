@@ -5,7 +5,7 @@
 
 #include "stages/data/mesh.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// A facet and its doubled area normal, which is exact where corners differ by less than 2^31 nm.
 struct Plane {
@@ -22,4 +22,4 @@ struct Plane {
 /// Source: separating axes of convex bodies (S. Gottschalk, 1996); coplanar and touching ones are decided in integers
 bool triangles_meet(const Plane& f, const Plane& g, int& shared);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

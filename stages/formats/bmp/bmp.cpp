@@ -14,7 +14,7 @@
 #include "stages/formats/images/image_formats.h"
 #include "stages/geometry/bits.h"
 
-namespace lamina::write::bmp {
+namespace lamina::formats::bmp {
 namespace {
 
 constexpr std::uint32_t kHeadBytes = 62, kInfoBytes = 40;
@@ -67,9 +67,9 @@ class BmpEncoder : public ImageEncoder {
 
 std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<BmpEncoder>(); }
 
-}  // namespace lamina::write::bmp
+}  // namespace lamina::formats::bmp
 
-namespace lamina::read {
+namespace lamina::formats {
 
 // 1-bit and 8-bit Windows bitmaps, uncompressed. Format: stages/formats/bmp/README.md.
 
@@ -151,4 +151,4 @@ Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int th
   return Image{builder.finish(), number(head, 38) * 0.0254, number(head, 42) * 0.0254};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

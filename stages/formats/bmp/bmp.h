@@ -5,8 +5,8 @@
 
 #include "stages/formats/image_format.h"
 
-namespace lamina::write::bmp {
+namespace lamina::formats::bmp {
 
 std::unique_ptr<ImageEncoder> make_encoder();
 
-}  // namespace lamina::write::bmp
+}  // namespace lamina::formats::bmp

@@ -8,7 +8,7 @@
 
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 enum Direction : std::uint32_t { kInternal = 0, kExternal = 1, kOpen = 2 };
@@ -257,4 +257,4 @@ std::unique_ptr<SliceEncoder> make_cli_16_encoder(const SliceFormatOptions& opti
   return std::make_unique<CliEncoder>(CliForm::kShort, options.empty_first_layer);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -8,7 +8,7 @@
 
 #include "stages/geometry/t6_codes.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 using namespace lamina::t6;
 
@@ -59,4 +59,4 @@ class BitWriter {
   std::byte* next_;
 };
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

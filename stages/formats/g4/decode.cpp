@@ -8,7 +8,7 @@
 
 #include "stages/geometry/t6_codes.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 /// What the highest bits of a window say: of a mode 0 .. 6 (a1 - b1 + 3), kPass or kHorizontal; of a run its length.
@@ -85,7 +85,8 @@ std::uint64_t window(const std::byte* coded, std::uint64_t at) {
 }
 
 /// Moves `at` behind a run's words; more than `most` if the run is longer or is none.
-std::uint32_t take_run(const std::byte* coded, std::uint64_t& at, std::uint64_t end, std::uint32_t black, std::uint32_t maximum) {
+std::uint32_t take_run(const std::byte* coded, std::uint64_t& at, std::uint64_t end, std::uint32_t black,
+                       std::uint32_t maximum) {
   const auto& words = run_words(black);
   std::uint32_t length = 0;
   for (;;) {
@@ -228,4 +229,4 @@ bool G4Decoder::append(Buffer<std::byte>& coded, const G4Strip& strip, Runs& run
   return decode_rows(coded.data(), strip, runs);
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

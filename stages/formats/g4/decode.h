@@ -7,7 +7,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/runs.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// How a strip of a TIFF is coded.
 struct G4Strip {
@@ -37,4 +37,4 @@ class G4Decoder {
   std::uint64_t bit_ = 0, bits_ = 0;          // the next one; all
 };
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 /// The row after `row` and all empty rows that follow it. Offsets (data/runs.h) never fall, so a search by doubling finds
 /// the end. cost: the logarithm of the stretch
@@ -22,4 +22,4 @@ inline std::uint32_t end_of_empty_rows(std::span<const std::uint32_t> row_offset
   return static_cast<std::uint32_t>(past - row_offset.begin() - 1);
 }
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

@@ -16,7 +16,7 @@
 #include "stages/formats/g4/steady_rows.h"
 #include "stages/geometry/isa.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 namespace {
 
 // A scratch row is: one 0, the changes, and `columns` this many times. The 0 is read as the change before the first
@@ -299,4 +299,4 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
   return static_cast<std::size_t>(writer.finish() - file.data());
 }
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

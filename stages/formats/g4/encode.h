@@ -8,7 +8,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/runs.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 struct StepsBody;
 
@@ -31,4 +31,4 @@ class Encoder {
   Buffer<std::uint32_t> coding_, reference_;  // 0, the changes of a row, then `columns` some times
 };
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

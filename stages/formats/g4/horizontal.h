@@ -5,7 +5,7 @@
 
 #include "stages/formats/g4/bit_writer.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 struct RunWord {
   std::uint64_t bits;
@@ -55,4 +55,4 @@ inline void put_horizontal(BitWriter& writer, unsigned black, std::uint32_t firs
   }
 }
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

@@ -4,7 +4,7 @@
 
 #include "stages/formats/g4/horizontal.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 namespace {
 
 /// From change `at` of a task on, those that take horizontal mode: a far one, and with it the next of its row.
@@ -55,4 +55,4 @@ std::uint32_t put_steady_rows(BitWriter& writer, const SteadyRows& rows, const S
   return total - task.left;
 }
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

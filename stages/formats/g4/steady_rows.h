@@ -6,7 +6,7 @@
 #include "stages/formats/g4/bit_writer.h"
 #include "stages/formats/g4/steps.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 /// Rows that follow each other; the first has a row above, and all have the same number of changes.
 struct SteadyRows {
@@ -21,4 +21,4 @@ struct SteadyRows {
 ///          above of the same number as T.6's b1, the one before it as a0
 std::uint32_t put_steady_rows(BitWriter& writer, const SteadyRows& rows, const StepsBody& body);
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

@@ -2,7 +2,7 @@
 
 #include "stages/geometry/targets.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 const StepsBody* steps_body([[maybe_unused]] Isa isa) {
 #if defined(LAMINA_WIDE_KERNELS)
@@ -13,4 +13,4 @@ const StepsBody* steps_body([[maybe_unused]] Isa isa) {
   return nullptr;
 }
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

@@ -7,7 +7,7 @@
 #include "stages/data/choices.h"
 #include "stages/formats/g4/bit_writer.h"
 
-namespace lamina::write::g4 {
+namespace lamina::formats::g4 {
 
 /// Which of the next changes are the last of their rows.
 class RowEnds {
@@ -90,4 +90,4 @@ namespace avx512 {
 void put_steps(BitWriter& writer, StepsTask& task, Steps& steps);
 }
 
-}  // namespace lamina::write::g4
+}  // namespace lamina::formats::g4

@@ -12,7 +12,7 @@
 
 #define LAMINA_INLINE LAMINA_AVX2 __attribute__((always_inline)) inline
 
-namespace lamina::write::g4::avx2 {
+namespace lamina::formats::g4::avx2 {
 namespace {
 
 LAMINA_INLINE std::uint32_t bits_of(__m256i v) {
@@ -80,6 +80,6 @@ LAMINA_AVX2 void put_steps(BitWriter& writer, StepsTask& task, Steps& found) {
   task.left = left;
 }
 
-}  // namespace lamina::write::g4::avx2
+}  // namespace lamina::formats::g4::avx2
 #undef LAMINA_INLINE
 #endif

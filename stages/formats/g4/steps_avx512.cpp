@@ -14,7 +14,7 @@
 
 LAMINA_AVX512_BEGIN
 
-namespace lamina::write::g4::avx512 {
+namespace lamina::formats::g4::avx512 {
 namespace {
 
 /// Joins the words of all lanes; a lane of length 0 has no word.
@@ -78,7 +78,7 @@ LAMINA_AVX512 void put_steps(BitWriter& writer, StepsTask& task, Steps& found) {
   task.left = left;
 }
 
-}  // namespace lamina::write::g4::avx512
+}  // namespace lamina::formats::g4::avx512
 
 LAMINA_AVX512_END
 #undef LAMINA_INLINE

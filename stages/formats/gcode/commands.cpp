@@ -13,7 +13,7 @@
 
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 constexpr std::size_t kMaxProfile = 64 << 10;  // bytes of settings; Cura's are some 5 kB
@@ -183,7 +183,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kNear = 1e-6;                         // mm or radians: NEAR() and NEAR_ZERO() of Marlin
 constexpr double kDeviation = Arc::kTolerance - 1e-5;  // leaves room for ends on whole nanometres
 constexpr double kLongest = 1e150;                     // mm: a radius that can be squared
-constexpr double kMaxChords = 1e9;                    // of an arc that leaves every bed with its first one
+constexpr double kMaxChords = 1e9;                     // of an arc that leaves every bed with its first one
 
 }  // namespace
 
@@ -422,8 +422,14 @@ bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>
     position_.primed = chord_ > 0 ? 0 : position_.primed + fed;
   } else if (fed > 0 && (to[0] != position_.at[0] || to[1] != position_.at[1])) {
     const double* at = position_.at;
-    bead = RawBead{
-        {at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, position_.volumetric, position_.speed, joined, position_.primed, true};
+    bead = RawBead{{at[0], at[1], at[2]},
+                   {to[0], to[1], to[2]},
+                   fed,
+                   position_.volumetric,
+                   position_.speed,
+                   joined,
+                   position_.primed,
+                   true};
     if (!within_reach(*bead)) return false;
     position_.deposits = true;
     position_.primed = 0;
@@ -489,4 +495,4 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
   return true;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -10,7 +10,7 @@
 #include "stages/formats/gcode/read_gcode.h"
 #include "stages/support/io/file_reader.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// Facts of a whole file, gathered line by line; a later comment of the same kind does not replace an earlier one.
 ///
@@ -89,7 +89,7 @@ class Arc {
 
  private:
   FilePosition from_, to_, spoke_;  // spoke: from the centre to the start
-  double travel_ = 0;        // radians, counter-clockwise
+  double travel_ = 0;               // radians, counter-clockwise
   double miss_ = 0;
   bool short_radius_ = false;
   std::uint64_t chords_ = 1;
@@ -124,8 +124,8 @@ class GcodeCommands {
     file_.go_to(position.byte, position.line);
     chord_ = 0;
   }
-  const FilePosition& position() const { return position_; }    // behind the line that next() returned for
-  const FilePosition& before() const { return before_; }  // in front of it
+  const FilePosition& position() const { return position_; }  // behind the line that next() returned for
+  const FilePosition& before() const { return before_; }      // in front of it
   std::optional<std::string> fault;
   bool layer_tag = false;  // the line begins a layer
   SlicerFacts facts;       // of the lines so far
@@ -167,4 +167,4 @@ class GcodeCommands {
   RawBead whole_{};          // the arc from its start to its end
 };
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -4,16 +4,16 @@
 #include <cmath>
 #include <numbers>
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 constexpr double kRound = 2 * std::numbers::pi;
-constexpr double kAlmost = 0.02;      // rad: ends of beads are rounded to micrometres
-constexpr double kJump = 0.1;         // mm of z without a bead that end a climb
-constexpr double kTurnless = 5;       // mm of climb without a turn that are a layer
+constexpr double kAlmost = 0.02;    // rad: ends of beads are rounded to micrometres
+constexpr double kJump = 0.1;       // mm of z without a bead that end a climb
+constexpr double kTurnless = 5;     // mm of climb without a turn that are a layer
 constexpr double kMinLayer = 0.04;  // mm: a slope that high leads to a new flat layer if a long flat way follows
 constexpr double kMinRise = 0.02;   // mm from a layer to the next
-constexpr double kSame = 1e-6;        // mm
+constexpr double kSame = 1e-6;      // mm
 
 double heading_of(const RawBead& bead) { return std::atan2(bead.to[1] - bead.from[1], bead.to[0] - bead.from[0]); }
 
@@ -156,4 +156,4 @@ void LayerCutter::finish() {
   }
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -9,7 +9,7 @@
 #include "stages/formats/gcode/commands.h"
 #include "stages/formats/gcode/read_gcode.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// Takes the beads of a file in their order. See GcodeFile for the rules.
 ///
@@ -24,7 +24,7 @@ class LayerCutter {
     double length = 0, sloped = 0;                 // mm, all beads and those that climb or fall
     double untagged_length = 0, untagged_fed = 0;  // of beads without ;WIDTH:
     double turn = 0;                               // rad: of the direction of beads that climb
-    double min_rise = 0;                         // mm between heights of flat beads, 0 if there is one height
+    double min_rise = 0;                           // mm between heights of flat beads, 0 if there is one height
     double tag_height = 0;                         // ;HEIGHT: of the last bead
     bool volumetric = false;                       // of the last bead
     bool turned = false;                           // ends with a turn
@@ -90,4 +90,4 @@ inline double width_of(const RawBead& bead, double height, double unit_mm3) {
   return std::clamp(std::round(width * 100) / 100, 0.01, 20.0);
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

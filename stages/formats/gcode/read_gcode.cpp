@@ -11,7 +11,7 @@
 #include "stages/formats/gcode/layers.h"
 #include "stages/support/io/file_reader.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 constexpr double kUsualNozzle = 0.4;  // mm
@@ -233,4 +233,4 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const 
   return layer;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -16,7 +16,7 @@ namespace lamina {
 class FileReader;
 }
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// One straight move that lays filament; its type is one of GcodeFile::types.
 using GcodeBead = DepositedBead;
@@ -28,8 +28,8 @@ struct GcodeLayer {
 };
 
 struct GcodeOptions {
-  double filament_mm = 0;                 // diameter; 0: what the file tells, else 1.75
-  double layer_height_mm = 0;             // begins layers at its multiples; 0: at tags, heights or turns
+  double filament_mm = 0;                // diameter; 0: what the file tells, else 1.75
+  double layer_height_mm = 0;            // begins layers at its multiples; 0: at tags, heights or turns
   std::uint32_t max_beads = 10'000'000;  // of a layer, 24 bytes each
   std::uint32_t max_layers = 400'000;    // a bed's height in steps of 5 um, some 400 bytes each
 };
@@ -79,13 +79,13 @@ class GcodeFile {
     double unit = 1;                               // mm
     double speed = 0;                              // mm/s; 0 until a line tells it
     bool relative = false, relative_feed = false;  // G91, M83
-    Firmware firmware = Firmware::kUnknown;         // of the tag ;FLAVOR:
+    Firmware firmware = Firmware::kUnknown;        // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
     std::uint8_t plane = 17;                       // of arcs: G17, G18, G19
     double width = 0, height = 0;                  // mm: tags, 0 without
     std::uint32_t type = 0;
     bool deposits = false;  // the last move laid a bead
-    double primed = 0;  // fed since then: mm, or mm3
+    double primed = 0;      // fed since then: mm, or mm3
   };
   /// Where a layer begins, and how high its beads are where no tag tells it.
   struct LayerPosition {
@@ -105,4 +105,4 @@ class GcodeFile {
   double filament_mm_ = 1.75, fed_mm3_ = 0, density_g_cm3_ = 0;
 };
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

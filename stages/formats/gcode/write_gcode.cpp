@@ -9,7 +9,7 @@
 #include "stages/data/units.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write::gcode {
+namespace lamina::formats::gcode {
 namespace {
 
 constexpr std::size_t kMaxLine = 160;  // bytes; five numbers with their letters need less
@@ -287,10 +287,10 @@ class GcodeFormat final : public ExtrusionFormat {
 };
 
 }  // namespace
-}  // namespace lamina::write::gcode
+}  // namespace lamina::formats::gcode
 
-namespace lamina::write {
+namespace lamina::formats {
 std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine, const Switches& switches) {
   return std::make_unique<gcode::GcodeFormat>(machine, switches);
 }
-}  // namespace lamina::write
+}  // namespace lamina::formats

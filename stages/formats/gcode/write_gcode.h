@@ -13,7 +13,7 @@
 #include "stages/data/toolpaths.h"
 #include "stages/formats/extrusion_format.h"
 
-namespace lamina::write::gcode {
+namespace lamina::formats::gcode {
 
 /// Writes one layer's moves; made anew for each layer.
 class LayerWriter final : public LayerMoves {
@@ -55,4 +55,4 @@ std::string time_text(double seconds);
 /// Replaces {name} in code of a profile; unknown names stay. `layer` and `z_mm` as far as they are known.
 std::string fill_code(const std::string& code, const Extruder& machine, std::uint32_t layers, std::uint32_t layer, double z_mm);
 
-}  // namespace lamina::write::gcode
+}  // namespace lamina::formats::gcode

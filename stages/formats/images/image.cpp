@@ -16,7 +16,7 @@
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 /// By the first bytes, whatever the name says.
@@ -215,4 +215,4 @@ bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, u
   return true;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -16,7 +16,7 @@ namespace lamina {
 struct Levels;
 }
 
-namespace lamina::read {
+namespace lamina::formats {
 
 struct Image {
   Runs runs;
@@ -67,4 +67,4 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path);
 /// layer  that the image is of, and that its description tells where lamina wrote one (stages/formats/tiff/)
 std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set, const Layer& layer);
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

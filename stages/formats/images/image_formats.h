@@ -10,7 +10,7 @@
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// Takes rows of grey as levels.
 struct LevelSink {
@@ -43,4 +43,4 @@ void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t s
 /// The same of values of four bits, of which 15 is 255.
 void bits_of_nibbles(std::span<std::byte> row, std::uint32_t columns, int threshold);
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -11,7 +11,7 @@
 #include "stages/support/hash/hash.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 namespace fs = std::filesystem;
@@ -156,4 +156,4 @@ Status LayerImages::check(std::uint32_t layer, const Image& image, std::uint32_t
   return {};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -10,7 +10,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 struct Image;
 
@@ -19,10 +19,10 @@ bool names_images(const std::string& path);
 
 /// What the files do not tell.
 struct LayerImagesRequest {
-  int threshold = 128;         // 1 .. 255: grey below it is set
-  bool invert = false;         // bright pixels are set
-  bool missing_empty = false;  // missing numbers are empty layers
-  std::uint32_t inspections = 1;     // images that are decoded at first, spread over the stack, for expected_changes()
+  int threshold = 128;            // 1 .. 255: grey below it is set
+  bool invert = false;            // bright pixels are set
+  bool missing_empty = false;     // missing numbers are empty layers
+  std::uint32_t inspections = 1;  // images that are decoded at first, spread over the stack, for expected_changes()
 };
 
 /// Images of one size and one resolution; const, readable from any thread.
@@ -56,7 +56,7 @@ class LayerImages {
  private:
   struct Page {
     std::uint32_t file = UINT32_MAX;  // of files_; UINT32_MAX: missing
-    std::uint64_t position = 0;          // of pages_of()
+    std::uint64_t position = 0;       // of pages_of()
     std::uint64_t bytes = 0;          // its share of the file
   };
   /// What tells that a file is another one than when it was hashed.
@@ -81,4 +81,4 @@ class LayerImages {
   double changes_a_byte_ = 0;  // the most of those that were looked at
 };
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -7,7 +7,7 @@
 
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 namespace fs = std::filesystem;
 
@@ -81,4 +81,4 @@ Runs inverse(const Runs& image) {
   return out;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

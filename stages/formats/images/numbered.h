@@ -8,7 +8,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 struct Numbered {
   std::uint64_t number;
@@ -24,4 +24,4 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
 /// What is not set of an image.
 Runs inverse(const Runs& image);
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 /// The image's pixel that holds the centre of the pixel `place` behind the corner, at dots of the image in the bed's span.
@@ -72,4 +72,4 @@ void position(const LevelsView& image, const Placement& placement, Levels& out) 
   }
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -8,7 +8,7 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// Which pixels of an image the pixels of a bed take. Rows and columns are those of images.
 struct Placement {
@@ -28,4 +28,4 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t d
 void position(const RunsView& image, const Placement& placement, Runs& out);
 void position(const LevelsView& image, const Placement& placement, Levels& out);
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -11,7 +11,7 @@
 #include "stages/formats/images/numbered.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 /// The columns and rows of a box, from the front to the back.
@@ -84,4 +84,4 @@ Result<VoxelStack> cut_box(const ImageStack& stack, const std::array<std::uint32
   return box;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

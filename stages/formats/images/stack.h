@@ -11,7 +11,7 @@
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// What a folder without a manifest does not tell.
 struct StackRequest {
@@ -41,4 +41,4 @@ Result<ImageStack> stack_of_images(const std::string& folder, const StackRequest
 Result<VoxelStack> cut_box(const ImageStack& stack, const std::array<std::uint32_t, 3>& low,
                            const std::array<std::uint32_t, 3>& count);
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -18,7 +18,7 @@
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 namespace fs = std::filesystem;
@@ -67,9 +67,11 @@ ImageInspection inspect_image(const ImageFile& position, int threshold) {
 /// What keeps an image from being a layer beside the first one.
 std::string differs(const ImageInspection& inspection, const StackInfo& first) {
   if (inspection.columns != first.columns || inspection.rows != first.rows)
-    return fmt::format("{} x {} pixels, the first image has {} x {}", inspection.columns, inspection.rows, first.columns, first.rows);
+    return fmt::format("{} x {} pixels, the first image has {} x {}", inspection.columns, inspection.rows, first.columns,
+                       first.rows);
   if (std::abs(inspection.dpi_x - first.dpi_x) > 0.05 || std::abs(inspection.dpi_y - first.dpi_y) > 0.05)
-    return fmt::format("{:g} x {:g} dpi, the first image has {:g} x {:g}", inspection.dpi_x, inspection.dpi_y, first.dpi_x, first.dpi_y);
+    return fmt::format("{:g} x {:g} dpi, the first image has {:g} x {:g}", inspection.dpi_x, inspection.dpi_y, first.dpi_x,
+                       first.dpi_y);
   return {};
 }
 
@@ -145,8 +147,10 @@ Result<StackInfo> inspect_stack(const std::string& path, int threshold) {
   }
   info.images = positions.size();
   std::vector<ImageInspection> inspections(positions.size());
-  tbb::parallel_for(std::size_t{0}, positions.size(), [&](std::size_t i) { inspections[i] = inspect_image(positions[i], threshold); });
-  const auto first = std::ranges::find_if(inspections, [](const ImageInspection& inspection) { return inspection.wrong.empty(); });
+  tbb::parallel_for(std::size_t{0}, positions.size(),
+                    [&](std::size_t i) { inspections[i] = inspect_image(positions[i], threshold); });
+  const auto first =
+      std::ranges::find_if(inspections, [](const ImageInspection& inspection) { return inspection.wrong.empty(); });
   if (first == inspections.end()) return Error{Fault::kInput, inspections.front().wrong};
   info.kind = first->kind;
   info.columns = first->columns;
@@ -172,8 +176,8 @@ std::string as_text(const StackInfo& info) {
   const bool reported = info.dpi_x > 0 && info.dpi_y > 0;
   line("size", fmt::format("{} x {} pixels{}", info.columns, info.rows,
                            reported ? fmt::format(" of {:.6g} x {:.6g} dpi: {:.3f} x {:.3f} mm", info.dpi_x, info.dpi_y,
-                                              info.columns * 25.4 / info.dpi_x, info.rows * 25.4 / info.dpi_y)
-                                : "; the files tell no resolution"));
+                                                  info.columns * 25.4 / info.dpi_x, info.rows * 25.4 / info.dpi_y)
+                                    : "; the files tell no resolution"));
   line("set", fmt::format("{} pixels, {} to {} an image{}", readable_count(info.set), readable_count(info.min_set),
                           readable_count(info.max_set), info.empty > 0 ? fmt::format("; {} of them empty", info.empty) : ""));
   if (info.kind.bits > 1)
@@ -265,4 +269,4 @@ Result<ImageKind> kind_of(const std::string& path, std::uint64_t page) {
   return Error{Fault::kInput, path + ": neither TIFF nor PNG nor BMP nor PBM nor PGM"};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -9,7 +9,7 @@
 #include "stages/data/status.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::read {
+namespace lamina::formats {
 
 /// How an image is stored, in words for people.
 struct ImageKind {
@@ -31,13 +31,13 @@ struct StackInfo {
   std::vector<std::array<std::uint64_t, 2>> missing;  // ranges of numbers, both ends included
   ImageKind kind;                                     // of the first image, as the next ones
   std::uint32_t columns = 0, rows = 0;
-  double dpi_x = 0, dpi_y = 0;                         // 0: not told
+  double dpi_x = 0, dpi_y = 0;                      // 0: not told
   std::uint64_t set = 0, min_set = 0, max_set = 0;  // dark pixels, of all images and of one
-  std::uint64_t empty = 0;                             // images without any
-  std::uint64_t grey = 0;                              // pixels between white and black
-  double filled = 0;                                   // pixels, each by its darkness
-  std::uint64_t unreadable = 0, differing = 0;         // images; those that no job takes as they are
-  std::vector<std::string> wrong;                      // the first of them, a line each
+  std::uint64_t empty = 0;                          // images without any
+  std::uint64_t grey = 0;                           // pixels between white and black
+  double filled = 0;                                // pixels, each by its darkness
+  std::uint64_t unreadable = 0, differing = 0;      // images; those that no job takes as they are
+  std::vector<std::string> wrong;                   // the first of them, a line each
 
   std::uint64_t missing_numbers() const;
 };
@@ -50,4 +50,4 @@ Result<StackInfo> inspect_stack(const std::string& path, int threshold);
 std::string as_text(const StackInfo& info);
 Json as_json(const StackInfo& info);
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

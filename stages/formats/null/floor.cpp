@@ -16,7 +16,7 @@
 #include "stages/support/io/file_target.h"
 #include "stages/support/io/temporary.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 /// A descriptor that closes itself.
@@ -166,4 +166,4 @@ Status measure_floor(const std::vector<std::string>& parts, const std::string& n
   return {};
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -8,7 +8,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// What any program has to do for a job, on one thread: read the parts, write as many bytes in as many files under another name
 /// and rename them, and touch each crossing of a row with a surface once, in memory that is in use already.
@@ -25,4 +25,4 @@ struct Floor {
 Status measure_floor(const std::vector<std::string>& parts, const std::string& neighbour, const std::atomic<bool>& cancel,
                      Floor& floor);
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

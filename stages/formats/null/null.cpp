@@ -1,6 +1,6 @@
 #include "stages/formats/null/null.h"
 
-namespace lamina::write::null {
+namespace lamina::formats::null {
 namespace {
 
 class NullEncoder : public ImageEncoder {
@@ -15,4 +15,4 @@ class NullEncoder : public ImageEncoder {
 
 std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<NullEncoder>(); }
 
-}  // namespace lamina::write::null
+}  // namespace lamina::formats::null

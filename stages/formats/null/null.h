@@ -5,8 +5,8 @@
 
 #include "stages/formats/image_format.h"
 
-namespace lamina::write::null {
+namespace lamina::formats::null {
 
 std::unique_ptr<ImageEncoder> make_encoder();
 
-}  // namespace lamina::write::null
+}  // namespace lamina::formats::null

@@ -13,7 +13,7 @@
 #include "stages/formats/images/image_formats.h"
 #include "stages/geometry/bits.h"
 
-namespace lamina::write::pbm {
+namespace lamina::formats::pbm {
 namespace {
 
 class PbmEncoder : public ImageEncoder {
@@ -33,9 +33,9 @@ class PbmEncoder : public ImageEncoder {
 
 std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<PbmEncoder>(); }
 
-}  // namespace lamina::write::pbm
+}  // namespace lamina::formats::pbm
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 // More than any header of ours, and than any sensible comment of others.
@@ -140,4 +140,4 @@ Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int th
   return Image{builder.finish(), head->dpi_x, head->dpi_y};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -21,7 +21,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot, width, height, boxes, images, lines, do
 
 }  // namespace lamina
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 void colour(SvgWriter& svg, std::string_view name, const std::string& rgb) { svg.attribute(name, "#" + rgb); }
@@ -115,4 +115,4 @@ Result<Plot> read_plot(std::string_view json) {
   }
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -7,7 +7,7 @@
 #include "stages/data/plot.h"
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// An SVG file.
 std::string plot_svg(const Plot& plot);
@@ -18,4 +18,4 @@ std::string plot_json(const Plot& plot);
 /// Parses that JSON. errors  kUsage
 Result<Plot> read_plot(std::string_view json);
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <string_view>
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 
 inline constexpr std::size_t kChunkHead = 8, kChunkTail = 4;  // bytes before and behind the content
 
@@ -26,4 +26,4 @@ inline std::byte* close_chunk(std::byte* chunk, std::byte* end, std::string_view
   return put_number(end, static_cast<std::uint32_t>(check));
 }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -7,7 +7,7 @@
 
 #include "stages/formats/png/chunk.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 namespace {
 
 void add_chunk(Buffer<std::byte>& file, std::string_view name, std::span<const std::byte> content) {
@@ -49,4 +49,4 @@ Buffer<std::byte> coloured(std::uint32_t columns, std::span<const std::string> c
   return file;
 }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

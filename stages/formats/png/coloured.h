@@ -7,7 +7,7 @@
 
 #include "stages/data/buffer.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 
 /// A byte a pixel, a palette, no filters (PNG specification, second edition, 9.2, 11.2.2 and 11.2.3).
 /// columns  at least 1
@@ -16,4 +16,4 @@ namespace lamina::write::png {
 /// cost     holds the file and all rows
 Buffer<std::byte> coloured(std::uint32_t columns, std::span<const std::string> colours, std::span<const std::uint8_t> pixels);
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 namespace {
 
 constexpr Table table_of(const Weights& weights) {
@@ -37,4 +37,4 @@ const Table& table_for(std::uint64_t bytes, std::uint64_t changes) {
   return changes * 512 > bytes ? kBusyTable : kSparseTable;
 }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <initializer_list>
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 
 /// Up to 56 bits, the first one lowest, and their number.
 struct Word {
@@ -343,4 +343,4 @@ struct Table {
 /// For rows of this many bytes that change colour this often in all.
 const Table& table_for(std::uint64_t bytes, std::uint64_t changes);
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

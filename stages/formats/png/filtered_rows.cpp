@@ -5,7 +5,7 @@
 
 #include "stages/geometry/bits.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 namespace {
 
 constexpr unsigned kUp = 2;
@@ -168,7 +168,8 @@ constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
 /// count    a multiple of 4, less than there are left in both rows
 /// moved    room for as many
 /// returns  how many move; kNotEdges if one moves too far or the change behind it is near
-[[gnu::always_inline]] inline std::size_t find_moved(const State& state, const PngRow& row, std::size_t count, MovedEdge* moved) {
+[[gnu::always_inline]] inline std::size_t find_moved(const State& state, const PngRow& row, std::size_t count,
+                                                     MovedEdge* moved) {
   const std::uint32_t* const change = row.changes.data() + state.next;
   const std::uint32_t* const above = row.above.data() + state.next_above;
   const std::int32_t even = state.next % 2 == 0 ? 1 << 7 : 0, odd = even ^ 1 << 7;
@@ -245,4 +246,4 @@ void FilteredRows::put(BitWriter& out, std::uint32_t r, std::span<const std::uin
   out = state.out;
 }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -10,7 +10,7 @@
 
 #include "stages/formats/png/deflate.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 
 /// Adler-32 (RFC 1950, section 8.2) of rows of one length. Its second sum counts each byte as often as there are bytes from
 /// it to the end of the stream, so rows can be added up one by one, and zeros need not be.
@@ -70,4 +70,4 @@ class FilteredRows {
   Adler32 check_;
 };
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -9,7 +9,7 @@
 #include "stages/formats/png/filtered_rows.h"
 #include "stages/geometry/bits.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 namespace {
 
 // zlib's header (RFC 1950, 2.2): deflate, a window of 32 KiB, no dictionary, the fastest level.
@@ -109,4 +109,4 @@ std::size_t put_image_data(const RunsView& runs, Bytes& file, std::size_t start)
   return chunks.close(put_number(out.finish(), filtered.check()));
 }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -7,7 +7,7 @@
 #include "stages/data/runs.h"
 #include "stages/formats/image_format.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 
 /// A chunk is closed at the first row's end from here on.
 inline constexpr std::size_t kChunkBytes = 64 * 1024;
@@ -20,4 +20,4 @@ inline constexpr std::size_t kChunkBytes = 64 * 1024;
 ///          white; a stretch of white rows costs the logarithm of its length and a bit in a hundred bytes
 std::size_t put_image_data(const RunsView& runs, Bytes& file, std::size_t start);
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

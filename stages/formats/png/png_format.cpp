@@ -22,7 +22,7 @@
 #include "stages/formats/png/image_data.h"
 #include "stages/geometry/bits.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 namespace {
 
 constexpr std::size_t kHeadBytes = 128;  // of what stands before the image data, and of IEND, at most
@@ -223,9 +223,9 @@ class GreyEncoder : public LevelEncoder {
 
 std::unique_ptr<LevelEncoder> make_8_bit_encoder() { return std::make_unique<GreyEncoder>(); }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 // Deflate makes at most 1032 bytes of one (zlib's technical notes); a header that promises more lies.
@@ -374,4 +374,4 @@ Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int th
   return Image{source->builder->finish(), source->dpi_x, source->dpi_y};
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

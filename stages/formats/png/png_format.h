@@ -5,9 +5,9 @@
 
 #include "stages/formats/image_format.h"
 
-namespace lamina::write::png {
+namespace lamina::formats::png {
 
 std::unique_ptr<ImageEncoder> make_encoder();
 std::unique_ptr<LevelEncoder> make_8_bit_encoder();
 
-}  // namespace lamina::write::png
+}  // namespace lamina::formats::png

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace lamina::write::rp3 {
+namespace lamina::formats::rp3 {
 
 std::string text_of(std::span<const LayerSetting> layers, const Settings& settings) {
   const auto filling_angle = [&](std::size_t layer) {
@@ -33,4 +33,4 @@ std::string text_of(std::span<const LayerSetting> layers, const Settings& settin
   return text;
 }
 
-}  // namespace lamina::write::rp3
+}  // namespace lamina::formats::rp3

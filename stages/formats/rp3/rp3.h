@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-namespace lamina::write::rp3 {
+namespace lamina::formats::rp3 {
 
 struct LayerSetting {
   double thickness_mm;
@@ -21,4 +21,4 @@ struct Settings {
 /// The whole file: UTF-8, lines end with LF, columns are separated by tabs. README.md has the columns.
 std::string text_of(std::span<const LayerSetting> layers, const Settings& settings);
 
-}  // namespace lamina::write::rp3
+}  // namespace lamina::formats::rp3

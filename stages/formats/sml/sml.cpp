@@ -8,7 +8,7 @@
 #include "stages/formats/extrusion_format.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 constexpr double kNmPerMil = 25'400;  // a thousandth of an inch
@@ -122,4 +122,4 @@ class SmlFormat final : public ExtrusionFormat {
 
 std::unique_ptr<ExtrusionFormat> make_sml_format(const Extruder& machine) { return std::make_unique<SmlFormat>(machine); }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace lamina::write::stl {
+namespace lamina::formats::stl {
 namespace {
 
 constexpr std::size_t kHeader = 80, kFacet = 50, kPiece = 4096;  // bytes, bytes, facets
@@ -98,4 +98,4 @@ std::string block(const std::array<double, 3>& size) {
   return bytes;
 }
 
-}  // namespace lamina::write::stl
+}  // namespace lamina::formats::stl

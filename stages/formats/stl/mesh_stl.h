@@ -11,7 +11,7 @@
 #include "stages/data/status.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write::stl {
+namespace lamina::formats::stl {
 
 struct StlCounts {
   std::uint64_t triangles = 0;
@@ -35,4 +35,4 @@ Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<
 /// The file of a block from the origin to `size`, mm: 12 triangles, anticlockwise seen from outside, normals left at 0.
 std::string block(const std::array<double, 3>& size);
 
-}  // namespace lamina::write::stl
+}  // namespace lamina::formats::stl

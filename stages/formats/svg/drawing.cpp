@@ -6,7 +6,7 @@
 
 #include "stages/formats/svg/svg_writer.h"
 
-namespace lamina::write::svg {
+namespace lamina::formats::svg {
 namespace {
 
 void write_region(SvgWriter& svg, const SvgFrame& frame, const std::string& name, const Ink& ink, const Contours& contours) {
@@ -42,4 +42,4 @@ std::string drawing(const LayerShapes& shapes) {
   return {out.begin(), out.end()};
 }
 
-}  // namespace lamina::write::svg
+}  // namespace lamina::formats::svg

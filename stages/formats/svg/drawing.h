@@ -5,9 +5,9 @@
 
 #include "stages/data/layer_shapes.h"
 
-namespace lamina::write::svg {
+namespace lamina::formats::svg {
 
 /// The file of a picture of the box and a margin around it; the classes of its paths are "solid" and the names of the beads.
 std::string drawing(const LayerShapes& shapes);
 
-}  // namespace lamina::write::svg
+}  // namespace lamina::formats::svg

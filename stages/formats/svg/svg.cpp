@@ -9,7 +9,7 @@
 #include "stages/formats/svg/svg_writer.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 // Slices as Slic3r writes them; see README.md for every attribute.
 
@@ -213,4 +213,4 @@ class SvgPolygonEncoder : public SliceEncoder {
 
 std::unique_ptr<SliceEncoder> make_svg_polygon_encoder() { return std::make_unique<SvgPolygonEncoder>(); }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

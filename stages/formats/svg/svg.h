@@ -5,10 +5,10 @@
 
 #include "stages/formats/slice_format.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 std::unique_ptr<SliceEncoder> make_svg_encoder();
 /// Polygons as Slic3r's --export-svg writes them; no filling.
 std::unique_ptr<SliceEncoder> make_svg_polygon_encoder();
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -4,7 +4,7 @@
 
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 std::string svg_escaped(std::string_view text) {
   std::string out;
@@ -94,4 +94,4 @@ void SvgWriter::text(std::string_view line, std::string_view element) {
   append(out_, ">\n");
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -9,7 +9,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// The picture's frame: x from the left of what is shown, y downwards from its back; nm on the bed.
 struct SvgFrame {
@@ -50,4 +50,4 @@ class SvgWriter {
   int depth_;
 };
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

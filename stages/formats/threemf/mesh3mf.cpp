@@ -10,7 +10,7 @@
 #include "stages/formats/threemf/threemf_package.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 using Corners3mf = std::array<std::uint32_t, 3>;
@@ -161,4 +161,4 @@ Result<Mesh3mfCounts> write_mesh_3mf(File& file, std::span<const Mesh3mfObject> 
   return counts;
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -10,7 +10,7 @@
 #include "stages/data/status.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// An object of the file.
 struct Mesh3mfObject {
@@ -37,4 +37,4 @@ struct Mesh3mfCounts {
 Result<Mesh3mfCounts> write_mesh_3mf(File& file, std::span<const Mesh3mfObject> objects, std::span<const Instance> instances,
                                      std::string_view program);
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -8,7 +8,7 @@
 #include "stages/support/io/file.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 constexpr std::size_t kEnoughText = std::size_t{64} << 10;
@@ -149,4 +149,4 @@ Result<File> Slice3mfWriter::write(const std::string& path, const FileOptions& o
   return file;
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -13,7 +13,7 @@
 #include "stages/formats/zip/zip.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// Gathers slices, deflated as they come, about 5 bytes a point, and writes the package at the end: each body's slices stand
 /// in one piece there, and a layer brings a slice of every body. Numbers are exact to the nanometre. Coordinates count from
@@ -44,4 +44,4 @@ class Slice3mfWriter {
   std::vector<PartBody> bodies_;
 };
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -5,7 +5,7 @@
 #include "stages/formats/zip/zip.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 constexpr std::string_view kContentTypes =
@@ -98,4 +98,4 @@ void append_attribute_mm(Buffer<char>& out, std::string_view name, std::int64_t 
   append(out, "\"");
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -10,7 +10,7 @@
 #include "stages/formats/zip/zip.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// Checks the date of the packages, before anything is made for one. errors  kUsage: SOURCE_DATE_EPOCH is no number
 Status check_3mf_date();
@@ -35,4 +35,4 @@ void append_attribute(Buffer<char>& out, std::string_view name, std::uint64_t nu
 /// Appends ` name="mm"` with all digits of a nanometre.
 void append_attribute_mm(Buffer<char>& out, std::string_view name, std::int64_t nm);
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

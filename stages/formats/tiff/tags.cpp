@@ -12,7 +12,7 @@
 #include "stages/geometry/bits.h"
 #include "stages/support/text/decimal.h"
 
-namespace lamina::write::tiff {
+namespace lamina::formats::tiff {
 namespace {
 
 MemoryFile& file_of(thandle_t handle) { return *static_cast<MemoryFile*>(handle); }
@@ -215,4 +215,4 @@ bool Ending::put(const Image& image, std::size_t strip_end, Bytes& file) const {
   return true;
 }
 
-}  // namespace lamina::write::tiff
+}  // namespace lamina::formats::tiff

@@ -13,7 +13,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/support/late/tiff.h"
 
-namespace lamina::write::tiff {
+namespace lamina::formats::tiff {
 
 /// Content is bytes[0 .. size); the buffer may be larger, so that it need not grow with every write.
 struct MemoryFile {
@@ -89,10 +89,10 @@ class Ending {
 
   Image image_;
   std::vector<std::byte> head_, tail_;  // before and behind the strip
-  std::vector<std::size_t> offsets_;     // in tail_, of 32-bit offsets into the file
+  std::vector<std::size_t> offsets_;    // in tail_, of 32-bit offsets into the file
   std::size_t tail_at_ = 0;             // where it stood
   std::size_t length_at_ = 0;           // in tail_, of the strip's length
   bool short_length_ = false;           // of 16 bits
 };
 
-}  // namespace lamina::write::tiff
+}  // namespace lamina::formats::tiff

@@ -18,7 +18,7 @@
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
 
-namespace lamina::write::tiff {
+namespace lamina::formats::tiff {
 namespace {
 
 // libtiff's header of a classic TIFF. The first strip follows it.
@@ -171,9 +171,9 @@ class GreyEncoder : public LevelEncoder {
 std::unique_ptr<LevelEncoder> make_4_bit_encoder() { return std::make_unique<GreyEncoder>(4); }
 std::unique_ptr<LevelEncoder> make_8_bit_encoder() { return std::make_unique<GreyEncoder>(8); }
 
-}  // namespace lamina::write::tiff
+}  // namespace lamina::formats::tiff
 
-namespace lamina::read {
+namespace lamina::formats {
 namespace {
 
 constexpr std::uint32_t kLargestAllocation = 64 << 20;  // bytes; no strip that anybody writes is larger
@@ -389,4 +389,4 @@ Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path)
   return pages;
 }
 
-}  // namespace lamina::read
+}  // namespace lamina::formats

@@ -6,7 +6,7 @@
 
 #include "stages/formats/image_format.h"
 
-namespace lamina::write::tiff {
+namespace lamina::formats::tiff {
 
 std::unique_ptr<ImageEncoder> make_g4_encoder();
 std::unique_ptr<ImageEncoder> make_packbits_encoder();
@@ -14,4 +14,4 @@ std::unique_ptr<ImageEncoder> make_uncompressed_encoder();
 std::unique_ptr<LevelEncoder> make_4_bit_encoder();
 std::unique_ptr<LevelEncoder> make_8_bit_encoder();
 
-}  // namespace lamina::write::tiff
+}  // namespace lamina::formats::tiff

@@ -6,7 +6,7 @@
 
 #include "stages/support/text/readable.h"
 
-namespace lamina::write::voxels {
+namespace lamina::formats::voxels {
 namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 18;  // bytes that are handed over at once
@@ -70,4 +70,4 @@ Status write_image(File& file, const VoxelView& box, VoxelPhase side, ImageKind 
   return kind == ImageKind::kVti ? file.append(std::string_view("\n</AppendedData>\n</VTKFile>\n")) : Status();
 }
 
-}  // namespace lamina::write::voxels
+}  // namespace lamina::formats::voxels

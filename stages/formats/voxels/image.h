@@ -12,7 +12,7 @@
 #include "stages/data/voxels.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write::voxels {
+namespace lamina::formats::voxels {
 
 /// Which voxels of a box are meant: the set ones, or the others.
 enum class VoxelPhase : std::uint8_t { kSolid, kVoid };
@@ -44,4 +44,4 @@ inline constexpr std::string_view kMark = "written by lamina";
 /// cost     one pass; memory of some rows, never of the box
 Status write_image(File& file, const VoxelView& box, VoxelPhase side, ImageKind kind, std::string_view version);
 
-}  // namespace lamina::write::voxels
+}  // namespace lamina::formats::voxels

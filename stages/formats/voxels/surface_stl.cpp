@@ -8,7 +8,7 @@
 
 #include "stages/formats/voxels/image.h"  // kMark
 
-namespace lamina::write::voxels {
+namespace lamina::formats::voxels {
 namespace {
 
 constexpr std::size_t kFacet = 50, kFacetsAtOnce = 4096;  // bytes, facets
@@ -214,4 +214,4 @@ Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, VoxelPhase
   return counts;
 }
 
-}  // namespace lamina::write::voxels
+}  // namespace lamina::formats::voxels

@@ -9,7 +9,7 @@
 #include "stages/formats/voxels/image.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write::voxels {
+namespace lamina::formats::voxels {
 
 struct SurfaceCounts {
   std::uint64_t facets = 0;
@@ -33,4 +33,4 @@ SurfaceCounts count_surface(const VoxelView& box, VoxelPhase side);
 /// cost     two passes; two facets a face, more where edges are parted, of 50 bytes each; memory of nine rows
 Result<SurfaceCounts> write_surface(File& file, const VoxelView& box, VoxelPhase side, std::string_view version);
 
-}  // namespace lamina::write::voxels
+}  // namespace lamina::formats::voxels

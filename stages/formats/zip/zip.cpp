@@ -8,7 +8,7 @@
 #include <chrono>
 #include <memory>
 
-namespace lamina::write {
+namespace lamina::formats {
 
 Status deflate_onto(Deflated& out, std::string_view text) {
   if (text.empty()) return {};
@@ -139,4 +139,4 @@ Status ZipWriter::finish() {
   return file_.append(directory);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

@@ -12,7 +12,7 @@
 #include "stages/data/status.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 
 /// Raw deflate data (RFC 1951) that end on a byte, without a last block: pieces one behind the other are one stream.
 struct Deflated {
@@ -67,4 +67,4 @@ class ZipWriter {
   std::vector<Entry> entries_;
 };
 
-}  // namespace lamina::write
+}  // namespace lamina::formats

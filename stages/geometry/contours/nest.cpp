@@ -229,7 +229,8 @@ bool is_around(std::span<const Point2> outer, std::span<const Point2> hole) {
     if (const int position = position_of(outer, p); position != 0) return position > 0;
   }
   const Point2 a = hole[0], b = hole[1];  // all corners touch: the middle of a side does not
-  return position_of(outer, {static_cast<Nm>((std::int64_t{a.x} + b.x) / 2), static_cast<Nm>((std::int64_t{a.y} + b.y) / 2)}) >= 0;
+  return position_of(outer, {static_cast<Nm>((std::int64_t{a.x} + b.x) / 2), static_cast<Nm>((std::int64_t{a.y} + b.y) / 2)}) >=
+         0;
 }
 
 /// For each hole the innermost outer contour around it.

@@ -90,7 +90,8 @@ struct Joined {
 
 /// What edges show.
 struct EdgeFindings {
-  explicit EdgeFindings(std::size_t positions) : open(positions), non_manifold(positions), misoriented(positions), duplicate(positions) {}
+  explicit EdgeFindings(std::size_t positions)
+      : open(positions), non_manifold(positions), misoriented(positions), duplicate(positions) {}
   Collector open, non_manifold, misoriented, duplicate;
   std::uint64_t count = 0;
   bool balanced = true;
@@ -182,8 +183,9 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   const auto vertices = static_cast<std::uint32_t>(mesh.vertices().size());
   const SideLists lists(vertices, rest);
   std::vector<Buffer<Side>>().swap(rest);
-  EdgeFindings visited = find_in(all_of(vertices), EdgeFindings(positions),
-                           [&](const BlockedRange& range, EdgeFindings& some) { some.inspect(mesh, lists, range, joined); });
+  EdgeFindings visited = find_in(all_of(vertices), EdgeFindings(positions), [&](const BlockedRange& range, EdgeFindings& some) {
+    some.inspect(mesh, lists, range, joined);
+  });
   visited.add(within);
   visited.add_repeats(mesh, repeats_among(mesh, visited.may_repeat));
   return visited;
@@ -206,7 +208,7 @@ struct ShellFindings {
 
   /// Of chunks.
   void inspect(const Numbered& mesh, std::span<const std::uint32_t> shell_of, std::span<const std::uint8_t> unbalanced,
-            const Point3& from, const BlockedRange& chunks) {
+               const Point3& from, const BlockedRange& chunks) {
     Buffer<Point3> points;
     for (std::size_t c = chunks.begin(); c != chunks.end(); ++c) {
       const std::span<const std::uint32_t> numbers = mesh.numbers_of(c);
@@ -227,7 +229,7 @@ struct ShellFindings {
   }
 
   void inspect(std::span<const Point3> points, std::span<const Numbered::Local> facets, std::span<const std::uint32_t> shell_of,
-            std::span<const std::uint8_t> unbalanced, const Point3& from) {
+               std::span<const std::uint8_t> unbalanced, const Point3& from) {
     const std::uint32_t only = shell_of.front();
     const bool all_in_one =
         only != UINT32_MAX && std::all_of(shell_of.begin(), shell_of.end(), [&](auto s) { return s == only; });

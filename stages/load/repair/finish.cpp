@@ -32,9 +32,10 @@ void describe_repair(const RepairReport& report, double uncertainty, const std::
   const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
   if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
   if (report.vertices_welded > 0)
-    note(fmt::format("{} {} at open edges welded to a neighbour within {:.6g} um{}", report.vertices_welded,
-                     report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000,
-                     uncertainty >= kReportedUncertainty ? fmt::format(": the volume may be off by {:.2g} %", 100 * uncertainty) : ""));
+    note(fmt::format(
+        "{} {} at open edges welded to a neighbour within {:.6g} um{}", report.vertices_welded,
+        report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000,
+        uncertainty >= kReportedUncertainty ? fmt::format(": the volume may be off by {:.2g} %", 100 * uncertainty) : ""));
   if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
   if (report.sheets_dropped > 0)
     note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
@@ -64,7 +65,8 @@ bool is_flat(const Mesh& mesh) {
 
 /// Decides which facets of a file whose length contradicts its header are taken. `found` is kept up to date.
 /// errors  kInput: neither all of them nor those that the header speaks of
-Status settle_warning(const Source& source, const ReadWarning& uncertainty, Mesh& mesh, Census& found, std::vector<Note>& notes) {
+Status settle_warning(const Source& source, const ReadWarning& uncertainty, Mesh& mesh, Census& found,
+                      std::vector<Note>& notes) {
   const std::span<const Triangle> all(mesh.triangles.data(), mesh.triangles.size());
   if (uncertainty.claimed == 0 || uncertainty.claimed >= all.size()) {
     if (!found.balanced) return source.error(uncertainty.error);

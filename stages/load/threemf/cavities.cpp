@@ -21,7 +21,7 @@ namespace {
 using Point = std::array<double, 3>;
 
 // What objects that lie side by side need, and a million voids at some 200 looks a point.
-constexpr std::uint64_t kMaxWork = std::uint64_t{1} << 28;    // boxes compared
+constexpr std::uint64_t kMaxWork = std::uint64_t{1} << 28;      // boxes compared
 constexpr std::uint64_t kMaxCompared = std::uint64_t{1} << 29;  // facets, and boxes of facets, that points were held against
 
 struct Extent {

@@ -77,8 +77,8 @@ struct ModelPackage {
   std::uint64_t not_printable = 0;                                                // items that PrusaSlicer would leave out
   std::uint64_t triangles = 0;                                                    // of all objects, once each
   std::map<std::string, std::uint32_t> file_of_name;                              // index in files
-  std::set<std::string> extensions;  // namespaces of elements that were passed over, where these may be geometry
-  std::set<std::string> unsupported;     // namespaces of attributes that were passed over
+  std::set<std::string> extensions;   // namespaces of elements that were passed over, where these may be geometry
+  std::set<std::string> unsupported;  // namespaces of attributes that were passed over
   std::vector<Departure> departures;
   bool needs_beams = false;             // the package requires the extension to be understood
   bool has_forward_references = false;  // a component stands before the object that it names

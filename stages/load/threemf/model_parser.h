@@ -80,9 +80,9 @@ class ModelParser : public XmlHandler {
   std::uint32_t file_;
   std::uint64_t triangle_limit_;
   XmlReader* reader_ = nullptr;
-  std::string core_;             // the namespace of <model>
-  std::vector<Element> elements_;    // of the elements that are open
-  std::set<std::uint64_t> ids_;  // of all resources of this file
+  std::string core_;               // the namespace of <model>
+  std::vector<Element> elements_;  // of the elements that are open
+  std::set<std::uint64_t> ids_;    // of all resources of this file
   Properties properties_;
   std::vector<Metadata> metadata_{1};  // of the model, and of the group that is open
   bool has_resources_ = false, has_build_ = false;

@@ -79,7 +79,7 @@ Status Properties::add(std::string_view element, XmlAttributes attributes, std::
   if (id != kNoId) kinds_.emplace(id, kind);
   const char* const to = find_attribute(attributes, kind == GroupKind::kTextureGroup ? "texid"
                                                     : kind == GroupKind::kComposites ? "matid"
-                                                                                : "pids");
+                                                                                     : "pids");
   if (to != nullptr) references_.push_back({kind, read_ids(to), line});
   return {};
 }

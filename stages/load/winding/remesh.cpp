@@ -183,7 +183,8 @@ void LevelGrid::cut_cell(std::size_t first, const Emit& emit) const {
   for (int bits = 0; bits < 8; ++bits) count += inside[static_cast<std::size_t>(bits)] = value_[corner(first, bits)] > 0;
   if (count == 0 || count == 8) return;
   const auto edge = [&](int one, int other) {
-    return CubeEdge{corner(first, one & other), static_cast<std::uint32_t>(one ^ other)};  // one's bits are a subset of the other's
+    return CubeEdge{corner(first, one & other),
+                    static_cast<std::uint32_t>(one ^ other)};  // one's bits are a subset of the other's
   };
   for (const auto& [a, b, c, d] : kTetrahedra) {
     std::array<int, 4> in{}, out{};

@@ -7,7 +7,7 @@
 #include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write::brundlefab {
+namespace lamina::program::brundlefab {
 namespace {
 
 // fab/brundle.py: where the tools stand on the carriage, and how far the bins give way to it.
@@ -78,8 +78,8 @@ class Writer final : public ProgramWriter {
       last = std::max<std::int64_t>(last, dot);
     });
     const double across = carriage_.across(sweep.first_line);
-    const MaintenanceClock::MachinePoint position{across, 0};                 // the bar's home
-    const std::int64_t end = band_end(last) + kWorthWiping;  // a shot before it may have been longer
+    const MaintenanceClock::MachinePoint position{across, 0};  // the bar's home
+    const std::int64_t end = band_end(last) + kWorthWiping;    // a shot before it may have been longer
     if (clock_.before_sweep(position, position, 2 * bar_seconds(machine_, end)).shot) {
       const auto dots = dots_;
       shoot(out);
@@ -209,9 +209,10 @@ Status check_shots(const Machine& machine, const Carriage& carriage, const HeadG
   const double ends[] = {carriage.across(0), carriage.across(std::int64_t{grid.lines} - 1)};
   const double low = std::min(ends[0], ends[1]) - head, high = std::max(ends[0], ends[1]) + head;
   if (x > low && x < high) {
-    return wrong("maintenance.spit_mm", fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x beside it, as 400, "
-                                             "over the waste bin",
-                                             low, high));
+    return wrong("maintenance.spit_mm",
+                 fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x beside it, as 400, "
+                             "over the waste bin",
+                             low, high));
   }
   if (x < kPenMm || x >= kPenMm + kLongestXMm) {
     return wrong("maintenance.spit_mm", fmt::format("the pen reaches x {:g} to {:g} mm", kPenMm, kPenMm + kLongestXMm));
@@ -221,8 +222,9 @@ Status check_shots(const Machine& machine, const Carriage& carriage, const HeadG
   const double needed =
       move_seconds(machine, way, machine.motion.travel_speed_mm_s) + 2 * bar_seconds(machine, kBarDots + kBrakeDots);
   if (needed < kShareOfLimit * maintenance.spit_seconds) return {};
-  return wrong("maintenance.spit_seconds", fmt::format("{:g} s, and a band ends up to {:.2f} s later; give more, or move faster",
-                                                maintenance.spit_seconds, needed));
+  return wrong(
+      "maintenance.spit_seconds",
+      fmt::format("{:g} s, and a band ends up to {:.2f} s later; give more, or move faster", maintenance.spit_seconds, needed));
 }
 
 }  // namespace
@@ -282,4 +284,4 @@ Status check(const Machine& machine, const HeadGrid& grid) {
   return {};
 }
 
-}  // namespace lamina::write::brundlefab
+}  // namespace lamina::program::brundlefab

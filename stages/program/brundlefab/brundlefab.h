@@ -3,7 +3,7 @@
 
 #include "stages/program/dialect.h"
 
-namespace lamina::write::brundlefab {
+namespace lamina::program::brundlefab {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
@@ -11,4 +11,4 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
 /// what the bar, the carriage and the bins reach, a second feed bin, more than a dot a millisecond
 Status check(const Machine& machine, const HeadGrid& grid);
 
-}  // namespace lamina::write::brundlefab
+}  // namespace lamina::program::brundlefab

@@ -4,7 +4,7 @@
 
 #include "stages/program/program_text.h"
 
-namespace lamina::write {
+namespace lamina::program {
 
 double move_seconds(const Machine& machine, double way_mm, double speed_mm_s) {
   if (speed_mm_s * 60 >= 1) speed_mm_s = std::round(speed_mm_s * 60) / 60;  // as it is spelt
@@ -90,11 +90,13 @@ void MaintenanceWriter::begin_layer(const LayerCycle& cycle, ProgramBytes& out) 
   serve(clock_.begin_layer(cycle.layer, machine_.motion.safe_mm), out);
 }
 
-void MaintenanceWriter::before_sweep(MaintenanceClock::MachinePoint from, MaintenanceClock::MachinePoint to, ProgramBytes& out) {
+void MaintenanceWriter::before_sweep(MaintenanceClock::MachinePoint from, MaintenanceClock::MachinePoint to,
+                                     ProgramBytes& out) {
   serve(clock_.before_sweep(from, to), out);
 }
 
-void MaintenanceWriter::before_sweep(MaintenanceClock::MachinePoint from, MaintenanceClock::MachinePoint to, double sweep_s, ProgramBytes& out) {
+void MaintenanceWriter::before_sweep(MaintenanceClock::MachinePoint from, MaintenanceClock::MachinePoint to, double sweep_s,
+                                     ProgramBytes& out) {
   serve(clock_.before_sweep(from, to, sweep_s), out);
 }
 
@@ -194,4 +196,4 @@ void MaintenanceRecords::put_own(const std::vector<std::string>& lines, ProgramB
   }
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::program

@@ -13,7 +13,7 @@
 #include "stages/program/dialect.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write {
+namespace lamina::program {
 
 /// Of a limit in seconds: speeds are written in whole mm a minute, and firmware rounds as well.
 inline constexpr double kShareOfLimit = 0.97;
@@ -128,4 +128,4 @@ class MaintenanceRecords {
   Put put_;
 };
 
-}  // namespace lamina::write
+}  // namespace lamina::program

@@ -9,7 +9,7 @@
 #include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write {
+namespace lamina::program {
 namespace {
 
 using MachinePoint = std::array<double, 2>;
@@ -64,7 +64,8 @@ class Checker {
     if (dialect_.maintenance.own_positions) return {};
     if (Status status = check_positions(); !status) return status;
     if (Status status = check_wiper_alone(); !status) return status;
-    if (Status status = check_clock("maintenance.spit_seconds", maintenance_.spit_seconds, maintenance_.spit_mm, 0); !status) return status;
+    if (Status status = check_clock("maintenance.spit_seconds", maintenance_.spit_seconds, maintenance_.spit_mm, 0); !status)
+      return status;
     if (!maintenance_.wipes()) return {};
     const MachinePoint wiped{(*maintenance_.wipe_mm)[2], (*maintenance_.wipe_mm)[3]};
     if (!maintenance_.spits()) return check_clock("maintenance.wipe_seconds", maintenance_.wipe_seconds, wiped, 0);
@@ -88,8 +89,10 @@ class Checker {
                 {"powder.refill", powder.refill == VatRefill::kPause, kSaysRefill},
                 {"powder.dry_s", powder.dry_s > 0, kSaysDry},
                 {"powder.roller_rpm", powder.roller_rpm > 0, kSaysRoller},
-                {maintenance_.spit_layers > 0 ? "maintenance.spit_layers" : "maintenance.spit_seconds", maintenance_.spits(), kSaysShots},
-                {maintenance_.wipe_layers > 0 ? "maintenance.wipe_layers" : "maintenance.wipe_seconds", maintenance_.wipes(), kSaysWipes},
+                {maintenance_.spit_layers > 0 ? "maintenance.spit_layers" : "maintenance.spit_seconds", maintenance_.spits(),
+                 kSaysShots},
+                {maintenance_.wipe_layers > 0 ? "maintenance.wipe_layers" : "maintenance.wipe_seconds", maintenance_.wipes(),
+                 kSaysWipes},
                 {"powder.dry_on_lines", !powder.dry_on_lines.empty(), kSaysOwn},
                 {"powder.dry_off_lines", !powder.dry_off_lines.empty(), kSaysOwn},
                 {"maintenance.wipe_lines", !maintenance_.wipe_lines.empty(), kSaysOwn},
@@ -110,8 +113,10 @@ class Checker {
     if (Status status = check_own("powder.dry_off_lines", powder.dry_off_lines, powder.dry_s > 0); !status) return status;
     if (Status status = check_own("maintenance.wipe_lines", maintenance_.wipe_lines, true); !status) return status;
     if (powder.refill == VatRefill::kPause && !depths) return wrong("powder.refill", "pauses need powder.vat_depth_mm");
-    if (maintenance_.spits() && !maintenance_.spit_mm) return wrong("maintenance.spit_mm", "is missing; give the carriage's place beside the bed");
-    if (maintenance_.wipes() && !maintenance_.wipe_mm) return wrong("maintenance.wipe_mm", "is missing; give x, y of both ends of the wiper");
+    if (maintenance_.spits() && !maintenance_.spit_mm)
+      return wrong("maintenance.spit_mm", "is missing; give the carriage's place beside the bed");
+    if (maintenance_.wipes() && !maintenance_.wipe_mm)
+      return wrong("maintenance.wipe_mm", "is missing; give x, y of both ends of the wiper");
     return {};
   }
 
@@ -139,7 +144,8 @@ class Checker {
     for (const auto& from : positions) {
       for (const auto& to : positions) {
         if (!from || !to || way({x, y}, *from) + way({to_x, to_y}, *to) >= 1e-3) continue;
-        return wrong("maintenance.wipe_mm", "the head travels there as fast anyway; give another wiper, or maintenance.wipe_speed_mm_s");
+        return wrong("maintenance.wipe_mm",
+                     "the head travels there as fast anyway; give another wiper, or maintenance.wipe_speed_mm_s");
       }
     }
     return {};
@@ -168,10 +174,12 @@ class Checker {
                                     box.low[0], box.high[0], box.low[1], box.high[1]));
     };
     if (maintenance_.spit_mm) {
-      if (Status status = check("maintenance.spit_mm", under_head(machine_, grid_, *maintenance_.spit_mm)); !status) return status;
+      if (Status status = check("maintenance.spit_mm", under_head(machine_, grid_, *maintenance_.spit_mm)); !status)
+        return status;
     }
     if (maintenance_.cap_mm) {
-      if (Status status = check("maintenance.cap_mm", under_head(machine_, grid_, *maintenance_.cap_mm)); !status) return status;
+      if (Status status = check("maintenance.cap_mm", under_head(machine_, grid_, *maintenance_.cap_mm)); !status)
+        return status;
     }
     if (!maintenance_.wipe_mm) return {};
     const auto& [x, y, to_x, to_y] = *maintenance_.wipe_mm;
@@ -187,7 +195,7 @@ class Checker {
     const auto& motion = machine_.motion;
     const auto& [width, depth] = machine_.bed.size_mm;
     const double clearance = motion.ramp_mm + kRunUpMm + static_cast<double>(grid_.max_lag) * grid_.step_nm() / kNmPerMm +
-                        grid_.swath_lines() * grid_.line_nm / kNmPerMm;
+                             grid_.swath_lines() * grid_.line_nm / kNmPerMm;
     double farthest = 0;
     for (const double x : {-clearance, width + clearance}) {
       for (const double y : {-clearance, depth + clearance}) {
@@ -205,7 +213,9 @@ class Checker {
     return wrong(key, fmt::format("{:g} s, and a sweep ends up to {:.2f} s later; give more, or move faster", limit_s, needed));
   }
 
-  double shot_s() const { return dialect_.maintenance.shot_s != nullptr ? dialect_.maintenance.shot_s(machine_) : shot_seconds(machine_); }
+  double shot_s() const {
+    return dialect_.maintenance.shot_s != nullptr ? dialect_.maintenance.shot_s(machine_) : shot_seconds(machine_);
+  }
 
   const Dialect& dialect_;
   const Machine& machine_;
@@ -229,17 +239,19 @@ void warn_of_idle_care(const Machine& machine, std::vector<Warning>& warnings) {
     if (said && !requested) idle += fmt::format("{}{}", idle.empty() ? "" : "; ", what);
   };
   add(shot, maintenance.spits(), "no shot: maintenance.spit_layers and maintenance.spit_seconds are 0");
-  add(maintenance.wipe_mm || !maintenance.wipe_lines.empty(), maintenance.wipes(), "no wipe: maintenance.wipe_layers and maintenance.wipe_seconds are 0");
-  add(maintenance.cap_mm.has_value(), pauses, "no pause under maintenance.cap_mm: powder.dry_s is 0 and powder.refill no \"pause\"");
+  add(maintenance.wipe_mm || !maintenance.wipe_lines.empty(), maintenance.wipes(),
+      "no wipe: maintenance.wipe_layers and maintenance.wipe_seconds are 0");
+  add(maintenance.cap_mm.has_value(), pauses,
+      "no pause under maintenance.cap_mm: powder.dry_s is 0 and powder.refill no \"pause\"");
   add(!powder.dry_on_lines.empty(), !powder.dry_off_lines.empty(),
       "what powder.dry_on_lines switch on stays on: powder.dry_off_lines is empty");
   add(!powder.dry_off_lines.empty(), !powder.dry_on_lines.empty(),
       "nothing is switched on before a layer dries: powder.dry_on_lines is empty");
   const double dries_s = maintenance.spit_seconds > 0 ? maintenance.spit_seconds : maintenance.wipe_seconds;
   add(dries_s > 0 && powder.dry_s > dries_s, maintenance.cap_mm.has_value(),
-      fmt::format("nozzles wait uncapped for {:g} s while a layer dries, and care.{} is {:g}: give maintenance.cap_mm", powder.dry_s,
-                  maintenance.spit_seconds > 0 ? "spit_seconds" : "wipe_seconds", dries_s));
+      fmt::format("nozzles wait uncapped for {:g} s while a layer dries, and care.{} is {:g}: give maintenance.cap_mm",
+                  powder.dry_s, maintenance.spit_seconds > 0 ? "spit_seconds" : "wipe_seconds", dries_s));
   if (!idle.empty()) warnings.push_back({"maintenance", fmt::format("{}: {}", machine.name, idle)});
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::program

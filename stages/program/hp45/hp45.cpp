@@ -8,14 +8,15 @@
 
 #include "stages/program/care/maintenance.h"
 
-namespace lamina::write::hp45 {
+namespace lamina::program::hp45 {
 namespace {
 
 constexpr MaintenanceWords kMaintenance{"G1", Head::spit, Head::kWait, "", "", 1};
 
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
+  Writer(const Machine& machine, const HeadGrid& grid)
+      : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t, ProgramBytes& out) override {
     put(out, "G21\nG90\n");
@@ -61,7 +62,7 @@ constexpr std::uint32_t kSpeedCounts = 50;  // of the encoder that one measure o
 constexpr double kMinCountsPerSecond = 600;
 constexpr std::int64_t kMaxProduct = 2'000'000'000;  // of micrometres and counts an inch in 32 bits
 constexpr std::uint32_t kMaxPrimed = 25'000;         // HP45_Standalone_V4.ino cuts the bursts of PRM there
-constexpr std::uint32_t kLines = 3950;                // the host stops at 50 free lines of 4000
+constexpr std::uint32_t kLines = 3950;               // the host stops at 50 free lines of 4000
 
 // Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one. Drops of the first
 // three fall on lines of others; seven never fire, and where nozzles fire as one, the others of their group do.
@@ -210,7 +211,8 @@ void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& maintena
   if (zero < 0 || um_of_counts(zero, counts_) > kMaxProduct / counts_) zero = 0;  // any count does that all lines start from
   const auto encoder = [&](double um) { return static_cast<double>(zero) * count_um + um - start; };
 
-  maintenance.before_sweep(carriage_.position(start / 1000, sweep.first_line), carriage_.position(end / 1000, sweep.first_line), out);
+  maintenance.before_sweep(carriage_.position(start / 1000, sweep.first_line), carriage_.position(end / 1000, sweep.first_line),
+                           out);
   put(out, "G1 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(start / 1000), carriage_.line_axis(),
       mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
   wait(out);
@@ -232,4 +234,4 @@ void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& maintena
   wait(out);
 }
 
-}  // namespace lamina::write::hp45
+}  // namespace lamina::program::hp45

@@ -7,7 +7,7 @@
 #include "stages/program/dialect.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write::hp45 {
+namespace lamina::program::hp45 {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
@@ -44,4 +44,4 @@ class Head {
   std::uint32_t repeat_;  // nozzles of the cartridge a nozzle of the profile
 };
 
-}  // namespace lamina::write::hp45
+}  // namespace lamina::program::hp45

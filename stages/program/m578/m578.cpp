@@ -8,7 +8,7 @@
 #include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write::m578 {
+namespace lamina::program::m578 {
 namespace {
 
 // Platform.h: INKJET_FIRE_MICROSECONDS and INKJET_DELAY_MICROSECONDS of each nozzle, one after the other.
@@ -33,7 +33,8 @@ constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "; fill the vats, th
 
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid), maintenance_(machine, kMaintenance) {}
+  Writer(const Machine& machine, const HeadGrid& grid)
+      : machine_(machine), carriage_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put(out, "; print program of {}, {} layers, for RepRapFirmware 1.09r to 3.4 built with SUPPORT_INKJET\nG21\nG90\n",
@@ -50,7 +51,8 @@ class Writer final : public ProgramWriter {
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
     if (machine_.maintenance.spit_seconds > 0 || machine_.maintenance.wipe_seconds > 0) {
       maintenance_.before_sweep(carriage_.position(carriage_.begin(sweep, vectors), sweep.first_line),
-                         carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), sweep_s(sweep, vectors), out);
+                                carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), sweep_s(sweep, vectors),
+                                out);
     }
     put(out, "; swath {} of {}\nG0 {}{} {}{} F{}\n", sweep.number, sweep.of, carriage_.scan_axis(),
         mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(), mm_text(carriage_.across(sweep.first_line)),
@@ -121,4 +123,4 @@ Status check(const Machine& machine, const HeadGrid&) {
                                           machine.name, machine.firmware)};
 }
 
-}  // namespace lamina::write::m578
+}  // namespace lamina::program::m578

@@ -3,7 +3,7 @@
 
 #include "stages/program/dialect.h"
 
-namespace lamina::write::m578 {
+namespace lamina::program::m578 {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
@@ -14,4 +14,4 @@ Status check(const Machine& machine, const HeadGrid& grid);
 double shot_s(const Machine& machine);
 double longest_sweep_s(const Machine& machine, const HeadGrid& grid);
 
-}  // namespace lamina::write::m578
+}  // namespace lamina::program::m578

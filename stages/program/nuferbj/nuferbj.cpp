@@ -7,7 +7,7 @@
 #include "stages/program/care/maintenance.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write::nuferbj {
+namespace lamina::program::nuferbj {
 namespace {
 
 /// The two hexadecimal digits of eight nozzles, the first one in the highest bit.
@@ -46,7 +46,7 @@ class Writer final : public ProgramWriter {
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
     maintenance_.before_sweep(carriage_.position(carriage_.begin(sweep, vectors), sweep.first_line),
-                       carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), out);
+                              carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), out);
     put(out, "M812 S{} T{} D{}\n", sweep.number, sweep.of, sweep.backward ? 1 : 0);
     put(out, "G0 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(),
         mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
@@ -114,4 +114,4 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
   return std::make_unique<Writer>(machine, grid);
 }
 
-}  // namespace lamina::write::nuferbj
+}  // namespace lamina::program::nuferbj

@@ -6,7 +6,7 @@
 #include "stages/program/hp45/hp45.h"
 #include "stages/program/program_text.h"
 
-namespace lamina::write::oasis {
+namespace lamina::program::oasis {
 namespace {
 
 // SerialGRBL.py: how far pistons go down before they come up, and how far they stay below the spreader's way afterwards.
@@ -14,11 +14,13 @@ constexpr double kHysteresisMm = 1, kClearanceMm = 0.25;
 // Where homing leaves the gantry.
 constexpr double kHomeMm[] = {5, 245};
 
-constexpr MaintenanceWords kMaintenance{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then go on\nM0\n", "G4 P", 1};
+constexpr MaintenanceWords kMaintenance{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then go on\nM0\n", "G4 P",
+                                        1};
 
 class OasisWriter final : public ProgramWriter {
  public:
-  OasisWriter(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
+  OasisWriter(const Machine& machine, const HeadGrid& grid)
+      : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t, ProgramBytes& out) override {
     const auto& motion = machine_.motion;
@@ -120,4 +122,4 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
   return std::make_unique<OasisWriter>(machine, grid);
 }
 
-}  // namespace lamina::write::oasis
+}  // namespace lamina::program::oasis

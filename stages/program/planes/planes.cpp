@@ -5,7 +5,7 @@
 #include "stages/program/binary_program.h"
 #include "stages/program/care/maintenance.h"
 
-namespace lamina::write::planes {
+namespace lamina::program::planes {
 namespace {
 
 constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kStart = 0x4C04, kDone = 0x4C05, kGrey = 0x4C06;
@@ -26,8 +26,8 @@ class Writer final : public ProgramWriter {
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     const bool grey = grid_.drop_bits > 1;
-    for (const std::uint32_t value : {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.positions, grid_.lines,
-                                      grid_.steps_per_pixel, words_}) {
+    for (const std::uint32_t value : {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.positions,
+                                      grid_.lines, grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
     if (grey) put_little<std::uint32_t>(out, grid_.drop_bits);
@@ -91,4 +91,4 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
   return std::make_unique<Writer>(machine, grid);
 }
 
-}  // namespace lamina::write::planes
+}  // namespace lamina::program::planes

@@ -3,8 +3,8 @@
 
 #include "stages/program/dialect.h"
 
-namespace lamina::write::planes {
+namespace lamina::program::planes {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
-}  // namespace lamina::write::planes
+}  // namespace lamina::program::planes

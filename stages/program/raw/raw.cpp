@@ -5,7 +5,7 @@
 #include "stages/program/binary_program.h"
 #include "stages/program/care/maintenance.h"
 
-namespace lamina::write::raw {
+namespace lamina::program::raw {
 namespace {
 
 constexpr std::size_t kSegmentHead = 8;
@@ -85,4 +85,4 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
   return std::make_unique<Writer>(machine, grid);
 }
 
-}  // namespace lamina::write::raw
+}  // namespace lamina::program::raw

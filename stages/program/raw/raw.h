@@ -3,8 +3,8 @@
 
 #include "stages/program/dialect.h"
 
-namespace lamina::write::raw {
+namespace lamina::program::raw {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
-}  // namespace lamina::write::raw
+}  // namespace lamina::program::raw

@@ -89,7 +89,7 @@ struct FillTask {
   std::span<const PlacedMesh> placed;
   Nm plane;
   std::uint32_t first_row;  // of the band
-  std::uint32_t* position;     // of each row, where its next crossing goes
+  std::uint32_t* position;  // of each row, where its next crossing goes
   std::uint32_t* crossing;  // column * 2 + (1 if it enters)
 };
 

@@ -3,7 +3,7 @@
 namespace lamina::replay::brundle {
 namespace {
 
-constexpr int kMaxInteger = 32'767;       // int of an ATmega2560
+constexpr int kMaxInteger = 32'767;        // int of an ATmega2560
 constexpr std::size_t kLongestLine = 254;  // GCODE_LINE_MAX, without its end
 constexpr std::size_t kLongestText = 255;  // PATH_MAX, without its end
 

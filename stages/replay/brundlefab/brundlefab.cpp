@@ -27,8 +27,8 @@ constexpr double kPenMm = 195;  // fab/brundle.py, X_OFFSET_PEN: where the pen i
 constexpr double kBladeMm = 0;  // X_OFFSET_BLADE: where the recoater is
 // Axis_DCEncoder spreads 5250 ticks of 600 dpi and the 10 before home over 222.25 mm (_mm_to_position): its dots are longer.
 constexpr double kLongerDots = 5260.0 / 5250 - 1;
-constexpr double kMaxXMm = 650;                   // X_MM_MAX
-constexpr double kMaxMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
+constexpr double kMaxXMm = 650;                    // X_MM_MAX
+constexpr double kMaxMmPerMinute = 2000;           // Axis::target_set: the most if a stepper is made without a limit
 constexpr std::array kTools = {0, 1, 20, 21, 22};  // BrundleFab.ino, setup()
 constexpr std::array kPositionMm = {kPenMm, kPenMm, 45.0, kBladeMm, 95.0};  // of each tool on the carriage
 constexpr double kBinMm = 140, kLiftedMm = 2;  // Z_MM_MAX, E_MM_MAX; the feed bin before the first layer
@@ -226,7 +226,7 @@ class Firmware {
       return fault(fmt::format("moves before {}: the firmware keeps what another print has set",
                                !unit_stated_   ? "G21 tells the unit"
                                : !mode_stated_ ? "G90 tells that places are absolute"
-                                             : fmt::format("G10 tells where tool {} is", tool_)));
+                                               : fmt::format("G10 tells where tool {} is", tool_)));
     }
     axis_x_ = std::clamp<double>(position_[kX] - offset_mm_[tool], 0, kMaxXMm);
     const double way = axis_x_ - from;

@@ -17,7 +17,7 @@ namespace lamina::replay {
 namespace {
 
 constexpr double kClearanceMm =
-    0.25;                            // SerialGRBL.py, NewLayer: the pistons stand so far nearer to the spreader than layers say
+    0.25;                           // SerialGRBL.py, NewLayer: the pistons stand so far nearer to the spreader than layers say
 constexpr int kMaxBusyTravels = 8;  // over lines that are not done; hosts have none
 constexpr int kMaxRewinds = 8;      // BRES reads up to 4000 lines again; hosts have none
 constexpr double kBurstsPerInch = 600;
@@ -187,7 +187,8 @@ void Hp45Reader::take_burst() {
       if (!bit(nozzle * repeat_ + r)) return reader_.fault(fmt::format("nozzle {} is set in part; SDP is wrong", nozzle));
     }
     const auto& blocked = printing_.profile().head.blocked;
-    if (std::ranges::find(kMisplaced, position) != std::end(kMisplaced) && std::ranges::find(blocked, nozzle) != blocked.end()) {
+    if (std::ranges::find(kMisplaced, position) != std::end(kMisplaced) &&
+        std::ranges::find(blocked, nozzle) != blocked.end()) {
       return reader_.fault(fmt::format("nozzle {} is set, which is blocked: its drops fall on another one's line", nozzle));
     }
   }
@@ -354,8 +355,7 @@ void Hp45Reader::spread(const GcodeLine& line) {
     printing_.roller_is_at(axes_.at(powder.roller_axis));
     printing_.roller_turns(0);
     // On the gantry it does not touch the powder on the way back.
-    if (powder.roller_axis == scan_.along || powder.roller_axis == scan_.across)
-      printing_.roller_is_at(powder.roller_mm[0]);
+    if (powder.roller_axis == scan_.along || powder.roller_axis == scan_.across) printing_.roller_is_at(powder.roller_mm[0]);
   } else if (std::abs(axes_.at(powder.roller_axis) - powder.roller_mm[0]) > 1e-3) {
     return reader_.fault(
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));

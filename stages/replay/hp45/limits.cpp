@@ -46,7 +46,8 @@ bool reaches(const Printing& printing, double counts_per_inch, double mm) {
   const auto& profile = printing.profile();
   const std::string& along = ScanAxes(profile).along;
   const bool x = profile.mounting.scan_axis == ScanAxis::kX;
-  const double begin = profile.mounting.offset_mm[x ? 0 : 1], offset = x ? printing.axis_positions().x_mm : printing.axis_positions().y_mm;
+  const double begin = profile.mounting.offset_mm[x ? 0 : 1],
+               offset = x ? printing.axis_positions().x_mm : printing.axis_positions().y_mm;
   double low = std::min(begin, offset), high = std::max(begin + profile.bed.size_mm[x ? 0 : 1], offset);
   if (profile.powder.roller_axis == along) {
     low = std::min({low, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});

@@ -1,7 +1,7 @@
 // stages/program/raw/README.md tells the format.
 #include "stages/replay/bytes.h"
-#include "stages/replay/maintenance_records.h"
 #include "stages/replay/dialects.h"
+#include "stages/replay/maintenance_records.h"
 
 namespace lamina::replay {
 

@@ -7,8 +7,8 @@
 namespace lamina::segment {
 namespace {
 
-constexpr std::size_t kHeights = 32;  // of the upper half of a layer
-constexpr std::size_t kPositions = 48;   // of half a thin stretch
+constexpr std::size_t kHeights = 32;    // of the upper half of a layer
+constexpr std::size_t kPositions = 48;  // of half a thin stretch
 
 /// Half of a bead's width at a height above the middle of its layer, mm.
 double half_width(double width, double layer, double above) {

@@ -58,7 +58,9 @@ void LineNeighbours::find_neighbours(std::uint32_t run) {
   const auto at = std::ranges::lower_bound(order_, run, {}, [&](std::uint32_t i) { return lines_[i].run; });
   if (at == order_.end() || lines_[*at].run != run) return;
   line_ = &lines_[*at];
-  const auto before = [](const NeighbourLine& a, const NeighbourLine& b) { return std::tuple(a.kind, a.number) < std::tuple(b.kind, b.number); };
+  const auto before = [](const NeighbourLine& a, const NeighbourLine& b) {
+    return std::tuple(a.kind, a.number) < std::tuple(b.kind, b.number);
+  };
   for (std::size_t side = 0; side < 2; ++side) {
     NeighbourLine wanted = *line_;
     wanted.number += side == 0 ? -1 : 1;
@@ -88,7 +90,8 @@ std::optional<double> LineNeighbours::curve_at(std::span<const NeighbourLine> ne
 
 std::optional<double> LineNeighbours::straight_at(std::span<const NeighbourLine> neighbour, double low, double high) const {
   // The piece that begins last at or before `low` is the one before.
-  const auto at = static_cast<std::size_t>(std::ranges::upper_bound(neighbour, low + kNear, {}, &NeighbourLine::low) - neighbour.begin());
+  const auto at =
+      static_cast<std::size_t>(std::ranges::upper_bound(neighbour, low + kNear, {}, &NeighbourLine::low) - neighbour.begin());
   if (at == 0 || !neighbour[at - 1].straight || neighbour[at - 1].high < high - kNear) return std::nullopt;
   return std::abs(neighbour[at - 1].across - line_->across) * 1e-6;
 }

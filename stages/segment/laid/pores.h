@@ -44,7 +44,7 @@ class LineNeighbours {
 
   const ToolpathsView& paths_;
   const LayerCut& cut_;
-  std::vector<NeighbourLine> lines_;           // by kind, number and place
+  std::vector<NeighbourLine> lines_;  // by kind, number and place
   std::vector<std::uint32_t> order_;  // into lines_, by run
   // --- of the run that was asked for last
   std::uint32_t run_ = UINT32_MAX;

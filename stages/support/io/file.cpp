@@ -14,7 +14,7 @@
 #include "stages/support/io/sync.h"
 #include "stages/support/io/temporary.h"
 
-namespace lamina::write {
+namespace lamina {
 
 constexpr std::size_t kGathered = 64 << 10, kLarge = 16 << 10;  // bytes that wait for one system call; pieces that do not
 constexpr std::uint64_t kGiven = 2 << 20;                       // bytes with which the disk begins while the file grows
@@ -252,4 +252,4 @@ Status write_file(const std::string& path, std::string_view text, const FileOpti
   return write_file(path, std::as_bytes(std::span(text)), options);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

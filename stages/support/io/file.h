@@ -16,7 +16,7 @@
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// What of a file survives a power cut once finish() has returned.
 enum class Durable {
@@ -87,4 +87,4 @@ int write_all(int file, std::span<const std::byte> bytes);
 /// The one line about a file that could not be written, from the system's error number: what happened and what to do.
 Error write_failure(const std::string& path, int code);
 
-}  // namespace lamina::write
+}  // namespace lamina

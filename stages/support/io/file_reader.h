@@ -22,7 +22,7 @@ struct ReadRules {
   std::string_view directory = "is a directory, not a file";
   std::string_view device = "is a device or a pipe, not a file";
   std::string_view no_text = "is no text file";  // of a line with a NUL byte, or that is too long
-  std::uint64_t max_bytes = UINT64_MAX;         // of the file
+  std::uint64_t max_bytes = UINT64_MAX;          // of the file
   std::size_t longest_line = 64 << 10;           // bytes
   bool any_bytes = false;                        // lines may hold NUL bytes
   bool streams = false;                          // `-`, /dev/stdin and /dev/fd/N are read as well: pipes by request

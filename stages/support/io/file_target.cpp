@@ -17,7 +17,7 @@
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/temporary.h"
 
-namespace lamina::write {
+namespace lamina {
 namespace {
 
 constexpr int kMaxLinks = 40;  // as the kernel
@@ -172,4 +172,4 @@ Result<bool> bring_file(const std::string& from, const std::string& to) {
   return linked;
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

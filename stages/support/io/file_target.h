@@ -9,7 +9,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// A file, there or not, or what takes bytes as they come.
 struct FileTarget {
@@ -64,4 +64,4 @@ Status check_plain(const std::string& file, std::optional<std::uint64_t> bytes =
 /// errors   kOutput
 Result<bool> bring_file(const std::string& from, const std::string& to);
 
-}  // namespace lamina::write
+}  // namespace lamina

@@ -14,7 +14,7 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 
-namespace lamina::write {
+namespace lamina {
 namespace {
 
 constexpr std::size_t kLongestLine = 64 << 20;  // bytes
@@ -71,4 +71,4 @@ Status Journal::append(std::string line) {
   return torn_ ? Status(write_failure(path_, reason)) : Status();
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

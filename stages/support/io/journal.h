@@ -10,7 +10,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina {
 
 class Journal {
  public:
@@ -39,4 +39,4 @@ class Journal {
   bool torn_ = false;  // the file does not end with a line break
 };
 
-}  // namespace lamina::write
+}  // namespace lamina

@@ -16,7 +16,7 @@
 
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina {
 namespace {
 
 Error not_started(const std::string& program, int reason) {
@@ -85,4 +85,4 @@ Result<std::string> filter(const std::string& program, const std::string& argume
   return Error{Fault::kInternal, fmt::format("{} was ended by signal {}", program, WTERMSIG(state))};
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

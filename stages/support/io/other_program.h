@@ -9,7 +9,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// Replaces the process by a program. Returns only if the start fails. errors  kInternal
 Error hand_over(const std::string& program, const std::vector<std::string>& arguments);
@@ -20,4 +20,4 @@ Error hand_over(const std::string& program, const std::vector<std::string>& argu
 /// cost     a process; input and output are held in memory
 Result<std::string> filter(const std::string& program, const std::string& argument, std::string_view input);
 
-}  // namespace lamina::write
+}  // namespace lamina

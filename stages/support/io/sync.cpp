@@ -15,7 +15,7 @@
 
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina {
 namespace {
 
 // Bytes that the thread waits for: few at first, so that a small job has less to wait for at its end, then twice as many.
@@ -145,4 +145,4 @@ Status FolderSync::sync() const {
   return folders_->met ? folders_->sync_all() : folders_->met;
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

@@ -10,7 +10,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// Bytes and size of an open file. returns  0 or the system's error number
 int sync_file(int file);
@@ -51,4 +51,4 @@ class FolderSync {
   std::unique_ptr<Folders> folders_;
 };
 
-}  // namespace lamina::write
+}  // namespace lamina

@@ -23,7 +23,7 @@
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/file.h"
 
-namespace lamina::write {
+namespace lamina {
 namespace {
 
 constexpr int kMaxTries = 16;  // of two runs that begin in the same instant
@@ -294,7 +294,8 @@ std::error_code MadeFolders::make(const std::string& folder) {
   namespace fs = std::filesystem;
   std::error_code error;
   std::vector<std::string> absent;
-  for (fs::path position = folder; !position.empty() && !fs::exists(fs::symlink_status(position, error)); position = position.parent_path()) {
+  for (fs::path position = folder; !position.empty() && !fs::exists(fs::symlink_status(position, error));
+       position = position.parent_path()) {
     if (position.has_filename()) absent.push_back(position.string());
   }
   fs::create_directories(folder, error);
@@ -343,4 +344,4 @@ std::vector<std::string> take_left_behind() {
   return std::exchange(notes, {});
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

@@ -17,7 +17,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// NAME.part
 std::string part_of(const std::string& file);
@@ -101,4 +101,4 @@ void note_left_behind(const std::string& path, int reason);
 /// One line for each file that could not be removed, since the last call; from any thread.
 std::vector<std::string> take_left_behind();
 
-}  // namespace lamina::write
+}  // namespace lamina

@@ -10,7 +10,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/units.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// Room that put_fixed() and put_mm() need at most: a sign, 20 digits, a point, and a little more.
 inline constexpr std::size_t kMaxDecimal = 24;
@@ -100,4 +100,4 @@ void append_written(Buffer<char>& out, std::size_t maximum, Write&& write) {
   out.resize(before + static_cast<std::size_t>(write(begin) - begin));
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

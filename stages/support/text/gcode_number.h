@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-namespace lamina::write {
+namespace lamina {
 
 /// mm with four digits (a tenth of a micrometre), never -0.
 inline std::string mm_text(double millimetres) {
@@ -32,4 +32,4 @@ inline std::string feed_text(double mm_s) {
   return mm_s * 60 < 1 ? fmt::format("{:.2f}", mm_s * 60) : fmt::format("{:.0f}", mm_s * 60);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

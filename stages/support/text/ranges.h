@@ -23,7 +23,8 @@ void apply(std::span<const Key<Target>> keys, const Changes<Target>& changes, Ta
 }
 
 template <class Target>
-std::string read_changes(const TomlValue& table, std::span<const Key<Target>> keys, Changes<Target>& changes, TextPosition& at) {
+std::string read_changes(const TomlValue& table, std::span<const Key<Target>> keys, Changes<Target>& changes,
+                         TextPosition& at) {
   if (!table.is_table()) return "is a table of keys, as in { gap_mm = 0.1 }";
   Changes<Target> read;
   auto wrong = read_table(table, keys.front().section, keys, read.values, at, &read.keys);

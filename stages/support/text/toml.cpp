@@ -27,7 +27,8 @@ namespace {
 
 TomlValue tree_of(const toml::node& node) {
   TomlValue tree;
-  tree.position = {static_cast<std::uint32_t>(node.source().begin.line), static_cast<std::uint32_t>(node.source().begin.column)};
+  tree.position = {static_cast<std::uint32_t>(node.source().begin.line),
+                   static_cast<std::uint32_t>(node.source().begin.column)};
   if (const auto* string = node.as_string()) {
     tree.text = string->get();
   } else if (const auto* whole = node.as_integer()) {
@@ -45,7 +46,8 @@ TomlValue tree_of(const toml::node& node) {
       tree.add(name.str(), tree_of(entry));
       TextPosition& position = tree.value.back().position;  // a header's, where the table was opened without one
       if (position.line == 0) {
-        position = {static_cast<std::uint32_t>(name.source().begin.line), static_cast<std::uint32_t>(name.source().begin.column)};
+        position = {static_cast<std::uint32_t>(name.source().begin.line),
+                    static_cast<std::uint32_t>(name.source().begin.column)};
       }
     }
   } else {

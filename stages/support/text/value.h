@@ -18,7 +18,7 @@
 namespace lamina {
 
 inline constexpr double kMinMm = 1e-6;  // 1 nm
-inline constexpr double kMaxMm = 2147;   // the range of 32-bit nanometres, in whole mm
+inline constexpr double kMaxMm = 2147;  // the range of 32-bit nanometres, in whole mm
 
 /// The limits of a number, and of the length of a list.
 struct Limits {

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 constexpr const char* kFont = "DejaVuSans";  // found by OpenImageIO in the system's font folders
@@ -100,4 +100,4 @@ int text_width(const std::string& line, int size) {
   return box.defined() ? box.xend : 0;
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

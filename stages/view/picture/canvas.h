@@ -10,7 +10,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 struct Colour {
   std::uint8_t red, green, blue;
@@ -47,4 +47,4 @@ bool have_font();
 /// Pixels from the start to the end of a line; 0 without a font.
 int text_width(const std::string& line, int size);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

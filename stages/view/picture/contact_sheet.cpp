@@ -11,7 +11,7 @@
 #include "stages/view/picture/canvas.h"
 #include "stages/view/picture/layout.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59}, kQuiet{120, 116, 108},
@@ -126,4 +126,4 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
   return canvas.png();
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

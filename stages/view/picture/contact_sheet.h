@@ -11,7 +11,7 @@
 #include "stages/data/levels.h"
 #include "stages/data/status.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 struct SheetLayer {
   std::vector<std::string> paths;  // of the images, whose levels are added up: one a drop of a pixel, or one of all
@@ -23,7 +23,7 @@ struct SheetRequest {
   std::string title;               // above all
   std::vector<SheetLayer> layers;  // one or more, in the order of the sheet
   PixelGrid grid;                  // of the bed; all images are of its size
-  std::uint8_t maximum = 1;           // level of a pixel that is drawn as set; those below are paler by their share of it
+  std::uint8_t maximum = 1;        // level of a pixel that is drawn as set; those below are paler by their share of it
   bool whole_bed = false;          // else the part of it that holds what is set in any of the layers, and a margin
   std::uint32_t width = 2400;      // pixels of the sheet; a single layer is never made larger than its pixels
 };
@@ -37,4 +37,4 @@ struct SheetRequest {
 using ReadImage = std::function<Result<Levels>(const std::string& path)>;
 Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 constexpr int kSubrows = 8;
@@ -71,4 +71,4 @@ std::vector<std::uint8_t> contour_shares(const ContoursView& contours, const Sca
   return shares;
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

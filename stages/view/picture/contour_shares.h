@@ -6,7 +6,7 @@
 
 #include "stages/data/contours.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 /// Pixels of a panel: x from its left, y from its top, which lie at `left` and `top` nm.
 struct Scale {
@@ -18,4 +18,4 @@ struct Scale {
 /// Shares of 0 .. 255 of a panel of width x height pixels that lie within contours, by the nonzero rule, to 1/8 of a row.
 std::vector<std::uint8_t> contour_shares(const ContoursView& contours, const Scale& scale, int width, int height);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

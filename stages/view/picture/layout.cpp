@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 // Sizes on a sheet of this width; others in proportion, within limits at which text can still be read.
@@ -76,4 +76,4 @@ SheetLayout layout_chart(int cells, const PixelWindow& window, const PixelGrid& 
   return best;
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

@@ -6,7 +6,7 @@
 #include "stages/data/grid.h"
 #include "stages/geometry/coverage.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 /// All in pixels of the sheet.
 struct SheetLayout {
@@ -29,4 +29,4 @@ PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid);
 /// A sheet at most `width` wide of `cells` pictures of `window`, as near to the proportion 3 : 2 as their shape allows.
 SheetLayout layout_chart(int cells, const PixelWindow& window, const PixelGrid& grid, int width);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

@@ -10,7 +10,7 @@
 #include "stages/view/picture/contour_shares.h"
 #include "stages/view/picture/layout.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 constexpr Colour kGround{255, 255, 255}, kPaper{244, 244, 246}, kSolid{205, 209, 216}, kText{40, 44, 52};
@@ -122,4 +122,4 @@ Result<Buffer<std::byte>> plan_view(const LayerShapes& shapes, std::uint32_t pic
   return canvas.png();
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

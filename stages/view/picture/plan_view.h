@@ -10,7 +10,7 @@
 #include "stages/data/layer_shapes.h"
 #include "stages/data/status.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 /// Layers side by side as PNG, all at one scale, `title` and `caption` of each below it; `box` and `width` are those of
 /// the sheet, the latter in pixels. shapes_of is asked for one after the other, so that the shapes of one layer are held at a
@@ -21,4 +21,4 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
 /// The picture as PNG, `width` pixels wide; each pixel is covered by the share of its area, to 1/64.
 Result<Buffer<std::byte>> plan_view(const LayerShapes& shapes, std::uint32_t width);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

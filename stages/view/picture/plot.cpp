@@ -9,7 +9,7 @@
 #include "stages/view/picture/canvas.h"
 #include "stages/view/picture/contour_shares.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 constexpr int kMaxPixels = 20'000;
@@ -93,4 +93,4 @@ Result<Buffer<std::byte>> plot_png(const Plot& plot) {
   return canvas.png();
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

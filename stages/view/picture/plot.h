@@ -5,9 +5,9 @@
 #include "stages/data/plot.h"
 #include "stages/data/status.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 /// A PNG file. errors  kUsage: a size that is none, or above 20000 pixels; kInternal
 Result<Buffer<std::byte>> plot_png(const Plot& plot);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

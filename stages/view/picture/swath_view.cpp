@@ -6,7 +6,7 @@
 #include "stages/geometry/coverage.h"
 #include "stages/view/picture/canvas.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 namespace {
 
 constexpr Colour kGround{255, 255, 255}, kBed{247, 247, 244}, kOdd{236, 240, 245}, kPresent{255, 240, 214};
@@ -73,4 +73,4 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   return canvas.png();
 }
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

@@ -11,14 +11,14 @@
 #include "stages/data/levels.h"
 #include "stages/data/status.h"
 
-namespace lamina::write::picture {
+namespace lamina::view::picture {
 
 struct SwathView {
   std::string title, caption;
   PixelGrid grid;
   LevelsView image;              // drops that are to be jetted: drawn light
   LevelsView fired;              // drops so far: drawn dark
-  std::uint8_t maximum = 1;         // drops of a pixel, which is drawn by its share of them
+  std::uint8_t maximum = 1;      // drops of a pixel, which is drawn by its share of them
   std::vector<SwathBand> bands;  // the present one is marked
   std::vector<NozzlePosition> nozzles;
   std::uint32_t width = 1200;  // of the picture
@@ -27,4 +27,4 @@ struct SwathView {
 /// A PNG of the whole bed. errors  kInternal
 Result<Buffer<std::byte>> swath_picture(const SwathView& view);
 
-}  // namespace lamina::write::picture
+}  // namespace lamina::view::picture

@@ -7,7 +7,7 @@
 
 #include "stages/data/buffer.h"
 
-namespace lamina::write::report {
+namespace lamina::view::report {
 
 /// Codes of layers (run_code.h), added in order and limited to the page's size: beyond the limit, every second one is
 /// dropped.
@@ -41,4 +41,4 @@ class HeldLayers {
   std::vector<std::pair<std::uint32_t, Buffer<std::byte>>> layers_;
 };
 
-}  // namespace lamina::write::report
+}  // namespace lamina::view::report

@@ -2,7 +2,7 @@
 
 #include "stages/support/text/escape.h"
 
-namespace lamina::write::report {
+namespace lamina::view::report {
 namespace {
 
 std::string escaped(std::string_view text, bool in_json) {
@@ -43,4 +43,4 @@ std::string make_page(std::string_view title, std::string_view head, const std::
   return page;
 }
 
-}  // namespace lamina::write::report
+}  // namespace lamina::view::report

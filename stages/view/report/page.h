@@ -8,7 +8,7 @@
 
 #include "stages/data/buffer.h"
 
-namespace lamina::write::report {
+namespace lamina::view::report {
 
 /// A piece of data that the page's script unpacks when it is looked at.
 struct PageData {
@@ -25,4 +25,4 @@ const PageTexts& page_texts();
 /// One HTML file that needs no other one. `head` is JSON; whatever stands in it cannot end its script element.
 std::string make_page(std::string_view title, std::string_view head, const std::vector<PageData>& data);
 
-}  // namespace lamina::write::report
+}  // namespace lamina::view::report

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace lamina::write::report {
+namespace lamina::view::report {
 namespace {
 
 void add_number(std::uint64_t value, Buffer<std::byte>& code) {
@@ -60,4 +60,4 @@ Buffer<std::byte> pack_runs(const RunsView& runs) {
   return deflate_bytes(code);
 }
 
-}  // namespace lamina::write::report
+}  // namespace lamina::view::report

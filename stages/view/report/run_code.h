@@ -15,7 +15,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/runs.h"
 
-namespace lamina::write::report {
+namespace lamina::view::report {
 
 /// The code of an image, deflated. cost  one pass over the changes, and deflate
 Buffer<std::byte> pack_runs(const RunsView& runs);
@@ -23,4 +23,4 @@ Buffer<std::byte> pack_runs(const RunsView& runs);
 /// Any bytes as one zlib stream.
 Buffer<std::byte> deflate_bytes(std::span<const std::byte> bytes);
 
-}  // namespace lamina::write::report
+}  // namespace lamina::view::report

@@ -26,8 +26,8 @@ namespace {
 pipeline::ResolvedMachine machine_of_chart(const std::string& name) {
   const auto machine = pipeline::find_machine(name);
   EXPECT_TRUE(machine) << name;
-  auto resolved = pipeline::resolve_profile(chart::chart_machine(*machine));
-  if (!resolved) resolved = pipeline::resolve_profile(chart::chart_machine(*machine, true));
+  auto resolved = pipeline::resolve_profile(calibration::chart_machine(*machine));
+  if (!resolved) resolved = pipeline::resolve_profile(calibration::chart_machine(*machine, true));
   EXPECT_TRUE(resolved) << resolved.error().message;
   return *resolved;
 }
@@ -53,7 +53,7 @@ std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> fired(const Hea
 TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
   for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
     const auto machine = machine_of_chart(std::string(name));
-    const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+    const auto deposited = calibration::layout_chart(machine.machine, machine.grid);
     ASSERT_TRUE(deposited) << name << ": " << deposited.error().message;
     Chart dashes = *deposited;
     dashes.marks.clear();
@@ -64,7 +64,7 @@ TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> wanted;
     for (const ChartDash& dash : dashes.dashes)
       wanted[{dash.swath, dash.nozzle}] += (dash.box.right - dash.box.left) * (dash.box.bottom - dash.box.top);
-    const auto drops = fired(machine.grid, chart::draw(dashes));
+    const auto drops = fired(machine.grid, calibration::draw(dashes));
     const std::uint32_t first = drops.begin()->first.first;  // of the bed's swaths
     ASSERT_EQ(drops.size(), wanted.size()) << name;
     for (const auto& [who, count] : wanted) {
@@ -80,7 +80,7 @@ TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
 TEST(ChartLayout, NothingTouchesAnythingElse) {
   for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
     const auto machine = machine_of_chart(std::string(name));
-    const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+    const auto deposited = calibration::layout_chart(machine.machine, machine.grid);
     ASSERT_TRUE(deposited);
     std::vector<ChartBox> boxes = deposited->marks;
     for (const ChartBar& bar : deposited->bars) boxes.push_back(bar.box);
@@ -104,7 +104,7 @@ TEST(ChartLayout, NothingTouchesAnythingElse) {
 
 TEST(ChartLayout, JsonKeepsAllOfAChart) {
   const auto machine = machine_of_chart("nuferbj");
-  const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+  const auto deposited = calibration::layout_chart(machine.machine, machine.grid);
   ASSERT_TRUE(deposited);
   const std::string text = chart_text(*deposited);
   const auto again = read_chart(text, "chart.json");
@@ -124,7 +124,7 @@ TEST(ChartLayout, ABedWithoutSpaceIsRefused) {
   machine.bed.size_mm = {30, 30};
   const auto resolved = pipeline::resolve_profile(machine);
   ASSERT_TRUE(resolved);
-  const auto deposited = chart::layout_chart(resolved->machine, resolved->grid);
+  const auto deposited = calibration::layout_chart(resolved->machine, resolved->grid);
   ASSERT_FALSE(deposited);
   EXPECT_EQ(deposited.error().fault, Fault::kUsage);
 }
@@ -132,29 +132,29 @@ TEST(ChartLayout, ABedWithoutSpaceIsRefused) {
 TEST(ChartDrops, AreAsManyAsStatedAndEvenAmongNozzles) {
   const auto machine = machine_of_chart("nuferbj");
   for (const std::uint64_t drops : {1ull, 127ull, 364'032ull, 364'033ull, 1'000'000ull}) {
-    const auto wanted = chart::layout_drops(machine.machine, machine.grid, drops);
+    const auto wanted = calibration::layout_drops(machine.machine, machine.grid, drops);
     ASSERT_TRUE(wanted);
     std::uint64_t sum = 0;
     for (std::uint32_t layer = 0; layer < wanted->layers; ++layer)
-      sum += set_pixels(chart::draw_drops(*wanted, machine.grid, layer));
+      sum += set_pixels(calibration::draw_drops(*wanted, machine.grid, layer));
     EXPECT_EQ(sum, drops);
   }
-  const auto whole = chart::layout_drops(machine.machine, machine.grid, 364'032);
+  const auto whole = calibration::layout_drops(machine.machine, machine.grid, 364'032);
   ASSERT_TRUE(whole);
   ASSERT_EQ(whole->layers, 1u);
   std::map<std::uint32_t, std::uint64_t> by_nozzle;
-  for (const auto& [who, count] : fired(machine.grid, chart::draw_drops(*whole, machine.grid, 0)))
+  for (const auto& [who, count] : fired(machine.grid, calibration::draw_drops(*whole, machine.grid, 0)))
     by_nozzle[who.second] += count;
   ASSERT_EQ(by_nozzle.size(), 128u);
   for (const auto& [nozzle, count] : by_nozzle) EXPECT_EQ(count, 364'032u / 128);
-  EXPECT_FALSE(chart::layout_drops(machine.machine, machine.grid, 1'000'000'000'000));
+  EXPECT_FALSE(calibration::layout_drops(machine.machine, machine.grid, 1'000'000'000'000));
 }
 
 /// 52.5 mg of water, a million drops: 52.5 nl / 1000, by hand.
 TEST(ChartDrops, VolumeFollowsFromMass) {
-  EXPECT_DOUBLE_EQ(chart::drop_pl_of(52.5, 1, 1e6), 52.5);
-  EXPECT_DOUBLE_EQ(chart::drop_pl_of(52.5, 1.05, 1e6), 50);
-  EXPECT_DOUBLE_EQ(chart::drop_pl_of(0.5, 1, 1e7), 0.05);
+  EXPECT_DOUBLE_EQ(calibration::drop_pl_of(52.5, 1, 1e6), 52.5);
+  EXPECT_DOUBLE_EQ(calibration::drop_pl_of(52.5, 1.05, 1e6), 50);
+  EXPECT_DOUBLE_EQ(calibration::drop_pl_of(0.5, 1, 1e7), 0.05);
 }
 
 /// Ticks of a swath are fired by it alone, and pair m + k lines up if the later swath lies k places too far.
@@ -162,17 +162,17 @@ TEST(ChartLayout, VerniersShowWholePixels) {
   std::size_t detected = 0;
   for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
     const auto machine = machine_of_chart(std::string(name));
-    const auto deposited = chart::layout_chart(machine.machine, machine.grid);
+    const auto deposited = calibration::layout_chart(machine.machine, machine.grid);
     ASSERT_TRUE(deposited);
     // Beside the dashes, which say where swaths begin.
     Chart dashes = *deposited;
     dashes.marks.clear(), dashes.bars.clear(), dashes.wedges.clear(), dashes.stitches.clear(), dashes.verniers.clear();
-    const auto alone = fired(machine.grid, chart::draw(dashes));
+    const auto alone = fired(machine.grid, calibration::draw(dashes));
     const auto drops_of_swath = [&](const ChartVernier& ticks) {
       Chart more = dashes;
       more.verniers = {ticks};
       std::map<std::uint32_t, std::uint64_t> drops;
-      for (const auto& [who, count] : fired(machine.grid, chart::draw(more)))
+      for (const auto& [who, count] : fired(machine.grid, calibration::draw(more)))
         if (const auto before = alone.find(who); count > (before == alone.end() ? 0 : before->second))
           drops[who.first - alone.begin()->first.first] += count;
       return drops;
@@ -198,7 +198,7 @@ TEST(ChartLayout, VerniersShowWholePixels) {
 /// nuferbj, by hand: 50 pl = 50,000 um3 on 96.944 x 96.944 x 100 um, of which 40 % are voids: 13.30 %.
 TEST(ChartMeasured, WedgesAreTakenForSaturations) {
   const auto machine = machine_of_chart("nuferbj");
-  auto deposited = chart::layout_chart(machine.machine, machine.grid);
+  auto deposited = calibration::layout_chart(machine.machine, machine.grid);
   ASSERT_TRUE(deposited);
   EXPECT_EQ(pipeline::saturation_of(100, *deposited, machine.machine), 0);  // of no thickness
   deposited->layer_mm = 0.1;

@@ -96,7 +96,8 @@ float cover_at(const Sheet& sheet, double x_mm, double y_mm) {
 
 Sheet print_sheet(const HeadGrid& grid, const RunsView& layer, const Printing& printing) {
   const bool along_x = grid.scan_axis == ScanAxis::kX;
-  const double x_mm = (along_x ? grid.position_nm : grid.line_nm) * 1e-6, y_mm = (along_x ? grid.line_nm : grid.position_nm) * 1e-6;
+  const double x_mm = (along_x ? grid.position_nm : grid.line_nm) * 1e-6,
+               y_mm = (along_x ? grid.line_nm : grid.position_nm) * 1e-6;
   std::uint32_t box[4] = {UINT32_MAX, UINT32_MAX, 0, 0};
   for_each_dot_line(grid, layer, [&](std::uint32_t, std::uint32_t l, std::uint32_t t, std::uint32_t r, std::uint32_t b) {
     box[0] = std::min(box[0], l), box[1] = std::min(box[1], t), box[2] = std::max(box[2], r), box[3] = std::max(box[3], b);

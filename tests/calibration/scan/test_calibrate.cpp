@@ -23,8 +23,8 @@ TEST(CalibrateScan, APhotographBecomesAProfile) {
   ASSERT_EQ(run_lamina(words_of("calibrate --machine nuferbj --quiet -o sheet"), directory.path()).code, 0);
   const auto machine = pipeline::find_machine("nuferbj");
   ASSERT_TRUE(machine);
-  const auto resolved = pipeline::resolve_profile(chart::chart_machine(*machine));
-  const auto layer = read::image(directory / "sheet/print/layers/000000.tif");
+  const auto resolved = pipeline::resolve_profile(calibration::chart_machine(*machine));
+  const auto layer = formats::image(directory / "sheet/print/layers/000000.tif");
   ASSERT_TRUE(resolved && layer);
   Printing printing;
   printing.blocked = {17, 93};
@@ -95,14 +95,15 @@ TEST(CompareScan, AnyDropOfAGreyLayerIsInk) {
   const auto machine = pipeline::find_machine("jet1000-grey");
   ASSERT_TRUE(machine);
   const auto resolved = pipeline::resolve_profile(*machine);
-  const auto all = read::dark_pixels(directory / "job/layers/000000.tif", 255);
+  const auto all = formats::dark_pixels(directory / "job/layers/000000.tif", 255);
   ASSERT_TRUE(resolved && all);
   std::mt19937_64 random(1);
   const GreyPicture picture = photograph(print_sheet(resolved->grid, all->runs, {}), {.pixels_a_mm = 10}, random);
   std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
                                                            << picture.width << ' ' << picture.height << "\n255\n"
                                                            << std::string(picture.grey.begin(), picture.grey.end());
-  const Outcome detected = run_lamina(words_of("compare job/layers/000000.tif photo.pgm --machine jet1000-grey"), directory.path());
+  const Outcome detected =
+      run_lamina(words_of("compare job/layers/000000.tif photo.pgm --machine jet1000-grey"), directory.path());
   ASSERT_EQ(detected.code, 0) << detected.err << detected.out;
   EXPECT_NEAR(std::stod(detected.out.substr(detected.out.find("area      ") + 10)), 45, 1) << detected.out;
 }

@@ -23,7 +23,9 @@ namespace {
 
 /// Blobs with holes, 6 to 20 mm wide, on the bed of the default machine.
 Runs random_layer(const HeadGrid& grid, std::mt19937_64& random) {
-  const auto between = [&](double minimum, double maximum) { return std::uniform_real_distribution<double>(minimum, maximum)(random); };
+  const auto between = [&](double minimum, double maximum) {
+    return std::uniform_real_distribution<double>(minimum, maximum)(random);
+  };
   struct Blob {
     double x, y, r, lobes, phase, depth, hole;
   };
@@ -65,7 +67,9 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
   std::vector<double> area;
   for (int i = 0; i < layers; ++i) {
     std::mt19937_64 random(static_cast<std::uint64_t>(i) * 104'729 + 7);
-    const auto between = [&](double minimum, double maximum) { return std::uniform_real_distribution<double>(minimum, maximum)(random); };
+    const auto between = [&](double minimum, double maximum) {
+      return std::uniform_real_distribution<double>(minimum, maximum)(random);
+    };
     const Runs layer = random_layer(*grid, random);
     // Three lines of 97 um: 0.3 mm of a swath, where at least 5 mm are to be printed; every other layer lacks nothing.
     std::uint32_t gap = UINT32_MAX;
@@ -104,8 +108,8 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
     for (int y = 0; y < picture.height; ++y)
       std::memcpy(grey.ptr(y), picture.grey.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width),
                   static_cast<std::size_t>(picture.width));
-    const auto detected =
-        scan::compare_layer(scan::photo_of(std::move(grey)), {layer.view(), grid->position_nm, grid->line_nm, true, 100});
+    const auto detected = calibration::compare_layer(calibration::photo_of(std::move(grey)),
+                                                     {layer.view(), grid->position_nm, grid->line_nm, true, 100});
     missing += gap != UINT32_MAX;
     if (!detected) {
       ++unread;
@@ -114,19 +118,19 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
     }
     const double at = (gap + 1.5) * grid->line_nm * 1e-6;
     bool hit = false;
-    for (const scan::MissingBand& band : detected->bands) {
+    for (const calibration::MissingBand& band : detected->bands) {
       const bool here = gap != UINT32_MAX && band.from_mm - 0.2 < at && at < band.to_mm + 0.2;
       hit = hit || here;
       wrong += !here;
     }
     found += hit;
     if (requested != nullptr && (hit != (gap != UINT32_MAX) || detected->bands.size() > 1))
-      printf("layer %d: %zu bands, gap %u, likeness %.3f, ink %.2f, turn %.2f\n", i, detected->bands.size(), gap, detected->likeness,
-             camera.ink, camera.turn_deg);
+      printf("layer %d: %zu bands, gap %u, likeness %.3f, ink %.2f, turn %.2f\n", i, detected->bands.size(), gap,
+             detected->likeness, camera.ink, camera.turn_deg);
     extra += detected->extra.size();
     if (gap == UINT32_MAX) {
       double expected = 0, got = 0;
-      for (const scan::BodyReading& body : detected->bodies) expected += body.expected_mm2, got += body.detected_mm2;
+      for (const calibration::BodyReading& body : detected->bodies) expected += body.expected_mm2, got += body.detected_mm2;
       area.push_back(std::abs(got / expected - 1));
     }
   }
@@ -189,9 +193,9 @@ cv::Mat grey_of_blocks(const SheetOfBlocks& sheet, std::uint64_t seed) {
   return grey;
 }
 
-Result<scan::Comparison> compare_blocks(const SheetOfBlocks& sheet, const cv::Mat& grey) {
-  return scan::compare_layer(scan::photo_of(grey.clone()),
-                             {sheet.layer.view(), sheet.grid.position_nm, sheet.grid.line_nm, true, 100});
+Result<calibration::Comparison> compare_blocks(const SheetOfBlocks& sheet, const cv::Mat& grey) {
+  return calibration::compare_layer(calibration::photo_of(grey.clone()),
+                                    {sheet.layer.view(), sheet.grid.position_nm, sheet.grid.line_nm, true, 100});
 }
 
 TEST(ComparedLayer, InkWhereTheLayerHasNoneIsReported) {

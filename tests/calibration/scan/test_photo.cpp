@@ -79,13 +79,13 @@ TEST(Photo, GreyColourOpacityAndSixteenBitsAreOnePicture) {
   for (const std::uint16_t samples : std::initializer_list<std::uint16_t>{1, 2, 3, 4}) {
     for (const std::uint16_t bits : std::initializer_list<std::uint16_t>{8, 16}) {
       write_photo(path, greys, kWide, kHigh, {samples, bits});
-      const auto photo = scan::read_photo(path, 20);
+      const auto photo = calibration::read_photo(path, 20);
       ASSERT_TRUE(photo) << photo.error().message;
       expect_greys(photo->grey, greys, std::to_string(samples) + " samples of " + std::to_string(bits));
     }
     if (samples % 2 == 1) continue;
     write_photo(path, greys, kWide, kHigh, {samples, 8, 1, 0});
-    const auto clear = scan::read_photo(path, 20);
+    const auto clear = calibration::read_photo(path, 20);
     ASSERT_TRUE(clear);
     expect_greys(clear->grey, std::vector<std::uint8_t>(greys.size(), 255), "transparent");
   }
@@ -114,7 +114,7 @@ TEST(Photo, IsTurnedAsTheCameraWasHeld) {
       }
     }
     write_photo(path, file, wide, high, {1, 8, o});
-    const auto photo = scan::read_photo(path, 20);
+    const auto photo = calibration::read_photo(path, 20);
     ASSERT_TRUE(photo) << photo.error().message;
     expect_greys(photo->grey, greys, "orientation " + std::to_string(o));
   }
@@ -126,7 +126,7 @@ TEST(Photo, WhatCannotBeReadOrIsTooSmallOrTooLargeIsRefusedInALine) {
   write_photo(path, some_greys(), kWide, kHigh, {1, 8});
   const auto put = [&](const std::string& bytes) { std::ofstream(pgm, std::ios::binary) << bytes; };
   const auto expect_refused = [](const std::string& file, int minimum, const std::string& words) {
-    const auto photo = scan::read_photo(file, minimum);
+    const auto photo = calibration::read_photo(file, minimum);
     ASSERT_FALSE(photo) << words;
     EXPECT_EQ(photo.error().fault, Fault::kInput);
     EXPECT_NE(photo.error().message.find(words), std::string::npos) << photo.error().message;
@@ -145,13 +145,13 @@ TEST(Photo, WhatCannotBeReadOrIsTooSmallOrTooLargeIsRefusedInALine) {
 TEST(Photo, SheetsWithoutAChartEndInALine) {
   Machine machine;
   machine.mounting.tilt_deg = 45;
-  const auto grid = program::make_head_grid(chart::chart_machine(machine));
+  const auto grid = program::make_head_grid(calibration::chart_machine(machine));
   ASSERT_TRUE(grid);
-  const auto deposited = chart::layout_chart(chart::chart_machine(machine), *grid);
+  const auto deposited = calibration::layout_chart(calibration::chart_machine(machine), *grid);
   ASSERT_TRUE(deposited);
   std::mt19937 random(7);
   const auto refused = [&](const char* what, const cv::Mat& grey) {
-    const auto reading = scan::read_chart_photo(scan::photo_of(grey.clone()), *deposited);
+    const auto reading = calibration::read_chart_photo(calibration::photo_of(grey.clone()), *deposited);
     ASSERT_FALSE(reading) << what;
     EXPECT_EQ(reading.error().fault, Fault::kInput);
     EXPECT_EQ(std::ranges::count(reading.error().message, '\n'), 0);

@@ -47,12 +47,12 @@ struct PrintedChart {
 };
 
 PrintedChart chart_of(bool along_y) {
-  const Machine machine = chart::chart_machine(head_machine(along_y));
+  const Machine machine = calibration::chart_machine(head_machine(along_y));
   const auto grid = program::make_head_grid(machine);
   EXPECT_TRUE(grid) << grid.error().message;
-  const auto deposited = chart::layout_chart(machine, *grid);
+  const auto deposited = calibration::layout_chart(machine, *grid);
   EXPECT_TRUE(deposited) << deposited.error().message;
-  return {*grid, *deposited, chart::draw(*deposited)};
+  return {*grid, *deposited, calibration::draw(*deposited)};
 }
 
 struct Trial {
@@ -63,7 +63,9 @@ struct Trial {
 
 Trial random_trial(const PrintedChart& printed, std::mt19937_64& random) {
   std::mt19937_64 seeded = random;  // of its own: photographs stay what they were
-  const auto between = [&](double minimum, double maximum) { return std::uniform_real_distribution<double>(minimum, maximum)(random); };
+  const auto between = [&](double minimum, double maximum) {
+    return std::uniform_real_distribution<double>(minimum, maximum)(random);
+  };
   const auto whole = [&](std::uint32_t maximum) { return std::uniform_int_distribution<std::uint32_t>(0, maximum)(random); };
   Trial trial;
   for (std::uint32_t left = whole(6); left > 0; --left) {
@@ -101,17 +103,17 @@ Trial random_trial(const PrintedChart& printed, std::mt19937_64& random) {
   return trial;
 }
 
-scan::Photo photo_in_memory(const GreyPicture& picture) {
+calibration::Photo photo_in_memory(const GreyPicture& picture) {
   cv::Mat grey(picture.height, picture.width, CV_8U);
   for (int y = 0; y < picture.height; ++y)
     std::memcpy(grey.ptr(y), picture.grey.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width),
                 static_cast<std::size_t>(picture.width));
-  return scan::photo_of(std::move(grey));
+  return calibration::photo_of(std::move(grey));
 }
 
-Result<scan::ChartReading> read_trial(const PrintedChart& printed, const Trial& trial, std::mt19937_64& random) {
+Result<calibration::ChartReading> read_trial(const PrintedChart& printed, const Trial& trial, std::mt19937_64& random) {
   const GreyPicture picture = photograph(print_sheet(printed.grid, printed.layer, trial.printing), trial.camera, random);
-  return scan::read_chart_photo(photo_in_memory(picture), printed.chart);
+  return calibration::read_chart_photo(photo_in_memory(picture), printed.chart);
 }
 
 /// A straight line through the nozzles' offsets cannot be told from the scale of the picture: docs/calibrate.md has the one
@@ -161,8 +163,8 @@ struct Errors {
   std::size_t stitches_without = 0, stitches_unclear = 0;
 };
 
-void add_measure(const scan::Measure& measure, double pitch_um, double truth, std::vector<double>& errors, Beyond& beyond,
-                 std::size_t& unreadable) {
+void add_measure(const calibration::Measure& measure, double pitch_um, double truth, std::vector<double>& errors,
+                 Beyond& beyond, std::size_t& unreadable) {
   if (measure.error_um > 0) beyond.add(measure.um - truth * pitch_um, measure.within_um);  // else all its dashes are marred
   if (!measure.reported) {
     ++unreadable;
@@ -171,8 +173,8 @@ void add_measure(const scan::Measure& measure, double pitch_um, double truth, st
   errors.push_back(std::abs(measure.um / pitch_um - truth));
 }
 
-void add_errors(const PrintedChart& printed, const Trial& trial, const scan::ChartReading& reading, Errors& errors) {
-  const scan::HeadReading& head = reading.head;
+void add_errors(const PrintedChart& printed, const Trial& trial, const calibration::ChartReading& reading, Errors& errors) {
+  const calibration::HeadReading& head = reading.head;
   const double along_um = printed.grid.position_nm * 1e-3, across_um = printed.grid.line_nm * 1e-3;
   for (const std::uint32_t n : trial.printing.blocked) errors.found += std::ranges::count(head.blocked, n) > 0;
   errors.blocked += trial.printing.blocked.size();
@@ -183,8 +185,8 @@ void add_errors(const PrintedChart& printed, const Trial& trial, const scan::Cha
     const auto& reported = trial.printing.nozzle[n];
     add_measure(head.nozzle[n]->along, along_um, reported[0] - along.middle - along.slope * n, errors.nozzle, errors.nozzles,
                 errors.nozzles_unreadable);
-    add_measure(head.nozzle[n]->across, across_um, reported[1] - across.middle - across.slope * n, errors.nozzle, errors.nozzles,
-                errors.nozzles_unreadable);
+    add_measure(head.nozzle[n]->across, across_um, reported[1] - across.middle - across.slope * n, errors.nozzle,
+                errors.nozzles, errors.nozzles_unreadable);
   }
   const ChartBox& dash = printed.chart.dashes[0].box;
   const bool along_x = printed.chart.scan_along_x, from_end = printed.grid.lines_from_end;
@@ -200,7 +202,7 @@ void add_errors(const PrintedChart& printed, const Trial& trial, const scan::Cha
     add_measure(head.swath[s]->across, across_um, to[1] - from[1] - across.slope * lines, errors.swath, errors.swaths,
                 errors.swaths_unreadable);
   }
-  for (const scan::JointReading& joint : reading.stitches) {
+  for (const calibration::JointReading& joint : reading.stitches) {
     const auto &from = trial.printing.swath[base + joint.swath - 1], &to = trial.printing.swath[base + joint.swath];
     const auto off = [&](double um, double pitch_um, std::size_t axis, double slope) {
       return std::abs(um / pitch_um - (to[axis] - from[axis] - slope * printed.grid.nozzles));
@@ -211,16 +213,17 @@ void add_errors(const PrintedChart& printed, const Trial& trial, const scan::Cha
     errors.stitches_unclear += !joint.agrees;
   }
   if (printed.chart.nozzle_rows == 2) {
-    std::vector<std::optional<chart::Located>> nozzles;
+    std::vector<std::optional<calibration::Located>> nozzles;
     for (const auto& one : head.nozzle)
-      nozzles.push_back(one && one->along.error_um > 0 ? std::optional(chart::Located{one->along.um, one->along.error_um, 0})
-                                                       : std::nullopt);
-    if (const auto row = chart::rows_of(nozzles, 2)[1]) {
+      nozzles.push_back(one && one->along.error_um > 0
+                            ? std::optional(calibration::Located{one->along.um, one->along.error_um, 0})
+                            : std::nullopt);
+    if (const auto row = calibration::rows_of(nozzles, 2)[1]) {
       errors.rows.add(row->um - trial.row * along_um, row->within_um);
       errors.row_um.push_back(std::abs(row->um - trial.row * along_um));
     }
   }
-  const scan::InkReading& inks = reading.inks;
+  const calibration::InkReading& inks = reading.inks;
   // Rows that lie apart make the edges of bars along the scan ragged.
   std::vector<double>& along_gains = std::abs(trial.row) < 0.1 ? errors.gain_um : errors.ragged_um;
   if (inks.bars_along > 0) along_gains.push_back(std::abs(inks.gain_along_um - trial.printing.gain_um));
@@ -289,16 +292,16 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
       "joints by verniers: %zu, half within %.4f, 99 %% within %.4f, all within %.4f; by blocks: %zu, half %.4f, 99 %% %.4f, all %.4f; "
       "%zu not read, %zu not as the dashes have them\n"
       "gain in um: half within %.2f, 99 %% within %.2f, all within %.2f; along the scan where rows lie apart: all within %.2f\n",
-      scans.size(), errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(), errors.nozzles_unreadable,
-      share_of(errors.nozzle, 0.5), share_of(errors.nozzle, 0.999), share_of(errors.nozzle, 1), errors.swath.size(),
-      errors.swaths_unreadable, share_of(errors.swath, 0.5), share_of(errors.swath, 0.99), share_of(errors.swath, 1),
-      errors.nozzles.percent(), errors.nozzles.all, errors.swaths.percent(), errors.swaths.all, errors.rows.percent(),
-      errors.rows.all, share_of(errors.row_um, 0.5), share_of(errors.row_um, 0.99), share_of(errors.row_um, 1),
-      errors.joint_along.size(), share_of(errors.joint_along, 0.5), share_of(errors.joint_along, 0.99),
-      share_of(errors.joint_along, 1), errors.joint_across.size(), share_of(errors.joint_across, 0.5),
-      share_of(errors.joint_across, 0.99), share_of(errors.joint_across, 1), errors.stitches_without, errors.stitches_unclear,
-      share_of(errors.gain_um, 0.5), share_of(errors.gain_um, 0.99), share_of(errors.gain_um, 1),
-      share_of(errors.ragged_um, 1));
+      scans.size(), errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(),
+      errors.nozzles_unreadable, share_of(errors.nozzle, 0.5), share_of(errors.nozzle, 0.999), share_of(errors.nozzle, 1),
+      errors.swath.size(), errors.swaths_unreadable, share_of(errors.swath, 0.5), share_of(errors.swath, 0.99),
+      share_of(errors.swath, 1), errors.nozzles.percent(), errors.nozzles.all, errors.swaths.percent(), errors.swaths.all,
+      errors.rows.percent(), errors.rows.all, share_of(errors.row_um, 0.5), share_of(errors.row_um, 0.99),
+      share_of(errors.row_um, 1), errors.joint_along.size(), share_of(errors.joint_along, 0.5),
+      share_of(errors.joint_along, 0.99), share_of(errors.joint_along, 1), errors.joint_across.size(),
+      share_of(errors.joint_across, 0.5), share_of(errors.joint_across, 0.99), share_of(errors.joint_across, 1),
+      errors.stitches_without, errors.stitches_unclear, share_of(errors.gain_um, 0.5), share_of(errors.gain_um, 0.99),
+      share_of(errors.gain_um, 1), share_of(errors.ragged_um, 1));
   EXPECT_GE(static_cast<double>(errors.found), 0.995 * static_cast<double>(errors.blocked));
   EXPECT_EQ(errors.accused, 0u);
   EXPECT_LE(share_of(errors.nozzle, 1), 0.1);

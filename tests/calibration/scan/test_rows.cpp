@@ -42,22 +42,23 @@ struct RowsRead {
 /// shift_um  of each row, further along the scan
 RowsRead read_rows(const std::vector<double>& shift_um, const Camera& camera) {
   RowsRead read;
-  Machine machine = chart::chart_machine(fine_head());
+  Machine machine = calibration::chart_machine(fine_head());
   const auto grid = program::make_head_grid(machine);
   EXPECT_TRUE(grid) << grid.error().message;
-  const auto deposited = chart::layout_chart(machine, *grid);
+  const auto deposited = calibration::layout_chart(machine, *grid);
   EXPECT_TRUE(deposited) << deposited.error().message;
   Printing printing;
-  for (std::uint32_t n = 0; n < grid->nozzles; ++n) printing.nozzle.push_back({shift_um[n % kRows] * 1e3 / grid->position_nm, 0});
+  for (std::uint32_t n = 0; n < grid->nozzles; ++n)
+    printing.nozzle.push_back({shift_um[n % kRows] * 1e3 / grid->position_nm, 0});
   std::mt19937_64 random(7);
-  const GreyPicture picture = photograph(print_sheet(*grid, chart::draw(*deposited).view(), printing), camera, random);
+  const GreyPicture picture = photograph(print_sheet(*grid, calibration::draw(*deposited).view(), printing), camera, random);
   cv::Mat grey(picture.height, picture.width, CV_8U);
   std::memcpy(grey.data, picture.grey.data(), picture.grey.size());
-  const auto reading = scan::read_chart_photo(scan::photo_of(std::move(grey)), *deposited);
+  const auto reading = calibration::read_chart_photo(calibration::photo_of(std::move(grey)), *deposited);
   EXPECT_TRUE(reading) << reading.error().message;
   if (!reading) return read;
   for (const auto& nozzle : reading->head.nozzle) read.reported += nozzle && nozzle->along.reported;
-  const auto lines = pipeline::take_over(json_line(scan::reading_json(*reading)), *deposited, machine);
+  const auto lines = pipeline::take_over(json_line(pipeline::reading_json(*reading)), *deposited, machine);
   EXPECT_TRUE(lines) << lines.error().message;
   for (const std::string& line : *lines) read.lines += line + "\n";
   read.row_offset_um = machine.head.row_offset_um;

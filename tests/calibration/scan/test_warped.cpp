@@ -38,24 +38,24 @@ TEST(WarpedPhotograph, ReportsWhatAChartWasPrintedWith) {
   const Directory directory;
   const std::vector<double> row_um{0, 45, -30, 12};
   const std::set<std::uint32_t> blocked{7, 90};
-  const Machine machine = chart::chart_machine(head_of(160, 360, {0, 2540, 5080, 7620}));
+  const Machine machine = calibration::chart_machine(head_of(160, 360, {0, 2540, 5080, 7620}));
   const auto grid = program::make_head_grid(machine);
   ASSERT_TRUE(grid) << grid.error().message;
-  const auto deposited = chart::layout_chart(machine, *grid);
+  const auto deposited = calibration::layout_chart(machine, *grid);
   ASSERT_TRUE(deposited) << deposited.error().message;
   ASSERT_TRUE(deposited->scan_along_x);
   std::vector<std::optional<std::uint32_t>> nozzle_of_row(deposited->rows);
   for (const ChartDash& dash : deposited->dashes) nozzle_of_row[dash.box.top] = dash.nozzle;
   // Beside its row, each seventh nozzle strays across.
   const auto across_um = [](std::uint32_t n) { return n % 7 == 3 ? 24.0 : 0.0; };
-  const InkedSheet sheet =
-      inked_sheet(chart::draw(*deposited), deposited->pixel_x_nm * 1e-6, deposited->pixel_y_nm * 1e-6,
-                  [&](std::uint32_t row) -> std::optional<cv::Point2d> {
-                    if (!nozzle_of_row[row]) return cv::Point2d();
-                    const std::uint32_t n = *nozzle_of_row[row];
-                    if (blocked.contains(n)) return std::nullopt;
-                    return cv::Point2d(deposited->along_sign * 1e-3 * row_um[n % 4], deposited->across_sign * 1e-3 * across_um(n));
-                  });
+  const InkedSheet sheet = inked_sheet(calibration::draw(*deposited), deposited->pixel_x_nm * 1e-6,
+                                       deposited->pixel_y_nm * 1e-6, [&](std::uint32_t row) -> std::optional<cv::Point2d> {
+                                         if (!nozzle_of_row[row]) return cv::Point2d();
+                                         const std::uint32_t n = *nozzle_of_row[row];
+                                         if (blocked.contains(n)) return std::nullopt;
+                                         return cv::Point2d(deposited->along_sign * 1e-3 * row_um[n % 4],
+                                                            deposited->across_sign * 1e-3 * across_um(n));
+                                       });
   const Shot shots[] = {
       {.pixels_a_mm = 22, .turn_deg = 3, .keystone = 0.03, .noise = 2, .jpeg_quality = 90},
       {.pixels_a_mm = 22, .turn_deg = 0, .noise = 1, .jpeg_quality = 0},
@@ -69,20 +69,20 @@ TEST(WarpedPhotograph, ReportsWhatAChartWasPrintedWith) {
       {.pixels_a_mm = 25, .turn_deg = 95, .finer = 1, .interpolation = cv::INTER_CUBIC, .noise = 2, .jpeg_quality = 90}};
   for (const Shot& shot : shots) {
     SCOPED_TRACE(shot.turn_deg);
-    const auto photo = scan::read_photo(photograph_to(directory / "chart", sheet, shot), 200);
+    const auto photo = calibration::read_photo(photograph_to(directory / "chart", sheet, shot), 200);
     ASSERT_TRUE(photo) << photo.error().message;
-    const auto reading = scan::read_chart_photo(*photo, *deposited);
+    const auto reading = calibration::read_chart_photo(*photo, *deposited);
     ASSERT_TRUE(reading) << reading.error().message;
-    const scan::HeadReading& head = reading->head;
+    const calibration::HeadReading& head = reading->head;
     EXPECT_EQ(head.blocked, std::vector<std::uint32_t>(blocked.begin(), blocked.end()));
-    std::vector<std::optional<chart::Located>> along(head.nozzle.size());
+    std::vector<std::optional<calibration::Located>> along(head.nozzle.size());
     for (std::uint32_t n = 0; n < head.nozzle.size(); ++n) {
       if (!head.nozzle[n]) continue;
-      along[n] = chart::Located{head.nozzle[n]->along.um, head.nozzle[n]->along.error_um, 0};
+      along[n] = calibration::Located{head.nozzle[n]->along.um, head.nozzle[n]->along.error_um, 0};
       const double off = head.nozzle[n]->across.um - across_um(n);
       EXPECT_LE(std::abs(off), 0.1e-3 * deposited->pixel_y_nm) << n;
     }
-    const auto rows = chart::rows_of(along, 4);
+    const auto rows = calibration::rows_of(along, 4);
     for (std::uint32_t r = 1; r < 4; ++r) {
       ASSERT_TRUE(rows[r]);
       EXPECT_NEAR(rows[r]->um, row_um[r] - row_um[0], rows[r]->within_um + 0.5) << r;
@@ -112,9 +112,9 @@ TEST(WarpedPhotograph, ReportsInkThatTheLayerDoesNotHave) {
   for (const Shot& shot : {Shot{.pixels_a_mm = 10, .turn_deg = 2, .keystone = 0.01, .noise = 3, .jpeg_quality = 85},
                            Shot{.pixels_a_mm = 10.2, .turn_deg = -3, .blur_pixels = 0.8, .noise = 2, .jpeg_quality = 0}}) {
     SCOPED_TRACE(shot.turn_deg);
-    const auto photo = scan::read_photo(photograph_to(directory / "layer", sheet, shot), 50);
+    const auto photo = calibration::read_photo(photograph_to(directory / "layer", sheet, shot), 50);
     ASSERT_TRUE(photo) << photo.error().message;
-    const auto detected = scan::compare_layer(*photo, {layer.view(), 1e6 * pitch_mm, 1e6 * pitch_mm, true, 100});
+    const auto detected = calibration::compare_layer(*photo, {layer.view(), 1e6 * pitch_mm, 1e6 * pitch_mm, true, 100});
     ASSERT_TRUE(detected) << detected.error().message;
     EXPECT_TRUE(detected->bands.empty());
     ASSERT_EQ(detected->extra.size(), 1u);

@@ -258,7 +258,7 @@ TEST_F(JobsInBatch, JobsBeginOnlyWhenTheirNeedFitsAndALargerOneRunsAlone) {
   const Json json = summary("out");
   EXPECT_LE(json["max_running"], 2);
   EXPECT_GT(json["max_need_bytes"], 500ull << 20);
-  EXPECT_LT(json["max_need_bytes"], 530ull << 20);                  // alone
+  EXPECT_LT(json["max_need_bytes"], 530ull << 20);                   // alone
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow memory counts
   EXPECT_LT(json["peak_resident_bytes"], 120ull << 20);
 #endif

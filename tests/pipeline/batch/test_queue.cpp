@@ -37,21 +37,22 @@ TEST(BatchQueue, JobsShareThreadsAndMemoryAndEachIsReportedOnce) {
   std::vector<BatchJob> jobs;
   for (std::uint32_t number = 1; number <= 24; ++number) {
     const std::uint64_t bytes = 10 + number % 5 * 10;
-    jobs.push_back(job_of(number, bytes, directory / ("out" + std::to_string(number)),
-                          [&, number, bytes](const CallSettings& settings, const ProgressCallback& progress, const std::atomic<bool>&) {
-                            const std::uint64_t now = need += bytes;
-                            for (std::uint64_t before = highest; before < now && !highest.compare_exchange_weak(before, now);) {
-                            }
-                            for (std::uint32_t layer = 1; layer <= 5; ++layer) {
-                              progress({ProgressEvent::Stage::kLayers, layer, 5});
-                              std::this_thread::sleep_for(std::chrono::milliseconds(1));
-                            }
-                            std::ofstream(settings.output) << number;
-                            need -= bytes;
-                            BatchResult result;
-                            result.code = number % 6 == 0 ? 3 : 0;
-                            return result;
-                          }));
+    jobs.push_back(
+        job_of(number, bytes, directory / ("out" + std::to_string(number)),
+               [&, number, bytes](const CallSettings& settings, const ProgressCallback& progress, const std::atomic<bool>&) {
+                 const std::uint64_t now = need += bytes;
+                 for (std::uint64_t before = highest; before < now && !highest.compare_exchange_weak(before, now);) {
+                 }
+                 for (std::uint32_t layer = 1; layer <= 5; ++layer) {
+                   progress({ProgressEvent::Stage::kLayers, layer, 5});
+                   std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                 }
+                 std::ofstream(settings.output) << number;
+                 need -= bytes;
+                 BatchResult result;
+                 result.code = number % 6 == 0 ? 3 : 0;
+                 return result;
+               }));
   }
   BatchOptions options;
   options.jobs = 4;

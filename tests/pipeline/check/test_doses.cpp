@@ -100,8 +100,10 @@ TEST_F(DosesOnRecord, WhereFewerFallTheyAreBounded) {
   const std::uint64_t dosed = number(job, "dosed_pixels"), requested = number(job, "requested_drops");
   expect_found(with(job, {{"requested_drops", requested + 2}}), "the manifest says requested_drops");
   expect_found(with(job, {{"dosed_pixels", dosed + 5}}), "the manifest says requested_drops");
-  expect_found(with(job, {{"dosed_pixels", dosed / 4}, {"requested_drops", requested / 4}}), "is the least that its images can have");
-  expect_found(with(job, {{"dosed_pixels", 2 * dosed}, {"requested_drops", 2 * requested}}), "is the most that its parts can have");
+  expect_found(with(job, {{"dosed_pixels", dosed / 4}, {"requested_drops", requested / 4}}),
+               "is the least that its images can have");
+  expect_found(with(job, {{"dosed_pixels", 2 * dosed}, {"requested_drops", 2 * requested}}),
+               "is the most that its parts can have");
 }
 
 TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirTargets) {
@@ -148,7 +150,8 @@ TEST_F(DosesOnRecord, OrdinaryJobsHold) {
     drops.output += "s";
     make(drops);
     EXPECT_EQ(faults(drops), "") << levels;
-    expect_found(with(drops, {{"requested_drops", number(drops, "requested_drops") * 11 / 10}}), "the manifest says requested_drops");
+    expect_found(with(drops, {{"requested_drops", number(drops, "requested_drops") * 11 / 10}}),
+                 "the manifest says requested_drops");
   }
 }
 

@@ -7,11 +7,11 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/terminal/arguments.h"
-#include "pipeline/cli/terminal/slicer_aliases.h"
 #include "pipeline/cli/terminal/pages.h"
+#include "pipeline/cli/terminal/slicer_aliases.h"
 #include "stages/support/text/names.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 namespace {
 
 TEST(Help, IsAsWideAsTheTerminalAndNamesEveryOption) {
@@ -120,4 +120,4 @@ TEST(Suggestions, AThirdOfTheLettersMayBeWrong) {
 }
 
 }  // namespace
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

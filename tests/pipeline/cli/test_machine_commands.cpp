@@ -104,7 +104,8 @@ TEST_F(MachineCommands, CheckReportsTheTimeThatTheProgramOfAFullLayerTakes) {
     const std::size_t seconds = replayed.find("\"seconds\":"), sweeps = replayed.find("\"sweeps\":");
     ASSERT_NE(seconds, std::string::npos) << replayed;
     ASSERT_NE(sweeps, std::string::npos) << replayed;
-    EXPECT_NEAR(number_before(reported, " s a full layer of 0.1 mm"), std::strtod(replayed.c_str() + seconds + 10, nullptr), 0.051)
+    EXPECT_NEAR(number_before(reported, " s a full layer of 0.1 mm"), std::strtod(replayed.c_str() + seconds + 10, nullptr),
+                0.051)
         << machine << "\n"
         << reported;
     EXPECT_EQ(number_before(reported, " sweeps of up to"), std::strtod(replayed.c_str() + sweeps + 9, nullptr)) << machine;
@@ -127,7 +128,8 @@ TEST_F(MachineCommands, CheckAveragesMaintenanceThatIsDueEverySoManyLayers) {
   part << "endsolid full\n";
   part.close();
   for (const std::string machine : {"xaar128-raw", "hp45"}) {
-    std::ofstream(at("m.toml")) << "inherits = \"" << machine << "\"\n[bed]\nsize_mm = [30, 24]\n[maintenance]\nspit_layers = 4\n"
+    std::ofstream(at("m.toml")) << "inherits = \"" << machine
+                                << "\"\n[bed]\nsize_mm = [30, 24]\n[maintenance]\nspit_layers = 4\n"
                                 << "spit_drops = 9000\nspit_mm = [-60, 5]\nwipe_layers = 6\nwipe_mm = [-60, 20, -60, 60]\n"
                                 << "wipe_speed_mm_s = 7\n";
     fs::remove_all(at("full"));
@@ -153,7 +155,7 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
     const std::string out = at(machine);
     lamina("jet " + at("f.stl") + " --machine " + machine + " --layer 1 -o " + out);
     lamina("verify " + out);  // what is printed is the image
-    const auto image = read::image(out + "/layers/000000.tif");
+    const auto image = formats::image(out + "/layers/000000.tif");
     ASSERT_TRUE(image.ok());
     const RunsView runs = image->runs;
     const double width = 25.4 / image->dpi_x, depth = 25.4 / image->dpi_y;
@@ -176,7 +178,7 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
     EXPECT_FALSE(set(12, 3)) << machine << ": no arm at the foot";
     EXPECT_FALSE(set(12, 21)) << machine;
     // The step on top is at the foot: the third layer holds nothing else.
-    const auto top = read::image(out + "/layers/000002.tif");
+    const auto top = formats::image(out + "/layers/000002.tif");
     ASSERT_TRUE(top.ok());
     for (std::uint32_t r = 0; r < runs.rows(); ++r) {
       const bool foot = r > back + static_cast<std::uint32_t>(23.5 / depth);

@@ -4,7 +4,7 @@
 
 #include "pipeline/cli/terminal/progress.h"
 
-namespace lamina::terminal {
+namespace lamina::pipeline {
 namespace {
 
 TEST(Progress, ReportsRateAndTimeLeftOfTheLayersThatWerePlannedNow) {
@@ -24,4 +24,4 @@ TEST(Progress, MillionEventsCostNoMillionWrites) {
 }
 
 }  // namespace
-}  // namespace lamina::terminal
+}  // namespace lamina::pipeline

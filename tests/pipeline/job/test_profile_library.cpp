@@ -12,7 +12,7 @@
 #include "stages/support/text/toml.h"
 #include "tests/commands/program.h"
 
-namespace lamina::read {
+namespace lamina::pipeline {
 namespace {
 
 constexpr std::string_view kDialects[] = {"nuferbj"};
@@ -132,4 +132,4 @@ TEST_F(ProfileLibrary, JobsArePlannedWithPresetsAndKeepWhatCameOut) {
 }
 
 }  // namespace
-}  // namespace lamina::read
+}  // namespace lamina::pipeline

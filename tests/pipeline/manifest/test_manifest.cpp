@@ -106,7 +106,7 @@ ManifestHead head_of_drops(const std::string& format, std::uint32_t maximum) {
   head.extension = ".tif";
   head.machine = "m";
   head.dialect = "raw";
-  head.program_extension = write::find_dialect("raw")->extension;
+  head.program_extension = program::find_dialect("raw")->extension;
   head.materials = {{"steel", 0}, {"bronze-drop2", 1}};
   head.max_drops = maximum;
   return head;

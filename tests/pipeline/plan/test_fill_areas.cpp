@@ -47,7 +47,8 @@ void expect_within(const Sections::Work& work, std::size_t a, const ContoursView
       for (int k = 0; k <= 8; ++k) {
         const double x = paths.point[i].x + (static_cast<double>(paths.point[i + 1].x) - paths.point[i].x) * k / 8;
         const double y = paths.point[i].y + (static_cast<double>(paths.point[i + 1].y) - paths.point[i].y) * k / 8;
-        ASSERT_EQ(winding_about(capacity, {static_cast<Nm>(std::llround(x)), static_cast<Nm>(std::llround(y))}), 1) << "area " << a;
+        ASSERT_EQ(winding_about(capacity, {static_cast<Nm>(std::llround(x)), static_cast<Nm>(std::llround(y))}), 1)
+            << "area " << a;
         ASSERT_GE(distance_to(capacity, x, y), width / 2 - 2) << "area " << a;
       }
     }
@@ -148,8 +149,8 @@ std::array<double, 2> charged_and_needed(const Sections& plan) {
   const std::uint64_t before = work.bytes();
   EXPECT_TRUE(plan.fill(2, work).ok());
   EXPECT_LE(work.bytes(), before + *own);
-  const auto encoder = write::make_svg_encoder();
-  write::SliceHead head;
+  const auto encoder = formats::make_svg_encoder();
+  formats::SliceHead head;
   head.parts.assign(work.contours.body.size() - 1, "part");
   head.bounds = plan.bounds();
   Buffer<char> text, outlines_alone;

@@ -106,7 +106,8 @@ TEST(Containment, StepsOfContoursLieInsideOrOutsideOfBothSectionsOfALayer) {
   Sections::Work middle, minimum, maximum;
   double min_mm3 = 0, middle_mm3 = 0, max_mm3 = 0;
   for (std::uint32_t i = 0; i < across->sections->layers().size(); ++i) {
-    ASSERT_TRUE(across->sections->layer(i, middle) && inside->sections->layer(i, minimum) && outside->sections->layer(i, maximum));
+    ASSERT_TRUE(across->sections->layer(i, middle) && inside->sections->layer(i, minimum) &&
+                outside->sections->layer(i, maximum));
     const double thickness = mm(across->sections->layers()[i].layer.thickness);
     min_mm3 += area(minimum.contours.contours) * thickness;
     middle_mm3 += area(middle.contours.contours) * thickness;
@@ -120,7 +121,8 @@ TEST(Containment, StepsOfContoursLieInsideOrOutsideOfBothSectionsOfALayer) {
     slice::LayerContours low, high;
     ASSERT_TRUE(inside->sections->slicer().layer(inside->sections->layers()[i].low, scratch, low).ok());
     ASSERT_TRUE(inside->sections->slicer().layer(inside->sections->layers()[i].high, scratch, high).ok());
-    EXPECT_NEAR(area(minimum.contours.contours) + area(maximum.contours.contours), area(low.contours) + area(high.contours), 1e-3);
+    EXPECT_NEAR(area(minimum.contours.contours) + area(maximum.contours.contours), area(low.contours) + area(high.contours),
+                1e-3);
   }
   EXPECT_LT(min_mm3, 0.99 * middle_mm3);
   EXPECT_GT(max_mm3, 1.01 * middle_mm3);

@@ -87,7 +87,8 @@ TEST(DesignedGradient, TheCommandWritesRegionsThatExtrudeDeposits) {
   ASSERT_EQ(deposited.code, 0) << deposited.err;
   const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(deposited.out);
   EXPECT_TRUE(summary["warnings"].empty()) << summary["warnings"].dump();
-  EXPECT_EQ(deposited.err.find("none closes"), std::string::npos) << "nothing is said of heights that no layer has\n" << deposited.err;
+  EXPECT_EQ(deposited.err.find("none closes"), std::string::npos) << "nothing is said of heights that no layer has\n"
+                                                                  << deposited.err;
   for (std::size_t i = 0; i < 2; ++i) {
     const double width = i == 0 ? 0.11 : 0.14;
     EXPECT_NEAR(reported["steps"][i]["pore_mm"][0].get<double>(), width, 0.05 * width);

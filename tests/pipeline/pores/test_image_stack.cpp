@@ -228,7 +228,7 @@ void write_lines(const std::string& path) {
 
 TEST_F(ImageStack, OfAPlanThatIsShiftedAndGrownByAVoxelComesBackWithBoth) {
   write_lines(folder / "lines.gcode");
-  const Result<read::GcodeFile> file = read::GcodeFile::open(folder / "lines.gcode");
+  const Result<formats::GcodeFile> file = formats::GcodeFile::open(folder / "lines.gcode");
   ASSERT_TRUE(file.ok());
   const Result<pipeline::Pile> pile = pipeline::pile_of(*file);
   ASSERT_TRUE(pile.ok());

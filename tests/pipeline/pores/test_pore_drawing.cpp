@@ -32,7 +32,7 @@ void write_grid_of_lines(const std::string& path) {
 
 /// Of a cell that repeats: 0.8 mm a side, two layers.
 struct Pictured {
-  read::GcodeFile file;
+  formats::GcodeFile file;
   pipeline::Pile pile;
   pipeline::WindowChoice choice;
   VoxelStack voxels, fine, coarse;
@@ -40,7 +40,7 @@ struct Pictured {
   Plot plot;
 };
 Pictured pictured(const std::string& path, bool flow) {
-  Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  Result<formats::GcodeFile> file = formats::GcodeFile::open(path);
   EXPECT_TRUE(file.ok());
   Result<pipeline::Pile> pile = pipeline::pile_of(*file);
   EXPECT_TRUE(pile.ok());
@@ -132,7 +132,7 @@ TEST(PoreDrawing, IsTheSameForAnyNumberOfThreads) {
   std::vector<std::string> files;
   for (const std::size_t threads : {1, 2, 5}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    files.push_back(write::plot_svg(pictured(folder / "lines.gcode", true).plot));
+    files.push_back(formats::plot_svg(pictured(folder / "lines.gcode", true).plot));
   }
   EXPECT_TRUE(files[0] == files[1] && files[0] == files[2]);
 }
@@ -142,7 +142,7 @@ TEST(PoreDrawing, PreviewDrawsThePngInTheColoursOfThePlot) {
   test::Directory folder;
   write_grid_of_lines(folder / "lines.gcode");
   const Plot plot = pictured(folder / "lines.gcode", true).plot;
-  const auto file = write::filter("lamina-preview", "--plot", write::plot_json(plot));
+  const auto file = filter("lamina-preview", "--plot", formats::plot_json(plot));
   ASSERT_TRUE(file.ok());
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -165,7 +165,7 @@ TEST(PoreDrawing, PreviewDrawsThePngInTheColoursOfThePlot) {
   Plot wrong = plot;
   wrong.images[0].pixels[7] = 255;
   wrong.images[0].colours.resize(10);
-  EXPECT_FALSE(write::filter("lamina-preview", "--plot", write::plot_json(wrong)).ok());
+  EXPECT_FALSE(filter("lamina-preview", "--plot", formats::plot_json(wrong)).ok());
 }
 
 }  // namespace

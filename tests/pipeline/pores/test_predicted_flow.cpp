@@ -33,11 +33,11 @@ void write_lines(const std::string& path, bool crossed) {
 }
 
 struct DepositedParts {
-  read::GcodeFile file;
+  formats::GcodeFile file;
   pipeline::Pile pile;
 };
 DepositedParts deposited(const std::string& path) {
-  Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  Result<formats::GcodeFile> file = formats::GcodeFile::open(path);
   EXPECT_TRUE(file.ok());
   Result<pipeline::Pile> pile = pipeline::pile_of(*file);
   EXPECT_TRUE(pile.ok());

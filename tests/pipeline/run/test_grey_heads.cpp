@@ -67,10 +67,10 @@ TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndReportWhatThatAdds) {
     EXPECT_EQ(json["saturation"]["max_jetted_drops"], 5);
   }
   const test::Outcome reported = lamina(kBox + std::string("--dry-run"));
-  EXPECT_NE(
-      reported.err.find("2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
-                    "at 5.0 mm/s; that adds 2 sweeps, 2.5 s"),
-      std::string::npos)
+  EXPECT_NE(reported.err.find(
+                "2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
+                "at 5.0 mm/s; that adds 2 sweeps, 2.5 s"),
+            std::string::npos)
       << reported.err;
   const auto records = records_of("out");
   ASSERT_EQ(records.size(), 2u);
@@ -114,7 +114,7 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
     const bool png = format == std::string("png-8");
     const std::string file = folder_ / (std::string(format) + "/layers/000001" + (png ? ".png" : ".tif"));
     Levels levels;
-    const auto image = read::levels(file, 15, levels);
+    const auto image = formats::levels(file, 15, levels);
     ASSERT_TRUE(image.ok()) << image.error().message;
     EXPECT_EQ(levels.level.size(), 30u);
     for (const std::uint8_t level : levels.level) EXPECT_EQ(level, 5);

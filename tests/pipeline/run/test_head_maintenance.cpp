@@ -74,11 +74,12 @@ class HeadMaintenance : public ::testing::Test {
 //   pause  1.5 s a layer where the head waits anyway
 //   all    30 (9.807 + 0.380 + 1.5) + 43.783 + 3 x 0.949 = 397.24 s
 TEST_F(HeadMaintenance, TimeBinderAndPowderByHand) {
-  const Job job = prism(3,
-                        profile("maintenance",
-                                "base_layers = 5\nbase_layer_mm = 0.2\ndry_s = 1.5\n[maintenance]\nspit_layers = 1\nspit_drops = 850\n"
-                                "spit_mm = [-40, 5]\nwipe_layers = 10\nwipe_mm = [-40, 20, -40, 60]\n"),
-                        "maintenance");
+  const Job job =
+      prism(3,
+            profile("maintenance",
+                    "base_layers = 5\nbase_layer_mm = 0.2\ndry_s = 1.5\n[maintenance]\nspit_layers = 1\nspit_drops = 850\n"
+                    "spit_mm = [-40, 5]\nwipe_layers = 10\nwipe_mm = [-40, 20, -40, 60]\n"),
+            "maintenance");
   Job dry = job;
   dry.dry_run = true;
   const auto reported = facts(dry), done = facts(job);
@@ -179,14 +180,15 @@ TEST_F(HeadMaintenance, JobsOfOnePowderAreFedByOneVat) {
 }
 
 TEST_F(HeadMaintenance, PositionsWithoutATimeForThemGiveAWarning) {
-  Job job =
-      prism(0.3F, profile("idle", "[maintenance]\nspit_mm = [-40, 5]\nwipe_mm = [-40, 20, -40, 60]\ncap_mm = [-40, 5]\n"), "idle");
+  Job job = prism(0.3F, profile("idle", "[maintenance]\nspit_mm = [-40, 5]\nwipe_mm = [-40, 20, -40, 60]\ncap_mm = [-40, 5]\n"),
+                  "idle");
   job.dry_run = true;
   const auto summary = made(job);
   ASSERT_TRUE(summary.ok()) << summary.error().message;
   ASSERT_EQ(summary->warnings.size(), 1u);
   EXPECT_EQ(summary->warnings[0].code, "maintenance");
-  for (const char* what : {"no shot: maintenance.spit_layers", "no wipe: maintenance.wipe_layers", "no pause under maintenance.cap_mm"})
+  for (const char* what :
+       {"no shot: maintenance.spit_layers", "no wipe: maintenance.wipe_layers", "no pause under maintenance.cap_mm"})
     EXPECT_NE(summary->warnings[0].text.find(what), std::string::npos) << summary->warnings[0].text;
 }
 

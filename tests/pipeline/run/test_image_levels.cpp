@@ -55,7 +55,7 @@ class ImageLevels : public testing::Test {
   }
   Levels levels(const std::string& file, std::uint8_t full) const {
     Levels levels;
-    const auto image = read::levels(folder_ / file, full, levels);
+    const auto image = formats::levels(folder_ / file, full, levels);
     EXPECT_TRUE(image.ok()) << image.error().message;
     return levels;
   }
@@ -195,7 +195,7 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
         const auto full = static_cast<std::uint8_t>(std::stoi(levels) - 1);
         Runs set;
         lower_bound(this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
-                 static_cast<std::uint8_t>((full + 1) / 2), set);
+                    static_cast<std::uint8_t>((full + 1) / 2), set);
         EXPECT_EQ(half.layers[record.layer.index].set_pixels, set_pixels(set));
       }
       forget({"shares", "half", "rounded"});
@@ -222,7 +222,7 @@ TEST_F(ImageLevels, ConvertToTheirFormatsAndBack) {
     const std::string stem = fs::path(file).stem().string();
     Runs full;
     lower_bound(levels("two/" + stem + ".tif", 1), 1, full);
-    EXPECT_EQ(set_pixels(full), set_pixels(read::image(folder_ / ("bits/" + stem + ".bmp"))->runs));
+    EXPECT_EQ(set_pixels(full), set_pixels(formats::image(folder_ / ("bits/" + stem + ".bmp"))->runs));
   }
   test::expect_refused("convert as4 -o no --format tiff-g4 --levels 4", 2, "--levels: is of grey formats", folder_);
   test::expect_refused("convert as4 -o no --format tiff-4 --levels 256", 2, "give 2, 4 or 16", folder_);

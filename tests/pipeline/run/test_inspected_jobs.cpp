@@ -179,7 +179,8 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsReportedOrRefused) {
       {"wiping that never comes", "[maintenance]\nwipe_mm = [-40, 20, -40, 60]\n", block, 0, "maintenance"},
       {"a wiper without a way", "[maintenance]\nwipe_layers = 5\n", block, 2, "maintenance.wipe_mm: is missing"},
       {"a cap and no pause", maintenance + "cap_mm = [-40, 5]\n", block, 0, "maintenance"},
-      {"a cap over the bed", "dry_s = 5\n[maintenance]\ncap_mm = [60, 20]\n", block, 2, "maintenance.cap_mm: nozzles are over the bed"},
+      {"a cap over the bed", "dry_s = 5\n[maintenance]\ncap_mm = [60, 20]\n", block, 2,
+       "maintenance.cap_mm: nozzles are over the bed"},
       {"a lamp without a pause", "dry_on_lines = [\"M106 S255\"]\n", block, 2, "there is no pause to dry"},
       {"a lamp that stays on", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\n", block, 0, "maintenance"},
       {"the same, switched off", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\ndry_off_lines = [\"M107\"]\n", block, 0, ""},
@@ -192,7 +193,8 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsReportedOrRefused) {
       {"nozzles that are faster than they fire", "", block + " --scan-speed 900", 2, "fires a nozzle"},
       {"a head all of whose nozzles are blocked", "", block + " --blocked " + all, 2, "one at least has to fire"},
       {"a powder that no vat holds", "materials = [\"steel\", \"bronze\"]\n", block + " --material zinc", 2, "zinc"},
-      {"a clock that no sweep keeps", "[maintenance]\nspit_seconds = 0.5\nspit_mm = [-40, 5]\n", block, 2, "a sweep ends up to"},
+      {"a clock that no sweep keeps", "[maintenance]\nspit_seconds = 0.5\nspit_mm = [-40, 5]\n", block, 2,
+       "a sweep ends up to"},
   };
   for (const auto& [name, lines, arguments, code, reported] : rows) {
     const Reported found = jet("--machine " + profile(lines) + " --layer 0.1 " + arguments + (code == 0 ? " --dry-run" : ""));
@@ -267,7 +269,8 @@ TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsReportedAndTheJobContinues) 
   EXPECT_LT(tight["peak_layer_bytes"], whole["peak_layer_bytes"]);
   // What it asks for is enough.
   const std::string text = tight["warnings"].back()["text"], give = "give --memory ";
-  const std::string requested = text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());
+  const std::string requested =
+      text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());
   EXPECT_GT(inspect(job + " --memory " + requested)["inspection"]["layers"].get<int>(), 1) << text;
 }
 

@@ -34,11 +34,11 @@ TEST(Levels, OfEachLayerComeFromThePlan) {
   const Result<Plan> plan = plan_of_levels(folder / "box.stl", 4);
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   const LayerImager imager(*plan);
-  cover::CoverageScratch scratch;
+  coverage::CoverageScratch scratch;
   Levels image;
   double volume = 0;
   for (std::uint32_t i = 0; i < plan->layer_count; ++i) {
-    const cover::CoverageReport report = imager.levels(plan->layer(i), scratch, image);
+    const coverage::CoverageReport report = imager.levels(plan->layer(i), scratch, image);
     volume += report.volume_mm3;
     EXPECT_EQ(image.view().rows(), plan->images->grid.rows());
     // Twenty by thirty voxels: full ones have level 3, those of half a layer round(1.5) = 2.
@@ -125,7 +125,7 @@ TEST_F(LevelJobs, WriteLevelsAsGreyInFormatsThatCarryThem) {
     Levels levels;
     const std::string top =
         folder_ / (std::string(format) + "/layers/000002" + (format == std::string("png-8") ? ".png" : ".tif"));
-    const auto image = read::levels(top, 15, levels);
+    const auto image = formats::levels(top, 15, levels);
     ASSERT_TRUE(image.ok()) << image.error().message;
     ASSERT_EQ(levels.level.size(), 30u);
     EXPECT_EQ(levels.change[0], 20u);

@@ -62,12 +62,13 @@ class MaterialDrops : public test::JobFolder {
   }
 
   /// What the images of one material, or of a job without any, come to. They are nested, or the test fails.
-  DropPixels drops_of(const std::string& output, std::uint32_t layer, const std::string& material, std::uint32_t maximum) const {
+  DropPixels drops_of(const std::string& output, std::uint32_t layer, const std::string& material,
+                      std::uint32_t maximum) const {
     DropPixels drops;
     for (std::uint32_t k = 1; k <= maximum; ++k) {
       const std::string drop = maximum > 1 ? "drop" + std::to_string(k) : "";
       const std::string name = material + (material.empty() || drop.empty() ? "" : "-") + drop;
-      const auto image = read::image(folder_ / (output + "/" + layer_file_name(layer, ".tif", name)));
+      const auto image = formats::image(folder_ / (output + "/" + layer_file_name(layer, ".tif", name)));
       EXPECT_TRUE(image.ok()) << (image.ok() ? "" : image.error().message);
       if (!image.ok()) return drops;
       const RunsView runs = image->runs.view();
@@ -186,7 +187,8 @@ TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsTarget) {
   for (std::size_t m = 0; m < 2; ++m) {
     for (const char* key : {"name", "set_pixels", "drops", "binder_ml"}) EXPECT_EQ(detected[m][key], reported[m][key]) << key;
   }
-  EXPECT_NE(lamina("jet --job target.toml --dry-run").err.find(" of steel: 19 200 drops, 0.002 ml of binder"), std::string::npos);
+  EXPECT_NE(lamina("jet --job target.toml --dry-run").err.find(" of steel: 19 200 drops, 0.002 ml of binder"),
+            std::string::npos);
 }
 
 // A voxel at the seam is three tenths of steel and seven tenths of bronze, and so are its drops over many voxels.
@@ -200,7 +202,8 @@ TEST_F(MaterialDrops, OfSharedVoxelsFollowTheShares) {
   ASSERT_EQ(maximum, 4u);
   std::uint64_t steel = 0, bronze = 0;
   for (std::uint32_t layer = 0; layer < 12; ++layer) {
-    const DropPixels of_steel = drops_of("seam", layer, "steel", maximum), of_bronze = drops_of("seam", layer, "bronze", maximum);
+    const DropPixels of_steel = drops_of("seam", layer, "steel", maximum),
+                     of_bronze = drops_of("seam", layer, "bronze", maximum);
     for (std::size_t r = 0; r < 100; ++r) steel += of_steel[r * 160 + 40], bronze += of_bronze[r * 160 + 40];
   }
   const double voxels = 40 * 12, share = 4.0 / 15;  // level 4 of 15 (0.3 is a tie that float edges end), 11 are left
@@ -245,7 +248,7 @@ TEST_F(MaterialDrops, AreGreyImagesToo) {
           const std::string name = m == 0 ? "steel" : "bronze";
           Levels levels;
           const auto image =
-              read::levels(folder_ / ("grey/" + layer_file_name(layer, ".tif", name)), grey_level_of(maximum), levels);
+              formats::levels(folder_ / ("grey/" + layer_file_name(layer, ".tif", name)), grey_level_of(maximum), levels);
           ASSERT_TRUE(image.ok()) << image.error().message;
           EXPECT_EQ(sum_of_levels(levels), sum_of_drops(drops_of("bits", layer, name, maximum))) << name << layer;
           EXPECT_EQ(grey.layers[layer].drops_of(m, 2), sum_of_levels(levels));

@@ -36,7 +36,7 @@ Job job_of_boxes(const test::Directory& folder, const std::string& out, double g
 }
 
 Runs layer_of(const Job& job, const std::string& name) {
-  auto read = read::image(job.output + "/layers/" + name);
+  auto read = formats::image(job.output + "/layers/" + name);
   EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
   return read.ok() ? std::move(read->runs) : Runs();
 }

@@ -40,7 +40,7 @@ class PorousJob : public testing::Test {
       const std::string file =
           folder / (name + "/layers/" + std::string(6 - std::to_string(i).size(), '0') + std::to_string(i) + ".pbm");
       if (!fs::exists(file)) return images;
-      auto image = read::image(file);
+      auto image = formats::image(file);
       EXPECT_TRUE(image.ok()) << (image.ok() ? "" : image.error().message);
       images.push_back(std::move(image->runs));
     }

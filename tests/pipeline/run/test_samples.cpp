@@ -176,7 +176,8 @@ TEST_F(Samples, RepeatedIntervalsOfTables5To7HaveTheirSpeedsExtrusionsAndSpacing
       }
     }
     std::ranges::sort(positions);
-    for (std::size_t i = 1; i < positions.size(); ++i) EXPECT_NEAR(positions[i] - positions[i - 1], kind.spacing, 0.002) << kind.job;
+    for (std::size_t i = 1; i < positions.size(); ++i)
+      EXPECT_NEAR(positions[i] - positions[i - 1], kind.spacing, 0.002) << kind.job;
   }
 }
 
@@ -211,7 +212,9 @@ TEST_F(Samples, CylindersOfTable8Have85LayersAndTheirSpacings) {
     std::size_t segmented = 0, last = 0;
     for (std::size_t i = 0; i < positions.size(); ++i) {
       if (i > 0) {
-        EXPECT_NEAR(positions[i].first - positions[i - 1].first, positions[i].second || positions[i - 1].second ? sc : cc, 0.002) << name;
+        EXPECT_NEAR(positions[i].first - positions[i - 1].first, positions[i].second || positions[i - 1].second ? sc : cc,
+                    0.002)
+            << name;
       }
       if (!positions[i].second) continue;
       if (segmented++ > 0) {
@@ -261,7 +264,8 @@ TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90D
       for (const GcodeBead& b : line) feeds.insert(b.feed);
     }
     std::ranges::sort(positions);
-    for (std::size_t i = 1; i < positions.size(); ++i) EXPECT_NEAR(positions[i] - positions[i - 1], spacings[n / 10], 0.002) << n;
+    for (std::size_t i = 1; i < positions.size(); ++i)
+      EXPECT_NEAR(positions[i] - positions[i - 1], spacings[n / 10], 0.002) << n;
     EXPECT_EQ(feeds, (std::set<double>{thick_feeds[n / 10], 900, 1800})) << n;
   }
 }

@@ -45,7 +45,7 @@ class FormulaJobs : public test::JobFolder {
     return summary.ok() ? summary->facts : Json();
   }
   Runs image(const Job& job, const std::string& name) const {
-    auto read = read::image(job.output + "/layers/" + name);
+    auto read = formats::image(job.output + "/layers/" + name);
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
     return read.ok() ? std::move(read->runs) : Runs();
   }

@@ -24,8 +24,8 @@ namespace {
 const std::atomic<bool> never{false};
 
 /// So much to write that nobody sees the end of it, in files of 1 MB.
-write::Floor endless_floor() {
-  write::Floor floor;
+formats::Floor endless_floor() {
+  formats::Floor floor;
   floor.bytes_written = std::uint64_t{1} << 50;
   floor.files = std::uint64_t{1} << 30;
   return floor;
@@ -36,7 +36,7 @@ template <class GiveUp>
 bool wait_for_temporary(const test::Directory& folder, const std::string& target, const GiveUp& give_up) {
   for (;;) {
     for (const std::string& name : test::files_below(folder.path())) {
-      if (write::named_by_temporary(name) == target) return true;
+      if (named_by_temporary(name) == target) return true;
     }
     if (give_up()) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -51,8 +51,8 @@ int ended_while_measuring(const test::Directory& folder, int signal) {
     ::setrlimit(RLIMIT_CORE, &none);
     for (const int one : {SIGHUP, SIGINT, SIGQUIT}) std::signal(one, SIG_DFL);  // not as the tests were started
     handle_signals();
-    write::Floor floor = endless_floor();
-    static_cast<void>(write::measure_floor({}, folder / "part.gcode", never, floor));
+    formats::Floor floor = endless_floor();
+    static_cast<void>(formats::measure_floor({}, folder / "part.gcode", never, floor));
     ::_exit(1);
   }
   int result = 0;
@@ -107,11 +107,11 @@ TEST(Timing, TheShareOfOneThreadFollowsFromWallAndProcessor) {
 TEST(Timing, TheLimitReadsThePartsAndLeavesNothing) {
   const test::Directory folder;
   test::write_text(folder / "part.stl", std::string(1000, 'x'));
-  write::Floor floor;
+  formats::Floor floor;
   floor.bytes_written = 1001;
   floor.files = 3;
   floor.crossings = 100;
-  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
+  const Status status = formats::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
   ASSERT_TRUE(status.ok()) << status.error().message;
   EXPECT_EQ(floor.bytes_read, 1000u);
   EXPECT_GT(floor.write, 0);
@@ -129,7 +129,7 @@ TEST(Timing, ASignalWhileTheLimitIsMeasuredLeavesNothing) {
 TEST(Timing, WhatAKilledRunLeavesGoesWithTheNextThatWritesTheFile) {
   const test::Directory folder;
   ASSERT_EQ(ended_while_measuring(folder, SIGKILL), SIGKILL);
-  ASSERT_TRUE(write::write_file(folder / "part.gcode", "whole").ok());
+  ASSERT_TRUE(write_file(folder / "part.gcode", "whole").ok());
   const std::vector<std::string> files = test::files_below(folder.path());
   EXPECT_EQ(files, std::vector<std::string>{"part.gcode"});
 }
@@ -139,8 +139,8 @@ TEST(Timing, AMeasurementThatIsCancelledEndsAndLeavesNothing) {
   std::atomic<bool> cancel{false};
   Status status;
   std::thread measures([&] {
-    write::Floor floor = endless_floor();
-    status = write::measure_floor({}, folder / "part.gcode", cancel, floor);
+    formats::Floor floor = endless_floor();
+    status = formats::measure_floor({}, folder / "part.gcode", cancel, floor);
   });
   wait_for_temporary(folder, "part.gcode", [] { return false; });
   cancel = true;
@@ -160,10 +160,10 @@ TEST(Timing, InterruptedCallsGoOn) {
   sigaction(SIGALRM, &action, &before);
   const itimerval often{{0, 100}, {0, 100}}, off{};
   ::setitimer(ITIMER_REAL, &often, nullptr);
-  write::Floor floor;
+  formats::Floor floor;
   floor.bytes_written = 50 << 20;
   floor.files = 5;
-  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
+  const Status status = formats::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
   ::setitimer(ITIMER_REAL, &off, nullptr);
   sigaction(SIGALRM, &before, nullptr);
   ASSERT_TRUE(status.ok()) << status.error().message;
@@ -175,7 +175,7 @@ TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
   timing.phases = {{"layers", {2, 3}}};
   timing.floor.bytes_written = 10;
   const test::Directory folder;
-  timing.not_measured = write::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
+  timing.not_measured = formats::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
   EXPECT_NE(timing.not_measured.find("missing.stl: "), std::string::npos);
   const Json limit = timing_json(timing)["limit"];
   EXPECT_EQ(limit.size(), 1u) << json_text(limit);

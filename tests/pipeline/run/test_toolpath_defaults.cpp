@@ -147,7 +147,8 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessRequestedAndTheSameInAJobFile) {
   // A job means in each command what that command does unasked; what was asked stays.
   EXPECT_EQ(extruded(directory, "--job out/job.toml --layer 0.2 --walls 1").summary["tolerance_um"], 10);
   for (const auto& [requested_um, kept] : {std::pair{"0", "\ntolerance_um = 0\n"}, {"25", "\ntolerance_um = 25\n"}}) {
-    const std::string save = std::string(" --layer 1 --overwrite --save-job kept.toml --quiet -o out --tolerance ") + requested_um;
+    const std::string save =
+        std::string(" --layer 1 --overwrite --save-job kept.toml --quiet -o out --tolerance ") + requested_um;
     const Outcome outcome = run_lamina(words_of("slice " + kToothFile + save), directory.path());
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_NE(read_text(directory / "kept.toml").find(kept), std::string::npos);

@@ -80,7 +80,7 @@ class TwoPowders : public ::testing::Test {
     EXPECT_EQ(report->replayed, report->layers);
   }
   static Runs image(const Job& job, std::uint32_t layer, const std::string& material = "") {
-    auto read = read::image(job.output + "/" + layer_file_name(layer, ".tif", material));
+    auto read = formats::image(job.output + "/" + layer_file_name(layer, ".tif", material));
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
     return read.ok() ? std::move(read->runs) : Runs();
   }
@@ -105,8 +105,8 @@ void expect_same(const Runs& a, const Runs& b, const std::string& what) {
 
 TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsAre) {
   const std::array<std::array<double, 2>, 3> positions[] = {{{{20, 30}, {55, 40}, {30, 60}}},   // apart
-                                                         {{{30, 30}, {35, 33}, {40, 36}}},   // all over each other
-                                                         {{{30, 30}, {30, 30}, {30, 30}}}};  // inside of each other
+                                                            {{{30, 30}, {35, 33}, {40, 36}}},   // all over each other
+                                                            {{{30, 30}, {30, 30}, {30, 30}}}};  // inside of each other
   int variant = 0;
   for (const auto& position : positions) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 1, "steel"), part("dental_crown.stl", 2, "bronze"),
@@ -385,7 +385,7 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   refused({"a", "b"}, "hp45", "the parts are of 2 materials (a, b), hp45 has one vat");
   refused({"a", ""}, "nuferbj", "has none; name that of every part, or of none");
   refused({"a"}, profile("materials = [\"bronze\"]"), "powder.materials: 1 names for 2 vats");
-  EXPECT_NE(read::check_material("a/b").find("is no name of a material"), std::string::npos);
+  EXPECT_NE(pipeline::check_material("a/b").find("is no name of a material"), std::string::npos);
   const auto wrong_ranges = [](const char* text) {
     std::vector<MaterialRange> ranges;
     TextPosition at;
@@ -420,14 +420,14 @@ TEST_F(TwoPowders, NamesWhoseFilesAreOneOrReadLikeADropAreRefused) {
   }
   refused(job({steel}, "refused", profile("materials = [\"steel\", \"STEEL\"]")), (directory_ / "mine.toml").string());
   for (const char* name : {"drop1", "Drop12", "steel-drop2", "a-b-DROP0"}) {
-    EXPECT_NE(read::check_material(name).find(std::string("'") + name + "' reads like a drop"), std::string::npos) << name;
+    EXPECT_NE(pipeline::check_material(name).find(std::string("'") + name + "' reads like a drop"), std::string::npos) << name;
     Job named = job({steel}, "refused");
     EXPECT_EQ(set_materials(name, named).error().fault, Fault::kUsage) << name;
     named.parts[0].material = name;
     EXPECT_NE(check_job(named).error().message.find("part.material: '"), std::string::npos) << check_job(named).error().message;
   }
   for (const char* name : {"drop", "drops2", "raindrop1", "drop-1x", "drop1-steel", "drop_1", "steel-drop"}) {
-    EXPECT_EQ(read::check_material(name), "") << name;
+    EXPECT_EQ(pipeline::check_material(name), "") << name;
   }
 }
 

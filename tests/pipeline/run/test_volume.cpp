@@ -125,7 +125,7 @@ TEST_F(Volume, ADeclaredErrorOfTheMachineChangesEAndNothingElse) {
 TEST_F(Volume, AProfileWithAFlowAloneMeansAShareOfAStadium) {
   const auto old = find_extruder("marlin");
   ASSERT_TRUE(old.ok());
-  std::string text = read::extruder_text(*old);
+  std::string text = pipeline::extruder_text(*old);
   const auto take = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
   take("bead_area = \"stadium\"\n", "");
   take("flow = 1\n", "flow = 0.9\n");

@@ -10,7 +10,7 @@
 #include "stages/support/io/file.h"
 #include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
@@ -165,4 +165,4 @@ TEST_F(Preview, APictureThatCannotBeWrittenIsExitCodeFour) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::pipeline

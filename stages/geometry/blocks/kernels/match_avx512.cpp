@@ -74,8 +74,9 @@ void match(const SortedBlock& block, CornerMatches& matches) {
     for (std::uint32_t k = 0; k < 3; ++k, i += kLanes, corner += kLanes) {
       const __m512i slot = _mm512_and_si512(load_shorts(block.hash.data() + i), _mm512_set1_epi32(CornerMatches::kSlots - 1));
       const __m512i first = gather_shorts(matches.slot.data(), slot), position = slots_of(first), own = lanes_from(i);
-      const auto other = static_cast<__mmask16>(other_than(corner, position, base) | other_than(corner + kY, position, base + kY) |
-                                                other_than(corner + kX, position, base + kX));
+      const auto other =
+          static_cast<__mmask16>(other_than(corner, position, base) | other_than(corner + kY, position, base + kY) |
+                                 other_than(corner + kX, position, base + kX));
       store_shorts(matches.first.data() + i, first);
       store_shorts(matches.rest.data() + rest, _mm512_maskz_compress_epi32(other, own));
       rest += static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(other)));
