@@ -143,7 +143,7 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
   if (!unreadable.empty()) lines.push_back("unknown   " + list_of(unreadable) + ": nothing of theirs can be seen");
   if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
-  for (std::string& line : joint_lines(json.at("joints"))) lines.push_back(std::move(line));
+  for (std::string& line : joint_lines(json.at("stitches"))) lines.push_back(std::move(line));
   if (auto unreadable_offsets = unreadable_line(nozzles); !unreadable_offsets.empty())
     lines.push_back(std::move(unreadable_offsets));
   if (const Json* gain = json.find("dot_gain_um")) {

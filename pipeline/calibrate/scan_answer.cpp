@@ -37,12 +37,12 @@ Json reading_json(const ChartReading& reading) {
   if (inks.bars_along > 0)
     json["dot_gain_um"] = {{"along", inks.gain_along_um},
                            {"across", inks.bars_across > 0 ? inks.gain_across_um : inks.gain_along_um}};
-  json["joints"] = Json::array();
+  json["stitches"] = Json::array();
   for (const JointReading& joint : reading.stitches) {
-    json["joints"].push_back({{"swath", joint.swath},
-                              {"along_um", joint.along_um ? Json(rounded(*joint.along_um)) : Json()},
-                              {"across_um", joint.across_um ? Json(rounded(*joint.across_um)) : Json()},
-                              {"agrees", joint.agrees}});
+    json["stitches"].push_back({{"swath", joint.swath},
+                                {"along_um", joint.along_um ? Json(rounded(*joint.along_um)) : Json()},
+                                {"across_um", joint.across_um ? Json(rounded(*joint.across_um)) : Json()},
+                                {"agrees", joint.agrees}});
   }
   json["wedges"] = Json::array();
   for (const auto& [percent, detected] : inks.wedges)

@@ -67,7 +67,7 @@ class Credits {
   std::vector<LayerState*> waiting_;  // by position; those without scratch are the last
   std::vector<LayerState*> leaving_;
   std::uint32_t recorded_ = 0, oversized_ = 0;
-  std::uint32_t beside_from_ = 0;  // the last layer whose recorder's bytes are known: messages of `record` may overtake
+  std::uint32_t recorded_from_ = 0;  // the last layer whose recorder's bytes are known: messages of `record` may overtake
 };
 
 }  // namespace lamina::pipeline

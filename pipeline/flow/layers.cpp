@@ -213,7 +213,7 @@ class LayerFlow {
           nodes_[layer.step]->clock.time([&] { return guarded([&] { return steps_.steps[layer.step].run(layer.ticket); }); });
       layer.held = std::max(layer.held, steps_.bytes_held(layer.ticket.work));
       ++layer.step;
-      if (layer.status && layer.step < nodes_.size()) ask_needs(layer);
+      if (layer.status && layer.step < nodes_.size()) request_needs(layer);
     }
     if (!layer.status || layer.step == nodes_.size()) layer.phase = Phase::kDone;
     const bool to_credits = layer.phase == Phase::kDone || layer.needs_more || layer.held > layer.loan->bytes;
@@ -221,7 +221,7 @@ class LayerFlow {
   }
 
   /// What the next step needs.
-  void ask_needs(LayerState& layer) {
+  void request_needs(LayerState& layer) {
     const Step& step = steps_.steps[layer.step];
     if (!step.needs) return;
     layer.needs_more = true;

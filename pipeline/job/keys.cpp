@@ -194,7 +194,7 @@ constexpr Key<RangeTarget> kRangeKeys[] = {
     structure<read_saturation, saturation_text, &RangeTarget::core>({"saturation_range", "core_saturation_percent"}),
 };
 
-std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at) {
+std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, TextPosition& at) {
   if (auto wrong = check_tables(list, "from_mm, to_mm and saturation_percent"); !wrong.empty()) return wrong;
   std::vector<SaturationRange> read;
   for (TomlValue table : list.value) {
@@ -345,7 +345,7 @@ const JobKey kSliceKeys[] = {
 
 // --- [extrude]
 
-std::string read_machine_changes(const TomlValue& tree, pipeline::ProfileChanges& changes, Place& at) {
+std::string read_machine_changes(const TomlValue& tree, pipeline::ProfileChanges& changes, TextPosition& at) {
   return tree.is_text() ? pipeline::read_changes(tree.text, changes) : pipeline::read_changes(tree, changes, at);
 }
 
@@ -507,7 +507,7 @@ const JobKey kRunKeys[] = {
 
 }  // namespace
 
-std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, Place&) {
+std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, TextPosition&) {
   if (!value.is_text()) return "is not a number of per cent or a formula of x, y and z";
   const std::string& text = value.text;
   const bool number = !text.empty() && text.find_first_not_of("0123456789.+-eE_") == std::string::npos;

@@ -146,7 +146,7 @@ Status set_materials(std::string_view text, Job& job) {
   return {};
 }
 
-std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at) {
+std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, TextPosition& at) {
   if (auto wrong = check_tables(list, "from_mm, to_mm and material"); !wrong.empty()) return wrong;
   std::vector<MaterialRange> read;
   for (TomlValue table : list.value) {

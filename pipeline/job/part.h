@@ -62,7 +62,7 @@ struct PartRequest {
 Status set_materials(std::string_view names, Job& job);
 
 /// Reads an array of tables { from_mm, to_mm, material }. returns "" or an error message; at  its place
-std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at);
+std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, TextPosition& at);
 std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
 }  // namespace lamina::pipeline

@@ -10,8 +10,8 @@
 #include "stages/data/mesh.h"
 #include "stages/dose/saturate.h"
 #include "stages/formats/image_format.h"
-#include "stages/program/care/maintenance_check.h"
 #include "stages/program/head_grid.h"
+#include "stages/program/maintenance/maintenance_check.h"
 
 namespace lamina::pipeline {
 
@@ -143,8 +143,8 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
 }
 
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
-  program::warn_of_idle_care(machine, warnings);
-  program::warn_of_fixed_joints(machine, grid, warnings);
+  program::warn_of_idle_maintenance(machine, warnings);
+  program::warn_of_fixed_stitching(machine, grid, warnings);
 }
 
 Status DosePlan::check_images(std::string_view format) const {

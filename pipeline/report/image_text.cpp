@@ -48,8 +48,8 @@ std::string binder_text(const dose::Budget& budget, const dose::BinderCount& cou
 
 Json binder_json(const dose::Budget& budget, const dose::BinderCount& count) {
   if (!budget.has_target())
-    return {{"asked", false}, {"min_percent", budget.gets().first}, {"max_percent", budget.gets().second}};
-  return {{"asked", true},
+    return {{"requested", false}, {"min_percent", budget.gets().first}, {"max_percent", budget.gets().second}};
+  return {{"requested", true},
           {"requested_percent", count.requested_percent(budget)},
           {"reached_percent", count.reached_percent(budget)},
           {"drops", count.drops()},

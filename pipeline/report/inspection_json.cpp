@@ -15,8 +15,8 @@ Json json_of(const Found& found, const std::string& amount) {
   json[amount] = found.amount;
   json["largest_" + amount] = found.largest;
   json["largest_at"] = json_of(found.spot);
-  for (const Place& position : found.positions) {
-    Json& one = json["places"].emplace_back(json_of(position.spot));
+  for (const Location& position : found.positions) {
+    Json& one = json["locations"].emplace_back(json_of(position.spot));
     one["last_layer"] = position.last_layer;
     one["box_mm"] = position.box_mm;
     one[amount] = position.amount;

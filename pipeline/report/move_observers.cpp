@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "pipeline/plan/heights.h"
-#include "pipeline/report/laid_summary.h"
+#include "pipeline/report/deposited_summary.h"
 #include "stages/checks/paths.h"
 #include "stages/formats/gcode/write_gcode.h"
 #include "stages/support/text/number_text.h"

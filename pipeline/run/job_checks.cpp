@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/plan/heights.h"
-#include "stages/checks/judge.h"
+#include "stages/checks/solid_checks.h"
 #include "stages/load/planned.h"
 #include "stages/slice/bodies.h"
 #include "stages/slice/surplus.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "pipeline/plan/plan.h"
-#include "stages/checks/judge.h"
+#include "stages/checks/solid_checks.h"
 #include "stages/checks/tally.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -22,7 +22,7 @@ std::vector<checks::Solid> solids_from_above(const Scene& scene);
 /// How images on a grid see the solids of a job, or contours if it is null. Names of parts are left to the caller.
 checks::Sampling sampling_of(const Job& job, const PixelGrid* grid);
 
-/// What the solids of a group hold together (stages/checks/judge.h). Scene, tally and cancel must outlive it.
+/// What the solids of a group hold together (stages/checks/solid_checks.h). Scene, tally and cancel must outlive it.
 std::function<Result<double>(std::uint32_t)> union_in(const Scene& scene, const checks::Tally& tally,
                                                       const std::atomic<bool>* cancel = nullptr,
                                                       checks::GroupUnion::Again again = {});

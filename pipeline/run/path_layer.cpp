@@ -13,7 +13,7 @@
 #include "pipeline/report/move_observers.h"
 #include "stages/bead/even_starts.h"
 #include "stages/infill/skirt.h"
-#include "stages/segment/laid/pores.h"
+#include "stages/segment/deposited/pores.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {

@@ -13,7 +13,7 @@
 #include "pipeline/report/job_cost.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_head.h"
-#include "pipeline/show/report_places.h"
+#include "pipeline/show/report_locations.h"
 #include "pipeline/show/report_source.h"
 #include "pipeline/show/report_warnings.h"
 #include "stages/geometry/coverage.h"

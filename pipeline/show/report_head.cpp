@@ -78,7 +78,7 @@ std::string head_json(const Manifest& manifest, const ReportManifest& file, cons
                {"quote", detected.quote},
                {"parts", Json::array()},
                {"warnings", Json::array()},
-               {"places", Json::array()},
+               {"locations", Json::array()},
                {"views", Json::object()},
                {"reasons", Json::array()},
                {"embedded", Json::array()}};
@@ -88,12 +88,12 @@ std::string head_json(const Manifest& manifest, const ReportManifest& file, cons
     if (warning.layer) json["warnings"].back()["layer"] = *warning.layer;
   }
   for (const ReportLocation& position : detected.positions) {
-    json["places"].push_back({{"code", position.code},
-                              {"mm", {position.x_mm, position.y_mm, position.z_mm}},
-                              {"box_mm", {position.column_mm, position.row_mm, position.width_mm, position.depth_mm}},
-                              {"layers", {position.layer, position.last_layer}},
-                              {"amount", position.amount},
-                              {"unit", position.unit}});
+    json["locations"].push_back({{"code", position.code},
+                                 {"mm", {position.x_mm, position.y_mm, position.z_mm}},
+                                 {"box_mm", {position.column_mm, position.row_mm, position.width_mm, position.depth_mm}},
+                                 {"layers", {position.layer, position.last_layer}},
+                                 {"amount", position.amount},
+                                 {"unit", position.unit}});
   }
   for (const ShownView& view : views)
     json["views"][view.name] = {view.width, view.height, view.maximum, view.width_mm, view.height_mm};

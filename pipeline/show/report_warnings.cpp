@@ -5,9 +5,9 @@
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/run/job_checks.h"
-#include "stages/checks/judge.h"
 #include "stages/checks/paths.h"
 #include "stages/checks/records.h"
+#include "stages/checks/solid_checks.h"
 #include "stages/heights/table.h"
 #include "stages/program/head_grid.h"
 

@@ -75,7 +75,7 @@ namespace {
 
 constexpr double kReach = 1.5;  // mm: half of the widest bead that spreads
 
-std::array<Stretch, 2> period_of(const BeadMachine& machine, const Pattern& pattern) {
+std::array<LineSegment, 2> period_of(const BeadMachine& machine, const Pattern& pattern) {
   const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
   return {{{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
 }
@@ -135,7 +135,7 @@ PatternSums steady_profile(const BeadMachine& machine, double height_mm, const P
   BeadLine line(machine, height_mm, 0.001);
   line.begin(joint);
   for (int i = 0; i <= 2 * before; ++i) {
-    for (const Stretch& segment : period) line.add(segment, piece);
+    for (const LineSegment& segment : period) line.add(segment, piece);
   }
   line.end(joint.speed_mm_s, piece);
   if (spread) pen.end(cell);

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/checks/judge.h"
+#include "stages/checks/solid_checks.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::checks {

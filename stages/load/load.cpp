@@ -10,7 +10,6 @@
 #include <string_view>
 
 #include "stages/data/shortage.h"
-#include "stages/load/foreign/unsupported.h"
 #include "stages/load/matrix.h"
 #include "stages/load/obj.h"
 #include "stages/load/repair/finish.h"
@@ -19,6 +18,7 @@
 #include "stages/load/stl_binary.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/threemf.h"
+#include "stages/load/unsupported/unsupported.h"
 
 namespace lamina::load {
 namespace {
@@ -89,7 +89,7 @@ Result<Format> detect(const Source& source) {
   if (head.substr(0, 4) == "PK\x03\x04" || head.substr(0, 4) == std::string_view("PK\x05\x06", 4)) return Format::k3mf;
   if (head.substr(0, 2) == "\x1f\x8b") return Format::kGzip;
   if (has_binary_stl_size(source, head)) return Format::kBinaryStl;
-  if (const Status known = refuse_foreign(source, head); !known) return known.error();
+  if (const Status known = refuse_unsupported(source, head); !known) return known.error();
   if (head.substr(0, 3) == "\xef\xbb\xbf") head.remove_prefix(3);
   std::string_view name = source.path();
   if (ends_with(name, ".gz")) name.remove_suffix(3);

@@ -4,10 +4,10 @@
 #include <array>
 
 #include "stages/program/brundlefab/brundlefab.h"
-#include "stages/program/care/maintenance_check.h"
 #include "stages/program/dialect.h"
 #include "stages/program/hp45/hp45.h"
 #include "stages/program/m578/m578.h"
+#include "stages/program/maintenance/maintenance_check.h"
 #include "stages/program/nuferbj/nuferbj.h"
 #include "stages/program/oasis/oasis.h"
 #include "stages/program/planes/planes.h"

@@ -275,11 +275,11 @@ Status Builder::check_speed() {
 
 Result<HeadGrid> make_head_grid(const Machine& machine) { return Builder(machine).build(); }
 
-void warn_of_fixed_joints(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
+void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
   const std::uint32_t apart = grid.swath_lines() - grid.overlap;
   if (grid.joint_shift == 0 || grid.joint_shift % apart != 0) return;
   warnings.push_back(
-      {"joints",
+      {"stitching",
        fmt::format("{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so that joints of all layers lie "
                    "over each other; give a number that comes round late, as {}",
                    machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});

@@ -27,7 +27,7 @@ namespace lamina::program {
 Result<HeadGrid> make_head_grid(const Machine& machine);
 
 /// Warns if stitch lines do not move from layer to layer though mounting.joint_shift_lines says so.
-void warn_of_fixed_joints(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings);
+void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings);
 
 /// Changes a machine so that it prints at these dpi, along x and y, if its head can: across the scan by its number of
 /// interlaced passes, along it by the length of a pixel.

@@ -15,8 +15,8 @@
 #include "stages/data/extruder.h"
 #include "stages/data/layer.h"
 #include "stages/data/toolpaths.h"
+#include "stages/segment/deposited/pores.h"
 #include "stages/segment/expand.h"
-#include "stages/segment/laid/pores.h"
 #include "stages/segment/predict.h"
 
 namespace lamina::segment {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "stages/checks/judge.h"
+#include "stages/checks/solid_checks.h"
 
 namespace lamina::checks {
 namespace {

@@ -1,7 +1,7 @@
 // Which jobs are doubted, and which are not.
 #include <gtest/gtest.h>
 
-#include "stages/checks/judge.h"
+#include "stages/checks/solid_checks.h"
 
 namespace lamina::checks {
 namespace {

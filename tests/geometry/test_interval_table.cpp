@@ -31,7 +31,7 @@ std::vector<Entry> random_entries(std::mt19937& random, int shortest) {
   return entries;
 }
 
-TEST(IntervalTable, FindsWhatALookAtEveryIntervalFinds) {
+TEST(IntervalTable, FindsWhatATestOfEveryIntervalFinds) {
   std::mt19937 random(5);
   for (const std::uint32_t finest : {0u, 3u, 14u}) {
     const std::vector<Entry> entries = random_entries(random, finest == 0 ? 1 : 0);

@@ -167,7 +167,7 @@ def inspection(browser, page, layer, shots, only_open):
     said["locations"] = browser.value("[...document.querySelectorAll('#places button')].map(b => b.textContent)")
     if said["locations"]:
         browser.click("#places li:last-child button")
-        steps["place"] = browser.value(STATE)
+        steps["position"] = browser.value(STATE)
         # Each frame of the picture in pixels of the image: left, top, right, bottom.
         said["frames"] = browser.value("(() => { const s = laminaReport.state, v = document.getElementById('view'), h = laminaReport.head,"
                                        " r = h.pixel_mm[1] / h.pixel_mm[0];"

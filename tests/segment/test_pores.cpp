@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/segment/laid/pores.h"
+#include "stages/segment/deposited/pores.h"
 #include "stages/segment/layer_cut.h"
 #include "stages/segment/pore_geometry.h"
 

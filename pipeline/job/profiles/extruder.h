@@ -31,7 +31,7 @@ std::string extruder_text(const ExtruderProfile& profile);
 using ProfileChanges = std::vector<std::pair<std::string, std::string>>;
 
 /// Reads { fan = { from_layer = 2 } }, or fan.from_layer = 2. returns "" or an error message; at  its place
-std::string read_changes(const TomlValue& table, ProfileChanges& changes, Place& at);
+std::string read_changes(const TomlValue& table, ProfileChanges& changes, TextPosition& at);
 
 /// Reads the option form: "fan.from_layer=2; bed.corner_mm=-110,-110". returns "" or an error message
 std::string read_changes(std::string_view text, ProfileChanges& changes);

@@ -221,7 +221,7 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const 
   while (layer.beads.size() < position.beads && walk.next(raw)) {
     if (walk.layer_tag) continue;
     if (layer.beads.empty()) layer.z = nm_of(raw->to[2]);
-    const Place& now = walk.position();
+    const FilePosition& now = walk.position();
     const double unit = volume_of_unit(raw->volumetric || volumetric_, filament_mm_);
     const double width = width_of(*raw, height_of(*raw, now.height, position.height, position.below), unit);
     layer.beads.push_back(bead_of(*raw, now.width > 0 ? now.width : width, now.type));

@@ -73,7 +73,7 @@ class GcodeFile {
   /// Decides what G90 and G91 mean for E.
   enum class Firmware : std::uint8_t { kUnknown, kMarlin, kRepRap };
   /// Where the printer stands in front of a line.
-  struct Place {
+  struct FilePosition {
     std::uint64_t byte = 0, line = 0;
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
@@ -89,7 +89,7 @@ class GcodeFile {
   };
   /// Where a layer begins, and how high its beads are where no tag tells it.
   struct LayerPosition {
-    Place start;
+    FilePosition start;
     double below = 0, height = 0;  // mm: the top of the layer before; of all beads, 0: what they lie above `below`
     std::uint32_t beads = 0;
   };

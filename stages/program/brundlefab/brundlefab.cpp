@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program::brundlefab {

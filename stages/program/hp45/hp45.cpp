@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 
 namespace lamina::program::hp45 {
 namespace {
@@ -41,7 +41,7 @@ class Writer final : public ProgramWriter {
  private:
   const Machine& machine_;
   Head head_;
-  Care maintenance_;
+  MaintenanceWriter maintenance_;
 };
 
 }  // namespace
@@ -193,7 +193,7 @@ void Head::spit(const Machine& machine, ProgramBytes& out) {
   put(out, "BCL\n");  // answered when the last burst is fired, as PRM is not
 }
 
-void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& maintenance, ProgramBytes& out) const {
+void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, MaintenanceWriter& maintenance, ProgramBytes& out) const {
   const double step_um = grid_.step_nm() / 1000, count_um = kUmPerInch / counts_;
   const double ahead = sweep.backward == grid_.positions_from_end ? 1 : -1;  // of the carriage
   const std::uint32_t last = vectors.first_step + vectors.steps - 1;

@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-#include "stages/program/care/maintenance.h"
 #include "stages/program/dialect.h"
+#include "stages/program/maintenance/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program::hp45 {
@@ -26,7 +26,7 @@ class Head {
   /// Mode of position, encoder, resolution, density, sides and buffer: whatever a layer needs, so that it can be sent alone.
   void settings(ProgramBytes& out) const;
   /// Moves to the start, waits, sends the lines and moves over them; before that whatever care is due.
-  void sweep(const Sweep& sweep, const SweepVectors& vectors, Care& maintenance, ProgramBytes& out) const;
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, MaintenanceWriter& maintenance, ProgramBytes& out) const;
   /// The host goes on when all movements have ended.
   static constexpr std::string_view kWait = "G4 P0\n";
   static void wait(ProgramBytes& out) { put(out, "{}", kWait); }

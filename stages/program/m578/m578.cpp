@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program::m578 {
@@ -87,7 +87,7 @@ class Writer final : public ProgramWriter {
 
   const Machine& machine_;
   Carriage carriage_;
-  Care maintenance_;
+  MaintenanceWriter maintenance_;
 };
 
 }  // namespace

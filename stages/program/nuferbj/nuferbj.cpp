@@ -4,7 +4,7 @@
 #include <array>
 #include <charconv>
 
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program::nuferbj {
@@ -105,7 +105,7 @@ class Writer final : public ProgramWriter {
   const Machine& machine_;
   const HeadGrid& grid_;
   Carriage carriage_;
-  Care maintenance_;
+  MaintenanceWriter maintenance_;
 };
 
 }  // namespace

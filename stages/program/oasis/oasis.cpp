@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "stages/program/care/maintenance.h"
 #include "stages/program/hp45/hp45.h"
+#include "stages/program/maintenance/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program::oasis {

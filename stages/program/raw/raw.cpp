@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "stages/program/binary_program.h"
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 
 namespace lamina::program::raw {
 namespace {

@@ -82,7 +82,7 @@ class Hp45Reader {
   bool begins_off_ = false;            // the first line of a sweep
   double begin_um_ = 0, ahead_ = 0;    // its place; 1 or -1, the way to the second one
   double first_um_ = 0, last_um_ = 0;  // of the head's centre where nozzles were on in a movement
-  struct Stretch {                     // of one line of a row
+  struct StepSpan {                    // of one line of a row
     std::uint32_t line = 0, steps = 0;
     double from_um = 0, to_um = 0;
     bool any = false;
@@ -265,7 +265,7 @@ void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
   const double way = firing.to_um > firing.from_um ? 1 : -1;
   if (std::isnan(first_um_) || way * (firing.from_um - row - first_um_) < 0) first_um_ = firing.from_um - row;
   if (std::isnan(last_um_) || way * (firing.to_um - row - last_um_) > 0) last_um_ = firing.to_um - row;
-  Stretch& now = interval_[firing.row];
+  StepSpan& now = interval_[firing.row];
   if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_span(firing.row);
   if (!now.any) {
     now = {firing.line, 0, firing.from_um, firing.to_um, true};
@@ -296,7 +296,7 @@ void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
 
 // A line that is on for less than a step may fire or not: the firmware's bursts come by the clock.
 void Hp45Reader::end_span(std::uint32_t row) {
-  Stretch& now = interval_[row];
+  StepSpan& now = interval_[row];
   if (now.any && now.steps == 0) {
     printing_.reading_step(std::llround(step_of(now.from_um)));
     printing_.fault(fmt::format("nozzles are on for {:.0f} um, between two steps", std::abs(now.to_um - now.from_um)));

@@ -279,7 +279,7 @@ function fillTexts() {
     const [x, y, z] = spot.mm.map(value => +value.toFixed(2)), unit = { mm2: 'mm²', mm3: 'mm³' }[spot.unit];
     const button = element('button', `${spot.code}` + (unit ? ` of ${+spot.amount.toPrecision(3)} ${unit}` : '') +
       ` at x ${x}, y ${y}, z ${z} mm, layer ${spot.layers[0]}` +
-      (spot.layers[1] > spot.layers[0] ? ` to ${spot.layers[1]}` : ''), element('li', undefined, $('places')));
+      (spot.layers[1] > spot.layers[0] ? ` to ${spot.layers[1]}` : ''), element('li', undefined, $('locations')));
     button.type = 'button';
     button.addEventListener('click', () => showLocation(spot));
   }

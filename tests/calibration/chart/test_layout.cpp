@@ -223,7 +223,7 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
       R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},null,)"
       R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":1,"across_detected_um":1,"across_error_um":0.5},)"
       R"({"along_um":null,"along_detected_um":-8,"along_error_um":3,"across_um":1,"across_detected_um":1,"across_error_um":0.5},null],)"
-      R"("joints":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
+      R"("stitches":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
       R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"detected_percent":61}]})";
   const auto lines = pipeline::take_over(reading, chart, machine);
   ASSERT_TRUE(lines) << lines.error().message;

@@ -53,11 +53,11 @@ TEST(PoreAnalysis, GroupsOfTouchingBeadsByHand) {
   EXPECT_EQ(json["connected"]["unbonded"].get<double>(), json["porosity"].get<double>());
   EXPECT_NEAR(json["connected"]["bonded"], total - cusps, 0.008);
   // Straight along the beads; up and down through the gap; nothing leads across.
-  EXPECT_EQ(json["ways"][0]["tortuosity"].get<double>(), 0);
-  EXPECT_NEAR(json["ways"][1]["tortuosity"], 1, 1e-9);
-  EXPECT_GT(json["ways"][2]["tortuosity"].get<double>(), 1);
-  EXPECT_EQ(json["ways"][0]["throat_mm"].get<double>(), 0);
-  EXPECT_NEAR(json["ways"][2]["throat_mm"], kPore, 0.011);
+  EXPECT_EQ(json["tortuosity"][0]["tortuosity"].get<double>(), 0);
+  EXPECT_NEAR(json["tortuosity"][1]["tortuosity"], 1, 1e-9);
+  EXPECT_GT(json["tortuosity"][2]["tortuosity"].get<double>(), 1);
+  EXPECT_EQ(json["tortuosity"][0]["throat_mm"].get<double>(), 0);
+  EXPECT_NEAR(json["tortuosity"][2]["throat_mm"], kPore, 0.011);
   // Gaps go on: no section has an end of one.
   EXPECT_EQ(json["pores"]["sections"].get<int>(), 6);
   EXPECT_EQ(json["pores"]["count"].get<int>(), 0);

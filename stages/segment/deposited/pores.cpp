@@ -1,4 +1,4 @@
-#include "stages/segment/laid/pores.h"
+#include "stages/segment/deposited/pores.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "pipeline/show/report_places.h"
+#include "pipeline/show/report_locations.h"
 
 #include <array>
 #include <stdexcept>
@@ -56,8 +56,9 @@ void add(const Json& json, const Shown& shown, ReportLayers& detected) {
   constexpr std::array<std::pair<const char*, const char*>, 4> kKinds = {
       {{"islands", "mm2"}, {"loose", "mm3"}, {"hollows", "mm3"}, {"thin", "mm2"}}};
   for (const auto& [code, unit] : kKinds) {
-    if (!found.at(code).contains("places")) continue;
-    for (const Json& position : found.at(code).at("places")) detected.positions.push_back(shown.position(code, unit, position));
+    if (!found.at(code).contains("locations")) continue;
+    for (const Json& position : found.at(code).at("locations"))
+      detected.positions.push_back(shown.position(code, unit, position));
   }
   for (const Json& pair : found.at("touching")) detected.positions.push_back(shown.position("touching", "", pair.at("at")));
   if (found.contains("bed_edge")) detected.positions.push_back(shown.position("bed-edge", "", found.at("bed_edge")));

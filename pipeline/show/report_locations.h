@@ -1,4 +1,4 @@
-// pipeline/show/report_places.h: where --inspect found something, for the page of a report.
+// pipeline/show/report_locations.h: where --inspect found something, for the page of a report.
 #pragma once
 
 #include <string>

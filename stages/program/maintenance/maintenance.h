@@ -1,4 +1,4 @@
-// stages/program/care/maintenance.h: lines of G-code that keep nozzles from drying and vats from running empty.
+// stages/program/maintenance/maintenance.h: lines of G-code that keep nozzles from drying and vats from running empty.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ double shot_seconds(const Machine& machine);
 /// The clock of a layer, which begins with it, so that a layer's care depends on that layer alone.
 class MaintenanceClock {
  public:
-  using Place = std::array<double, 2>;  // of the carriage, x and y in mm
+  using MachinePoint = std::array<double, 2>;  // of the carriage, x and y in mm
 
   /// What is due, in this order; a shot follows each wipe where the profile has shots, since a wiper leaves binder and grains
   /// at the nozzles.
@@ -39,19 +39,19 @@ class MaintenanceClock {
   MaintenanceClock(const Machine& machine, double shot_s) : machine_(machine), shot_s_(shot_s) {}
 
   /// Before the first sweep. at  where the head stands
-  Due begin_layer(std::uint32_t layer, Place at);
+  Due begin_layer(std::uint32_t layer, MachinePoint at);
   /// Before a sweep: what would be overdue at its end. The sweep is then made.
   /// from, to  of the sweep. sweep_s  how long it takes without the way to it
-  Due before_sweep(Place from, Place to, double sweep_s);
-  Due before_sweep(Place from, Place to);
+  Due before_sweep(MachinePoint from, MachinePoint to, double sweep_s);
+  Due before_sweep(MachinePoint from, MachinePoint to);
 
  private:
   Due serve(bool wipe, bool shot);
-  double seconds(Place from, Place to, double speed_mm_s) const;
+  double seconds(MachinePoint from, MachinePoint to, double speed_mm_s) const;
 
   const Machine& machine_;
   double shot_s_;
-  Place at_{};
+  MachinePoint at_{};
   double since_shot_ = 0, since_wipe_ = 0;  // seconds
 };
 

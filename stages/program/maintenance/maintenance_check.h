@@ -1,5 +1,5 @@
-// stages/program/care/maintenance_check.h: whether a dialect can say the care that a profile asks for, and a machine can take
-// it.
+// stages/program/maintenance/maintenance_check.h: whether a dialect can say the care that a profile asks for, and a machine can
+// take it.
 #pragma once
 
 #include <vector>
@@ -14,6 +14,6 @@ Status check_maintenance(const Dialect& dialect, const Machine& machine, const H
 
 /// Warns of what a profile has places for and never requests, and of head maintenance that does not go together: a lamp that
 /// is switched on and never off, a pause without a cap that is longer than nozzles may wait.
-void warn_of_idle_care(const Machine& machine, std::vector<Warning>& warnings);
+void warn_of_idle_maintenance(const Machine& machine, std::vector<Warning>& warnings);
 
 }  // namespace lamina::program

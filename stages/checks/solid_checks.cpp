@@ -1,4 +1,4 @@
-#include "stages/checks/judge.h"
+#include "stages/checks/solid_checks.h"
 
 #include <fmt/format.h>
 

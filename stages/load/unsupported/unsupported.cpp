@@ -1,5 +1,5 @@
-// stages/load/foreign/unsupported.cpp: signatures of formats, as their specifications have them.
-#include "stages/load/foreign/unsupported.h"
+// stages/load/unsupported/unsupported.cpp: signatures of formats, as their specifications have them.
+#include "stages/load/unsupported/unsupported.h"
 
 #include <algorithm>
 #include <array>
@@ -142,7 +142,7 @@ std::string unsupported_format(std::string_view head) {
 
 }  // namespace
 
-Status refuse_foreign(const Source& source, std::string_view head) {
+Status refuse_unsupported(const Source& source, std::string_view head) {
   const std::string format = unsupported_format(head);
   return format.empty() ? Status() : source.error(format);
 }

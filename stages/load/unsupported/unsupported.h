@@ -1,4 +1,5 @@
-// stages/load/foreign/unsupported.h: names of formats that are not read, so that a refusal says what to do; internal to load.
+// stages/load/unsupported/unsupported.h: names of formats that are not read, so that a refusal says what to do; internal to
+// load.
 #pragma once
 
 #include <string_view>
@@ -11,7 +12,7 @@ namespace lamina::load {
 /// Refuses a file whose signature is that of a known format that lamina does not read.
 /// head    its first bytes, at least 512 where the file has them
 /// errors  kInput: the format, and what to do about it
-Status refuse_foreign(const Source& source, std::string_view head);
+Status refuse_unsupported(const Source& source, std::string_view head);
 
 /// Whether text looks like the program of a machine, which has no signature.
 bool is_machine_program(std::string_view head);

@@ -1,4 +1,4 @@
-#include "stages/program/care/maintenance_check.h"
+#include "stages/program/maintenance/maintenance_check.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program {
@@ -229,7 +229,7 @@ Status check_maintenance(const Dialect& dialect, const Machine& machine, const H
   return Checker(dialect, machine, grid).check();
 }
 
-void warn_of_idle_care(const Machine& machine, std::vector<Warning>& warnings) {
+void warn_of_idle_maintenance(const Machine& machine, std::vector<Warning>& warnings) {
   const auto& maintenance = machine.maintenance;
   const auto& powder = machine.powder;
   const bool pauses = powder.dry_s > 0 || powder.refill == VatRefill::kPause;

@@ -1,4 +1,4 @@
-// stages/segment/laid/pores.h: the pores that thin stretches leave, counted from the toolpaths that are laid.
+// stages/segment/deposited/pores.h: the pores that thin stretches leave, counted from the toolpaths that are laid.
 //
 // Their sizes are those of pore_geometry.h, at the distances that the lines have.
 #pragma once

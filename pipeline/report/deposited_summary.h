@@ -1,4 +1,4 @@
-// pipeline/report/laid_summary.h: what toolpaths of segmented lines deposit, as lines of a summary and as JSON.
+// pipeline/report/deposited_summary.h: what toolpaths of segmented lines deposit, as lines of a summary and as JSON.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// stages/checks/judge.h: what layers hold against what the meshes hold.
+// stages/checks/solid_checks.h: what layers hold against what the meshes hold.
 //
 // codes   part-lost     a solid of which no layer has anything
 //         volume        more or less planned than the meshes hold

@@ -1,4 +1,4 @@
-#include "stages/program/care/maintenance.h"
+#include "stages/program/maintenance/maintenance.h"
 
 #include <cmath>
 
@@ -15,22 +15,22 @@ double move_seconds(const Machine& machine, double way_mm, double speed_mm_s) {
 
 double shot_seconds(const Machine& machine) { return machine.maintenance.spit_drops / machine.head.highest_frequency_hz; }
 
-double MaintenanceClock::seconds(Place from, Place to, double speed_mm_s) const {
+double MaintenanceClock::seconds(MachinePoint from, MachinePoint to, double speed_mm_s) const {
   return move_seconds(machine_, std::hypot(to[0] - from[0], to[1] - from[1]), speed_mm_s);
 }
 
-MaintenanceClock::Due MaintenanceClock::begin_layer(std::uint32_t layer, Place at) {
+MaintenanceClock::Due MaintenanceClock::begin_layer(std::uint32_t layer, MachinePoint at) {
   const auto& maintenance = machine_.maintenance;
   const auto due = [&](std::uint32_t layers, double limit_s) { return limit_s > 0 || (layers > 0 && layer % layers == 0); };
   at_ = at;
   return serve(due(maintenance.wipe_layers, maintenance.wipe_seconds), due(maintenance.spit_layers, maintenance.spit_seconds));
 }
 
-MaintenanceClock::Due MaintenanceClock::before_sweep(Place from, Place to) {
+MaintenanceClock::Due MaintenanceClock::before_sweep(MachinePoint from, MachinePoint to) {
   return before_sweep(from, to, seconds(from, to, machine_.motion.scan_speed_mm_s));
 }
 
-MaintenanceClock::Due MaintenanceClock::before_sweep(Place from, Place to, double sweep_s) {
+MaintenanceClock::Due MaintenanceClock::before_sweep(MachinePoint from, MachinePoint to, double sweep_s) {
   const auto& maintenance = machine_.maintenance;
   const double travel = machine_.motion.travel_speed_mm_s;
   double now = seconds(at_, from, travel) + sweep_s;

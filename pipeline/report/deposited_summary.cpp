@@ -1,4 +1,4 @@
-#include "pipeline/report/laid_summary.h"
+#include "pipeline/report/deposited_summary.h"
 
 #include <fmt/format.h>
 
