@@ -135,12 +135,12 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
   return description;
 }
 
-struct Kind {
+struct PartKind {
   const char* name;
   const char* key;
   Diagnosis::Finding Diagnosis::*finding;
 };
-constexpr std::array<Kind, 5> kKinds{{
+constexpr std::array<PartKind, 5> kKinds{{
     {"open edges", "open_edges", &Diagnosis::open_edges},
     {"non-manifold edges", "non_manifold_edges", &Diagnosis::non_manifold_edges},
     {"misoriented edges", "misoriented_edges", &Diagnosis::misoriented_edges},
@@ -148,7 +148,7 @@ constexpr std::array<Kind, 5> kKinds{{
     {"duplicate facets", "duplicate_facets", &Diagnosis::duplicate_facets},
 }};
 
-std::uint64_t count_of(const Description& description, const Kind& kind) {
+std::uint64_t count_of(const Description& description, const PartKind& kind) {
   std::uint64_t count = 0;
   for (std::size_t i = 0; i < description.diagnosis.size(); ++i)
     count += description.copies[i] * (description.diagnosis[i].*kind.finding).count;
@@ -171,7 +171,7 @@ std::string short_name(const Description& description, std::size_t mesh) {
 void row(std::string& text, const char* label, const std::string& value) { text += fmt::format("  {:<20} {}\n", label, value); }
 
 /// The first places of a kind in all meshes.
-std::string first_positions(const Description& description, const Kind& kind) {
+std::string first_positions(const Description& description, const PartKind& kind) {
   std::string text;
   std::size_t shown = 0;
   for (std::size_t i = 0; i < description.diagnosis.size() && shown < kPositions; ++i) {
@@ -200,10 +200,10 @@ void describe_meshes(const Description& description, std::string& text) {
 void describe_findings(const Description& description, std::string& text) {
   const auto inverted = description.total(&Diagnosis::inverted_shells);
   bool any = inverted > 0;
-  for (const Kind& kind : kKinds) any = any || count_of(description, kind) > 0;
+  for (const PartKind& kind : kKinds) any = any || count_of(description, kind) > 0;
   if (!any) return;
   text += "\n  found                     count  first places, mm\n";
-  for (const Kind& kind : kKinds)
+  for (const PartKind& kind : kKinds)
     if (const std::uint64_t count = count_of(description, kind); count > 0)
       text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, readable_count(count), first_positions(description, kind));
   if (inverted > 0)
@@ -244,7 +244,7 @@ Json as_json(const Diagnosis& found) {
   mesh["closed"] = found.balanced;
   mesh["bounds_mm"] = {{"lo", as_json(found.bounds.lo)}, {"hi", as_json(found.bounds.hi)}};
   mesh["volume_mm3"] = found.volume_mm3;
-  for (const Kind& kind : kKinds) {
+  for (const PartKind& kind : kKinds) {
     const auto& finding = found.*kind.finding;
     Json positions = Json::array();
     for (const auto& position : finding.first)

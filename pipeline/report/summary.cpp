@@ -14,7 +14,7 @@ double rate(double amount, double seconds) { return seconds > 0 ? amount / secon
 
 Json point_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
-using Line = std::pair<std::string, std::string>;
+using NamedText = std::pair<std::string, std::string>;
 
 std::string layers_line(const Summary& s) {
   std::string text = fmt::format("{} {}", readable_count(s.layers_total), s.layer_text);
@@ -23,7 +23,7 @@ std::string layers_line(const Summary& s) {
   return text;
 }
 
-void add_costs(const Summary& s, std::vector<Line>& lines) {
+void add_costs(const Summary& s, std::vector<NamedText>& lines) {
   std::string steps;
   for (const auto& [name, seconds] : s.step_seconds) {
     steps += fmt::format("{}{} {}", steps.empty() ? "" : ", ", name, readable_seconds(seconds));
@@ -42,7 +42,7 @@ void add_costs(const Summary& s, std::vector<Line>& lines) {
   }
 }
 
-void add_dry_run(const Summary& s, std::vector<Line>& lines) {
+void add_dry_run(const Summary& s, std::vector<NamedText>& lines) {
   lines.emplace_back("memory", fmt::format("mesh {}, index {}, a layer needs up to {}", readable_bytes(s.mesh_bytes),
                                            readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes)));
   lines.emplace_back("time",

@@ -10,7 +10,7 @@
 namespace lamina::pipeline {
 Elapsed Timing::whole() const {
   Elapsed all;
-  for (const Phase& phase : phases) all.wall += phase.took.wall, all.processor += phase.took.processor;
+  for (const TimedPhase& phase : phases) all.wall += phase.took.wall, all.processor += phase.took.processor;
   return all;
 }
 

@@ -15,14 +15,14 @@
 namespace lamina::pipeline {
 
 struct Timing {
-  struct Phase {
+  struct TimedPhase {
     std::string_view name;
     Elapsed took;
   };
   std::uint32_t threads = 1;
-  std::vector<Phase> phases;    // one after the other; together the run. Of "start", what the process did before, the
-                                // processor's time stands for both, in a batch with that of other jobs
-  std::vector<NodeTime> nodes;  // of the graph that makes the layers, at the same time
+  std::vector<TimedPhase> phases;  // one after the other; together the run. Of "start", what the process did before, the
+                                   // processor's time stands for both, in a batch with that of other jobs
+  std::vector<NodeTime> nodes;     // of the graph that makes the layers, at the same time
   formats::Floor floor;
   std::string not_measured;  // why the limit is not; else empty
 

@@ -11,7 +11,7 @@
 namespace lamina::bead {
 
 /// A part of a stretch on which the head accelerates evenly, with the flow at its beginning.
-struct Phase {
+struct FlowPhase {
   double length_mm, area_mm2;
   double speed_mm_s, acceleration_mm_s2;  // at the beginning; below 0 where it slows down
   double tau_s, flow_mm3_s;

@@ -84,7 +84,7 @@ constexpr double kMinPiece = 1e-4;  // mm
 
 /// The one to three phases of a stretch, in order.
 struct Phases {
-  std::array<Phase, 3> phase;
+  std::array<FlowPhase, 3> phase;
   std::uint32_t count = 0;
 
   void add(double length, double area, double from, double to, double tau) {
@@ -154,11 +154,11 @@ void BeadLine::deposit(const Planned& planned, const TakePiece& take) {
   }
 }
 
-double BeadLine::width(const Phase& phase, double s) const {
+double BeadLine::width(const FlowPhase& phase, double s) const {
   return width_of(std::min(phase.area_at(s), 1e12), pressed_ && may_stay_pressed(phase.area_mm2, height_), height_);
 }
 
-double BeadLine::step_within(const Phase& phase, double from, double step) const {
+double BeadLine::step_within(const FlowPhase& phase, double from, double step) const {
   // Probes see an exponential's and a root's largest distance within a quarter of it: half of the tolerance is allowed.
   for (; step > kMinPiece; step /= 2) {
     const double a = width(phase, from), b = width(phase, from + step);
@@ -172,7 +172,7 @@ double BeadLine::step_within(const Phase& phase, double from, double step) const
   return step;
 }
 
-void BeadLine::deposit(const Phase& phase, const TakePiece& take) {
+void BeadLine::deposit(const FlowPhase& phase, const TakePiece& take) {
   const double length = phase.length_mm;
   double s = 0, step = length, deposited = 0;
   const double fed = phase.area_mm2;

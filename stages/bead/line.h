@@ -98,9 +98,9 @@ class BeadLine {
 
  private:
   void deposit(const Planned& planned, const TakePiece& take);
-  void deposit(const Phase& phase, const TakePiece& take);
-  double step_within(const Phase& phase, double from, double step) const;
-  double width(const Phase& phase, double s) const;
+  void deposit(const FlowPhase& phase, const TakePiece& take);
+  double step_within(const FlowPhase& phase, double from, double step) const;
+  double width(const FlowPhase& phase, double s) const;
 
   BeadMachine machine_;
   double height_, tolerance_;

@@ -21,11 +21,11 @@ namespace lamina::checks {
 
 /// Columns of each of its rows, ends included, counted from its left and its top.
 struct Stencil {
-  struct Row {
+  struct StencilRow {
     std::uint32_t first = 0, last = 0;
   };
   std::uint32_t columns = 0;  // rows are rows.size()
-  std::vector<Row> rows;
+  std::vector<StencilRow> rows;
 };
 
 class Stencils {

@@ -340,9 +340,10 @@ namespace {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-class Search {
+class HeightSearch {
  public:
-  explicit Search(const Stacks& stacks) : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, UINT32_MAX) {}
+  explicit HeightSearch(const Stacks& stacks)
+      : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, UINT32_MAX) {}
 
   Buffer<std::uint32_t> all() {
     sort_by_layers();
@@ -352,14 +353,14 @@ class Search {
       find_rows(layers);
       if (!rows_.empty()) halve(0, rows_.size(), 0, columns_.size() - 1);
       columns_.clear();
-      for (const Row& row : rows_) columns_.push_back(row.candidate);
+      for (const CandidateRow& row : rows_) columns_.push_back(row.candidate);
     }
     return std::move(via_);
   }
 
  private:
   // A rung and the columns, [first, last), on which a layer from it may end.
-  struct Row {
+  struct CandidateRow {
     std::uint32_t candidate;
     std::size_t first, last;
   };
@@ -395,7 +396,7 @@ class Search {
   // Rows [first, last), whose best columns lie in [low, high].
   void halve(std::size_t first, std::size_t last, std::size_t low, std::size_t high) {
     const std::size_t middle = first + (last - first) / 2;
-    const Row& row = rows_[middle];
+    const CandidateRow& row = rows_[middle];
     const double below = stacks_.below[row.candidate];
     std::size_t best = low;
     double minimum = kFar;
@@ -417,11 +418,11 @@ class Search {
   Buffer<std::uint32_t> via_;
   Buffer<std::uint32_t> candidates_, begin_;  // rungs by number of layers below them, with the offset of each number
   Buffer<std::uint32_t> columns_;             // rungs of one layer more from which the end is reached
-  Buffer<Row> rows_;
+  Buffer<CandidateRow> rows_;
 };
 
 }  // namespace
 
-Buffer<std::uint32_t> fewest_steps(const Stacks& stacks) { return Search(stacks).all(); }
+Buffer<std::uint32_t> fewest_steps(const Stacks& stacks) { return HeightSearch(stacks).all(); }
 
 }  // namespace lamina::heights

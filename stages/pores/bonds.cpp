@@ -117,7 +117,7 @@ Connected connected(const VoxelView& solid, Nm gap, Nm contact, Faces outside) {
 namespace {
 
 /// Rows of one slice, and those beyond its ends.
-struct Rows {
+struct SliceRows {
   Buffer<std::uint32_t> offset{0}, change;
 
   std::size_t size() const { return offset.size() - 1; }
@@ -130,8 +130,8 @@ struct Rows {
 };
 
 /// Row r becomes the union, or what is common, of rows r and r + step.
-Rows joined(const Rows& rows, std::size_t step, Operation operation) {
-  Rows out;
+SliceRows joined(const SliceRows& rows, std::size_t step, Operation operation) {
+  SliceRows out;
   for (std::size_t r = 0; r + step < rows.size(); ++r) {
     combine_rows(rows[r], rows[r + step], operation, [&](std::uint32_t column) { out.change.push_back(column); });
     out.end_row();
@@ -140,7 +140,7 @@ Rows joined(const Rows& rows, std::size_t step, Operation operation) {
 }
 
 /// The same of `length` rows from each on, from windows of half the length and a rest that overlaps.
-Rows windows(Rows rows, std::size_t length, Operation operation) {
+SliceRows windows(SliceRows rows, std::size_t length, Operation operation) {
   std::size_t have = 1;
   while (have < length) {
     const std::size_t step = std::min(have, length - have);
@@ -151,8 +151,8 @@ Rows windows(Rows rows, std::size_t length, Operation operation) {
 }
 
 /// Gaps of up to `gap` rows are filled: rows are spread over `gap` more, and of these windows what is common is kept.
-Rows closed_along_y(const VoxelView& slice, std::uint32_t gap) {
-  Rows rows;
+SliceRows closed_along_y(const VoxelView& slice, std::uint32_t gap) {
+  SliceRows rows;
   const std::int64_t ny = slice.ny, far = gap;
   for (std::int64_t y = -far; y < ny + far; ++y) {
     const bool inside = y >= 0 && y < ny;
@@ -163,7 +163,7 @@ Rows closed_along_y(const VoxelView& slice, std::uint32_t gap) {
 }
 
 /// The row with runs joined whose gap is small; across the ends too if it repeats.
-void close_row(Row row, std::uint32_t nx, bool periodic, std::uint32_t gap, Rows& out) {
+void close_row(Row row, std::uint32_t nx, bool periodic, std::uint32_t gap, SliceRows& out) {
   const bool around = periodic && !row.empty() && row.front() + (nx - row.back()) <= gap;
   for (std::size_t i = 0; i < row.size(); i += 2) {
     const bool first = i == 0, last = i + 2 == row.size();
@@ -180,7 +180,7 @@ VoxelStack close_gaps(const VoxelView& solid, int axis, Nm gap) {
   const auto voxels = static_cast<std::uint32_t>(std::max(gap, 0) / solid.edge[a]);
   // A gap as long as the axis is none.
   const std::uint32_t maximum = std::min(voxels, solid.size()[a]);
-  std::vector<Rows> slices(solid.nz);
+  std::vector<SliceRows> slices(solid.nz);
   tbb::parallel_for(std::uint32_t{0}, solid.nz, [&](std::uint32_t z) {
     const VoxelView slice = solid.slice(z);
     if (axis == 1 && solid.ny > 0) slices[z] = closed_along_y(slice, maximum);
@@ -189,7 +189,7 @@ VoxelStack close_gaps(const VoxelView& solid, int axis, Nm gap) {
     }
   });
   VoxelStack out(solid.nx, solid.ny, solid.edge, solid.periodic);
-  for (Rows& slice : slices) {
+  for (SliceRows& slice : slices) {
     if (!out.append(RunsView{solid.nx, slice.offset, slice.change})) {
       throw std::length_error("a box of voxels has 2^32 changes or more");
     }

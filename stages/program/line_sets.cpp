@@ -4,7 +4,7 @@
 
 namespace lamina::program {
 
-void combine(Line one, Line other, LineOperation operation, Buffer<std::uint32_t>& result) {
+void combine(ColumnChanges one, ColumnChanges other, LineOperation operation, Buffer<std::uint32_t>& result) {
   std::size_t i = 0, j = 0;
   bool before = false;
   while (i < one.size() || j < other.size()) {
@@ -19,13 +19,13 @@ void combine(Line one, Line other, LineOperation operation, Buffer<std::uint32_t
   }
 }
 
-std::uint64_t pixels_of(Line line) {
+std::uint64_t pixels_of(ColumnChanges line) {
   std::uint64_t pixels = 0;
   for (std::size_t i = 0; i + 1 < line.size(); i += 2) pixels += line[i + 1] - line[i];
   return pixels;
 }
 
-void divide(Line line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result) {
+void divide(ColumnChanges line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result) {
   for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
     bool before = false;
     for (std::uint32_t position = line[i]; position < line[i + 1]; ++position) {
@@ -45,7 +45,7 @@ void DropBits::begin(std::uint32_t bits) {
   }
 }
 
-void DropBits::add(std::span<const Line> drops) {
+void DropBits::add(std::span<const ColumnChanges> drops) {
   next_.assign(drops.size(), 0);
   std::uint32_t before = 0;
   for (;;) {
@@ -66,9 +66,9 @@ void DropBits::add(std::span<const Line> drops) {
   for (std::uint32_t bit = 0; bit < bits_; ++bit) end_[bit].push_back(static_cast<std::uint32_t>(change_[bit].size()));
 }
 
-void DropBits::end(std::span<Line> nozzle) const {
+void DropBits::end(std::span<ColumnChanges> nozzle) const {
   for (std::uint32_t bit = 0; bit < bits_; ++bit) {
-    const Line all(change_[bit].data(), change_[bit].size());
+    const ColumnChanges all(change_[bit].data(), change_[bit].size());
     const std::size_t nozzles = end_[bit].size();
     std::uint32_t begin = 0;
     for (std::size_t i = 0; i < nozzles; ++i) {

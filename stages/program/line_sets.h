@@ -14,9 +14,9 @@ namespace lamina::program {
 enum class LineOperation : std::uint8_t { kUnion, kDifference };
 
 /// Appends what is set in either line, or in `one` and not in `other`. cost  linear
-void combine(Line one, Line other, LineOperation operation, Buffer<std::uint32_t>& result);
+void combine(ColumnChanges one, ColumnChanges other, LineOperation operation, Buffer<std::uint32_t>& result);
 
-std::uint64_t pixels_of(Line line);
+std::uint64_t pixels_of(ColumnChanges line);
 
 /// Whether the upper of two swaths fires a place of a line that they share. `share` of 64 places, evenly spread.
 constexpr bool upper_fires(std::uint64_t line, std::uint32_t position, std::uint32_t share) {
@@ -28,7 +28,7 @@ constexpr bool upper_fires(std::uint64_t line, std::uint32_t position, std::uint
 }
 
 /// Appends the places of a line that the upper (or the lower) swath fires.
-void divide(Line line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result);
+void divide(ColumnChanges line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result);
 
 // --- lines of drops become lines of the bits of their number.
 
@@ -43,10 +43,10 @@ class DropBits {
   void begin(std::uint32_t bits);
   /// The next nozzle. drops  line k, from 0, has the places of more than k drops, each within the one before; fewer than
   /// 2 ^ bits. cost  O(drops x changes)
-  void add(std::span<const Line> drops);
+  void add(std::span<const ColumnChanges> drops);
   /// The lines of all nozzles added, those of the lowest bit first; they live until begin().
   /// nozzle  of nozzles x bits
-  void end(std::span<Line> nozzle) const;
+  void end(std::span<ColumnChanges> nozzle) const;
 
   std::uint64_t bytes() const;
 

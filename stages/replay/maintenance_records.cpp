@@ -14,25 +14,25 @@ namespace {
 constexpr std::uint32_t kPlanesFirst = 0x4C10;  // GOTO
 constexpr std::uint32_t kLongestOwn = 15;       // words of a line of the machine's own
 
-struct Kind {
+struct RecordKind {
   std::string_view tag;
   std::uint32_t minimum, maximum;  // numbers that it has
 };
-constexpr std::array<Kind, 8> kKinds = {{{"GOTO", 2, 2},
-                                         {"FILL", 0, 0},
-                                         {"BASE", 2, 2},
-                                         {"ROLL", 1, 1},
-                                         {"WIPE", 3, 3},
-                                         {"SPIT", 1, 1},
-                                         {"DRYS", 1, 1},
-                                         {"LINE", 1, kLongestOwn}}};
+constexpr std::array<RecordKind, 8> kKinds = {{{"GOTO", 2, 2},
+                                               {"FILL", 0, 0},
+                                               {"BASE", 2, 2},
+                                               {"ROLL", 1, 1},
+                                               {"WIPE", 3, 3},
+                                               {"SPIT", 1, 1},
+                                               {"DRYS", 1, 1},
+                                               {"LINE", 1, kLongestOwn}}};
 
 /// The record that follows; nullptr if another one does.
-const Kind* kind_ahead(const ByteReader& reader, bool planes) {
+const RecordKind* kind_ahead(const ByteReader& reader, bool planes) {
   const std::string_view tag = reader.ahead(4);
   if (tag.size() < 4) return nullptr;
   if (!planes) {
-    const auto found = std::ranges::find(kKinds, tag, &Kind::tag);
+    const auto found = std::ranges::find(kKinds, tag, &RecordKind::tag);
     return found == kKinds.end() ? nullptr : &*found;
   }
   std::uint32_t command = 0;
@@ -46,7 +46,7 @@ class Carer {
  public:
   Carer(ByteReader& reader, Printing& printing, Passes& passes) : reader_(reader), printing_(printing), passes_(passes) {}
 
-  void take(const Kind& kind) {
+  void take(const RecordKind& kind) {
     reader_.take(4);
     const std::uint32_t count = reader_.word();
     if (!printing_.ok()) return;
@@ -96,7 +96,7 @@ void take_maintenance_records(ByteReader& reader, Printing& printing, Passes& pa
   const bool planes = printing.profile().dialect == "planes";
   Carer carer(reader, printing, passes);
   while (printing.ok()) {
-    const Kind* const kind = kind_ahead(reader, planes);
+    const RecordKind* const kind = kind_ahead(reader, planes);
     if (kind == nullptr) return;
     carer.take(*kind);
   }

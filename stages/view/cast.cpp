@@ -13,7 +13,7 @@
 namespace lamina::view {
 namespace {
 
-using Vector = std::array<float, 3>;
+using RayVector = std::array<float, 3>;
 
 /// Which axis of the bed is to the right, up and towards whoever looks, and which way.
 struct ViewFrame {
@@ -27,7 +27,7 @@ constexpr ViewFrame frame_of(ViewSide side) {
 }
 
 /// Where the light comes from: left, above, and from behind whoever looks. Unit length; the rest is never quite dark.
-constexpr Vector kLight = {-0.35f, 0.45f, 0.82f};
+constexpr RayVector kLight = {-0.35f, 0.45f, 0.82f};
 constexpr float kMinLight = 0.15f;
 constexpr float kDepthShade = 0.4f;
 
@@ -65,8 +65,8 @@ struct Caster::State {
   bool add_mesh(const Mesh& mesh) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     const std::size_t count = mesh.triangles.size();
-    auto* corners = static_cast<Vector*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vector), 3 * count));
+    auto* corners = static_cast<RayVector*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(RayVector), 3 * count));
     auto* indices = static_cast<unsigned*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), count));
     if (corners == nullptr || indices == nullptr) {
@@ -84,12 +84,12 @@ struct Caster::State {
   }
 
   /// How light the facet is that a ray meets first; negative if it meets none. The parts lie between the two depths, mm.
-  float light(const ViewFrame& frame, const Vector& origin, float first_depth, float last_depth) const {
+  float light(const ViewFrame& frame, const RayVector& origin, float first_depth, float last_depth) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit ray{};
     ray.ray.org_x = origin[0], ray.ray.org_y = origin[1], ray.ray.org_z = origin[2];
-    Vector way{};
+    RayVector way{};
     way[static_cast<std::size_t>(frame.towards)] = -frame.sign;
     ray.ray.dir_x = way[0], ray.ray.dir_y = way[1], ray.ray.dir_z = way[2];
     ray.ray.tfar = std::numeric_limits<float>::infinity();
@@ -97,7 +97,7 @@ struct Caster::State {
     ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene, &context, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return -1;
-    const Vector normal = {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z};
+    const RayVector normal = {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z};
     const auto of = [&](int axis) { return normal[static_cast<std::size_t>(axis)]; };
     const float length = std::hypot(normal[0], normal[1], normal[2]);
     if (!(length > 0)) return kMinLight;
@@ -150,8 +150,8 @@ Result<Caster> Caster::build(std::span<const Mesh> meshes, std::span<const Insta
 Picture Caster::render(ViewSide side, std::uint32_t maximum) const {
   const ViewFrame frame = frame_of(side);
   const Box& box = state_->box;
-  const Vector lo = {float_mm(box.lo.x), float_mm(box.lo.y), float_mm(box.lo.z)};
-  const Vector hi = {float_mm(box.hi.x), float_mm(box.hi.y), float_mm(box.hi.z)};
+  const RayVector lo = {float_mm(box.lo.x), float_mm(box.lo.y), float_mm(box.lo.z)};
+  const RayVector hi = {float_mm(box.hi.x), float_mm(box.hi.y), float_mm(box.hi.z)};
   const auto extent = [&](int axis) { return hi[static_cast<std::size_t>(axis)] - lo[static_cast<std::size_t>(axis)]; };
   const float longest = std::max({extent(0), extent(1), extent(2), 1e-6f}), pixel = longest / static_cast<float>(maximum);
   const auto pixels = [&](int axis) {
@@ -171,7 +171,7 @@ Picture Caster::render(ViewSide side, std::uint32_t maximum) const {
       float sum = 0;
       int hits = 0;
       for (const auto& [x, y] : {std::pair{0.25f, 0.25f}, {0.75f, 0.25f}, {0.25f, 0.75f}, {0.75f, 0.75f}}) {
-        Vector origin{};
+        RayVector origin{};
         origin[right] = lo[right] + (static_cast<float>(column) + x) / static_cast<float>(picture.width) * extent(frame.right);
         origin[up] = hi[up] - (static_cast<float>(row) + y) / static_cast<float>(picture.height) * extent(frame.up);
         origin[towards] = (frame.sign > 0 ? hi : lo)[towards] + frame.sign * longest;

@@ -15,11 +15,11 @@ double area_after(const BeadMachine& machine, double from, const StableAfter& ro
   double ramp = 0, flow = machine.area_mm2 * from;
   if (std::isfinite(machine.acceleration_mm_s2)) {
     ramp = (row.speed_mm_s * row.speed_mm_s - from * from) / (2 * machine.acceleration_mm_s2);
-    const Phase rising{ramp, machine.area_mm2, from, machine.acceleration_mm_s2, tau, flow};
+    const FlowPhase rising{ramp, machine.area_mm2, from, machine.acceleration_mm_s2, tau, flow};
     if (row.distance_mm <= ramp) return rising.area_at(row.distance_mm);
     flow = rising.flow_after(rising.time_at(ramp));
   }
-  return Phase{row.distance_mm, machine.area_mm2, row.speed_mm_s, 0, tau, flow}.area_at(row.distance_mm - ramp);
+  return FlowPhase{row.distance_mm, machine.area_mm2, row.speed_mm_s, 0, tau, flow}.area_at(row.distance_mm - ramp);
 }
 
 }  // namespace

@@ -323,16 +323,16 @@ cv::Mat disc_of(double across_cells) {
 }
 
 /// The image of the layer in cells from its upper left corner.
-struct Field {
+struct ColourField {
   double side = 0;  // mm
   cv::Mat light;    // CV_32F; -1 where the photograph does not reach
   cv::Mat wanted;   // CV_8U: something of the cell, or near it, was to be printed
 };
 
-Field field_of(const Photo& photo, const ExpectedLayer& layer, const View& view) {
+ColourField field_of(const Photo& photo, const ExpectedLayer& layer, const View& view) {
   const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6;
   const double wide = layer.image.columns * px, deep = layer.image.rows() * py;
-  Field field;
+  ColourField field;
   field.side = std::max(layer.photo_um * 1e-3, std::max(wide, deep) / kMaxCells);
   const int columns = static_cast<int>(wide / field.side) + 1, rows = static_cast<int>(deep / field.side) + 1;
   field.wanted = cv::Mat::zeros(rows, columns, CV_8U);
@@ -364,7 +364,7 @@ Field field_of(const Photo& photo, const ExpectedLayer& layer, const View& view)
 /// ink   darkness of full ink, of the light of the blank sheet
 /// cost  O(cells of the image, 4 million at most)
 std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, const View& view, double ink) {
-  const Field field = field_of(photo, layer, view);
+  const ColourField field = field_of(photo, layer, view);
   const cv::Mat dark = darkness_of(field.light, field.wanted == 0, 8, 0.3 * ink);
   cv::Mat soft, found, labels, stats, middles;
   cv::GaussianBlur(dark, soft, {}, 1);

@@ -12,7 +12,7 @@ namespace lamina::formats {
 namespace {
 
 /// What the highest bits of a window say: of a mode 0 .. 6 (a1 - b1 + 3), kPass or kHorizontal; of a run its length.
-struct Word {
+struct WindowCode {
   std::uint16_t value = 0;
   std::uint8_t length = 0;  // bits; 0: no word begins so
   bool ends = false;        // a terminating code: no more follow
@@ -22,14 +22,14 @@ constexpr std::uint16_t kPass = 7, kHorizontal = 8;
 constexpr std::uint32_t kModeBits = 7, kRunBits = 13;
 
 template <std::size_t kSize>
-constexpr void put(std::array<Word, kSize>& table, std::uint32_t bits, t6::Code code, Word word) {
+constexpr void put(std::array<WindowCode, kSize>& table, std::uint32_t bits, t6::Code code, WindowCode word) {
   word.length = static_cast<std::uint8_t>(code.length());
   const std::uint32_t free = bits - code.length();
   for (std::uint32_t i = 0; i < 1u << free; ++i) table[(code.bits() << free) + i] = word;
 }
 
-constexpr std::array<Word, 1 << kModeBits> kModes = [] {
-  std::array<Word, 1 << kModeBits> table{};
+constexpr std::array<WindowCode, 1 << kModeBits> kModes = [] {
+  std::array<WindowCode, 1 << kModeBits> table{};
   for (std::uint16_t i = 0; i < 7; ++i) put(table, kModeBits, t6::kVertical[i], {i});
   put(table, kModeBits, t6::kPass, {kPass});
   put(table, kModeBits, t6::kHorizontal, {kHorizontal});
@@ -51,7 +51,7 @@ constexpr std::array<Steps, 1 << kStepsBits> kSteps = [] {
     Steps& steps = table[bits];
     for (std::uint32_t at = 0; steps.count < steps.step.size();) {
       const std::uint32_t left = bits << at & (table.size() - 1);
-      const Word mode = kModes[left >> (kStepsBits - kModeBits)];
+      const WindowCode mode = kModes[left >> (kStepsBits - kModeBits)];
       at += mode.length;
       if (mode.length == 0 || mode.value >= kPass || at > kStepsBits) break;
       steps.step[steps.count++] = static_cast<std::int8_t>(mode.value - 3);
@@ -60,8 +60,8 @@ constexpr std::array<Steps, 1 << kStepsBits> kSteps = [] {
   return table;
 }();
 
-std::array<Word, 1 << kRunBits> run_table(const t6::RunCodes& codes) {
-  std::array<Word, 1 << kRunBits> table{};
+std::array<WindowCode, 1 << kRunBits> run_table(const t6::RunCodes& codes) {
+  std::array<WindowCode, 1 << kRunBits> table{};
   for (std::uint16_t i = 0; i < codes.terminating.size(); ++i) {
     put(table, kRunBits, codes.terminating[i], {i, 0, true});
   }
@@ -71,7 +71,7 @@ std::array<Word, 1 << kRunBits> run_table(const t6::RunCodes& codes) {
   return table;
 }
 
-const std::array<Word, 1 << kRunBits>& run_words(std::uint32_t black) {
+const std::array<WindowCode, 1 << kRunBits>& run_words(std::uint32_t black) {
   static const std::array tables{run_table(t6::kRunCodes[0]), run_table(t6::kRunCodes[1])};
   return tables[black];
 }
@@ -90,7 +90,7 @@ std::uint32_t take_run(const std::byte* coded, std::uint64_t& at, std::uint64_t 
   const auto& words = run_words(black);
   std::uint32_t length = 0;
   for (;;) {
-    const Word word = words[window(coded, at) >> (64 - kRunBits)];
+    const WindowCode word = words[window(coded, at) >> (64 - kRunBits)];
     at += word.length;
     if (word.length == 0 || at > end) return maximum + 1;
     length += word.value;
@@ -144,7 +144,7 @@ bool G4Decoder::decode_row(const std::byte* coded) {
       a0 = row[n - 1];
       continue;
     }
-    const Word mode = kModes[bits >> (64 - kModeBits)];
+    const WindowCode mode = kModes[bits >> (64 - kModeBits)];
     if (mode.length == 0) return false;
     at += mode.length;
     if (mode.value < kPass) {

@@ -104,7 +104,7 @@ double cura_profile_number(std::string_view base64, std::string_view setting) {
   return 0;
 }
 
-void SlicerFacts::state_filament(double diameter_mm, Source source) {
+void SlicerFacts::state_filament(double diameter_mm, DiameterSource source) {
   if (!(diameter_mm > 0.1 && diameter_mm < 20) || source <= source_) return;
   filament_mm = diameter_mm;
   source_ = source;
@@ -117,7 +117,7 @@ void SlicerFacts::state_density(double g_cm3) {
 void SlicerFacts::read_flavor(std::string_view flavor) {
   // Cura: gcodeExport.cpp, GCodeExport::setFlavor(): these two count E in mm3.
   if (flavor.starts_with("UltiGCode") || flavor.starts_with("Marlin(Volumetric)")) volumetric = true;
-  if (flavor.starts_with("Griffin")) state_filament(2.85, Source::kFlavor);
+  if (flavor.starts_with("Griffin")) state_filament(2.85, DiameterSource::kFlavor);
 }
 
 void SlicerFacts::read_weight(std::string_view used) {
@@ -127,15 +127,15 @@ void SlicerFacts::read_weight(std::string_view used) {
   if (!(metres > 0 && grams > 0)) return;
   // Plastics for filament weigh 0.9 to 1.4 g/cm3: 2.2 to 3.4 g a metre of 1.75 mm, 5.7 to 8.9 g of 2.85 mm.
   const double weight = grams / metres;
-  if (weight > 2 && weight < 4) state_filament(1.75, Source::kWeight);
-  if (weight > 5 && weight < 10) state_filament(2.85, Source::kWeight);
+  if (weight > 2 && weight < 4) state_filament(1.75, DiameterSource::kWeight);
+  if (weight > 5 && weight < 10) state_filament(2.85, DiameterSource::kWeight);
 }
 
 void SlicerFacts::read_setting(std::string_view comment) {
   const SettingLine line(comment);
   const std::string_view name = line.name();
   if (name == "filamentdiameter" || name == "filamentdiameters" || name == "fiberdiamm" || name == "materialdiameter") {
-    state_filament(leading_number(line.value), Source::kSetting);
+    state_filament(leading_number(line.value), DiameterSource::kSetting);
   }
   if (name == "nozzlediameter" || name == "extruderdiameter" || name == "extrudertrainnozzlediameter") {
     const double diameter = leading_number(line.value);
@@ -157,9 +157,9 @@ void SlicerFacts::read(std::string_view comment) {
   constexpr std::string_view kMachine = "; machine: ";
   constexpr std::string_view kCuraSettings = ";SETTING_3 ", kMaterial = "material_diameter = ";
   if (comment.starts_with(kProfile)) {
-    if (source_ < Source::kProfile) {
+    if (source_ < DiameterSource::kProfile) {
       const std::string_view profile = comment.substr(kProfile.size());
-      state_filament(cura_profile_number(profile, "filament_diameter"), Source::kProfile);
+      state_filament(cura_profile_number(profile, "filament_diameter"), DiameterSource::kProfile);
     }
   } else if (comment.starts_with(kFlavor)) {
     read_flavor(comment.substr(kFlavor.size()));
@@ -169,7 +169,8 @@ void SlicerFacts::read(std::string_view comment) {
     if (machine.empty()) machine = comment.substr(kMachine.size(), 100);
   } else if (comment.starts_with(kCuraSettings)) {
     const std::size_t at = comment.find(kMaterial);
-    if (at != std::string_view::npos) state_filament(leading_number(comment.substr(at + kMaterial.size())), Source::kProfile);
+    if (at != std::string_view::npos)
+      state_filament(leading_number(comment.substr(at + kMaterial.size())), DiameterSource::kProfile);
   } else {
     for (const std::string_view sign : {"iameter", "IAMETER", "fiber_dia", "volumetric_e", "_density", "ment used ["}) {
       if (comment.find(sign) != std::string_view::npos) return read_setting(comment);

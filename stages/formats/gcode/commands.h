@@ -38,12 +38,12 @@ struct SlicerFacts {
 
  private:
   /// How sure a way to know the diameter is.
-  enum class Source : std::uint8_t { kNone, kFlavor, kWeight, kProfile, kSetting };
-  Source source_ = Source::kNone;
+  enum class DiameterSource : std::uint8_t { kNone, kFlavor, kWeight, kProfile, kSetting };
+  DiameterSource source_ = DiameterSource::kNone;
   double used_cm3_ = 0;
   bool density_set_ = false;
   void state_density(double g_cm3);
-  void state_filament(double diameter_mm, Source source);
+  void state_filament(double diameter_mm, DiameterSource source);
   void read_flavor(std::string_view flavor);
   void read_weight(std::string_view used);
   void read_setting(std::string_view comment);

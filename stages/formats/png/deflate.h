@@ -14,18 +14,18 @@
 namespace lamina::formats::png {
 
 /// Up to 56 bits, the first one lowest, and their number.
-struct Word {
+struct BitString {
   std::uint64_t packed = 0;
 
-  constexpr Word() = default;
-  constexpr Word(std::uint64_t bits, std::uint32_t length) : packed(bits << 8 | length) {}
+  constexpr BitString() = default;
+  constexpr BitString(std::uint64_t bits, std::uint32_t length) : packed(bits << 8 | length) {}
   constexpr std::uint64_t bits() const { return packed >> 8; }
   constexpr std::uint32_t length() const { return static_cast<std::uint32_t>(packed & 0xFF); }
 };
 
 /// One word, then the other; 56 bits at most.
-constexpr Word join(Word first, Word second) {
-  return Word(first.bits() | second.bits() << first.length(), first.length() + second.length());
+constexpr BitString join(BitString first, BitString second) {
+  return BitString(first.bits() | second.bits() << first.length(), first.length() + second.length());
 }
 
 /// Lengths of the words of an optimal code (Huffman 1952) by the weights of the symbols; 0 for a symbol of no weight.
@@ -64,15 +64,15 @@ constexpr std::array<std::uint8_t, kSymbols> word_lengths(const std::array<std::
 /// The words: of one length in the order of their symbols, shorter ones first (RFC 1951, 3.2.2). In a stream their highest
 /// bit comes first, so it stands lowest here.
 template <std::size_t kSymbols>
-constexpr std::array<Word, kSymbols> words_of(const std::array<std::uint8_t, kSymbols>& lengths) {
-  std::array<Word, kSymbols> words{};
+constexpr std::array<BitString, kSymbols> words_of(const std::array<std::uint8_t, kSymbols>& lengths) {
+  std::array<BitString, kSymbols> words{};
   std::uint32_t code = 0;
   for (std::uint32_t length = 1; length <= 15; ++length, code <<= 1) {
     for (std::size_t s = 0; s < kSymbols; ++s) {
       if (lengths[s] != length) continue;
       std::uint32_t turned = 0;
       for (std::uint32_t bit = 0; bit < length; ++bit) turned |= (code >> bit & 1) << (length - 1 - bit);
-      words[s] = Word(turned, length);
+      words[s] = BitString(turned, length);
       ++code;
     }
   }
@@ -97,7 +97,7 @@ class BitWriter {
     word_ >>= pending_ & 56;
     pending_ &= 7;
   }
-  void put(Word word) { put(word.bits(), word.length()); }
+  void put(BitString word) { put(word.bits(), word.length()); }
 
   /// First byte that is not final yet.
   std::byte* next() const { return next_; }
@@ -147,7 +147,7 @@ constexpr LengthClass length_class(std::uint32_t length) {
 /// Bytes that change where an edge is `shift` pixels to the right of the one above: a change of colour in column `above`
 /// of the row above and in column `above + shift` of this one. Bytes as the Up filter has them: this row's less the one's
 /// above, modulo 256. A run that begins adds ones from its column on; one that ends takes them away.
-struct Edge {
+struct RunEdge {
   std::uint8_t bytes = 0;  // 1 or 2 that change, the first one that of the column further left; 0 if the edge stands
   std::uint8_t first = 0, second = 0;
 };
@@ -155,7 +155,7 @@ struct Edge {
 inline constexpr std::int32_t kMaxShift = 7;
 
 /// above: column modulo 8; shift: -7 .. 7
-constexpr Edge edge_of(bool begins, std::int32_t above, std::int32_t shift) {
+constexpr RunEdge edge_of(bool begins, std::int32_t above, std::int32_t shift) {
   if (shift == 0) return {};
   std::uint32_t value[3] = {0, 0, 0};
   const std::int32_t low = shift < 0 ? above + shift : above;
@@ -178,8 +178,8 @@ constexpr std::size_t edge_index(bool begins, std::uint32_t above, std::uint32_t
   return std::size_t{begins} << 7 | (above & 7) << 4 | shift_and_seven;
 }
 
-inline constexpr std::array<Edge, 256> kEdges = [] {
-  std::array<Edge, 256> edges{};
+inline constexpr std::array<RunEdge, 256> kEdges = [] {
+  std::array<RunEdge, 256> edges{};
   for (std::uint32_t index = 0; index < 256; ++index) {
     const std::int32_t shift = static_cast<std::int32_t>(index & 15) - kMaxShift;
     if (shift <= kMaxShift) edges[index] = edge_of(index >> 7 != 0, static_cast<std::int32_t>(index >> 4 & 7), shift);
@@ -198,7 +198,7 @@ struct Weights {
 constexpr std::array<std::uint32_t, kSymbols> weights_of_symbols(const Weights& weights) {
   std::array<std::uint32_t, kSymbols> symbols{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) symbols[byte] = weights.other_bytes;
-  for (const Edge& edge : kEdges) {
+  for (const RunEdge& edge : kEdges) {
     for (std::uint32_t i = 0; i < edge.bytes; ++i) symbols[i == 0 ? edge.first : edge.second] = weights.few_pixels;
   }
   for (std::uint32_t bit = 0; bit < 8; ++bit) symbols[1u << bit] = symbols[256 - (1u << bit)] = weights.one_pixel;
@@ -218,32 +218,32 @@ inline constexpr std::uint32_t kShortZeros = 1024;
 struct EdgeWord {
   std::uint32_t bits = 0;
   std::uint8_t length = 0;
-  Edge edge;
+  RunEdge edge;
 };
 
 /// A code and the words that it makes for what rows are made of.
 struct Codes {
   std::array<std::uint8_t, kSymbols> length{};
-  std::array<Word, 256> byte{};
-  std::array<Word, kLongestMatch + 1> match{};   // by length, 3 .. 258
-  std::array<Word, kLongestMatch> more_zeros{};  // behind a zero, less than a longest match
-  std::array<Word, kShortZeros> zeros{};         // behind another byte
-  std::array<EdgeWord, 256> edge{};              // by edge_index()
-  Word end;
+  std::array<BitString, 256> byte{};
+  std::array<BitString, kLongestMatch + 1> match{};   // by length, 3 .. 258
+  std::array<BitString, kLongestMatch> more_zeros{};  // behind a zero, less than a longest match
+  std::array<BitString, kShortZeros> zeros{};         // behind another byte
+  std::array<EdgeWord, 256> edge{};                   // by edge_index()
+  BitString end;
 };
 
 /// Literals where they are shorter than a match, and where no match is short enough.
-constexpr Word more_zeros_word(const Codes& codes, std::uint32_t zeros) {
+constexpr BitString more_zeros_word(const Codes& codes, std::uint32_t zeros) {
   const std::uint32_t as_bytes = zeros * codes.byte[0].length();
   if (zeros >= kShortestMatch && codes.match[zeros].length() < as_bytes) return codes.match[zeros];
-  Word word;
+  BitString word;
   for (; zeros > 0; --zeros) word = join(word, codes.byte[0]);
   return word;
 }
 
-constexpr Word zeros_word(const Codes& codes, std::uint32_t zeros) {
+constexpr BitString zeros_word(const Codes& codes, std::uint32_t zeros) {
   if (zeros == 0) return {};
-  Word word = codes.byte[0];
+  BitString word = codes.byte[0];
   --zeros;
   for (; zeros >= kLongestMatch; zeros -= kLongestMatch) word = join(word, codes.match[kLongestMatch]);
   return join(word, codes.more_zeros[zeros]);
@@ -252,19 +252,19 @@ constexpr Word zeros_word(const Codes& codes, std::uint32_t zeros) {
 constexpr Codes codes_of(const Weights& weights) {
   Codes codes;
   codes.length = word_lengths(weights_of_symbols(weights));
-  const std::array<Word, kSymbols> words = words_of(codes.length);
+  const std::array<BitString, kSymbols> words = words_of(codes.length);
   for (std::uint32_t byte = 0; byte < 256; ++byte) codes.byte[byte] = words[byte];
   codes.end = words[kEndOfBlock];
   for (std::uint32_t length = kShortestMatch; length <= kLongestMatch; ++length) {
     const LengthClass found = length_class(length);
-    const Word distance_one(0, 1);
-    codes.match[length] = join(join(words[found.symbol], Word(found.extra, found.extra_bits)), distance_one);
+    const BitString distance_one(0, 1);
+    codes.match[length] = join(join(words[found.symbol], BitString(found.extra, found.extra_bits)), distance_one);
   }
   for (std::uint32_t zeros = 0; zeros < kLongestMatch; ++zeros) codes.more_zeros[zeros] = more_zeros_word(codes, zeros);
   for (std::uint32_t zeros = 0; zeros < kShortZeros; ++zeros) codes.zeros[zeros] = zeros_word(codes, zeros);
   for (std::uint32_t index = 0; index < 256; ++index) {
-    const Edge& edge = kEdges[index];
-    Word word;
+    const RunEdge& edge = kEdges[index];
+    BitString word;
     if (edge.bytes > 0) word = codes.byte[edge.first];
     if (edge.bytes > 1) word = join(word, codes.byte[edge.second]);
     codes.edge[index] = {static_cast<std::uint32_t>(word.bits()), static_cast<std::uint8_t>(word.length()), edge};
@@ -273,9 +273,9 @@ constexpr Codes codes_of(const Weights& weights) {
 }
 
 template <std::size_t kWords>
-constexpr std::uint32_t longest(const std::array<Word, kWords>& words) {
+constexpr std::uint32_t longest(const std::array<BitString, kWords>& words) {
   std::uint32_t longest = 0;
-  for (const Word& word : words) longest = word.length() > longest ? word.length() : longest;
+  for (const BitString& word : words) longest = word.length() > longest ? word.length() : longest;
   return longest;
 }
 
@@ -286,7 +286,7 @@ struct BlockHead {
   std::array<std::uint32_t, 48> words{};
   std::uint32_t bits = 0;
 
-  constexpr void put(Word word) {
+  constexpr void put(BitString word) {
     for (std::uint32_t i = 0; i < word.length(); ++i, ++bits) {
       words[bits / 32] |= static_cast<std::uint32_t>(word.bits() >> i & 1) << bits % 32;
     }
@@ -316,19 +316,19 @@ constexpr BlockHead block_head(const Codes& codes) {
   const auto words = words_of(lengths);
 
   BlockHead head;
-  head.put(Word(1, 1));               // the last block
-  head.put(Word(2, 2));               // which tells its code
-  head.put(Word(kSymbols - 257, 5));  // HLIT
-  head.put(Word(0, 5));               // HDIST: one distance
+  head.put(BitString(1, 1));               // the last block
+  head.put(BitString(2, 2));               // which tells its code
+  head.put(BitString(kSymbols - 257, 5));  // HLIT
+  head.put(BitString(0, 5));               // HDIST: one distance
   constexpr std::array<std::uint8_t, kLengthSymbols> kOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
                                                                11, 4,  12, 3, 13, 2, 14, 1, 15};
   std::uint32_t used = kLengthSymbols;
   while (lengths[kOrder[used - 1]] == 0) --used;
-  head.put(Word(used - 4, 4));  // HCLEN
-  for (std::uint32_t i = 0; i < used; ++i) head.put(Word(lengths[kOrder[i]], 3));
+  head.put(BitString(used - 4, 4));  // HCLEN
+  for (std::uint32_t i = 0; i < used; ++i) head.put(BitString(lengths[kOrder[i]], 3));
   for (std::uint32_t i = 0; i < count; ++i) {
     head.put(words[reported[i]]);
-    if (reported[i] == kRepeat) head.put(Word(times[i] - 3, 2));
+    if (reported[i] == kRepeat) head.put(BitString(times[i] - 3, 2));
   }
   return head;
 }

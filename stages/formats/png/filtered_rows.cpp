@@ -28,9 +28,9 @@ struct State {
 
 /// A zero, then matches, as long as it takes.
 [[gnu::noinline]] BitWriter put_long_zeros(BitWriter out, const Codes& codes, std::uint64_t zeros) {
-  const Word match = codes.match[kLongestMatch];
+  const BitString match = codes.match[kLongestMatch];
   const std::uint32_t maximum = BitWriter::kMaxBits / match.length();
-  Word matches;
+  BitString matches;
   for (std::uint32_t i = 0; i < maximum; ++i) matches = join(matches, match);
   out.put(codes.byte[0]);
   for (--zeros; zeros >= maximum * kLongestMatch; zeros -= maximum * kLongestMatch) out.put(matches);
@@ -53,7 +53,7 @@ struct State {
 }
 
 /// All zeros up to a place, then a word of one byte or two.
-[[gnu::always_inline]] inline void put_at(State& state, const Codes& codes, std::uint64_t position, Word word,
+[[gnu::always_inline]] inline void put_at(State& state, const Codes& codes, std::uint64_t position, BitString word,
                                           std::uint32_t bytes) {
   const std::uint64_t zeros = position - state.written;
   if (zeros < kShortZeros) [[likely]] {
@@ -120,7 +120,7 @@ constexpr MovedEdge moved_edge(std::uint32_t at, std::size_t index) { return at 
   const std::uint32_t at = moved >> 8;
   const std::uint64_t zeros = row.begin + at - state.written;
   if (zeros < kShortZeros) [[likely]] {
-    const Word before = row.codes.zeros[zeros];
+    const BitString before = row.codes.zeros[zeros];
     state.out.put(before.bits() | std::uint64_t{word.bits} << before.length(), before.length() + word.length);
   } else {
     state.out = put_long_zeros(state.out, row.codes, zeros);

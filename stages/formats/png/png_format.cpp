@@ -95,19 +95,19 @@ constexpr std::array<std::uint8_t, 288> fixed_lengths() {
 constexpr auto kFixed = words_of(fixed_lengths());
 
 /// A match of `length` 3 .. 257 bytes of distance 1, whose own word is five zeros.
-constexpr Word match_word(std::uint32_t length) {
+constexpr BitString match_word(std::uint32_t length) {
   std::uint32_t symbol = 257, base = 3, extra = 0;
   for (;; ++symbol) {
     extra = symbol < 265 ? 0 : (symbol - 261) / 4;
     if (length < base + (1u << extra)) break;
     base += 1u << extra;
   }
-  return join(join(kFixed[symbol], Word(length - base, extra)), Word(0, 5));
+  return join(join(kFixed[symbol], BitString(length - base, extra)), BitString(0, 5));
 }
-constexpr std::array<Word, kMaxEqual + 1> match_words() {
-  std::array<Word, kMaxEqual + 1> words{};
+constexpr std::array<BitString, kMaxEqual + 1> match_words() {
+  std::array<BitString, kMaxEqual + 1> words{};
   for (std::uint32_t length = 3; length < kMaxEqual; ++length) words[length] = match_word(length);
-  words[kMaxEqual] = join(kFixed[kLengthOf258], Word(0, 5));
+  words[kMaxEqual] = join(kFixed[kLengthOf258], BitString(0, 5));
   return words;
 }
 constexpr auto kMatch = match_words();
@@ -232,7 +232,7 @@ namespace {
 constexpr std::uint64_t kMaxExpansion = 1032;
 
 /// What libpng's callbacks see and what has to outlive a jump out of libpng.
-struct Source {
+struct ReadState {
   int file = -1;
   std::uint64_t bytes = 0;
   char message[128] = {};
@@ -246,7 +246,7 @@ struct Source {
 };
 
 void keep_error(png_structp png, png_const_charp text) {
-  auto* source = static_cast<Source*>(png_get_error_ptr(png));
+  auto* source = static_cast<ReadState*>(png_get_error_ptr(png));
   std::strncpy(source->message, text, sizeof source->message - 1);
   png_longjmp(png, 1);
 }
@@ -254,7 +254,7 @@ void keep_error(png_structp png, png_const_charp text) {
 void ignore_warning(png_structp, png_const_charp) {}
 
 void read_bytes(png_structp png, png_bytep to, png_size_t count) {
-  Source& source = *static_cast<Source*>(png_get_io_ptr(png));
+  ReadState& source = *static_cast<ReadState*>(png_get_io_ptr(png));
   while (count != 0) {
     if (source.begin == source.end) {
       ssize_t got;
@@ -284,7 +284,7 @@ bool set_is_dark(png_structp png, png_infop info, int colour_type) {
   return light(palette[1]) < light(palette[0]);
 }
 
-bool add_row(Source& source, std::size_t bytes, bool invert) {
+bool add_row(ReadState& source, std::size_t bytes, bool invert) {
   try {
     if (source.level_bits > 0) return source.sink->add_row(source.row, source.sink->levels.columns, source.level_bits, false);
     return source.builder->add_row(std::span(source.row).first(bytes), invert);
@@ -293,7 +293,7 @@ bool add_row(Source& source, std::size_t bytes, bool invert) {
   }
 }
 
-bool prepare(Source& source, std::uint32_t columns, std::size_t stride) {
+bool prepare(ReadState& source, std::uint32_t columns, std::size_t stride) {
   try {
     source.row.resize(stride);
     source.builder.emplace(columns);
@@ -305,7 +305,7 @@ bool prepare(Source& source, std::uint32_t columns, std::size_t stride) {
 }
 
 /// No object of this frame needs its destructor run when libpng jumps out.
-bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
+bool read_rows(png_structp png, png_infop info, ReadState& source, int threshold) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_user_limits(png, kMaxPixelsASide, kMaxPixelsASide);
   png_set_chunk_malloc_max(png, 1 << 20);
@@ -354,7 +354,7 @@ bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
 }  // namespace
 
 Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
-  const auto source = std::make_unique<Source>();
+  const auto source = std::make_unique<ReadState>();
   source->file = file;
   source->bytes = bytes;
   source->sink = sink;

@@ -183,7 +183,7 @@ bool Ending::find_fields(std::span<const std::byte> file, std::size_t strip_end)
   return length_at_ != 0;
 }
 
-void Ending::take(const Image& image, std::span<const std::byte> file, std::size_t strip_end) {
+void Ending::take(const TiffLayout& image, std::span<const std::byte> file, std::size_t strip_end) {
   tail_.clear();
   if (!find_fields(file, strip_end)) return;
   image_ = image;
@@ -191,7 +191,7 @@ void Ending::take(const Image& image, std::span<const std::byte> file, std::size
   tail_.assign(file.begin() + static_cast<std::ptrdiff_t>(tail_at_), file.end());
 }
 
-bool Ending::put(const Image& image, std::size_t strip_end, Bytes& file) const {
+bool Ending::put(const TiffLayout& image, std::size_t strip_end, Bytes& file) const {
   if (tail_.empty() || !(image == image_)) return false;
   const std::size_t begin = even(strip_end);
   file.resize(begin + tail_.size());

@@ -71,23 +71,23 @@ class LayerText {
 class Ending {
  public:
   /// What decides the directory, but for the length of the strip: lengths of 16 and of 32 bits are different fields.
-  struct Image {
+  struct TiffLayout {
     std::uint32_t columns = 0, rows = 0;
     double dpi_x = 0, dpi_y = 0;
     bool long_strip = false;
-    bool operator==(const Image&) const = default;
+    bool operator==(const TiffLayout&) const = default;
   };
 
   /// Keeps the ending of a whole file, as libtiff wrote it, whose strip ends at `strip_end`. Keeps nothing of a file that is
   /// laid out otherwise than in one strip from byte 8 on and all else behind it.
-  void take(const Image& image, std::span<const std::byte> file, std::size_t strip_end);
+  void take(const TiffLayout& image, std::span<const std::byte> file, std::size_t strip_end);
   /// Ends another file, whose strip stands from byte 8 to `strip_end`. returns  false if no ending of such an image is kept
-  bool put(const Image& image, std::size_t strip_end, Bytes& file) const;
+  bool put(const TiffLayout& image, std::size_t strip_end, Bytes& file) const;
 
  private:
   bool find_fields(std::span<const std::byte> file, std::size_t strip_end);
 
-  Image image_;
+  TiffLayout image_;
   std::vector<std::byte> head_, tail_;  // before and behind the strip
   std::vector<std::size_t> offsets_;    // in tail_, of 32-bit offsets into the file
   std::size_t tail_at_ = 0;             // where it stood

@@ -34,7 +34,7 @@ class G4Encoder : public ImageEncoder {
     file.resize(file.capacity());
     const std::size_t end = encoder_.encode(runs, file, kHeaderBytes);
     if (end > kMaxClassicBytes - kDirectoryBytes) return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB");
-    const Ending::Image image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kHeaderBytes > UINT16_MAX};
+    const Ending::TiffLayout image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kHeaderBytes > UINT16_MAX};
     if (!text_.any() && ending_.put(image, end, file)) return {};
     if (file.size() < end + kDirectoryBytes) file.resize(end + kDirectoryBytes);
 

@@ -9,9 +9,9 @@ namespace {
 
 int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
 
-class Search {
+class ContactSearch {
  public:
-  Search(const ContoursView& contours, MonotoneScratch& scratch)
+  ContactSearch(const ContoursView& contours, MonotoneScratch& scratch)
       : contours_(contours),
         scratch_(scratch),
         max_chains_(32 + contours.point.size() / 6),
@@ -111,7 +111,9 @@ class Search {
 
 }  // namespace
 
-bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch) { return Search(contours, scratch).run(); }
+bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch) {
+  return ContactSearch(contours, scratch).run();
+}
 
 namespace {
 

@@ -69,7 +69,7 @@ void put(Point2 at, double x, double y, Contours& to) {
 }  // namespace
 
 /// Puts what the corner between two edges becomes. returns  false for a loop
-bool OffsetCurve::corner(const Edge& in, const Edge& out, Contours& to) const {
+bool OffsetCurve::corner(const OffsetEdge& in, const OffsetEdge& out, Contours& to) const {
   const double sine = in.nx * out.ny - in.ny * out.nx, cosine = in.nx * out.nx + in.ny * out.ny;
   const bool opens = sine * distance_ >= 0;
   const double reach = std::abs(distance_ * sine) / (1 + cosine);  // along both edges, from the corner

@@ -40,15 +40,15 @@ class OffsetCurve {
   bool append(std::span<const Point2> points, Contours& out);
 
  private:
-  struct Edge {
+  struct OffsetEdge {
     double nx, ny, length;  // unit normal to the right
     Point2 end;
   };
 
-  bool corner(const Edge& in, const Edge& out, Contours& to) const;
+  bool corner(const OffsetEdge& in, const OffsetEdge& out, Contours& to) const;
 
   double distance_;
-  std::vector<Edge> edges_;
+  std::vector<OffsetEdge> edges_;
 };
 
 }  // namespace lamina

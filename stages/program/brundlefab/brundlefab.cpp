@@ -39,9 +39,9 @@ double shot_s(const Machine& machine) {
   return 2 * bar_seconds(machine, drops + runs * 2 * kBrakeDots);
 }
 
-class Writer final : public ProgramWriter {
+class BrundlefabWriter final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid)
+  BrundlefabWriter(const Machine& machine, const HeadGrid& grid)
       : machine_(machine), carriage_(machine, grid), clock_(machine, shot_s(machine)) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
@@ -230,7 +230,7 @@ Status check_shots(const Machine& machine, const Carriage& carriage, const HeadG
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
-  return std::make_unique<Writer>(machine, grid);
+  return std::make_unique<BrundlefabWriter>(machine, grid);
 }
 
 Status check(const Machine& machine, const HeadGrid& grid) {

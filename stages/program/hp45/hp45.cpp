@@ -13,9 +13,9 @@ namespace {
 
 constexpr MaintenanceWords kMaintenance{"G1", Head::spit, Head::kWait, "", "", 1};
 
-class Writer final : public ProgramWriter {
+class Hp45Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid)
+  Hp45Writer(const Machine& machine, const HeadGrid& grid)
       : machine_(machine), head_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t, ProgramBytes& out) override {
@@ -47,7 +47,7 @@ class Writer final : public ProgramWriter {
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
-  return std::make_unique<Writer>(machine, grid);
+  return std::make_unique<Hp45Writer>(machine, grid);
 }
 
 namespace {

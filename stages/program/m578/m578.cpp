@@ -31,9 +31,9 @@ void put_spit(const Machine& machine, ProgramBytes& out) {
 
 constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "; fill the vats, then go on\nM226\n", "G4 P", 1e-3, shot_s};
 
-class Writer final : public ProgramWriter {
+class M578Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid)
+  M578Writer(const Machine& machine, const HeadGrid& grid)
       : machine_(machine), carriage_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
@@ -93,7 +93,7 @@ class Writer final : public ProgramWriter {
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
-  return std::make_unique<Writer>(machine, grid);
+  return std::make_unique<M578Writer>(machine, grid);
 }
 
 double shot_s(const Machine& machine) {

@@ -25,9 +25,9 @@ void put_spit(const Machine& machine, ProgramBytes& out) { put(out, "M816 N{}\n"
 
 constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "M815\n", "G4 P", 1e-3};
 
-class Writer final : public ProgramWriter {
+class NuferbjWriter final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid)
+  NuferbjWriter(const Machine& machine, const HeadGrid& grid)
       : machine_(machine), grid_(grid), carriage_(machine, grid), maintenance_(machine, kMaintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
@@ -111,7 +111,7 @@ class Writer final : public ProgramWriter {
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
-  return std::make_unique<Writer>(machine, grid);
+  return std::make_unique<NuferbjWriter>(machine, grid);
 }
 
 }  // namespace lamina::program::nuferbj

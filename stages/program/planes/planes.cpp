@@ -19,9 +19,9 @@ void put_maintenance(MaintenanceRecord kind, std::span<const std::uint32_t> numb
   for (const std::uint32_t number : numbers) put_little<std::uint32_t>(out, number);
 }
 
-class Writer final : public ProgramWriter {
+class PlanesWriter final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid)
+  PlanesWriter(const Machine& machine, const HeadGrid& grid)
       : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32), maintenance_(machine, grid, put_maintenance) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
@@ -88,7 +88,7 @@ class Writer final : public ProgramWriter {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
   static_assert(std::endian::native == std::endian::little);
-  return std::make_unique<Writer>(machine, grid);
+  return std::make_unique<PlanesWriter>(machine, grid);
 }
 
 }  // namespace lamina::program::planes

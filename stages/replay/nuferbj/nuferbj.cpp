@@ -13,7 +13,7 @@ namespace lamina::replay {
 namespace {
 
 /// J<step> fired there and, after R<repeats>, at as many steps behind it.
-struct Vector {
+struct ShotVector {
   std::int64_t step = 0;
   std::uint32_t repeats = 0;
 };
@@ -25,7 +25,7 @@ class Loaded {
 
   /// Words of eight hexadecimal digits, read from left to right as nozzles 0, 1, 2, ... returns  the step
   std::int64_t add(const GcodeLine& line, GcodeReader& reader) {
-    Vector vector;
+    ShotVector vector;
     const std::string_view number = line.command.substr(1);
     const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), vector.step);
     if (error != std::errc() || stop != number.data() + number.size() || vector.step < -kMaxStep || vector.step > kMaxStep) {
@@ -49,7 +49,7 @@ class Loaded {
     return true;
   }
 
-  std::span<const Vector> vectors() const { return vectors_; }
+  std::span<const ShotVector> vectors() const { return vectors_; }
   std::span<const std::uint64_t> words(std::size_t vector) const {
     return std::span(words_).subspan(vector * words_a_vector_, words_a_vector_);
   }
@@ -77,19 +77,19 @@ class Loaded {
 
   std::uint32_t nozzles_;
   std::size_t words_a_vector_;
-  std::vector<Vector> vectors_;
+  std::vector<ShotVector> vectors_;
   std::vector<std::uint64_t> words_;
 };
 
 /// Whether the head goes the way that the sweep says, and has its ramps before the first step and behind the last.
-bool goes_its_way(std::span<const Vector> vectors, bool backward, double from, double to, Printing& printing) {
+bool goes_its_way(std::span<const ShotVector> vectors, bool backward, double from, double to, Printing& printing) {
   if (vectors.empty()) return true;
   const bool grows = printing.position_of(1) > printing.position_of(0), up = (to > from) == grows;
   if (up == backward) {
     printing.fault(fmt::format("D{} and the head goes from {:g} to {:g} mm", backward ? 1 : 0, from, to));
     return false;
   }
-  const Vector& last = vectors.back();
+  const ShotVector& last = vectors.back();
   const double sign = to > from ? 1 : -1, repeats = backward ? -double(last.repeats) : last.repeats;
   const double first_mm = printing.position_of(static_cast<double>(vectors.front().step));
   const double last_mm = printing.position_of(static_cast<double>(last.step) + repeats);

@@ -26,9 +26,9 @@ bool read_row(const char* row, std::uint32_t words, std::vector<std::uint64_t>& 
 }
 
 /// The rows of a plane, or of the planes of a grey one, and what each step of them fires.
-class Rows {
+class PlaneRows {
  public:
-  Rows(std::string_view bytes, std::uint32_t steps, std::uint32_t words, std::uint32_t planes)
+  PlaneRows(std::string_view bytes, std::uint32_t steps, std::uint32_t words, std::uint32_t planes)
       : bytes_(bytes), steps_(steps), words_(words), vector_(planes) {}
 
   void fire(std::uint32_t row, std::int64_t step, Printing& printing, Passes& passes) {
@@ -102,7 +102,7 @@ void read_planes(std::string_view text, Printing& printing) {
     if (reader.word() != words || size != 7 + grey + std::uint64_t{steps} * words * bits)
       return reader.fault("a plane of another width");
     if (grey != 0 && reader.word() != bits) return reader.fault("a plane of other bits");
-    Rows rows(reader.take(std::size_t{steps} * words * bits * 4), steps, words, bits);
+    PlaneRows rows(reader.take(std::size_t{steps} * words * bits * 4), steps, words, bits);
     for (std::uint32_t k = 0; k < steps && printing.ok(); ++k) {
       const std::uint32_t row = backward ? steps - 1 - k : k;
       rows.fire(row, first + row, printing, passes);
