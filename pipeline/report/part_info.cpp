@@ -84,7 +84,7 @@ Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& optio
   as_is.repair = false;
   as_is.blocks = true;
   Result<Part> part =
-      load::load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspection(first, facets); });
+      load::load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspect(first, facets); });
   if (!part) return part;
   as_is.blocks = false;
   sound = false;

@@ -176,7 +176,7 @@ Plot draw_fit(const FlowGroup& group, const Permeability& fit, bool gas) {
   plot.height = 430;
   // No axis where nothing flows or no pressure drops.
   if (max_v > 0 && max_y > 0) draw_axes(max_v, max_y, unit_of(max_y), gas, plot);
-  auto& curve = plot.lines.emplace_back(Plot::PlotLine{{}, "cc3333"});
+  auto& curve = plot.lines.emplace_back(Plot::Line{{}, "cc3333"});
   for (int i = 0; i <= 100; ++i) {
     const double v = max_v * i / 100;
     curve.points.push_back({x(v), y(fit.linear * v + fit.quadratic * v * v)});

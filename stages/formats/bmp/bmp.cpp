@@ -94,7 +94,7 @@ std::uint32_t number(std::span<const std::byte> bytes, std::size_t at, std::size
 
 }  // namespace
 
-Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+Result<Image> read_bmp(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole BMP: {}; plan the layer again", path, why)};
   };

@@ -11,14 +11,14 @@
 namespace lamina::formats {
 namespace {
 
-/// What the highest bits of a window say: of a mode 0 .. 6 (a1 - b1 + 3), kPass or kHorizontal; of a run its length.
+/// What the highest bits of a window say: of a mode 0 .. 6 (a1 - b1 + 3), kPassMode or kHorizontalMode; of a run its length.
 struct WindowCode {
   std::uint16_t value = 0;
   std::uint8_t length = 0;  // bits; 0: no word begins so
   bool ends = false;        // a terminating code: no more follow
 };
 
-constexpr std::uint16_t kPass = 7, kHorizontal = 8;
+constexpr std::uint16_t kPassMode = 7, kHorizontalMode = 8;
 constexpr std::uint32_t kModeBits = 7, kRunBits = 13;
 
 template <std::size_t kSize>
@@ -31,8 +31,8 @@ constexpr void put(std::array<WindowCode, kSize>& table, std::uint32_t bits, t6:
 constexpr std::array<WindowCode, 1 << kModeBits> kModes = [] {
   std::array<WindowCode, 1 << kModeBits> table{};
   for (std::uint16_t i = 0; i < 7; ++i) put(table, kModeBits, t6::kVertical[i], {i});
-  put(table, kModeBits, t6::kPass, {kPass});
-  put(table, kModeBits, t6::kHorizontal, {kHorizontal});
+  put(table, kModeBits, t6::kPass, {kPassMode});
+  put(table, kModeBits, t6::kHorizontal, {kHorizontalMode});
   return table;
 }();
 
@@ -53,7 +53,7 @@ constexpr std::array<Steps, 1 << kStepsBits> kSteps = [] {
       const std::uint32_t left = bits << at & (table.size() - 1);
       const WindowCode mode = kModes[left >> (kStepsBits - kModeBits)];
       at += mode.length;
-      if (mode.length == 0 || mode.value >= kPass || at > kStepsBits) break;
+      if (mode.length == 0 || mode.value >= kPassMode || at > kStepsBits) break;
       steps.step[steps.count++] = static_cast<std::int8_t>(mode.value - 3);
     }
   }
@@ -147,14 +147,14 @@ bool G4Decoder::decode_row(const std::byte* coded) {
     const WindowCode mode = kModes[bits >> (64 - kModeBits)];
     if (mode.length == 0) return false;
     at += mode.length;
-    if (mode.value < kPass) {
+    if (mode.value < kPassMode) {
       const std::int64_t a1 = std::int64_t{above[b]} + mode.value - 3;
       if (a1 <= a0 || a1 > columns) return false;
       if (a1 == columns) break;
       row[n++] = static_cast<std::uint32_t>(a1);
       a0 = a1;
       b = mode.value < 3 && b > 0 ? b - 1 : b + 1;
-    } else if (mode.value == kPass) {
+    } else if (mode.value == kPassMode) {
       if (above[b + 1] >= columns) return false;
       a0 = above[b + 1];
       b += 2;

@@ -188,7 +188,7 @@ constexpr double kMaxChords = 1e9;                     // of an arc that leaves 
 
 }  // namespace
 
-bool Arc::plan(FilePosition from, FilePosition to, const ArcWords& words) {
+bool Arc::plan(ArcPoint from, ArcPoint to, const ArcWords& words) {
   from_ = from;
   to_ = to;
   short_radius_ = false;

@@ -72,23 +72,23 @@ struct ArcWords {
 class Arc {
  public:
   static constexpr double kTolerance = 0.005;
-  struct FilePosition {
+  struct ArcPoint {
     double x = 0, y = 0;
   };
 
   /// False where Marlin prints an error and stays where it is (Klipper and RepRapFirmware end the print): neither R nor I and
   /// J; R with an end at the start; or, without a word of Marlin, an end in the direction of the start, counter-clockwise.
   /// Also of radii beyond all numbers of a firmware.
-  bool plan(FilePosition from, FilePosition to, const ArcWords& words);
+  bool plan(ArcPoint from, ArcPoint to, const ArcWords& words);
   /// At least 1. The chords within a bed of some metres are a few thousand, whatever the radius.
   std::uint64_t chords() const { return chords_; }
   /// The end of a chord, 1 .. chords(); that of the last one is the arc's.
-  FilePosition end_of(std::uint64_t chord) const;
+  ArcPoint end_of(std::uint64_t chord) const;
   double miss() const { return miss_; }                // of the end, off the circle
   bool radius_short() const { return short_radius_; }  // R is more than 1 % too short, which RepRapFirmware refuses
 
  private:
-  FilePosition from_, to_, spoke_;  // spoke: from the centre to the start
+  ArcPoint from_, to_, spoke_;  // spoke: from the centre to the start
   double travel_ = 0;               // radians, counter-clockwise
   double miss_ = 0;
   bool short_radius_ = false;

@@ -86,7 +86,7 @@ void GcodeSurvey::add_to_box(const RawBead& raw) {
 }
 
 Status GcodeSurvey::check_limits() const {
-  const std::vector<LayerCutter::Layer>& layers = cutter_.layers();
+  const std::vector<LayerCutter::CutLayer>& layers = cutter_.layers();
   if (layers.size() > options_.max_layers) {
     return Error{Fault::kUsage, fmt::format("{}: line {}: more than {} layers; --layer-height MM cuts thicker ones",
                                             file_.path_, walk_.position().line, options_.max_layers)};
@@ -135,7 +135,7 @@ void GcodeSurvey::take_filament() {
 /// Over the length of all beads whose widths no tag tells; 0 if there is none.
 double GcodeSurvey::mean_width() const {
   double area = 0, length = 0;
-  for (const LayerCutter::Layer& layer : cutter_.layers()) {
+  for (const LayerCutter::CutLayer& layer : cutter_.layers()) {
     const auto& [start, below, height, beads] = layer.position;
     const double own = layer.top > below ? layer.top - below : kUsualHeight;
     const double h = layer.tag_height > 0 ? layer.tag_height : height > 0 ? height : own;
@@ -187,7 +187,7 @@ Result<GcodeFile> GcodeSurvey::run() {
   if (Status status = read_all(); !status) return status.error();
   cutter_.finish();
   take_filament();
-  for (const LayerCutter::Layer& layer : cutter_.layers()) file_.layers_.push_back(layer.position);
+  for (const LayerCutter::CutLayer& layer : cutter_.layers()) file_.layers_.push_back(layer.position);
   note_widths();
   note_climbs();
   note_arcs();

@@ -27,12 +27,12 @@ Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& pa
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold, page, sink);
-  if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path, threshold, sink);
+  if (begins("II", 2) || begins("MM", 2)) return read_tiff(file, bytes, path, threshold, page, sink);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file, bytes, path, threshold, sink);
   if (sink != nullptr && !sink->nearest)
     return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
-  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return pbm(file, bytes, path, threshold, sink);
-  if (begins("BM", 2)) return bmp(file, bytes, path, threshold, sink);
+  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return read_pbm(file, bytes, path, threshold, sink);
+  if (begins("BM", 2)) return read_bmp(file, bytes, path, threshold, sink);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
 

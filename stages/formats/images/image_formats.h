@@ -30,12 +30,12 @@ struct LevelSink {
 /// sink  takes the levels of a grey image, whose runs are empty then; one of 1 bit is refused, or with `nearest` leaves the
 /// sink
 ///       as it is
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, std::uint64_t page = 0,
+Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, std::uint64_t page = 0,
                    LevelSink* sink = nullptr);
 Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path);
-Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
-Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
-Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
+Result<Image> read_bmp(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
+Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
+Result<Image> read_pbm(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
 
 /// Makes bits of a row of grey values, in place: set where a value is below the threshold.
 /// step  bytes a pixel; the first one of each counts, or the second where `second`

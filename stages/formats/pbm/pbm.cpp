@@ -101,7 +101,7 @@ bool read_all_at(int file, std::span<std::byte> to, std::uint64_t offset) {
 
 }  // namespace
 
-Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+Result<Image> read_pbm(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4) or PGM: {}; plan the layer again", path, why)};
   };

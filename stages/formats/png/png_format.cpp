@@ -353,7 +353,7 @@ bool read_rows(png_structp png, png_infop info, ReadState& source, int threshold
 
 }  // namespace
 
-Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
   const auto source = std::make_unique<ReadState>();
   source->file = file;
   source->bytes = bytes;

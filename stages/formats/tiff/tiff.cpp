@@ -316,7 +316,7 @@ std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, in
 
 }  // namespace
 
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page, LevelSink* sink) {
+Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page, LevelSink* sink) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path,

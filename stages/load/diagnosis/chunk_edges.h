@@ -184,7 +184,7 @@ class DegenerateFacets {
   explicit DegenerateFacets(std::size_t positions) : positions_(positions), found_(positions) {}
 
   /// first  the number of the first of these facets
-  void inspection(std::uint32_t first, std::span<const Triangle> facets) {
+  void inspect(std::uint32_t first, std::span<const Triangle> facets) {
     Collector here(positions_);
     for (std::size_t i = 0; i < facets.size(); ++i)
       if (!has_area(facets[i])) here.add(first + static_cast<std::uint32_t>(i), facets[i].a, facets[i].a);

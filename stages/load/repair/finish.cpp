@@ -65,30 +65,30 @@ bool is_flat(const Mesh& mesh) {
 
 /// Decides which facets of a file whose length contradicts its header are taken. `found` is kept up to date.
 /// errors  kInput: neither all of them nor those that the header speaks of
-Status settle_warning(const Source& source, const ReadWarning& uncertainty, Mesh& mesh, Census& found,
+Status settle_warning(const Source& source, const ReadWarning& warning, Mesh& mesh, Census& found,
                       std::vector<Note>& notes) {
   const std::span<const Triangle> all(mesh.triangles.data(), mesh.triangles.size());
-  if (uncertainty.claimed == 0 || uncertainty.claimed >= all.size()) {
-    if (!found.balanced) return source.error(uncertainty.error);
-    notes.push_back({false, uncertainty.note});
+  if (warning.claimed == 0 || warning.claimed >= all.size()) {
+    if (!found.balanced) return source.error(warning.error);
+    notes.push_back({false, warning.note});
     return {};
   }
-  const Census first = census(all.first(uncertainty.claimed), mesh.bounds.middle().z);
+  const Census first = census(all.first(warning.claimed), mesh.bounds.middle().z);
   // Behind a closed mesh, padding with zeros closes too, but encloses nothing.
   const bool rest_counts = std::fabs(found.volume_mm3 - first.volume_mm3) > 1e-9 * std::fabs(first.volume_mm3);
   bool whole = found.balanced && (!first.balanced || rest_counts);
   if (!whole && !first.balanced) {
     // Rubbish fits nowhere; facets fit as well as those before them.
-    whole = open_share(all) <= 1.001 * open_share(all.first(uncertainty.claimed));
+    whole = open_share(all) <= 1.001 * open_share(all.first(warning.claimed));
     if (whole)
       notes.push_back({true, fmt::format("the header says {} facets, the file holds {}, which fit together: all are read",
-                                         uncertainty.claimed, all.size())});
+                                         warning.claimed, all.size())});
   } else if (whole) {
-    notes.push_back({true, uncertainty.note});
+    notes.push_back({true, warning.note});
   }
   if (whole) return {};
-  notes.push_back({false, uncertainty.rest_left_out});
-  mesh.triangles.resize(uncertainty.claimed);
+  notes.push_back({false, warning.rest_left_out});
+  mesh.triangles.resize(warning.claimed);
   mesh.bounds = {};
   for (const Triangle& t : mesh.triangles) mesh.bounds.add(t.a), mesh.bounds.add(t.b), mesh.bounds.add(t.c);
   found = census(mesh.triangles, mesh.bounds.middle().z);
@@ -188,8 +188,8 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   for (Note& note : facets.notes) notes.push_back({note.repair, prefix + note.text});
   Census found = census(mesh.triangles, mesh.bounds.middle().z);
-  if (facets.uncertainty) {
-    const Status settled = settle_warning(source, *facets.uncertainty, mesh, found, notes);
+  if (facets.warning) {
+    const Status settled = settle_warning(source, *facets.warning, mesh, found, notes);
     if (!settled) return settled.error();
     mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   }

@@ -78,7 +78,7 @@ Result<Buffer<std::byte>> plot_png(const Plot& plot) {
   }
   for (const Plot::Image& image : plot.images)
     if (Status status = put(canvas, image); !status) return status.error();
-  for (const Plot::PlotLine& line : plot.lines) {
+  for (const Plot::Line& line : plot.lines) {
     if (Status status = stroke(canvas, line.points, 1, 1, colour_of(line.colour)); !status) return status.error();
   }
   for (const Plot::Dot& dot : plot.dots) {
