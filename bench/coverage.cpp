@@ -25,8 +25,8 @@ struct CoveredPart {
 /// Whether voxels that are full are pixels that are set, and empty ones not, but for one in a thousand: thin walls.
 bool agree(const RunsView& pixels, const LevelsView& levels, std::uint8_t top) {
   Runs full, some;
-  lower_bound(levels, top, full);
-  lower_bound(levels, 1, some);
+  threshold_levels(levels, top, full);
+  threshold_levels(levels, 1, some);
   const auto set = static_cast<double>(set_pixels(pixels));
   return static_cast<double>(set_pixels(full)) <= 1.001 * set && static_cast<double>(set_pixels(some)) >= 0.999 * set;
 }

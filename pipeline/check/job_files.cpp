@@ -66,7 +66,7 @@ Result<formats::Image> read_layer_image(const std::string& path, const ManifestH
                  fmt::format("{}: has pixels of {} drops, the job at most {}", path, maximum, head.max_drops)};
   }
   drops.resize(head.max_drops);
-  for (std::uint32_t k = 0; k < head.max_drops; ++k) min_level(levels, static_cast<std::uint8_t>(k + 1), drops[k]);
+  for (std::uint32_t k = 0; k < head.max_drops; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), drops[k]);
   return image;
 }
 

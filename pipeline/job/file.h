@@ -9,9 +9,9 @@
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 class File;
-}
+}  // namespace lamina
 
 namespace lamina::pipeline {
 

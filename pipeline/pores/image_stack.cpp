@@ -83,7 +83,7 @@ Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head,
   Levels levels;
   auto image = formats::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
   if (!image) return image.error();
-  min_level(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
+  threshold_levels(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
   return std::move(image->runs);
 }
 

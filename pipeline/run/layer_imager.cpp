@@ -62,7 +62,7 @@ Status LayerImager::position(const Layer& layer, const PlacedImages& part, Image
     const auto levels = part.images->levels(number, full);
     if (!levels) return levels.error();
     formats::position(*levels, part.position, work.drops.zones);
-    min_level(work.drops.zones, 1, work.section);
+    threshold_levels(work.drops.zones, 1, work.section);
     filled = sum_of_levels(work.drops.zones);
   } else {
     const auto read = part.images->read(number);
@@ -94,7 +94,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
     if (const std::uint8_t full = images.dose.full(); full > 0) {
       larger(work.drops.shares, work.drops.zones, work.drops.levels);
       std::swap(work.drops.shares, work.drops.levels);
-      min_level(work.drops.zones, dose::half_of(full), work.section);
+      threshold_levels(work.drops.zones, dose::half_of(full), work.section);
     }
     const DoseZones& zones = images.dose.zones();
     if (zones.several()) work.zones.deposit(zones.of_part(part.part), work.section, work.runs);
@@ -111,7 +111,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   }
   if (!shares_voxels() || plan_.scene->images.empty()) return {};
   dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
-  min_level(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
+  threshold_levels(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
   own_voxels(work);
   return {};
 }
@@ -416,7 +416,7 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
     const bool levels = formats::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
     if (levels && images.dose.max_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
   } else if (plan_.job.levels > 0) {
-    min_level(work.drops.shares, 1, work.runs);
+    threshold_levels(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);

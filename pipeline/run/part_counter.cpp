@@ -67,7 +67,7 @@ void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64
     drops[zone] = sum_of_levels(work.drops.levels, work.zones.image[zone]);
   for (std::size_t i = 0; full_ > 0 && i < work.drops.deposited.size(); ++i) {
     Runs voxels;
-    lower_bound(work.drops.deposited[i].shares, 1, voxels);
+    threshold_levels(work.drops.deposited[i].shares, 1, voxels);
     drops[work.drops.deposited[i].zone] += sum_of_levels(work.drops.levels, voxels);
   }
   drops = shared(record.drops, drops);

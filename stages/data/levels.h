@@ -102,7 +102,7 @@ inline std::uint64_t sum_of_levels(const LevelsView& image, const RunsView& mask
 }
 
 /// The pixels whose level is at least `least` (> 0): the plane of the drop of that number. No branch waits for a level.
-inline void min_level(const LevelsView& image, std::uint8_t minimum, Runs& plane) {
+inline void threshold_levels(const LevelsView& image, std::uint8_t minimum, Runs& plane) {
   const std::uint32_t rows = image.rows();
   plane.columns = image.columns;
   plane.row_offset.resize(std::size_t{rows} + 1);

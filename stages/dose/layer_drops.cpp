@@ -57,7 +57,7 @@ DropBound bound_of(const DropRules& rules, const DropSizes& sizes) {
 }
 
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work) {
-  min_level(work.shares, half_of(full), second);
+  threshold_levels(work.shares, half_of(full), second);
   const Difference found = difference(image, second);
   std::swap(image, second);
   return found;
@@ -68,7 +68,7 @@ namespace {
 /// Shell and core in work.zones, by the levels in work.shares.
 void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Runs& second, DropWork& work) {
   if (rules.shell.half_width.empty()) {
-    min_level(work.shares, 1, second);
+    threshold_levels(work.shares, 1, second);
   } else {
     erode(image, rules.shell, second);
   }
@@ -79,7 +79,7 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
 void make_planes(const DropRules& rules, Runs& image, DropWork& work) {
   work.planes.resize(rules.max_drops);
   for (std::uint32_t drop = 0; drop < rules.max_drops; ++drop) {
-    min_level(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
+    threshold_levels(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
   }
   image.row_offset = work.planes[0].row_offset;
   image.change = work.planes[0].change;
@@ -169,7 +169,7 @@ void drops_of_materials(std::uint32_t max_drops, bool shared, std::span<Runs> im
     if (!shared && max_drops == 1) levels_of(image[m], 1, drops);
     if (!shared && max_drops > 1) within(work.levels, image[m], drops);
     Runs* const planes = &work.material_planes[m * max_drops];
-    for (std::uint32_t drop = 0; drop < max_drops; ++drop) min_level(drops, static_cast<std::uint8_t>(drop + 1), planes[drop]);
+    for (std::uint32_t drop = 0; drop < max_drops; ++drop) threshold_levels(drops, static_cast<std::uint8_t>(drop + 1), planes[drop]);
     image[m] = planes[0];
   }
 }

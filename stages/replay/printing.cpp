@@ -633,17 +633,17 @@ bool Printing::head_at_safe() const {
   return std::hypot(x - safe[0], y - safe[1]) < 1e-3;
 }
 
-void Printing::check_way(Part part, double mm_s) {
+void Printing::check_way(MovingPart part, double mm_s) {
   const auto& powder = profile().powder;
   const bool gantry = roller_on_gantry();
   const auto at_roller = [&] {
     return fmt::format("while the roller is at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]);
   };
-  if (part == Part::kHead) {
+  if (part == MovingPart::kHead) {
     if (!gantry && !roller_at_home()) wrong_powder(fmt::format("the head moves {}", at_roller()));
     return;
   }
-  const bool roller = part == Part::kRoller;
+  const bool roller = part == MovingPart::kRoller;
   if (roller && !head_at_safe()) {
     wrong_powder(fmt::format("the roller moves while the head is at {:g}, {:g} mm, not at its safe place", (*head_mm_)[0],
                              (*head_mm_)[1]));

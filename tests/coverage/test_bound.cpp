@@ -31,7 +31,7 @@ void expect_layer_within(const coverage::Coverage& coverage, const Layer& layer,
   EXPECT_LE(image.level.size(), bound.runs);
   Runs plane;
   for (std::uint32_t minimum = 1; minimum < levels; ++minimum) {
-    lower_bound(image, static_cast<std::uint8_t>(minimum), plane);
+    threshold_levels(image, static_cast<std::uint8_t>(minimum), plane);
     EXPECT_LE(plane.change.size(), bound.edges) << "of level " << minimum << " and more";
   }
   if (report.inspected == 0) {

@@ -320,7 +320,7 @@ TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyNextToItsBoundary) {
   for (const Layer& layer : layers_of(100'000, 59, 50'000)) {
     coverage->layer(layer, scratch, levels);
     rasterizer->layer(raster::Engine::kContours, layer.plane(), of_pixels, pixels);
-    lower_bound(levels, 1, full);
+    threshold_levels(levels, 1, full);
     const auto of_bitmap = bits_of(pixels), of_shares = bits_of(full);
     for (int r = 1; r + 1 < static_cast<int>(grid.rows()); ++r) {
       for (int c = 1; c + 1 < static_cast<int>(grid.columns()); ++c) {

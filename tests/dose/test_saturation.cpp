@@ -63,7 +63,7 @@ void expect_one_drop(const Levels& shares, std::span<const Drops24> drops, std::
   Levels levels;
   Runs plane, image{7, {0, 1}, {3}};
   dither(shares, drops, layer, scratch, levels);
-  lower_bound(levels, 1, plane);
+  threshold_levels(levels, 1, plane);
   EXPECT_EQ(set_pixels(plane), sum_of_levels(levels));
   dither_one(shares, drops, layer, scratch, image);
   EXPECT_EQ(image.columns, plane.columns);

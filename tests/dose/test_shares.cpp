@@ -58,7 +58,7 @@ Levels random_shares(std::uint32_t seed, std::uint32_t full) {
 
 Runs random_mask(std::uint32_t seed) {
   Runs mask;
-  lower_bound(random_shares(seed, 2), 1, mask);
+  threshold_levels(random_shares(seed, 2), 1, mask);
   return mask;
 }
 

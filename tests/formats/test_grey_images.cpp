@@ -232,7 +232,7 @@ TEST(GreyImages, ArePlacedAndMergedPixelByPixel) {
     for (std::size_t i = 1; i < out.level.size(); ++i)  // joined where they touch
       EXPECT_FALSE(out.change[2 * i] == out.change[2 * i - 1] && out.level[i] == out.level[i - 1] && out.change[2 * i] > 0);
     Runs mask;
-    lower_bound(second, 1, mask);
+    threshold_levels(second, 1, mask);
     EXPECT_EQ(sum_of_levels(first, mask), within);
   }
   const Pixels image = picture(31, 23);

@@ -60,7 +60,7 @@ TEST_P(LevelFiles, GiveTheLevelsBack) {
       EXPECT_NEAR(read->dpi_y, 300, 0.01);
       EXPECT_TRUE(back.change == image.change && back.level == image.level && back.row_offset == image.row_offset);
       Runs any;
-      lower_bound(image, 1, any);
+      threshold_levels(image, 1, any);
       EXPECT_TRUE(read->runs.change == any.change);
     }
   }
@@ -78,7 +78,7 @@ TEST_P(LevelFiles, AreHalvesToAReaderThatTakesTheDarkPixels) {
     const auto read = formats::dark_pixels(path(), 128);
     ASSERT_TRUE(read.ok()) << read.error().message;
     Runs half;
-    lower_bound(image, static_cast<std::uint8_t>((full + 1) / 2), half);
+    threshold_levels(image, static_cast<std::uint8_t>((full + 1) / 2), half);
     EXPECT_TRUE(read->runs.change == half.change);
   }
 }

@@ -91,7 +91,7 @@ bool read_grey(std::string_view bytes) {
   check_levels(half, 1);
   check_levels(levels, full);
   Runs set;
-  lower_bound(half, 1, set);
+  threshold_levels(half, 1, set);
   law(same(set, dark->runs), "half and more is not what is below 128");
   const auto kind = formats::kind_of(path, page);
   law(kind.ok() && kind->bits >= 1 && kind->bits <= 16, "an image that is read is of no kind");

@@ -85,7 +85,7 @@ TEST(OpenImageIO, SeesLevelsAsGreyInEveryFormatThatCarriesThem) {
       levels.end_row();
     }
     Runs size;
-    lower_bound(levels, 1, size);
+    threshold_levels(levels, 1, size);
     for (const LevelFormat& format : level_formats()) {
       SCOPED_TRACE(std::string(format.id) + ", " + std::to_string(columns) + " columns");
       const std::string path = folder / ("grey" + std::string(format.extension));

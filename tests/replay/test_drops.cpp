@@ -58,7 +58,7 @@ TEST_P(Drops, AreReplayedDropForDrop) {
     });
     const Levels levels = random_drops(resolved.grid.image, 7);
     std::array<Runs, 3> planes;
-    for (std::uint8_t k = 0; k < 3; ++k) lower_bound(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+    for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
     const auto program = program_of_drops(resolved, views, numbers);
@@ -100,7 +100,7 @@ TEST_P(GreyDrops, AreReplayedDropForDrop) {
     ASSERT_EQ(resolved.grid.sweep_drops, allowed);
     const Levels levels = random_drops(resolved.grid.image, maximum);
     std::array<Runs, 3> planes;
-    for (std::uint8_t k = 0; k < 3; ++k) lower_bound(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+    for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
     const auto program = program_of_drops(resolved, views, numbers);
@@ -148,7 +148,7 @@ TEST_P(GreyDrops, OfBlockedNozzlesAreMovedAndMadeUp) {
     ASSERT_GE(resolved.grid.sweep_drops, 2u);
     const Levels levels = random_drops(resolved.grid.image, 7);
     std::array<Runs, 3> planes;
-    for (std::uint8_t k = 0; k < 3; ++k) lower_bound(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+    for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
     const auto program = program_of_drops(resolved, views, numbers);
@@ -192,7 +192,7 @@ std::string five_and_six(const pipeline::ResolvedMachine& resolved) {
   levels.end_row();
   levels.end_row();
   std::array<Runs, 6> planes;
-  for (std::uint8_t k = 0; k < 6; ++k) lower_bound(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+  for (std::uint8_t k = 0; k < 6; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
   const std::vector<RunsView> views(planes.begin(), planes.end());
   std::vector<std::uint32_t> numbers;
   return program_of_drops(resolved, views, numbers).text;

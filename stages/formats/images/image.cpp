@@ -57,7 +57,7 @@ Result<Image> image(const std::string& path, std::uint8_t full) {
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels) {
   LevelSink sink{full, levels};
   auto image = read_image(path, 0, 0, &sink);
-  if (image) lower_bound(levels, 1, image->runs);
+  if (image) threshold_levels(levels, 1, image->runs);
   return image;
 }
 

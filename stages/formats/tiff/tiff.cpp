@@ -118,7 +118,7 @@ class GreyEncoder : public LevelEncoder {
   void tag(const LayerTags& tags) override { text_.take(tags); }
 
   Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) override {
-    const Frame frame{image.columns, image.rows(), dpi_x, dpi_y};
+    const TagFrame frame{image.columns, image.rows(), dpi_x, dpi_y};
     if (Status status = check_size(frame.columns, frame.rows); !status) return status;
     if (full == 0 || darkest_ % full != 0) {
       return cannot_hold(frame.columns, frame.rows, fmt::format("{} levels are no whole steps of {} bits", full + 1, bits_));

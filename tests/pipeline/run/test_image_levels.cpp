@@ -138,7 +138,7 @@ TEST_F(ImageLevels, AreMergedWithMeshesByTheLargerShare) {
     const Levels a = levels("one/" + file, 15), b = levels("moved/" + file, 15), c = levels("overlap/" + file, 15);
     for (std::uint8_t minimum = 1; minimum <= 15; ++minimum) {
       Runs in_a, in_b, in_c;
-      lower_bound(a, minimum, in_a), lower_bound(b, minimum, in_b), lower_bound(c, minimum, in_c);
+      threshold_levels(a, minimum, in_a), threshold_levels(b, minimum, in_b), threshold_levels(c, minimum, in_c);
       std::vector<bool> expected(in_a.columns);
       for (std::uint32_t r = 0; r < in_a.view().rows(); ++r) {
         expected.assign(in_a.columns, false);
@@ -194,7 +194,7 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
       for (const LayerRecord& record : shares.layers) {
         const auto full = static_cast<std::uint8_t>(std::stoi(levels) - 1);
         Runs set;
-        lower_bound(this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
+        threshold_levels(this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
                     static_cast<std::uint8_t>((full + 1) / 2), set);
         EXPECT_EQ(half.layers[record.layer.index].set_pixels, set_pixels(set));
       }
@@ -221,7 +221,7 @@ TEST_F(ImageLevels, ConvertToTheirFormatsAndBack) {
   for (const std::string& file : test::files_below(folder_.path() / "bits")) {
     const std::string stem = fs::path(file).stem().string();
     Runs full;
-    lower_bound(levels("two/" + stem + ".tif", 1), 1, full);
+    threshold_levels(levels("two/" + stem + ".tif", 1), 1, full);
     EXPECT_EQ(set_pixels(full), set_pixels(formats::image(folder_ / ("bits/" + stem + ".bmp"))->runs));
   }
   test::expect_refused("convert as4 -o no --format tiff-g4 --levels 4", 2, "--levels: is of grey formats", folder_);
