@@ -18,7 +18,7 @@ namespace lamina::pipeline {
 namespace {
 
 // 0 or the reason.
-int write_all(int file, std::string_view text) { return write_all(file, std::as_bytes(std::span(text))); }
+int write_all(int file, std::string_view text) { return lamina::write_all(file, std::as_bytes(std::span(text))); }
 
 std::atomic<bool> interrupted{false}, keeping{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else

@@ -28,8 +28,6 @@ namespace {
 namespace fs = std::filesystem;
 using view::report::HeldLayers;
 using view::report::PageData;
-using view::report::ReportLayers;
-using view::report::ShownView;
 
 constexpr std::uint32_t kChunk = 64;  // layers read in parallel
 
@@ -87,7 +85,7 @@ std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
 }
 
 /// Reads every layer; codes that fit the page go to `held`.
-Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& report_warnings, HeldLayers& held) {
+Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& report_warnings, view::report::HeldLayers& held) {
   struct First {
     PixelWindow window;
     Buffer<std::byte> code;
@@ -164,7 +162,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   auto detected = see_layers(*source, report_warnings, held);
   if (!detected) return detected.error();
-  view::report::add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
+  add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
   detected->deposited = options.deposited;
   detected->deposited_svg = options.deposited_svg;
   if (source->machine) {
@@ -180,15 +178,15 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
     if (!built) return built.error();
     views = std::move(*built);
   }
-  const std::string head = view::report::head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file},
-                                                   source->grid, *detected, held, views);
+  const std::string head =
+      head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file}, source->grid, *detected, held, views);
   std::vector<PageData> data;
   for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
   for (auto& [position, code] : held.layers()) data.push_back({fmt::format("r{}", position), std::move(code)});
   report.layers = static_cast<std::uint32_t>(manifest.layers.size());
   report.held = static_cast<std::uint32_t>(held.layers().size());
   report.stride = held.stride();
-  report.page = view::report::make_page("lamina: " + view::report::page_title(manifest.head), head, data);
+  report.page = view::report::make_page("lamina: " + page_title(manifest.head), head, data);
   return report;
 }
 

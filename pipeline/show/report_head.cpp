@@ -6,7 +6,7 @@
 #include "stages/support/text/escape.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::pipeline::report {
+namespace lamina::pipeline {
 namespace {
 
 Json part_json(const PartSummary& part) {
@@ -54,7 +54,7 @@ Json layers_json(const Manifest& manifest, const ReportLayers& detected) {
 std::string page_title(const ManifestHead& head) { return head.parts.empty() ? "a job" : title_of(head.parts); }
 
 std::string head_json(const Manifest& manifest, const ReportManifest& file, const PixelGrid& grid, const ReportLayers& detected,
-                      HeldLayers& held, const std::vector<ShownView>& views) {
+                      view::report::HeldLayers& held, const std::vector<ShownView>& views) {
   const ManifestHead& head = manifest.head;
   const double dpi_x = grid.x.dpi(), dpi_y = grid.y.dpi();
   Json json = {{"title", page_title(head)},
@@ -104,4 +104,4 @@ std::string head_json(const Manifest& manifest, const ReportManifest& file, cons
   return json_text(json);
 }
 
-}  // namespace lamina::pipeline::report
+}  // namespace lamina::pipeline

@@ -13,7 +13,7 @@
 #include "stages/support/hash/hash.h"
 #include "stages/view/report/held_layers.h"
 
-namespace lamina::pipeline::report {
+namespace lamina::pipeline {
 
 /// A view in the page: its entry in the head, and its pixels.
 struct ShownView {
@@ -60,6 +60,6 @@ std::string page_title(const ManifestHead& head);
 /// grid  of the layers' pixels
 /// cost  O(layers)
 std::string head_json(const Manifest& manifest, const ReportManifest& file, const PixelGrid& grid, const ReportLayers& detected,
-                      HeldLayers& held, const std::vector<ShownView>& views);
+                      view::report::HeldLayers& held, const std::vector<ShownView>& views);
 
-}  // namespace lamina::pipeline::report
+}  // namespace lamina::pipeline

@@ -7,7 +7,7 @@
 #include "pipeline/manifest/inspection_file.h"
 #include "stages/support/text/json_value.h"
 
-namespace lamina::pipeline::report {
+namespace lamina::pipeline {
 namespace {
 
 struct Shown {
@@ -83,4 +83,4 @@ void add_inspection(const std::string& directory, const ManifestHead& head, bool
   detected.positions = std::move(with.positions);
 }
 
-}  // namespace lamina::pipeline::report
+}  // namespace lamina::pipeline

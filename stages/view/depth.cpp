@@ -29,7 +29,7 @@ ThreeViews::ThreeViews(const PixelGrid& grid, const PixelWindow& window, Nm bott
 
 void ThreeViews::inspect(const RunsView& runs, std::vector<std::uint8_t>& cells) const {
   cells.resize(std::size_t{columns_} * rows_);
-  coverage(runs, window_, columns_, cells);
+  box_coverage(runs, window_, columns_, cells);
 }
 
 void ThreeViews::add(const Layer& layer, const std::vector<std::uint8_t>& cells) {

@@ -43,7 +43,7 @@ TEST(Coverage, IsTheShareOfTheAreaRegardlessOfTheScale) {
     window.bottom = window.top + 1 + testing::below(random, rows - window.top);
     const std::uint32_t to_columns = 1 + testing::below(random, 30), to_rows = 1 + testing::below(random, 30);
     std::vector<std::uint8_t> result(std::size_t{to_columns} * to_rows);
-    coverage(runs, window, to_columns, result);
+    box_coverage(runs, window, to_columns, result);
     const std::vector<double> expected = shares_by_pixels(runs, window, to_columns, to_rows);
     for (std::size_t i = 0; i < result.size(); ++i) ASSERT_NEAR(result[i], expected[i] * 255, 0.5 + 1e-6) << seed;
   }
@@ -54,9 +54,9 @@ TEST(Coverage, AFullImageIsFullAndAnEmptyOneEmpty) {
   const Runs full = testing::image_of(side, std::vector<testing::Row>(side, {0, side}));
   const Runs empty = testing::image_of(side, std::vector<testing::Row>(side));
   std::vector<std::uint8_t> result(500 * 377);
-  coverage(full, {0, side, 0, side}, 500, result);
+  box_coverage(full, {0, side, 0, side}, 500, result);
   EXPECT_EQ(std::count(result.begin(), result.end(), 255), 500 * 377);
-  coverage(empty, {0, side, 0, side}, 500, result);
+  box_coverage(empty, {0, side, 0, side}, 500, result);
   EXPECT_EQ(std::count(result.begin(), result.end(), 0), 500 * 377);
 }
 
@@ -81,7 +81,7 @@ TEST(Coverage, OfLevelsIsTheMeanOfTheirShares) {
       for (std::size_t i = 0; i < shares.size(); ++i) expected[i] += shares[i];
     }
     std::vector<std::uint8_t> result(std::size_t{to_columns} * to_rows);
-    coverage(levels, full, window, to_columns, result);
+    box_coverage(levels, full, window, to_columns, result);
     for (std::size_t i = 0; i < result.size(); ++i) ASSERT_NEAR(result[i], expected[i] / full * 255, 0.5 + 1e-6) << seed;
   }
 }

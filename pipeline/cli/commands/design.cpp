@@ -87,11 +87,11 @@ std::string read_pore(std::string_view text, segment::PoreTarget& target) {
 }
 
 /// A number, times what it is told in.
-auto number_reader(const Limits& limits, double unit, std::optional<double> segment::PoreTarget::*target) {
-  return [limits, unit, target](std::string_view text, segment::PoreTarget& target) {
+auto number_reader(const Limits& limits, double unit, std::optional<double> segment::PoreTarget::*member) {
+  return [limits, unit, member](std::string_view text, segment::PoreTarget& target) {
     double value = 0;
     std::string wrong = read_value(text, limits, value);
-    if (wrong.empty()) target.*target = value * unit;
+    if (wrong.empty()) target.*member = value * unit;
     return wrong;
   };
 }

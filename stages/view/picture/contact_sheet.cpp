@@ -117,7 +117,7 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
 
   const Status status = for_each_image(request, read, [&](std::size_t index, const LevelsView& levels) {
     Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
-    coverage(levels, request.maximum, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
+    box_coverage(levels, request.maximum, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
     const int cell = static_cast<int>(index);
     const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;
     canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, request.layers[index].warns ? kWarning : kInk);

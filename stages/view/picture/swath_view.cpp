@@ -54,7 +54,7 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   const PixelWindow window{0, view.grid.columns(), 0, view.grid.rows()};
   Buffer<std::uint8_t> shares(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
   const auto paint = [&](const LevelsView& levels, Colour ink) {
-    coverage(levels, view.maximum, window, static_cast<std::uint32_t>(wide), shares);
+    box_coverage(levels, view.maximum, window, static_cast<std::uint32_t>(wide), shares);
     for (int row = 0; row < high; ++row) {
       canvas.paint(left, top + row, wide,
                    std::span(shares).subspan(static_cast<std::size_t>(row) * static_cast<std::size_t>(wide),
