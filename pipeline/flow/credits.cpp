@@ -55,7 +55,7 @@ void Credits::take_back(LayerState& layer) {
 }
 
 void Credits::end(LayerState& layer) {
-  if (layer.ticket.position >= recorded_from_) budget_.hold_extra(layer.neighbour), recorded_from_ = layer.ticket.position;
+  if (layer.ticket.position >= recorded_from_) budget_.hold_extra(layer.extra), recorded_from_ = layer.ticket.position;
   if (layer.loan) budget_.give_back(*layer.loan, steps_.bytes_held(layer.ticket.work));
   free_.push_back(layer.ticket.record);
   ++recorded_;

@@ -27,7 +27,7 @@ struct LayerState {
   bool needs_more = false;  // the next step has requested `more` bytes
   std::optional<Budget::Loan> loan = {};
   std::uint64_t estimate = 0, more = 0, held = 0;  // bytes: for the admission; from the next step on; the largest so far
-  std::uint64_t neighbour = 0;                     // bytes that the recorder keeps, once recorded
+  std::uint64_t extra = 0;                     // bytes that the recorder keeps, once recorded
 };
 
 /// Lends scratch and bytes to layers: in order while their estimated bytes fit the budget. What finished layers held corrects

@@ -12,7 +12,11 @@
 #include "pipeline/job/fill.h"
 #include "stages/data/saturation.h"
 #include "stages/data/status.h"
-#include "stages/support/text/toml.h"
+
+namespace lamina {
+struct TextPosition;
+struct TomlValue;
+}  // namespace lamina
 
 namespace lamina::pipeline {
 

@@ -88,7 +88,7 @@ Status check_coverage(std::vector<Shard>& shards) {
 }
 
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
-  const auto linked = bring_file(from.string(), to.string());
+  const auto linked = lamina::bring_file(from.string(), to.string());
   if (!linked) return linked.error();
   ++(*linked ? report.linked : report.copied);
   return {};
