@@ -5,17 +5,17 @@
 namespace lamina::pipeline {
 namespace {
 
-Json json_of(const Spot& spot) {
+Json json_of(const checks::Spot& spot) {
   return {{"x_mm", spot.x_mm}, {"y_mm", spot.y_mm}, {"z_mm", spot.z_mm}, {"layer", spot.layer}};
 }
 
-Json json_of(const Found& found, const std::string& amount) {
+Json json_of(const checks::Found& found, const std::string& amount) {
   Json json{{"count", found.count}};
   if (found.count == 0) return json;
   json[amount] = found.amount;
   json["largest_" + amount] = found.largest;
   json["largest_at"] = json_of(found.spot);
-  for (const Location& position : found.positions) {
+  for (const checks::Location& position : found.positions) {
     Json& one = json["locations"].emplace_back(json_of(position.spot));
     one["last_layer"] = position.last_layer;
     one["box_mm"] = position.box_mm;
@@ -26,7 +26,7 @@ Json json_of(const Found& found, const std::string& amount) {
 
 }  // namespace
 
-Json json_of(const Findings& findings, double min_mm) {
+Json json_of(const checks::Findings& findings, double min_mm) {
   Json json{{"layers", findings.layers},
             {"min_wall_mm", min_mm},
             {"islands", json_of(findings.islands, "mm2")},

@@ -7,6 +7,6 @@
 namespace lamina::pipeline {
 
 /// min_mm  least width of what is not thin
-Json json_of(const Findings& findings, double min_mm);
+Json json_of(const checks::Findings& findings, double min_mm);
 
 }  // namespace lamina::pipeline

@@ -33,7 +33,7 @@ class BeadObserver : public MoveObserver {
     summary.volume_mm3 = totals.volume_mm3 - totals.auxiliary_mm3;
     summary.results.emplace_back(
         "beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
-                             (totals.bead_mm - totals.adjacent_mm) / 1000, summary.volume_mm3 / 1000,
+                             (totals.bead_mm - totals.auxiliary_mm) / 1000, summary.volume_mm3 / 1000,
                              readable_count(totals.travels), totals.travel_mm / 1000));
     const char* none = plan_.moves->profile.machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
                        : plan_.range[0] > 0 ? "none: --layers leaves the first layer out"
@@ -41,7 +41,7 @@ class BeadObserver : public MoveObserver {
     summary.results.emplace_back(
         "skirt", totals.auxiliary_moves == 0
                      ? std::string(none)
-                     : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts", totals.adjacent_mm,
+                     : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts", totals.auxiliary_mm,
                                    totals.auxiliary_mm3, totals.auxiliary_filament_mm));
   }
 
@@ -116,12 +116,12 @@ class FilamentObserver : public MoveObserver {
     facts["travels"] = totals.travels;
     facts["retractions"] = totals.retractions;
     facts["stored_points"] = sums_.stored_points;
-    facts["bead_mm"] = totals.bead_mm - totals.adjacent_mm;
+    facts["bead_mm"] = totals.bead_mm - totals.auxiliary_mm;
     facts["travel_mm"] = totals.travel_mm;
     facts["filament_mm"] = totals.filament_mm;
     facts["filament_g"] = filament_g;
     facts["skirt"] = {{"moves", totals.auxiliary_moves},
-                      {"bead_mm", totals.adjacent_mm},
+                      {"bead_mm", totals.auxiliary_mm},
                       {"volume_mm3", totals.auxiliary_mm3},
                       {"filament_mm", totals.auxiliary_filament_mm}};
     facts["print_seconds"] = totals.seconds;

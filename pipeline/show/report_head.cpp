@@ -9,7 +9,7 @@
 namespace lamina::pipeline {
 namespace {
 
-Json part_json(const PartSummary& part) {
+Json shown_part_json(const PartSummary& part) {
   const auto point = [](const Point3& p) { return Json{mm(p.x), mm(p.y), mm(p.z)}; };
   Json json = {{"path", part.path},
                {"copies", part.copies},
@@ -82,7 +82,7 @@ std::string head_json(const Manifest& manifest, const ReportManifest& file, cons
                {"views", Json::object()},
                {"reasons", Json::array()},
                {"embedded", Json::array()}};
-  for (const PartSummary& part : head.parts) json["parts"].push_back(part_json(part));
+  for (const PartSummary& part : head.parts) json["parts"].push_back(shown_part_json(part));
   for (const Warning& warning : detected.warnings) {
     json["warnings"].push_back({{"code", warning.code}, {"text", warning.text}});
     if (warning.layer) json["warnings"].back()["layer"] = *warning.layer;
