@@ -66,7 +66,7 @@ std::string connected_text(const pores::Connected& connected) {
 }
 
 Json as_json(const pores::Distribution& values) {
-  return {{"mean", values.mean}, {"deviation", values.deviation}, {"min", values.minimum}, {"max", values.maximum},
+  return {{"mean", values.mean}, {"deviation", values.deviation}, {"least", values.minimum}, {"most", values.maximum},
           {"bin", values.bin},   {"counts", values.bins}};
 }
 
@@ -83,32 +83,32 @@ std::string sections_text(const LayerSections& sections) {
 
 }  // namespace
 
-std::string as_text(const PoreAnalysis& analysis) {
-  std::string text = "connected " + connected_text(analysis.connected) + "\n";
+std::string as_text(const PoreAnalysis& inspection) {
+  std::string text = "connected " + connected_text(inspection.connected) + "\n";
   for (std::size_t a = 0; a < 3; ++a) {
-    const pores::Tortuosity& way = analysis.tortuosities[a];
+    const pores::Tortuosity& way = inspection.paths[a];
     text += way.reached == 0
                 ? fmt::format("ways      along {}: none leads through\n", "xyz"[a])
                 : fmt::format("ways      along {}: {:.3f} times as long as the window, {:.3f} to {:.3f}; throat {:.3f} mm\n",
-                              "xyz"[a], way.mean, way.minimum, way.maximum, analysis.throat_mm[a]);
+                              "xyz"[a], way.mean, way.minimum, way.maximum, inspection.throat_mm[a]);
   }
-  return text + sections_text(analysis.sections);
+  return text + sections_text(inspection.sections);
 }
 
-void add_to(const PoreAnalysis& analysis, Json& json) {
-  json["connected"] = {{"bonded", analysis.connected.bonded_share()},
-                       {"unbonded", analysis.connected.unbonded_share()},
+void add_to(const PoreAnalysis& inspection, Json& json) {
+  json["connected"] = {{"bonded", inspection.connected.bonded_share()},
+                       {"unbonded", inspection.connected.unbonded_share()},
                        {"bond_gap_mm", segment::kBondGap}};
-  json["tortuosity"] = Json::array();
+  json["ways"] = Json::array();
   for (std::size_t a = 0; a < 3; ++a) {
-    const pores::Tortuosity& way = analysis.tortuosities[a];
-    json["tortuosity"].push_back({{"along", std::string(1, "xyz"[a])},
-                                  {"tortuosity", way.mean},
-                                  {"min", way.minimum},
-                                  {"max", way.maximum},
-                                  {"throat_mm", analysis.throat_mm[a]}});
+    const pores::Tortuosity& way = inspection.paths[a];
+    json["ways"].push_back({{"along", std::string(1, "xyz"[a])},
+                            {"tortuosity", way.mean},
+                            {"least", way.minimum},
+                            {"most", way.maximum},
+                            {"throat_mm", inspection.throat_mm[a]}});
   }
-  const LayerSections& sections = analysis.sections;
+  const LayerSections& sections = inspection.sections;
   json["pores"] = {{"sections", sections.layers},
                    {"section_mm", sections.side_mm},
                    {"voxel_um", sections.voxel_um},
@@ -125,7 +125,7 @@ std::string as_text(const PrintAnalysis& print) {
           : ", of a filament whose density nothing tells; give --density";
   return fmt::format("fed       {:.1f} mm3 in {} layer{}{}\nbeads     {}\n", print.fed_mm3, print.layers,
                      print.layers == 1 ? "" : "s", weight, print.beads) +
-         as_text(print.choice, print.pores) + as_text(print.analysis);
+         as_text(print.choice, print.pores) + as_text(print.inspection);
 }
 
 Json as_json(const PrintAnalysis& print) {
@@ -139,7 +139,7 @@ Json as_json(const PrintAnalysis& print) {
   }
   json["layers"] = print.layers;
   json["beads"] = print.beads;
-  add_to(print.analysis, json);
+  add_to(print.inspection, json);
   return json;
 }
 
@@ -168,20 +168,20 @@ void add_pores(const std::string& path, Summary& summary) {
   if (!print) return summary.results.emplace_back("void", print.error().message), void();
   const Box& box = print->choice.window.box;
   const auto& repeats = print->choice.window.periodic;
-  const PoreAnalysis& analysis = print->analysis;
+  const PoreAnalysis& inspection = print->inspection;
   summary.results.emplace_back(
-      "void", fmt::format("{:.2f} % of {:.3f} x {:.3f} x {:.3f} mm in the middle{}; connected {}",
-                          100 * print->pores.porosity.total(), mm(box.width()), mm(box.depth()), mm(box.height()),
-                          repeats[0] && repeats[1] && repeats[2] ? ", which repeat" : "", connected_text(analysis.connected)));
-  std::string tortuosities = fmt::format("surface {:.2f} mm2 a mm3", print->pores.surface_per_mm);
+      "void",
+      fmt::format("{:.2f} % of {:.3f} x {:.3f} x {:.3f} mm in the middle{}; connected {}", 100 * print->pores.porosity.total(),
+                  mm(box.width()), mm(box.depth()), mm(box.height()),
+                  repeats[0] && repeats[1] && repeats[2] ? ", which repeat" : "", connected_text(inspection.connected)));
+  std::string paths = fmt::format("surface {:.2f} mm2 a mm3", print->pores.surface_per_mm);
   for (std::size_t a = 0; a < 3; ++a) {
-    tortuosities += analysis.tortuosities[a].reached == 0
-                        ? fmt::format("; nothing leads along {}", "xyz"[a])
-                        : fmt::format("; along {} ways {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
-                                      analysis.tortuosities[a].mean, analysis.throat_mm[a]);
+    paths += inspection.paths[a].reached == 0 ? fmt::format("; nothing leads along {}", "xyz"[a])
+                                              : fmt::format("; along {} ways {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
+                                                            inspection.paths[a].mean, inspection.throat_mm[a]);
   }
-  summary.results.emplace_back("tortuosity", std::move(tortuosities));
-  const pores::PoreSizes& sizes = analysis.sections.sizes;
+  summary.results.emplace_back("ways", std::move(paths));
+  const pores::PoreSizes& sizes = inspection.sections.sizes;
   if (!sizes.pores.empty()) {
     summary.results.emplace_back("widths", histogram_line(histogram(sizes, false)));
     summary.results.emplace_back("lengths", histogram_line(histogram(sizes, true)));
