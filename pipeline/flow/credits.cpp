@@ -1,7 +1,5 @@
 #include "pipeline/flow/credits.h"
 
-#include <algorithm>
-
 namespace lamina::pipeline {
 
 using Phase = LayerState::Phase;
@@ -9,7 +7,7 @@ using Phase = LayerState::Phase;
 Credits::Credits(const LayerSteps& steps, const FlowLimits& limits, const std::function<bool()>& stopped)
     : steps_(steps),
       stopped_(stopped),
-      budget_(limits.budget_bytes, limits.max_in_flight, {steps.bytes_held, steps.let_go}),
+      budget_(limits.budget_bytes, limits.max_in_flight, steps.let_go),
       layers_(limits.record_slots) {
   for (std::uint32_t slot = limits.record_slots; slot-- > 0;) free_.push_back(slot);
   waiting_.reserve(limits.record_slots);
@@ -29,7 +27,10 @@ Credits::Leaving Credits::begin(std::uint32_t position) {
 Credits::Leaving Credits::receive(LayerState& layer) {
   leaving_.clear();
   if (layer.phase == Phase::kRecorded) {
-    end(layer);
+    if (layer.ticket.position >= recorded_from_) budget_.hold_extra(layer.extra), recorded_from_ = layer.ticket.position;
+    if (layer.loan) budget_.give_back(*layer.loan, steps_.bytes_held(layer.ticket.work));
+    free_.push_back(layer.ticket.record);
+    ++recorded_;
   } else if (layer.phase == Phase::kDone) {
     take_back(layer);
     leaving_.push_back(&layer);
@@ -52,13 +53,6 @@ void Credits::take_back(LayerState& layer) {
   if (steps_.records_from_work) return budget_.settle(*layer.loan, retained);
   budget_.give_back(*layer.loan, retained);
   layer.loan.reset();
-}
-
-void Credits::end(LayerState& layer) {
-  if (layer.ticket.position >= recorded_from_) budget_.hold_extra(layer.extra), recorded_from_ = layer.ticket.position;
-  if (layer.loan) budget_.give_back(*layer.loan, steps_.bytes_held(layer.ticket.work));
-  free_.push_back(layer.ticket.record);
-  ++recorded_;
 }
 
 bool Credits::admit(LayerState& layer) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <new>
 #include <tuple>
@@ -23,16 +24,14 @@ Error interrupted() { return {Fault::kInterrupted, "interrupted"}; }
 
 std::size_t threads() { return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism); }
 
+constexpr std::uint32_t kAllDecided = UINT32_MAX;  // position of the message that says so
+
 struct LayerMessage {
   LayerState* layer = nullptr;  // null until it is begun
   std::uint32_t position = 0;
   std::uint32_t step = 0;   // to be taken next
   bool to_credits = false;  // before that step
-};
-
-/// Oldest first.
-struct IsYounger {
-  bool operator()(const LayerMessage& a, const LayerMessage& b) const { return a.position > b.position; }
+  friend bool operator>(const LayerMessage& a, const LayerMessage& b) { return a.position > b.position; }
 };
 
 /// When layers are to be left.
@@ -61,40 +60,10 @@ class StopSignal {
   std::atomic<std::int64_t> cancelled_at_{0};
 };
 
-/// The time spent in a node.
-class NodeClock {
- public:
-  NodeClock(std::string_view name, bool processor_times) : name_(name), processor_times_(processor_times) {}
-
-  template <class Act>
-  auto time(Act&& act) {
-    struct Turn {
-      NodeClock& clock;
-      Clock::time_point start = Clock::now();
-      double processor = clock.processor_seconds();
-      ~Turn() {
-        clock.busy_ns_.fetch_add(std::chrono::nanoseconds(Clock::now() - start).count(), std::memory_order_relaxed);
-        if (!clock.processor_times_) return;
-        clock.processor_ns_.fetch_add(static_cast<std::int64_t>(1e9 * (clock.processor_seconds() - processor)),
-                                      std::memory_order_relaxed);
-      }
-    } const turn{*this};
-    return act();
-  }
-
-  NodeTime total() const { return {name_, static_cast<double>(busy_ns_) * 1e-9, static_cast<double>(processor_ns_) * 1e-9}; }
-
- private:
-  double processor_seconds() const { return processor_times_ ? thread_seconds() : 0; }
-  const std::string_view name_;
-  const bool processor_times_;
-  std::atomic<std::int64_t> busy_ns_{0}, processor_ns_{0};
-};
-
 template <class Act>
-Status guarded(Act&& act) {
+Status timed(BusyClock& clock, Act&& act) {
   try {
-    return act();
+    return clock.time(act);
   } catch (const std::bad_alloc&) {
     return out_of_memory();
   }
@@ -108,29 +77,37 @@ class LayerFlow {
         steps_(steps),
         stop_(cancel),
         credits_(steps, limits, is_stopped_),
-        credits_clock_("credits", limits.processor_times),
-        record_clock_("record", limits.processor_times),
-        source_(graph_, [this](tbb::flow_control& control) { return next_layer(control); }),
+        heights_clock_(limits.processor_times),
+        credits_clock_(limits.processor_times),
+        record_clock_(limits.processor_times),
+        heights_(graph_, [this](tbb::flow_control& control) { return next_layer(control); }),
+        decided_(graph_, flow::unlimited,
+                 [](const LayerMessage& message, Gate::output_ports_type& ports) noexcept {
+                   (message.position == kAllDecided ? std::get<1>(ports) : std::get<0>(ports)).try_put(message);
+                 }),
+        backlog_(graph_),
         slots_(graph_, limits.record_slots),
         credits_node_(graph_, flow::serial, [this](const LayerMessage& message, auto& ports) { lend(message, ports); }),
-        order_(graph_, [](const LayerMessage& message) { return std::size_t{message.position}; }),
+        order_(graph_,
+               [first = steps.decide ? 1u : 0u](const LayerMessage& message) { return std::size_t{message.position + first}; }),
         record_(graph_, flow::serial, [this](const LayerMessage& message) { return record(message); }) {
     for (std::uint32_t s = 0; s < steps.steps.size(); ++s) nodes_.push_back(std::make_unique<StepNodes>(*this, s, limits));
     make_edges();
   }
 
   Status run() {
-    source_.activate();
+    heights_.activate();
     graph_.wait_for_all();
-    if (result_ && sent_ < count_) return interrupted();
+    if (result_ && !all_sent_) return interrupted();
     return result_;
   }
 
   FlowReport report() const {
-    FlowReport report{credits_.budget().max_in_flight(), credits_.budget().max_bytes(), credits_.oversized(),
-                      credits_clock_.total()};
-    for (const auto& nodes : nodes_) report.steps.push_back(nodes->clock.total());
-    report.steps.push_back(record_clock_.total());
+    FlowReport report{credits_.budget().max_in_flight(), credits_.budget().max_bytes(), credits_.oversized()};
+    if (steps_.decide) report.nodes.push_back({"heights", heights_clock_.total()});
+    report.nodes.push_back({"credits", credits_clock_.total()});
+    for (std::size_t s = 0; s < nodes_.size(); ++s) report.nodes.push_back({steps_.steps[s].name, nodes_[s]->clock.total()});
+    report.nodes.push_back({"record", record_clock_.total()});
     return report;
   }
 
@@ -140,28 +117,30 @@ class LayerFlow {
 
   /// A step with what leads to it. `credits` sends to all gates; each passes on what is for its step.
   struct StepNodes {
-    NodeClock clock;
+    BusyClock clock;
     Gate gate;
-    flow::priority_queue_node<LayerMessage, IsYounger> queue;
+    flow::priority_queue_node<LayerMessage, std::greater<>> queue;  // the oldest first
     flow::function_node<LayerMessage, LayerMessage, flow::rejecting> step;
 
     StepNodes(LayerFlow& flow, std::uint32_t s, const FlowLimits& limits)
-        : clock(flow.steps_.steps[s].name, limits.processor_times),
+        : clock(limits.processor_times),
           gate(flow.graph_, flow::unlimited,
                [s](const LayerMessage& message, Gate::output_ports_type& ports) noexcept {
-                 if (message.step != s) return;
-                 if (message.to_credits) {
-                   std::get<1>(ports).try_put(message);
-                 } else {
-                   std::get<0>(ports).try_put(message);
-                 }
+                 if (message.step == s) (message.to_credits ? std::get<1>(ports) : std::get<0>(ports)).try_put(message);
                }),
           queue(flow.graph_),
           step(flow.graph_, threads(), [&flow](const LayerMessage& message) { return flow.take_step(message); }) {}
   };
 
   void make_edges() {
-    flow::make_edge(source_, slots_);
+    if (steps_.decide) {
+      flow::make_edge(heights_, decided_);
+      flow::make_edge(flow::output_port<0>(decided_), backlog_);
+      flow::make_edge(flow::output_port<1>(decided_), order_);
+      flow::make_edge(backlog_, slots_);
+    } else {
+      flow::make_edge(heights_, slots_);
+    }
     flow::make_edge(slots_, credits_node_);
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
       StepNodes& nodes = *nodes_[s];
@@ -169,12 +148,9 @@ class LayerFlow {
       flow::make_edge(flow::output_port<0>(nodes.gate), nodes.queue);
       flow::make_edge(flow::output_port<1>(nodes.gate), credits_node_);
       flow::make_edge(nodes.queue, nodes.step);
-      if (s + 1 < nodes_.size()) {
-        flow::make_edge(nodes.step, nodes_[s + 1]->gate);
-      } else {
-        flow::make_edge(nodes.step, credits_node_);
-      }
+      if (s > 0) flow::make_edge(nodes_[s - 1]->step, nodes.gate);
     }
+    flow::make_edge(nodes_.back()->step, credits_node_);
     flow::make_edge(flow::output_port<1>(credits_node_), order_);
     flow::make_edge(order_, record_);
     flow::make_edge(record_, credits_node_);
@@ -184,23 +160,26 @@ class LayerFlow {
   // --- the bodies of the nodes
 
   LayerMessage next_layer(tbb::flow_control& control) {
-    if (sent_ < count_ && !stop_.stopped()) return {nullptr, sent_++};
+    if (!ended_) {
+      const bool more = sent_ < count_ && !stop_.stopped();
+      if (more && (!steps_.decide || heights_clock_.time([&] { return steps_.decide(sent_); }))) return {nullptr, sent_++};
+      ended_ = true;
+      all_sent_ = sent_ == count_ || !stop_.stopped();
+      if (steps_.decide) return {nullptr, kAllDecided};
+    }
     control.stop();
     return {};
   }
 
   void lend(const LayerMessage& message, CreditsNode::output_ports_type& ports) {
+    if (message.position == kAllDecided) return;
     const bool ends = message.layer != nullptr && message.layer->phase == Phase::kRecorded;
     const auto leaving = credits_clock_.time(
         [&] { return message.layer == nullptr ? credits_.begin(message.position) : credits_.receive(*message.layer); });
     if (ends) std::get<2>(ports).try_put({});
     for (LayerState* const layer : leaving) {
       const LayerMessage next{layer, layer->ticket.position, layer->step};
-      if (layer->phase == Phase::kDone) {
-        std::get<1>(ports).try_put(next);
-      } else {
-        std::get<0>(ports).try_put(next);
-      }
+      (layer->phase == Phase::kDone ? std::get<1>(ports) : std::get<0>(ports)).try_put(next);
     }
   }
 
@@ -209,11 +188,10 @@ class LayerFlow {
     if (stop_.gives_up()) {
       layer.status = interrupted();
     } else {
-      layer.status =
-          nodes_[layer.step]->clock.time([&] { return guarded([&] { return steps_.steps[layer.step].run(layer.ticket); }); });
-      layer.held = std::max(layer.held, steps_.bytes_held(layer.ticket.work));
+      layer.status = timed(nodes_[layer.step]->clock, [&] { return steps_.steps[layer.step].run(layer.ticket); });
       ++layer.step;
       if (layer.status && layer.step < nodes_.size()) request_needs(layer);
+      layer.held = std::max(layer.held, steps_.bytes_held(layer.ticket.work));
     }
     if (!layer.status || layer.step == nodes_.size()) layer.phase = Phase::kDone;
     const bool to_credits = layer.phase == Phase::kDone || layer.needs_more || layer.held > layer.loan->bytes;
@@ -223,28 +201,27 @@ class LayerFlow {
   /// What the next step needs.
   void request_needs(LayerState& layer) {
     const Step& step = steps_.steps[layer.step];
-    if (!step.needs) return;
-    layer.needs_more = true;
-    layer.status = nodes_[layer.step]->clock.time([&] {
-      return guarded([&]() -> Status {
-        const Result<std::uint64_t> more = step.needs(layer.ticket);
-        if (!more) return more.error();
-        layer.more = *more;
-        return {};
-      });
+    layer.needs_more = static_cast<bool>(step.needs);
+    if (!layer.needs_more) return;
+    layer.status = timed(nodes_[layer.step]->clock, [&]() -> Status {
+      const Result<std::uint64_t> more = step.needs(layer.ticket);
+      if (!more) return more.error();
+      layer.more = *more;
+      return {};
     });
-    layer.held = std::max(layer.held, steps_.bytes_held(layer.ticket.work));
   }
 
   LayerMessage record(const LayerMessage& message) {
-    LayerState& layer = *message.layer;
-    if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
-      result_ = layer.status ? record_clock_.time([&] { return guarded([&] { return steps_.record(layer.ticket); }); })
-                             : layer.status;
-      if (!result_) stop_.fail();
+    if (message.position == kAllDecided) {
+      result_ = all_sent_ ? timed(record_clock_, steps_.decided) : interrupted();
+    } else if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
+      result_ = message.layer->status;
+      if (result_) result_ = timed(record_clock_, [&] { return steps_.record(message.layer->ticket); });
     }
-    if (steps_.extra_bytes) layer.extra = steps_.extra_bytes();
-    layer.phase = Phase::kRecorded;
+    if (!result_) stop_.fail();
+    if (message.layer == nullptr) return message;
+    if (steps_.extra_bytes) message.layer->extra = steps_.extra_bytes();
+    message.layer->phase = Phase::kRecorded;
     return message;
   }
 
@@ -252,13 +229,16 @@ class LayerFlow {
   const LayerSteps& steps_;
   StopSignal stop_;
   const std::function<bool()> is_stopped_ = [this] { return stop_.stopped(); };
-  std::uint32_t sent_ = 0;  // by the source
-  Credits credits_;         // of its node
-  Status result_;           // of `record`
-  NodeClock credits_clock_, record_clock_;
+  std::uint32_t sent_ = 0;                 // layers decided
+  bool ended_ = false, all_sent_ = false;  // no further layers; for they are all decided
+  Credits credits_;                        // of its node
+  Status result_;                          // of `record`
+  BusyClock heights_clock_, credits_clock_, record_clock_;
 
   flow::graph graph_;
-  flow::input_node<LayerMessage> source_;
+  flow::input_node<LayerMessage> heights_;
+  Gate decided_;
+  flow::queue_node<LayerMessage> backlog_;
   flow::limiter_node<LayerMessage> slots_;
   CreditsNode credits_node_;
   std::vector<std::unique_ptr<StepNodes>> nodes_;  // of each step

@@ -99,6 +99,15 @@ Status ImageFiles::open() {
   if (program_) {
     if (Status status = program_->begin(); !status) return status;
   }
+  claim_.emplace(std::move(*claim));
+  return plan_.undecided ? Status() : start();
+}
+
+Status ImageFiles::start() {
+  const Job& job = plan_.job;
+  head_.layer_count = plan_.layer_count;
+  head_.first_layer = plan_.range[0];
+  head_.last_layer = plan_.range[1];
   std::vector<std::string> folders{job.output + "/layers"};
   if (program_) folders.push_back(job.output + "/program");
   sync_ = FolderSync::of(folders);
@@ -112,9 +121,10 @@ Status ImageFiles::open() {
   const bool at_once = job.sync != Sync::kJob || !kept_.empty();
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head_,
                                        {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)},
-                                       {job.sync, at_once, sync_names}, std::move(*claim));
+                                       {job.sync, at_once, sync_names}, std::move(*claim_));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
+  claim_.reset();
   return at_once ? Status() : sync_->begin();
 }
 
@@ -234,7 +244,7 @@ Status ImageFiles::finish() {
 Status ImageFiles::keep() { return manifest_->flush(); }
 
 void ImageFiles::discard() {
-  manifest_->discard();
+  if (manifest_) manifest_->discard();
   if (!remove_layers(plan_.job.output)) return;
   for (const char* folder : {"layers", "program"}) {
     const std::filesystem::path path = std::filesystem::path(plan_.job.output) / folder;

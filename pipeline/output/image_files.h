@@ -43,9 +43,12 @@ class ImageFiles {
   void pause_before(const std::vector<std::uint32_t>& layers) {
     if (program_) program_->refills = layers;
   }
-  /// Prepares the directory and starts its manifest.
+  /// Prepares the directory and starts its manifest, if the number of layers is known: see start().
   /// errors  kUsage: the directory holds another job; kOutput
   Status open();
+  /// Starts the manifest of a plan whose layers are decided since open(). errors  kOutput
+  Status start();
+  bool started() const { return manifest_.has_value(); }
   /// Layers still to be made, in increasing order; valid after opening.
   std::vector<std::uint32_t> take_todo() { return std::move(todo_); }
   /// Layers kept from an interrupted run.
@@ -92,6 +95,7 @@ class ImageFiles {
   const formats::ImageFormat* format_;  // null if levels_ is there
   const formats::LevelFormat* levels_;
   std::optional<PrintProgram> program_;
+  std::optional<Claim> claim_;  // until the manifest is started
   std::optional<ManifestWriter> manifest_;
   std::optional<FolderSync> sync_;
   std::vector<std::uint32_t> todo_;

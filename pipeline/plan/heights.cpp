@@ -33,4 +33,15 @@ Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
   return plan;
 }
 
+bool decides_in_order(const Job& job) {
+  return job.heights.mode != heights::Mode::kUniform && job.heights.mode != heights::Mode::kOptimal && !job.heights.per_part;
+}
+
+Result<std::unique_ptr<heights::GreedyLayers>> begin_heights(const Job& job, const Scene& scene, heights::Plan& plan) {
+  count(Decision::kHeights);
+  const Result<heights::Options> options = heights_options(job);
+  if (!options) return options.error();
+  return heights::begin_heights(index_scene(job, scene, *options), *options, plan);
+}
+
 }  // namespace lamina::pipeline

@@ -38,6 +38,7 @@ class Planner {
     plan_.job = std::move(resolved.job);
     plan_.product = resolved.product;
     plan_.bed = resolved.bed;
+    streams_layers_ = resolved.streams_layers;
     if (resolved.printer) printer_ = std::move(*resolved.printer);
     if (resolved.extruder) plan_.moves.emplace(MovePlan{std::move(*resolved.extruder)});
   }
@@ -143,6 +144,12 @@ class Planner {
       if (!status) return status;
     }
     if (Status status = check_layer_count(); !status) return status;
+    if (streams_layers()) {
+      auto begun = begin_heights(job(), *plan_.scene, plan_.heights);
+      if (!begun) return begun.error();
+      plan_.undecided = std::move(*begun);
+      return {};
+    }
     if (!job().heights.per_part) {
       auto heights = decide_heights(job(), *plan_.scene);
       if (!heights) return heights.error();
@@ -158,6 +165,15 @@ class Planner {
     plan_.layer_count =
         job().heights.per_part || moves() ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();
     return {};
+  }
+
+  bool streams_layers() const {
+    const Job& job = plan_.job;
+    const bool counts_first = beads_ || machine() != nullptr || job.inspect || job.resume || job.dry_run || !job.title.empty();
+    const bool whole = !job.layers && !job.shard;
+    const bool warns_of_top = covers_top(job) && job.heights.containment == Containment::kInside;
+    return streams_layers_ && images() && whole && !counts_first && !warns_of_top && plan_.scene->images.empty() &&
+           decides_in_order(job);
   }
 
   /// Steps inside of a part and a layer that ends above it exclude each other.
@@ -303,6 +319,7 @@ class Planner {
   std::vector<FillPlan> fillings_;
   LayerSchedule schedule_;
   bool beads_ = false;  // fill the parts of an image
+  bool streams_layers_ = false;
   Stopwatch indexing_;
 };
 

@@ -15,7 +15,7 @@ Json json_of(const checks::Found& found, const std::string& amount) {
   json[amount] = found.amount;
   json["largest_" + amount] = found.largest;
   json["largest_at"] = json_of(found.spot);
-  for (const checks::Location& position : found.positions) {
+  for (const checks::Location& position : found.locations) {
     Json& one = json["locations"].emplace_back(json_of(position.spot));
     one["last_layer"] = position.last_layer;
     one["box_mm"] = position.box_mm;

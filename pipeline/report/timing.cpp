@@ -31,7 +31,7 @@ Lines timing_lines(const Timing& timing) {
   for (const auto& [name, span] : timing.phases) phase_line(name, span);
   phase_line("all", timing.whole());
   add(fmt::format("{:<12}{:>10}{:>14}", "node", "busy, s", "processor, s"));
-  for (const auto& [name, busy, processor] : timing.nodes) add(fmt::format("{:<12}{:>10.4f}{:>14.4f}", name, busy, processor));
+  for (const auto& [name, busy] : timing.nodes) add(fmt::format("{:<12}{:>10.4f}{:>14.4f}", name, busy.wall, busy.processor));
   const formats::Floor& floor = timing.floor;
   if (!timing.not_measured.empty()) {
     add("limit       not measured: " + timing.not_measured);
@@ -51,8 +51,8 @@ Json timing_json(const Timing& timing) {
     phases[std::string(name)] = {
         {"wall", span.wall}, {"processor", span.processor}, {"serial_share", serial_share(span, timing.threads)}};
   }
-  for (const auto& [name, busy, processor] : timing.nodes) {
-    nodes[std::string(name)] = {{"busy", busy}, {"processor", processor}};
+  for (const auto& [name, busy] : timing.nodes) {
+    nodes[std::string(name)] = {{"busy", busy.wall}, {"processor", busy.processor}};
   }
   const formats::Floor& floor = timing.floor;
   Json limit = {{"read_bytes", floor.bytes_read}, {"read_seconds", floor.read},   {"write_bytes", floor.bytes_written},

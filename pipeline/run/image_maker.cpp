@@ -42,6 +42,7 @@ class ImageMaker : public Maker {
     if (Status status = files_.open(); !status) return status.error();
     return files_.take_todo();
   }
+  Status start() override { return files_.start(); }
   std::vector<LayerRecord> kept() const override { return files_.kept(); }
 
   std::vector<MakerStep> steps() override {
@@ -138,7 +139,7 @@ class ImageMaker : public Maker {
 
   std::uint64_t crossings() const override { return crossings_; }
   bool times_dry_runs() const override { return plan_.images->machine.has_value() || inspector_->on(); }
-  bool keeps() const override { return !plan_.job.dry_run; }
+  bool keeps() const override { return files_.started(); }
   Status finish() override {
     if (plan_.job.dry_run) return {};
     const Status status = files_.finish();

@@ -69,7 +69,7 @@ std::function<Result<double>(std::uint32_t)> union_in(const Scene& scene, const 
 }
 
 JobChecks::JobChecks(const Plan& plan, const std::atomic<bool>& cancel)
-    : plan_(plan), tally_(std::make_unique<checks::Tally>(solids_of(plan))), filled_(plan.layer_count) {
+    : plan_(plan), tally_(std::make_unique<checks::Tally>(solids_of(plan))) {
   for (const PartSummary& part : plan.scene->parts) names_.push_back(one_line(part.path));
   if (plan.images) tally_->inspect_layers(plan.images->grid);
   sampling_ = sampling_of(plan.job, plan.images ? &plan.images->grid : nullptr);
@@ -81,8 +81,13 @@ JobChecks::JobChecks(const Plan& plan, const std::atomic<bool>& cancel)
     return scene ? Result<std::vector<Mesh>>(std::move(scene->meshes)) : scene.error();
   };
   sampling_.union_mm3 = union_in(*plan.scene, *tally_, &cancel, plan.images ? again : nullptr);
-  for (std::uint32_t i = 0; i < plan.layer_count; ++i) {
-    sampling_.thickest_mm = std::max(sampling_.thickest_mm, mm(plan.layer(i).thickness));
+  count_layers();
+}
+
+void JobChecks::count_layers() {
+  filled_.resize(plan_.layer_count);
+  for (std::uint32_t i = 0; i < plan_.layer_count; ++i) {
+    sampling_.thickest_mm = std::max(sampling_.thickest_mm, mm(plan_.layer(i).thickness));
   }
 }
 

@@ -33,6 +33,9 @@ class JobChecks {
   /// The plan and `cancel` must outlive this object.
   JobChecks(const Plan& plan, const std::atomic<bool>& cancel);
 
+  /// For a plan whose layers are decided since; before any is recorded.
+  void count_layers();
+
   // --- from many threads at once
   void add_image(const Layer& layer, const Runs& image) { tally_->add_image(layer, image); }
   /// The image without its bleed, mirrored as the job asks.

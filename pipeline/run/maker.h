@@ -34,6 +34,8 @@ class Maker {
   /// Starts the files. returns  the layers still to be made, in increasing order
   /// errors  kUsage: existing output of another job; kOutput
   virtual Result<std::vector<std::uint32_t>> open() = 0;
+  /// Starts what states the number of layers, of a plan whose layers are decided since open(). errors  kOutput
+  virtual Status start() { return {}; }
   /// Whether a dry run makes the layers too, for what they take; then open() and all below write nothing.
   virtual bool times_dry_runs() const { return false; }
   /// Records of the layers kept from an interrupted run.

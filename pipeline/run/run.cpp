@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <span>
 
 #include "pipeline/flow/layers.h"
 #include "pipeline/job/job.h"
@@ -45,6 +46,13 @@ std::unique_ptr<Maker> make_maker(const Plan& plan, JobChecks& checks, const Flo
   return make_move_maker(plan, checks, limits);
 }
 
+void count_layers(const Plan& plan, Summary& summary) {
+  summary.layers_total = plan.layer_count;
+  if (plan.layer_count == 0) return;
+  const Layer highest = plan.layer(plan.layer_count - 1);
+  summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
+}
+
 Summary summary_of(const Plan& plan) {
   Summary summary;
   summary.product = plan.product;
@@ -53,35 +61,34 @@ Summary summary_of(const Plan& plan) {
   summary.layer_text = text_of(plan.job.heights, plan.job.layer_mm);
   const std::string small = small_peaks_text(plan.heights, plan.job.heights.min_flat_mm2);
   if (!small.empty()) summary.layer_text += "; " + small;
-  summary.layers_total = plan.layer_count;
   summary.triangles = plan.triangles;
   summary.load_seconds = plan.load_seconds;
   summary.index_seconds = plan.index_seconds;
   summary.memory_budget_bytes = plan.job.memory_bytes;
   summary.parts = plan.scene->parts;
   summary.warnings = plan.warnings;
-  if (plan.layer_count > 0) {
-    const Layer highest = plan.layer(plan.layer_count - 1);
-    summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
-  }
+  count_layers(plan, summary);
   if (plan.product == Product::kImages) report_image_plan(plan, summary);
   if (plan.product == Product::kMoves) report_move_plan(plan, summary);
   return summary;
 }
 
-/// The maker's steps as those of the flow. todo  layers by position; outlives them
-LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const std::function<void()>& recorded) {
+/// The maker's steps as those of the flow. layer_at  by position; outlives them
+LayerSteps steps_of(Maker& maker, const std::function<std::uint32_t(std::uint32_t)>& layer_at,
+                    const std::function<void()>& recorded) {
   LayerSteps steps;
-  steps.bytes_of = [&](std::uint32_t position) { return maker.bytes_of(todo[position]); };
+  steps.bytes_of = [&](std::uint32_t position) { return maker.bytes_of(layer_at(position)); };
   for (MakerStep& step : maker.steps()) {
     Step& made = steps.steps.emplace_back();
     made.name = step.name;
-    made.run = [&todo, run = std::move(step.run)](const Ticket& ticket) { return run(todo[ticket.position], ticket); };
+    made.run = [&layer_at, run = std::move(step.run)](const Ticket& ticket) { return run(layer_at(ticket.position), ticket); };
     if (!step.needs) continue;
-    made.needs = [&todo, needs = std::move(step.needs)](const Ticket& ticket) { return needs(todo[ticket.position], ticket); };
+    made.needs = [&layer_at, needs = std::move(step.needs)](const Ticket& ticket) {
+      return needs(layer_at(ticket.position), ticket);
+    };
   }
   steps.record = [&](const Ticket& ticket) {
-    const Status status = maker.record(todo[ticket.position], ticket);
+    const Status status = maker.record(layer_at(ticket.position), ticket);
     if (status) recorded();
     return status;
   };
@@ -109,8 +116,7 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer, bool shared)
 
 void report_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
   timing.phases.push_back({"layers", layers});
-  timing.nodes = {report.credits};
-  timing.nodes.insert(timing.nodes.end(), report.steps.begin(), report.steps.end());
+  timing.nodes = report.nodes;
 }
 
 bool cut_short(const Status& status) {
@@ -133,15 +139,25 @@ Status check_job(const Plan& plan, Maker& maker, const JobChecks& checks, bool s
   return status;
 }
 
+/// Lets the flow decide the layers of a plan whose layers are undecided. decided  called once they are all in the plan
+void stream_layers(Plan& plan, LayerSteps& steps, const std::function<Status()>& decided) {
+  steps.decide = [&plan](std::uint32_t position) { return plan.undecided->decide(position, plan.heights); };
+  steps.decided = [&plan, decided] {
+    plan.layer_count = plan.heights.table.size();
+    plan.range = {0, plan.layer_count};
+    return decided();
+  };
+}
+
 /// Makes the remaining layers. errors  of the lowest failing layer
-Status make_layers(const Plan& plan, Maker& maker, const JobChecks& checks, const FlowLimits& limits, Summary& summary,
+Status make_layers(Plan& plan, Maker& maker, JobChecks& checks, const FlowLimits& limits, Summary& summary,
                    const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   auto todo = maker.open();
   if (!todo) return todo.error();
   const std::vector<LayerRecord> kept = maker.kept();
   for (const LayerRecord& record : kept) maker.add_kept(record);
   summary.layers_kept = static_cast<std::uint32_t>(kept.size());
-  const std::uint32_t layers = plan.range[1] - plan.range[0];
+  std::uint32_t layers = plan.range[1] - plan.range[0];
   std::uint32_t done = layers - static_cast<std::uint32_t>(todo->size());
   progress({ProgressEvent::Stage::kLayers, done, layers});
   const Stopwatch moving;
@@ -149,10 +165,22 @@ Status make_layers(const Plan& plan, Maker& maker, const JobChecks& checks, cons
     ++summary.layers_planned;
     progress({ProgressEvent::Stage::kLayers, ++done, layers});
   };
-  const LayerSteps steps = steps_of(maker, *todo, recorded);
+  const std::function<std::uint32_t(std::uint32_t)> layer_at = [&](std::uint32_t position) {
+    return plan.undecided ? position : (*todo)[position];
+  };
+  LayerSteps steps = steps_of(maker, layer_at, recorded);
+  if (plan.undecided) {
+    stream_layers(plan, steps, [&] {
+      layers = plan.layer_count;
+      count_layers(plan, summary);
+      checks.count_layers();
+      return maker.start();
+    });
+  }
   const bool shared = !kept.empty() || plan.job.shard;
   FlowReport report;
-  const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
+  const std::uint32_t count = plan.undecided ? plan.undecided->max_layers() : static_cast<std::uint32_t>(todo->size());
+  const Status moved = flow_layers(count, steps, limits, cancel, report);
   if (!moved) return ended_early(maker, moved.error(), done > 0, shared);
   if (Status status = check_job(plan, maker, checks, shared, summary); !status) {
     return cut_short(status) ? ended_early(maker, status.error(), done > 0, shared) : status;
@@ -160,7 +188,8 @@ Status make_layers(const Plan& plan, Maker& maker, const JobChecks& checks, cons
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0, shared);
   const Elapsed moved_in = moving.elapsed();
   summary.layer_seconds = moved_in.wall;
-  for (const NodeTime& step : report.steps) summary.step_seconds.emplace_back(step.name, step.busy);
+  for (const NodeTime& step : std::span(report.nodes).last(steps.steps.size() + 1))
+    summary.step_seconds.emplace_back(step.name, step.busy.wall);
   summary.max_layers_in_flight = report.max_in_flight;
   summary.peak_layer_bytes = report.max_bytes;
   summary.oversized_layers = report.oversized;
@@ -208,7 +237,8 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (!resolved.job.dry_run) {
     if (Status status = check_output_of(resolved); !status) return status.error();
   }
-  const auto plan = make_plan(std::move(resolved), progress);
+  resolved.streams_layers = true;
+  auto plan = make_plan(std::move(resolved), progress);
   if (!plan) return plan.error();
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
 

@@ -71,15 +71,15 @@ Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options) {
     plan.table = LayerTable::uniform(index.top, options.set.minimum());
     return plan;
   }
-  const Result<CandidateHeights> candidate_heights =
+  Result<CandidateHeights> candidate_heights =
       CandidateHeights::reachable(options.set, std::int64_t{index.top} + options.set.maximum());
   if (!candidate_heights) return candidate_heights.error();
-  switch (options.mode) {
-    case Mode::kAngle: return plan_by_angle(index, options, *candidate_heights);
-    case Mode::kCusp: return plan_by_cusp(index, options, *candidate_heights);
-    case Mode::kStepwise: return plan_stepwise(index, options, *candidate_heights);
-    default: return plan_optimal(index, options, *candidate_heights);
+  if (options.mode == Mode::kOptimal) return plan_optimal(index, options, *candidate_heights);
+  Plan plan;
+  GreedyLayers layers(index, options, std::move(*candidate_heights), plan);
+  while (layers.advance(plan)) {
   }
+  return plan;
 }
 
 }  // namespace lamina::heights

@@ -25,6 +25,9 @@ class LayerTable {
   }
   LayerTable() = default;
 
+  /// Layers are then added without moving the others; not of a uniform table.
+  void reserve(std::uint32_t layers) { entries_.reserve(layers); }
+  std::size_t capacity() const { return entries_.capacity(); }
   void add(Nm thickness, LayerReason reason) {
     entries_.push_back({static_cast<Nm>(top()), thickness, reason});
     ++count_;

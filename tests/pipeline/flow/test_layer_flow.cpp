@@ -105,8 +105,8 @@ TEST(LayerFlow, LayersInFlightHoldTheBudgetOrItAndOneLayer) {
     EXPECT_LE(report.max_bytes, limits.budget_bytes + largest);
     EXPECT_GE(report.max_bytes, static_cast<std::uint64_t>(meter.maximum));
     EXPECT_GE(report.max_in_flight, turn % 4 != 0 ? 2u : 1u);
-    ASSERT_EQ(report.steps.size(), 3u);
-    EXPECT_EQ(report.steps[2].name, "record");
+    ASSERT_EQ(report.nodes.size(), 4u);
+    EXPECT_EQ(report.nodes[3].name, "record");
   }
 }
 
@@ -363,6 +363,85 @@ TEST(LayerFlow, ACancelledFlowEndsWhileLayersWaitForBytes) {
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().fault, Fault::kInterrupted);
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+}
+
+/// Layers that are decided while they are made: `layers` of at most 1000.
+struct Decided {
+  std::uint32_t layers = 0;
+  std::atomic<std::uint32_t> calls{0}, ended{0}, made{0}, recorded{0};
+  LayerSteps steps = plain_steps();
+  explicit Decided(std::uint32_t count) : layers(count) {
+    steps.decide = [this](std::uint32_t position) {
+      EXPECT_EQ(position, calls++) << "in order";
+      return position < layers;
+    };
+    steps.decided = [this]() -> Status {
+      EXPECT_EQ(recorded, 0u);
+      return ++ended, Status();
+    };
+    steps.steps = {{"only", [this](const Ticket& ticket) -> Status {
+                      EXPECT_LT(ticket.position, calls);
+                      return ++made, Status();
+                    }}};
+    steps.record = [this](const Ticket& ticket) -> Status {
+      EXPECT_EQ(ended, 1u) << "nothing is recorded before all are decided";
+      EXPECT_EQ(ticket.position, recorded);
+      return ++recorded, Status();
+    };
+  }
+  Status flow(const std::atomic<bool>& cancel, FlowReport& report) const {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+    FlowLimits limits;
+    limits.max_in_flight = 4;
+    limits.record_slots = 8;
+    return flow_layers(1000, steps, limits, cancel, report);
+  }
+};
+
+TEST(LayerFlow, LayersAreMadeWhileOthersAreDecided) {
+  for (const std::uint32_t layers : {0u, 1u, 5u, 300u, 1000u}) {
+    Decided job(layers);
+    // The last ones are not decided before a layer is made.
+    const auto decide = job.steps.decide;
+    job.steps.decide = [&](std::uint32_t position) {
+      for (int i = 0; position == 5 && i < 2000 && job.made == 0; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return decide(position);
+    };
+    FlowReport report;
+    const std::atomic<bool> cancel{false};
+    ASSERT_TRUE(job.flow(cancel, report).ok());
+    EXPECT_EQ(job.recorded, layers);
+    EXPECT_EQ(job.ended, 1u);
+    EXPECT_EQ(report.nodes[0].name, "heights");
+  }
+}
+
+TEST(LayerFlow, AFlowCancelledWhileLayersAreDecidedRecordsNone) {
+  Decided job(1000);
+  std::atomic<bool> cancel{false};
+  const auto decide = job.steps.decide;
+  job.steps.decide = [&](std::uint32_t position) {
+    if (position == 20) cancel = true;
+    return decide(position);
+  };
+  FlowReport report;
+  const Status status = job.flow(cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kInterrupted);
+  EXPECT_EQ(job.recorded, 0u);
+  EXPECT_EQ(job.ended, 0u);
+}
+
+TEST(LayerFlow, AnErrorOnceAllAreDecidedIsTheFirst) {
+  Decided job(100);
+  job.steps.decided = []() -> Status { return Error{Fault::kOutput, "no manifest"}; };
+  FlowReport report;
+  const std::atomic<bool> cancel{false};
+  const Status status = job.flow(cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().message, "no manifest");
+  EXPECT_EQ(job.recorded, 0u);
 }
 
 TEST(LayerFlow, AFlowWithoutLayersIsDone) {
