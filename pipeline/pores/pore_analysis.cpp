@@ -10,7 +10,7 @@
 #include "pipeline/pores/bead_rules.h"
 #include "pipeline/pores/pore_drawing.h"
 #include "pipeline/pores/pore_page.h"
-#include "stages/data/ticks.h"
+#include "stages/data/plot.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/pores/throat.h"
 #include "stages/segment/pore_geometry.h"
@@ -107,7 +107,7 @@ std::string connected_text(const pores::Connected& connected) {
 }
 
 Json as_json(const pores::Distribution& values) {
-  return {{"mean", values.mean}, {"deviation", values.deviation}, {"least", values.minimum}, {"most", values.maximum},
+  return {{"mean", values.mean}, {"deviation", values.deviation}, {"min", values.minimum}, {"max", values.maximum},
           {"bin", values.bin},   {"counts", values.bins}};
 }
 
@@ -211,13 +211,13 @@ void add_to(const PoreAnalysis& analysis, Json& json) {
   json["connected"] = {{"bonded", analysis.connected.bonded_share()},
                        {"unbonded", analysis.connected.unbonded_share()},
                        {"bond_gap_mm", segment::kBondGap}};
-  json["ways"] = Json::array();
+  json["tortuosity"] = Json::array();
   for (std::size_t a = 0; a < 3; ++a) {
     const pores::Tortuosity& way = analysis.tortuosities[a];
-    json["ways"].push_back({{"along", std::string(1, "xyz"[a])},
+    json["tortuosity"].push_back({{"along", std::string(1, "xyz"[a])},
                             {"tortuosity", way.mean},
-                            {"least", way.minimum},
-                            {"most", way.maximum},
+                            {"min", way.minimum},
+                            {"max", way.maximum},
                             {"throat_mm", analysis.throat_mm[a]}});
   }
   const LayerSections& sections = analysis.sections;
@@ -292,7 +292,7 @@ void add_pores(const std::string& path, Summary& summary) {
                         : fmt::format("; along {} ways {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
                                       analysis.tortuosities[a].mean, analysis.throat_mm[a]);
   }
-  summary.results.emplace_back("ways", std::move(tortuosities));
+  summary.results.emplace_back("tortuosity", std::move(tortuosities));
   const pores::PoreSizes& sizes = analysis.sections.sizes;
   if (!sizes.pores.empty()) {
     summary.results.emplace_back("widths", histogram_line(histogram(sizes, false)));
