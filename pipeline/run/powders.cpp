@@ -100,7 +100,7 @@ Status refuse_faulty_formulas(const Plan& plan, const LayerImager& imager) {
   if (!budget || !budget->is_uncertain(plan.job.allow_unbound)) return {};
   tbb::enumerable_thread_specific<ImageWork> works;
   std::atomic<std::uint32_t> lowest{UINT32_MAX};
-  const auto inspect = [&](std::uint32_t i, ImageWork& work) {
+  const auto prepare = [&](std::uint32_t i, ImageWork& work) {
     LayerRecord record;
     ImageNotes notes;
     return imager.make(plan.layer(i), work, record, notes);
