@@ -18,7 +18,7 @@ Error at_photo(const std::string& path, const Error& error) { return {error.faul
 Result<std::string> answer(const Json& json, const cv::Mat& picture) {
   std::string text = json_line(json);
   if (picture.empty()) return text;
-  const auto png = png_of(picture);
+  const auto png = calibration::png_of(picture);
   return png ? Result<std::string>(text + *png) : png.error();
 }
 
@@ -28,12 +28,12 @@ Result<std::string> read_chart_of(const Json& request) {
   const auto path = request.at("photo").get<std::string>();
   const auto chart = read_chart(json_text(request.at("chart")), "the chart");
   if (!chart) return chart.error();
-  const auto photo = read_photo(path, kMin);
+  const auto photo = calibration::read_photo(path, kMin);
   if (!photo) return photo.error();
-  const auto reading = read_chart_photo(*photo, *chart);
+  const auto reading = calibration::read_chart_photo(*photo, *chart);
   if (!reading) return at_photo(path, reading.error());
   return answer(reading_json(*reading), request.contains("picture") && request.at("picture").get<bool>()
-                                            ? picture_of(*photo, *chart, *reading)
+                                            ? calibration::picture_of(*photo, *chart, *reading)
                                             : cv::Mat());
 }
 
@@ -48,14 +48,14 @@ Result<std::string> compare_with(const Json& request) {
   bool good = !image.row_offset.empty() && image.row_offset[0] == 0 && image.row_offset.back() == image.change.size();
   for (std::size_t r = 1; good && r < image.row_offset.size(); ++r) good = image.row_offset[r - 1] <= image.row_offset[r];
   for (std::size_t i = 0; good && i < image.change.size(); ++i) good = image.change[i] <= image.columns;
-  const ExpectedLayer layer{image.view(), request.at("pixel_nm").at(0).get<double>(),
-                            request.at("pixel_nm").at(1).get<double>(), request.at("scan_along_x").get<bool>(),
-                            request.at("photo_um").get<double>()};
+  const calibration::ExpectedLayer layer{image.view(), request.at("pixel_nm").at(0).get<double>(),
+                                         request.at("pixel_nm").at(1).get<double>(), request.at("scan_along_x").get<bool>(),
+                                         request.at("photo_um").get<double>()};
   good = good && layer.pixel_x_nm >= 1 && layer.pixel_y_nm >= 1 && layer.photo_um >= 1;
   if (!good) return Error{Fault::kUsage, "the request holds no image"};
-  const auto photo = read_photo(path, kMin);
+  const auto photo = calibration::read_photo(path, kMin);
   if (!photo) return photo.error();
-  const auto comparison = compare_layer(*photo, layer);
+  const auto comparison = calibration::compare_layer(*photo, layer);
   if (!comparison) return at_photo(path, comparison.error());
   return json_line(comparison_json(*comparison));
 }
@@ -81,9 +81,9 @@ int end(const Result<std::string>& result) {
 int main(int count, char** words) {
   using namespace lamina;
   try {
-    return calibration::end(calibration::run(count == 2 ? words[1] : ""));
+    return pipeline::end(pipeline::run(count == 2 ? words[1] : ""));
   } catch (const std::exception& error) {
-    return calibration::end(is_shortage(error) ? out_of_memory()
-                                               : Error{Fault::kInternal, std::string("internal error: ") + error.what()});
+    return pipeline::end(is_shortage(error) ? out_of_memory()
+                                            : Error{Fault::kInternal, std::string("internal error: ") + error.what()});
   }
 }
