@@ -93,7 +93,7 @@ TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
               text.rfind("not-inspected"))
         << text;
     EXPECT_NE(text.find("give --memory"), std::string::npos) << text;
-    EXPECT_EQ(json_of(found, 0.3)["stopped"]["layer"], found.layers);
+    EXPECT_EQ(pipeline::json_of(found, 0.3)["stopped"]["layer"], found.layers);
   }
   EXPECT_EQ(last, kLayers);
   EXPECT_EQ(reported(all).find("not-inspected"), std::string::npos);
@@ -103,8 +103,8 @@ TEST_F(BoundedInspection, StopsWhereItDoesRegardlessOfTheScratchOfLayers) {
   const Findings all = inspect(UINT64_MAX);
   const std::uint64_t maximum = *std::ranges::max_element(held_);
   for (const std::uint64_t may : {maximum / 16, maximum / 4, maximum / 2, maximum}) {
-    const std::string one = json_text(json_of(inspect(may), 0.3));
-    for (const std::size_t slots : {2, 3, 5, 12}) EXPECT_EQ(json_text(json_of(inspect(may, kLayers, slots), 0.3)), one) << may;
+    const std::string one = json_text(pipeline::json_of(inspect(may), 0.3));
+    for (const std::size_t slots : {2, 3, 5, 12}) EXPECT_EQ(json_text(pipeline::json_of(inspect(may, kLayers, slots), 0.3)), one) << may;
   }
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 using Pixel = std::pair<std::int64_t, std::int64_t>;  // column, row
 
-PixelGrid grid_of(std::int64_t dpi_x, std::int64_t dpi_y) {
+PixelGrid square_grid(std::int64_t dpi_x, std::int64_t dpi_y) {
   return {PixelAxis(dpi_x, 10 * kNmPerMm), PixelAxis(dpi_y, 10 * kNmPerMm)};
 }
 
@@ -112,7 +112,7 @@ std::set<Pixel> reported_of(const Volume& image, const Stencils& stencils) {
 TEST(Stencils, AreAsWideAsRequestedAndMadeOfThoseBeforeThem) {
   const std::pair<int, int> dpi[] = {{254, 254}, {600, 300}, {300, 600}, {600, 400}, {600, 599}, {1200, 360}};
   for (const auto& [x, y] : dpi) {
-    const PixelGrid grid = grid_of(x, y);
+    const PixelGrid grid = square_grid(x, y);
     const Stencils stencils(grid, 2'000'000);
     std::set<Pixel> before{{0, 0}};
     ASSERT_EQ(pixels_of(stencils.at(0)), before);
@@ -136,13 +136,13 @@ TEST(Stencils, AreAsWideAsRequestedAndMadeOfThoseBeforeThem) {
     EXPECT_EQ(last.columns, std::ceil(2 * x / 25.4 - 1e-6));
     EXPECT_EQ(last.rows.size(), std::ceil(2 * y / 25.4 - 1e-6));
   }
-  EXPECT_EQ(Stencils(grid_of(600, 600), nm_of(2 * 25.4 / 600)).count(), 2u) << "two pixels, rounded to a nanometre";
-  EXPECT_EQ(Stencils(grid_of(600, 600), 0).count(), 1u);
-  EXPECT_LE(Stencils(grid_of(1200, 1200), 1'000'000'000).count(), 480u) << "no wider than the image";
+  EXPECT_EQ(Stencils(square_grid(600, 600), nm_of(2 * 25.4 / 600)).count(), 2u) << "two pixels, rounded to a nanometre";
+  EXPECT_EQ(Stencils(square_grid(600, 600), 0).count(), 1u);
+  EXPECT_LE(Stencils(square_grid(1200, 1200), 1'000'000'000).count(), 480u) << "no wider than the image";
 }
 
 TEST(Stencils, AreRoundWherePixelsAreSquare) {
-  const Stencils stencils = stencils_of(grid_of(254, 254), 40);
+  const Stencils stencils = stencils_of(square_grid(254, 254), 40);
   for (std::uint32_t k = 4; k < stencils.count(); ++k) {
     double widest = 0, narrowest = 1e9;
     for (int degree = 0; degree < 180; degree += 5) {
@@ -165,7 +165,7 @@ TEST(ThinRegions, AreThosePixelsThatAStencilCoversNowhere) {
   std::mt19937 random(7);
   ThinScratch scratch;
   for (const auto& [x, y] : {std::pair{254, 254}, {600, 300}, {600, 400}}) {
-    const PixelGrid grid = grid_of(x, y);
+    const PixelGrid grid = square_grid(x, y);
     for (int turn = 0; turn < 24; ++turn) {
       const Volume image = random_image(random, turn % 3 == 0 ? 0 : 0.2 * (turn % 5));
       for (const std::int64_t wide : {2, 3, 5, 9}) {
@@ -192,7 +192,7 @@ TEST(ThinRegions, AreFoundByEveryWiderMinimum) {
     const Volume image = random_image(random, turn % 2 == 0 ? 0 : 0.004 * turn);
     ThinRegions before;
     for (std::int64_t wide = 1; wide < 30; ++wide) {
-      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(grid_of(254, 254), wide), scratch);
+      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(square_grid(254, 254), wide), scratch);
       ASSERT_GE(locations.pixels, before.pixels) << turn << " " << wide;
       for (const ThinRegion& one : before.largest) {
         ASSERT_TRUE(std::ranges::any_of(locations.largest,
@@ -215,7 +215,7 @@ TEST(ThinRegions, WallsAreReportedFromTheWidthOnThatIsMore) {
     fill(image, 10, 10, 40, 40);
     fill(image, 50, 20, 40, wall);  // a fin to the right
     for (std::uint32_t minimum = 1; minimum <= 32; ++minimum) {
-      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(grid_of(254, 254), minimum), scratch);
+      const ThinRegions locations = thin_regions(image.layer(0), stencils_of(square_grid(254, 254), minimum), scratch);
       EXPECT_EQ(locations.count, minimum > wall ? 1u : 0u) << wall << " " << minimum;
       for (const ThinRegion& position : locations.largest) EXPECT_EQ(position.box.right, 90u);
     }
@@ -224,7 +224,7 @@ TEST(ThinRegions, WallsAreReportedFromTheWidthOnThatIsMore) {
 
 // At any angle: of a block turned about, corners are no thin places, and its fin is where it is thinner than a least wall.
 TEST(ThinRegions, OfTurnedBodiesAreTheirFins) {
-  const PixelGrid grid = grid_of(508, 508);  // pixels of 50 um
+  const PixelGrid grid = square_grid(508, 508);  // pixels of 50 um
   ThinScratch scratch;
   for (int degree = 0; degree < 90; degree += 5) {
     Volume image = image_of(200, 200);

@@ -76,7 +76,7 @@ float DropStack::share(std::int64_t column, std::int64_t row, std::int64_t layer
   return share_[static_cast<std::size_t>((layer * count_[1] + row) * count_[0] + column)];
 }
 
-bool DropStack::filled(const ClusterSlot& at) const {
+bool DropStack::filled(const Position& at) const {
   std::array<std::int64_t, 3> voxel{};
   std::array<double, 3> within{};
   for (std::size_t a = 0; a < 3; ++a) {
@@ -95,7 +95,7 @@ bool DropStack::filled(const ClusterSlot& at) const {
   return depth < own;
 }
 
-double DropStack::blurred(const ClusterSlot& at) const {
+double DropStack::blurred(const Position& at) const {
   // The weights of each axis: drops lie in the middles of voxels; sigma is 1 or 1/3 of them.
   constexpr std::int64_t kMax = 5;
   constexpr double kSigma[3] = {1, 1, 1.0 / 3};
@@ -129,7 +129,7 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
   double sum = 0;
   for (const SurfacePoint& point : points) {
     const auto is_solid = [&](double by) {
-      return solid(ClusterSlot{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1],
+      return solid(Position{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1],
                                point.at[2] + by * point.normal[2]});
     };
     const bool here = is_solid(0);
@@ -154,10 +154,10 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
 }  // namespace
 
 SurfaceDistance distance_of_filled(const DropStack& stack, const std::vector<SurfacePoint>& points) {
-  return distance(points, [&](const ClusterSlot& at) { return stack.filled(at); });
+  return distance(points, [&](const Position& at) { return stack.filled(at); });
 }
 SurfaceDistance distance_of_blurred(const DropStack& stack, const std::vector<SurfacePoint>& points) {
-  return distance(points, [&](const ClusterSlot& at) { return stack.blurred(at) >= 0.5; });
+  return distance(points, [&](const Position& at) { return stack.blurred(at) >= 0.5; });
 }
 
 RebuiltShape rebuilt_sphere(std::uint32_t points) {
@@ -180,7 +180,7 @@ RebuiltShape rebuilt_sphere(std::uint32_t points) {
   for (std::uint32_t i = 0; i < points; ++i) {
     const auto [u, v] = spread(i, points);
     const double z = 2 * u - 1, turn = 2 * std::numbers::pi * v, flat = std::sqrt(1 - z * z);
-    const ClusterSlot normal{flat * std::cos(turn), flat * std::sin(turn), z};
+    const Position normal{flat * std::cos(turn), flat * std::sin(turn), z};
     shape.points.push_back(
         {{kMiddle + kRadius * normal[0], kMiddle + kRadius * normal[1], kHigh + kRadius * normal[2]}, normal});
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/report/image_text.h"
 #include "stages/dose/blue_noise.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/covered_spans.h"
@@ -301,7 +302,7 @@ TEST(Budget, WithoutATargetReportsWhatOneDropGives) {
   budget.foresee(tenth(0));
   std::vector<Warning> warnings;
   EXPECT_TRUE(budget.check(false, warnings).ok());
-  EXPECT_EQ(reported(budget, {}), "one drop of 40 pl a pixel fills 10.0 % of the voids");
+  EXPECT_EQ(pipeline::binder_text(budget, {}), "one drop of 40 pl a pixel fills 10.0 % of the voids");
 }
 
 std::string refusal(const Budget& budget, std::vector<Warning>& warnings) {
@@ -339,8 +340,8 @@ TEST(Budget, ChecksTheShareOfACore) {
   for (Budget* budget : {&core, &shell}) budget->foresee(tenth(0));
   EXPECT_NE(refusal(core, warnings).find("get 0.5 %"), std::string::npos) << refusal(core, warnings);
   EXPECT_NE(refusal(shell, warnings).find("get 0.5 %"), std::string::npos) << refusal(shell, warnings);
-  EXPECT_EQ(reported(core, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 % of the voids");
-  EXPECT_EQ(reported(shell, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 to 10.0 % of the voids");
+  EXPECT_EQ(pipeline::binder_text(core, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 % of the voids");
+  EXPECT_EQ(pipeline::binder_text(shell, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 to 10.0 % of the voids");
 }
 
 TEST(Budget, NamesTheWorstDose) {

@@ -2,22 +2,13 @@
 
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/names.h"
+#include "stages/support/text/renamed_keys.h"
 
 namespace lamina {
 
-namespace {
-
-/// Keys that have another name now.
-constexpr std::string_view kRenamed[][3] = {{"fill", "by_height", "range"},
-                                            {"segment", "by_height", "range"},
-                                            {"part", "material_by_height", "material_range"},
-                                            {"extrude", "set", "machine"}};
-
-}  // namespace
-
 std::string no_such_key(std::string_view section, std::string_view name, std::span<const std::string_view> names) {
-  for (const auto& [of, old, now] : kRenamed) {
-    if (of == section && old == name) return fmt::format("is now {}.{}; see docs/job.md", section, now);
+  for (const auto& [of, old, now] : kRenamedKeys) {
+    if (of == section && old == name) return fmt::format("is now {}; see docs/job.md", now);
   }
   const std::string near = suggest(name, names);
   return near.empty() ? fmt::format("no such key; [{}] has {}", section, fmt::join(names, ", "))
@@ -25,6 +16,9 @@ std::string no_such_key(std::string_view section, std::string_view name, std::sp
 }
 
 std::string no_such_section(std::string_view section, std::span<const std::string_view> names) {
+  for (const auto& [of, old, now] : kRenamedKeys) {
+    if (of == section && old.empty()) return fmt::format("is now [{}]; see docs/job.md", now);
+  }
   const std::string near = suggest(section, names);
   return near.empty() ? fmt::format("no such section; there are {}", fmt::join(names, ", "))
                       : fmt::format("no such section{}", near);

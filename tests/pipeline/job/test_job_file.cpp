@@ -301,7 +301,10 @@ TEST(JobFile, RenamedKeyNamesTheNewOne) {
   for (const auto& [assignment, renamed] : {std::pair{"fill.by_height=2.7:3 gap_mm=0", "is now fill.range"},
                                             {"segment.by_height=2.7:3 thin_mm=2", "is now segment.range"},
                                             {"part.material_by_height=2:4 bronze", "is now part.material_range"},
-                                            {"extrude.set=fan.from_layer=2", "is now extrude.machine"}}) {
+                                            {"extrude.set=fan.from_layer=2", "is now extrude.machine"},
+                                            {"run.least_wall_mm=1", "is now run.min_wall_mm"},
+                                            {"segment.least_end_mm=1", "is now segment.min_end_mm"},
+                                            {"place.gap_mm=1", "is now [placement]"}}) {
     Job job;
     job.parts.emplace_back();
     const Status status = set_key(job, assignment);
