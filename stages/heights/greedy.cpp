@@ -10,7 +10,7 @@
 namespace lamina::heights {
 namespace {
 
-// The slopes that a layer looks at, by rungs: those in its cells, or those that the plane on top of it cuts.
+// The slopes that a layer considers, by candidates: those in its cells, or those that its upper plane cuts.
 class Slopes {
  public:
   Slopes(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights, Slope slope)
@@ -23,7 +23,7 @@ class Slopes {
   bool plane() const { return plane_; }
   Steepness at(std::uint32_t i) const { return i < values_.size() ? values_[i] : 0; }
 
-  /// Grows upwards from a rung: the flattest slope of a layer from there to each of increasing heights.
+  /// Grows upwards from a candidate: the flattest slope of a layer from there to each of increasing heights.
   class Growing {
    public:
     Growing(const Slopes& slopes, std::int64_t bottom) : slopes_(slopes), cell_(slopes.candidate_of(bottom)) {}
