@@ -11,11 +11,11 @@
 
 namespace lamina::heights {
 
-/// Rungs r_0 = 0 < r_1 < ... in nm; cell k lies between rung k and rung k + 1. Rungs are evenly spaced where the
+/// Candidate heights r_0 = 0 < r_1 < ... in nm; cell k is between candidates k and k + 1. They are evenly spaced if the
 /// thicknesses share a useful step, else every sum of thicknesses is listed.
 class CandidateHeights {
  public:
-  /// Every height that a stack of these thicknesses can reach, up to the first rung at or above `highest`.
+  /// Every height that a stack of these thicknesses can reach, up to the first one at or above `highest`.
   /// errors  kUsage if there are more than kMaxCandidates
   static Result<CandidateHeights> reachable(const ThicknessSet& set, std::int64_t highest);
   /// These heights; increasing, the first is the lowest (need not be 0).
@@ -26,10 +26,10 @@ class CandidateHeights {
   std::uint32_t candidates() const { return count_; }
   std::uint32_t cells() const { return count_ - 1; }
   std::int64_t operator[](std::uint32_t candidate) const { return step_ > 0 ? step_ * candidate : heights_[candidate]; }
-  /// nm between rungs, or 0 if they are listed.
+  /// nm between candidates, or 0 if they are listed.
   std::int64_t step() const { return step_; }
 
-  /// The number of rungs at or below `height`.
+  /// The number of candidates at or below `height`.
   std::uint32_t candidates_up_to(std::int64_t height) const {
     if (step_ > 0) {
       if (height < 0) return 0;
@@ -53,7 +53,7 @@ class CandidateHeights {
  private:
   std::int64_t step_ = 0;
   // ceil(2^64 / step): the upper half of its product with a height below 2^32 is the quotient, exactly (Lemire, Kaser and
-  // Kurz, "Faster remainder by direct computation", 2019). 0 where that does not hold: a step of 1, or none.
+  // Kurz, "Faster remainder by direct computation", 2019). 0 where that does not apply: a step of 1, or none.
   std::uint64_t inverse_ = 0;
   std::uint32_t count_ = 0;
   std::vector<std::int64_t> heights_;  // empty if evenly spaced

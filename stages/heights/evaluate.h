@@ -1,4 +1,4 @@
-// stages/heights/evaluate.h: what a layer table does to the surface of the parts, whoever made the table.
+// stages/heights/evaluate.h: the effect of any layer table on the surface of the parts.
 #pragma once
 
 #include <cstdint>

@@ -28,7 +28,7 @@ struct TimeModel {
   bool on() const { return seconds_per_layer > 0 || seconds_per_mm2 > 0; }
 };
 
-/// What comparisons tell time by where no model is given: a section filled with beads of 0.4 mm at 40 mm/s, and 2 s to lift.
+/// The time model of comparisons where none is given: a section filled with beads of 0.4 mm at 40 mm/s, and 2 s to lift.
 inline constexpr TimeModel kPlainTime{2, 1 / (0.4 * 40)};
 
 struct Options {
@@ -58,7 +58,7 @@ struct FlatHit {
 struct Plan {
   LayerTable table;
   std::vector<Steepness> inspected;  // angle: of each layer, the flattest slope that decided; else empty
-  std::vector<bool> stepped_back;    // cusp: thinner than the slopes at its bottom ask for
+  std::vector<bool> stepped_back;    // cusp: thinner than the slopes at its bottom require
   std::uint32_t small_peaks = 0;     // angle: heights with horizontal facets that are peaks in the documents, but no flats
   /// optimal: no table of one layer less (or, with a time model, of less time) that ends as near to the flats and keeps
   /// the step gets higher than this, nm; -1 if there is no such statement

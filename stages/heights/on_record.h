@@ -1,4 +1,4 @@
-// stages/heights/on_record.h: whether layers that somebody tells can be those of a job.
+// stages/heights/on_record.h: whether given layers can be those of a job.
 #pragma once
 
 #include <cstdint>

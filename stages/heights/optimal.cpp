@@ -24,7 +24,7 @@ constexpr Cost unreached() {
   return static_cast<Cost>((static_cast<unsigned __int128>(1) << (8 * sizeof(Cost) - 1)) - 1);
 }
 
-// The highest rung to which the steps allow a layer from each rung. Both ends only move up: if a layer keeps the limit,
+// The highest candidate to which the steps allow a layer from each one. Both ends only move up: if a layer keeps the limit,
 // one inside of it does.
 Buffer<std::uint32_t> highest_by_cusp(const CandidateHeights& candidate_heights, const Buffer<Steepness>& cells,
                                       std::int64_t cusp, std::int64_t maximum) {
@@ -56,7 +56,7 @@ class Solver {
         candidate_heights_(candidate_heights),
         set_(options.set),
         tolerance_(options.surface.flat_tolerance) {
-    // Where every height is within the tolerance of a rung, the rung that is nearest has to be met.
+    // Where every height is within the tolerance of a candidate, the nearest candidate has to be met.
     hit_ = candidate_heights.step() > 0 ? std::min<std::int64_t>(tolerance_, candidate_heights.step() / 2) : tolerance_;
     highest_ = highest_by_cusp(candidate_heights, steepest_in_cells(index, index.parts, candidate_heights), options.cusp,
                                set_.maximum());
@@ -90,7 +90,7 @@ class Solver {
   }
 
  private:
-  // Costs of layers by the rung at their bottom, in microseconds; empty if each counts 1.
+  // Costs of layers by the candidate at their bottom, in microseconds; empty if each counts 1.
   void weigh_layers() {
     if (!options_.time.on()) return;
     const Buffer<double> section = section_at_candidates(index_, candidate_heights_, tolerance_);
@@ -108,7 +108,7 @@ class Solver {
   bool covers(std::int64_t height) const { return !options_.cover_top || height >= index_.top - hit_; }
   std::int64_t counted(std::int64_t distance) const { return distance > hit_ ? distance : 0; }
 
-  // Calls visit(thickness index, upper rung) for every thickness from a rung, thin to thick.
+  // Calls visit(thickness index, upper candidate) for every thickness from a candidate, thin to thick.
   template <class Visit>
   void for_each_layer(std::uint32_t candidate, const Visit& visit) const {
     for (std::uint32_t i = 0; i < set_.size(); ++i) {
@@ -119,7 +119,7 @@ class Solver {
       visit(i, up);
     }
   }
-  // The highest rung that a layer from each rung may reach if every flat has to have a boundary within `distance`.
+  // The highest candidate that a layer from each candidate may reach if every flat has to have a boundary within `distance`.
   void allow(std::int64_t distance) {
     allowed_ = distance;
     limit_.resize(candidate_heights_.candidates());
@@ -135,7 +135,7 @@ class Solver {
         const std::int64_t boundary = (bottom / options_.slab + 1) * options_.slab;
         if (boundary >= index_.top || index_.top - boundary >= set_.minimum()) maximum = std::min(maximum, boundary);
       }
-      // The least thickness is allowed whatever the slopes ask for.
+      // The minimum thickness is allowed regardless of the slopes.
       const std::uint32_t thinnest = candidate_heights_.candidates_up_to(bottom + set_.minimum()) - 1;
       limit_[candidate] = std::min(candidate_heights_.candidates_up_to(maximum) - 1, std::max(highest_[candidate], thinnest));
       if (bottom + set_.minimum() > maximum) limit_[candidate] = candidate;
@@ -159,13 +159,13 @@ class Solver {
       missed += counted(flats_[i] - candidate_heights_[candidate]);
     return static_cast<Cost>(static_cast<__int128>(missed) << 64);
   }
-  // Nothing is built upon an end, but where ends are missed the next rung may be nearer.
+  // Nothing is built upon an end, but where ends are missed the next candidate may be nearer.
   template <class Cost>
   bool is_last(std::uint32_t candidate) const {
     return sizeof(Cost) > 8 ? candidate_heights_[candidate] >= index_.top : is_end(candidate);
   }
 
-  // The costs of reaching every rung that layers within limit_ reach.
+  // The costs of reaching every candidate that layers within limit_ reach.
   template <class Cost>
   Buffer<Cost> costs_by_layers() const {
     Buffer<Cost> cost(candidate_heights_.candidates(), unreached<Cost>());
@@ -180,8 +180,8 @@ class Solver {
     return cost;
   }
   // The same where the thicknesses are all the multiples of the step in a range and a layer's cost does not depend on its
-  // top: the rungs below from which a rung can be reached are a window whose ends only move up, so that the cheapest of
-  // them costs O(1) a rung.
+  // top: the candidates below from which one can be reached are a window whose ends only move up, so that finding the
+  // cheapest costs O(1) a candidate.
   template <class Cost>
   Buffer<Cost> costs_by_windows() const {
     Buffer<Cost> cost(candidate_heights_.candidates(), unreached<Cost>());
@@ -223,7 +223,7 @@ class Solver {
     }
     return trace(cost, end);
   }
-  // Whether the thicknesses are all the multiples of the ladder's step in a range.
+  // Whether the thicknesses are all the multiples of the candidates' step in a range.
   bool even_range() const { return !strides_.empty() && set_.is_contiguous() && set_.step() == candidate_heights_.step(); }
 
   bool nearer_top(std::uint32_t a, std::uint32_t b) const {
@@ -268,7 +268,7 @@ class Solver {
   template <class Cost>
   std::vector<std::uint32_t> trace(const Buffer<Cost>& cost, std::uint32_t end) const {
     const Buffer<double> below = projected_below(index_, index_.parts, candidate_heights_, Sign::kBoth);
-    Buffer<std::uint32_t> via;  // the next rung of the stack from each rung
+    Buffer<std::uint32_t> via;  // the next candidate of the stack from each one
     if constexpr (std::is_same_v<Cost, Layers>) {
       if (even_range()) via = fewest_steps({cost, limit_, below, strides_.front(), end});
     }
@@ -284,7 +284,7 @@ class Solver {
   template <class Cost>
   Buffer<std::uint32_t> fewest_steps_by_layers(const Buffer<Cost>& cost, const Buffer<double>& below, std::uint32_t end) const {
     constexpr double kNowhere = std::numeric_limits<double>::infinity();
-    Buffer<double> steps(end + 1, kNowhere);  // mm2 nm, from a rung to the end
+    Buffer<double> steps(end + 1, kNowhere);  // mm2 nm, from a candidate to the end
     Buffer<std::uint32_t> via(end + 1, kNone);
     steps[end] = 0;
     for (std::uint32_t candidate = end; candidate-- > 0;) {
@@ -324,7 +324,7 @@ class Solver {
   const ThicknessSet& set_;
   const Nm tolerance_;
   std::vector<std::int64_t> flats_;     // below the top
-  std::vector<std::uint32_t> strides_;  // thicknesses in rungs, where rungs are even
+  std::vector<std::uint32_t> strides_;  // thicknesses in steps of candidates, where these are even
   Buffer<std::uint32_t> highest_, limit_;
   Buffer<std::int64_t> weights_;
   std::int64_t hit_ = 0, allowed_ = 0, one_less_ = -1;
@@ -359,7 +359,7 @@ class HeightSearch {
   }
 
  private:
-  // A rung and the columns, [first, last), on which a layer from it may end.
+  // A candidate and the columns, [first, last), on which a layer from it may end.
   struct CandidateRow {
     std::uint32_t candidate;
     std::size_t first, last;
@@ -380,7 +380,7 @@ class HeightSearch {
     }
   }
 
-  // The rungs from which a layer reaches a column. Both ends of what they reach only move up.
+  // The candidates from which a layer reaches a column. Both ends of what they reach only move up.
   void find_rows(std::int32_t layers) {
     rows_.clear();
     std::size_t first = 0, last = 0;
@@ -414,10 +414,10 @@ class HeightSearch {
   }
 
   const Stacks& stacks_;
-  Buffer<double> steps_;  // mm2 times rungs, from a rung to the end
+  Buffer<double> steps_;  // mm2 times steps, from a candidate to the end
   Buffer<std::uint32_t> via_;
-  Buffer<std::uint32_t> candidates_, begin_;  // rungs by number of layers below them, with the offset of each number
-  Buffer<std::uint32_t> columns_;             // rungs of one layer more from which the end is reached
+  Buffer<std::uint32_t> candidates_, begin_;  // by number of layers below them, with the offset of each number
+  Buffer<std::uint32_t> columns_;             // those of one layer more from which the end is reached
   Buffer<CandidateRow> rows_;
 };
 

@@ -9,7 +9,7 @@
 namespace lamina::heights {
 
 /// Every part is built in slabs that are common to all; within a slab each part has its own layers, so that a part
-/// with steep walls need not be built in the thin layers that its neighbour's slopes ask for.
+/// with steep walls need not be built in the thin layers that its neighbour's slopes require.
 /// source  J. Tyberg and J. H. Bohn, "Local adaptive slicing", Rapid Prototyping Journal 4 (1998)
 struct PerPartPlan {
   std::int64_t slab = 0;    // nm: every part has a boundary at each multiple of it, up to the least thickness

@@ -7,8 +7,8 @@
 
 namespace lamina::heights {
 
-/// mm2 of the section just above each rung, of all copies: what looks down below it minus what looks up. Horizontal
-/// facets up to `tolerance` above a rung count as below it. Right for closed meshes, but that a facet's area counts as
+/// mm2 of the section just above each candidate, of all copies: downward facets below it minus upward ones. Horizontal
+/// facets up to `tolerance` above a candidate count as below it. Right for closed meshes, but that a facet's area counts as
 /// evenly spread over its height; never below 0.
 Buffer<double> section_at_candidates(const SurfaceIndex& index, const CandidateHeights& candidate_heights, Nm tolerance);
 

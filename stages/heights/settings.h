@@ -30,8 +30,8 @@ constexpr std::string_view mode_name(Mode mode) {
   return "uniform";
 }
 
-/// Which slopes a layer looks at: all that reach into it, or only those that its bounding plane cuts, as the documents
-/// do. The latter can miss whatever lies between two planes.
+/// Which slopes a layer considers: all that reach into it, or only those that its bounding plane cuts, as the cited
+/// documents do. The latter can miss slopes between two planes.
 enum class Facets : std::uint8_t { kRange, kPlane };
 
 /// Which horizontal faces are peaks for kAngle: those that are flats, or every horizontal facet as in the documents.

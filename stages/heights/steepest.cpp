@@ -12,8 +12,8 @@
 namespace lamina::heights {
 namespace {
 
-// Raises ranges of an array to at least a value, many times, and then tells every entry: level l of the table holds
-// what was asked of stretches of 2^l entries; any range is two such stretches that may overlap. Handing levels down
+// Raises ranges of an array to at least a value, many times, and then returns every entry: level l of the table contains
+// the values set for intervals of 2^l entries; any range is two such intervals that may overlap. Handing levels down
 // once at the end makes it O(1) a range. Ranges longer than a block are a range of blocks and two short ones, which
 // keeps the table small.
 class RangeRaiser {
@@ -96,10 +96,10 @@ Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSur
   return std::move(found[0]);
 }
 
-// What facets put below each rung; sums of floating point, so shares are joined in their order.
+// What facets put below each candidate; sums of floating point, so shares are joined in their order.
 struct Spread {
   Buffer<double> within;  // mm2 inside of a cell
-  Buffer<double> slope;   // mm2 per nm that begins (or ends) to cover whole cells at a rung
+  Buffer<double> slope;   // mm2 per nm that begins (or ends) to cover whole cells at a candidate
   explicit Spread(std::uint32_t candidates) : within(candidates, 0.0), slope(candidates + 1, 0.0) {}
 
   void add(const CandidateHeights& candidate_heights, Nm lo, Nm hi, double mm2) {

@@ -1,6 +1,6 @@
 // stages/heights/surface.h: what layer heights need to know of a part: its slopes and its horizontal faces by height.
 //
-// One pass over the facets of every mesh. Later questions are answered from these arrays; no layer looks at all facets.
+// One pass over the facets of every mesh. Later questions are answered from these arrays; no layer reads all facets.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ constexpr std::int64_t cusp_of(std::int64_t thickness, Steepness steepness) {
   return (thickness * steepness + kHorizontal - 1) / kHorizontal;
 }
 
-/// mm2 of a facet as seen from above, negative where it looks down. Exact before the last rounding.
+/// mm2 of a facet projected along z, negative where it faces down. Exact before the last rounding.
 inline double projected_mm2(const Triangle& t) {
   const std::int64_t ux = std::int64_t{t.b.x} - t.a.x, uy = std::int64_t{t.b.y} - t.a.y;
   const std::int64_t vx = std::int64_t{t.c.x} - t.a.x, vy = std::int64_t{t.c.y} - t.a.y;
@@ -40,7 +40,7 @@ struct SurfaceOptions {
   double peak_angle_deg = 90;      // facets at least as flat as this are horizontal
   double normal_tolerance = 1e-3;  // of |n_z|, for all comparisons of angles
   Nm flat_tolerance = 1000;        // nm: a horizontal facet may be that much out of level
-  double min_facet_mm2 = 0;        // smaller facets ask for nothing
+  double min_facet_mm2 = 0;        // smaller facets have no effect
   bool nominal_cusps = false;      // steps as they are left on the part once it has shrunk, not as printed
 };
 
@@ -62,11 +62,11 @@ struct MeshSlopes {
   Buffer<Steepness> steepness;       // of each facet; a layer's thickness times it is its step
   Buffer<Steepness> nominal;         // of each facet before the stretch, for angles; empty where that is the same
   std::vector<FlatFacet> flats;      // in no order; the same for any number of threads
-  double area_mm2 = 0;               // of all facets that are not horizontal, where steps are looked at
+  double area_mm2 = 0;               // of all facets that are not horizontal, where steps are considered
   double step_share = 1;             // of a facet's projected area in sums of steps; 1 but for steps of a part that has shrunk
 };
 
-/// Which steepness of a facet is asked for.
+/// Which steepness of a facet is requested.
 enum class Slope { kSteps, kAngles };
 
 /// A mesh at a height; copies that stand on the same level count as one with a larger area.
@@ -94,7 +94,7 @@ struct SurfaceIndex {
   }
 };
 
-/// Looks at every facet once, in parallel; the result does not depend on the number of threads.
+/// Reads every facet once, in parallel; the result does not depend on the number of threads.
 ///
 /// instances, part_of_instance  of equal length; the offset's z is the height above the bed
 /// angles come from the corners of the facets, never from the normals that a file may hold
@@ -112,7 +112,7 @@ SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instanc
 std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries);
 
 /// Calls visit(lo, hi, steepness, projected) for each sloped facet of one of `shares` shares of a mesh that stands
-/// somewhere: heights in nm above the bed, mm2 of all copies, negative where the facet looks down.
+/// somewhere: heights in nm above the bed, mm2 of all copies, negative where the facet faces down.
 template <class Visit>
 void for_each_slope(const MeshSlopes& mesh, const PlacedSurface& placed, std::uint32_t share, std::uint32_t shares,
                     const Visit& visit, Slope slope = Slope::kSteps) {

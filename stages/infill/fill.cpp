@@ -15,7 +15,7 @@
 namespace lamina::infill {
 namespace {
 
-/// Beads below this are of no use: planners of printers look ahead over a few dozen moves.
+/// Beads below this are of no use: planners of printers use a lookahead of a few dozen moves.
 constexpr Nm kShortest = 50'000;
 
 /// A closed path: the first point comes again at the end.
@@ -76,11 +76,11 @@ Status append_curves(Contours& region, const FillContext& context, const FillPar
   return {};
 }
 
-/// Points of the first `curves` closed curves, at most. The region is looked at in a few depths: from one to the next its
+/// Points of the first `curves` closed curves, at most. The region is evaluated in a few depths: from one to the next its
 /// corners can only part where one that points inwards meets an edge, so they at most double.
 Result<std::uint64_t> bound_curves(const ContoursView& region, const FillContext& context, const FillParameters& parameters,
                                    const LinePositions& positions, std::size_t curves) {
-  constexpr std::size_t kDepths = 8, kCurvesADepth = 8;  // so looking takes an eighth of the time that laying will
+  constexpr std::size_t kDepths = 8, kCurvesADepth = 8;  // so this takes an eighth of the time of the deposit
   const std::size_t step = std::max(kCurvesADepth, (curves + kDepths - 1) / kDepths);
   const auto depth = region_depth(context, parameters);
   if (!depth) return depth.error();

@@ -25,7 +25,7 @@ Status check(const FillParameters& parameters);
 /// errors    kUsage: a distance between lines that is not positive, a formula that fails; kInternal of Clipper
 Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
-/// Where the centres of beads lie, or may lie: what is laid is made of these alone.
+/// Where the centres of beads are, or may be: all deposited lines are made of these alone.
 struct Outlines {
   std::vector<Contours> walls;  // from the surface inwards; one that would hold nothing ends them
   Contours region;              // of filling beads: the contours moved inwards past the walls; nothing for kNone
@@ -45,8 +45,8 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
 /// The same, with the outlines made beforehand.
 Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
-/// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region
-/// counted, curves counted by their places and what the region is like at some of these, waves by what of them lies within
+/// What append_fill may come to, counted before anything is deposited: lines are placed and their crossings with the region
+/// counted, curves counted by their positions and what the region is like at some of these, waves by what of them is within
 /// reach of the region.
 struct FillBound {
   std::uint64_t points = 0;  // of toolpaths
@@ -55,7 +55,7 @@ struct FillBound {
   std::uint64_t scratch_bytes = 0;  // while they are made
 };
 /// errors  as append_fill
-/// cost    O(P log L) for P points of the region and L lines; of curves, an eighth of what laying them takes
+/// cost    O(P log L) for P points of the region and L lines; of curves, an eighth of the cost of append_fill
 Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
                              const FillParameters& parameters);
 

@@ -13,7 +13,7 @@ namespace lamina::infill {
 /// u runs along the lines, v across them, nm from a centre. Whole quarter turns are exact; others are rounded to the
 /// nearest nm, so that a point there and back again is off by at most 1 nm in x and y.
 ///
-/// Directions that differ by half a turn share a frame: their lines are the same lines, laid the other way.
+/// Directions that differ by half a turn share a frame: their lines are the same lines, deposited the other way.
 class Frame {
  public:
   Frame(MicroDegrees angle, Point2 centre)
@@ -26,7 +26,7 @@ class Frame {
     sin_ = std::sin(turn);
   }
 
-  /// Whether lines are laid towards -u first.
+  /// Whether lines are deposited towards -u first.
   bool reversed() const { return reversed_; }
 
   Point2 to(Point2 p) const {

@@ -1,4 +1,4 @@
-// stages/infill/layout.h: where the lines, waves or closed curves of one layer lie, before any is laid.
+// stages/infill/layout.h: the positions of the lines, waves or closed curves of one layer, before any is deposited.
 #pragma once
 
 #include "stages/data/contours.h"

@@ -45,7 +45,7 @@ struct FillParameters {
 
   // --- stagger: lines of layers with the same angle are moved sideways by these amounts in turn
   std::vector<Nm> stagger{0};
-  bool stagger_every_layer = false;  // the turn goes on with every layer, not with every return of the angle
+  bool stagger_every_layer = false;  // the turn continues with every layer, not with every return of the angle
 
   std::optional<Nm> first_line;    // distance of line 0 from the part's side, across the lines; no line of any layer is
                                    // nearer to either side. Absent: one distance from the centre of the innermost wall

@@ -127,7 +127,7 @@ class Scan {
     const auto [nb, db] = exact(b.edge, v);
     const __int128 left = na * db, right = nb * da;  // below 2^97
     if (left != right) return left < right;
-    // Where the region touches itself the stretch goes on.
+    // Where the region touches itself the segment continues.
     if (a.enters != b.enters) return a.enters;
     return a.edge < b.edge;
   }

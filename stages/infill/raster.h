@@ -5,8 +5,8 @@
 // rounded to the nm inside the region.
 //
 // The end of a line is linked to the start of the next by walking along the contour from one crossing to the other. A
-// link exists if that walk comes to the next line first and is not too long. It lies on the region's edge, so it leaves
-// the region nowhere, whatever its shape.
+// link exists if that walk comes to the next line first and is not too long. It is on the region's edge, so it leaves
+// the region nowhere, regardless of its shape.
 #pragma once
 
 #include <cstdint>

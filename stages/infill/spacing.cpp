@@ -129,7 +129,7 @@ Result<LinePositions> line_positions(const FillParameters& parameters, const Fil
   auto distances = Distances::make(parameters, context, extent);
   if (!distances) return distances.error();
   const std::int64_t shift = layer_stagger(parameters, context.layer.index);
-  // Places count from the part's side and without the stagger while lines are laid out. No line is nearer to either
+  // Positions count from the part's side and without the stagger while lines are placed. No line is nearer to either
   // side of the part than the first one.
   std::int64_t lowest = extent.low - extent.side, high = extent.high - extent.side;
   if (extent.off_sides) {
@@ -147,7 +147,7 @@ Result<LinePositions> line_positions(const FillParameters& parameters, const Fil
   Buffer<std::int64_t> before;
   std::int64_t position = *first;
   for (std::int64_t i = -1; position > lowest; --i) {
-    // Backwards: the distance is that of line i, asked where it would be if its gap were that of line i + 1.
+    // Backwards: the distance is that of line i, evaluated where it would be if its gap were that of line i + 1.
     const auto distance = (*distances)(i, position);
     if (!distance) return distance.error();
     position -= *distance + extent.line_height;

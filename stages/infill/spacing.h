@@ -55,7 +55,7 @@ class Expression {
   /// errors  kUsage: what is wrong, and at which character
   static Result<Expression> parse(const std::string& text);
 
-  /// Whether the formula looks at a variable.
+  /// Whether the formula uses a variable.
   bool uses(std::string_view variable) const { return formula_.uses(variable); }
   /// errors  kUsage: no finite number, and for which variables
   Result<double> operator()(const Variables& variables);

@@ -40,7 +40,7 @@ WaveBound bound_waves(const ContoursView& region, const FillParameters& paramete
 /// Appends the waves that lie in `region` (clean contours in the frame), their troughs at `places` (of positions_across).
 /// `start_u` is where crests are counted from. Pieces shorter than shortest_line along u are left out.
 /// errors  kUsage: too many cells; kInternal of the clipping library
-/// memory  some megabytes beside the result: waves are clipped a few at a time
+/// memory  some megabytes in addition to the result: waves are clipped a few at a time
 Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions,
                     std::int64_t start_u, const Frame& frame, Toolpaths& out);
 

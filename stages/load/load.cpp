@@ -48,7 +48,7 @@ bool ends_with(std::string_view path, std::string_view lower_case) {
   return path.size() >= lower_case.size() && is_word(path.substr(path.size() - lower_case.size()), lower_case);
 }
 
-/// Binary STL has zero bytes in its first facets; text, in whatever encoding, has none (but for padding at its end),
+/// Binary STL has zero bytes in its first facets; text, in any encoding, has none (but for padding at its end),
 /// nor other control characters.
 bool is_text(std::string_view head) {
   head = head.substr(0, head.find_last_not_of('\0') + 1);
@@ -70,8 +70,8 @@ bool has_line_with(std::string_view head, std::initializer_list<std::string_view
   return false;
 }
 
-/// The size that a binary STL file's own count asks for. In text, the count's bytes are characters and ask for
-/// more than 7 GB, so the test decides whatever the header says.
+/// The size that a binary STL file's own count implies. In text, the count's bytes are characters and imply
+/// more than 7 GB, so the test decides regardless of the header.
 bool has_binary_stl_size(const Source& source, std::string_view head) {
   if (head.size() < 84) return false;
   std::uint64_t count = 0;
@@ -79,7 +79,7 @@ bool has_binary_stl_size(const Source& source, std::string_view head) {
   return source.size() == 84 + 50 * count;
 }
 
-/// Tells the format from the content, and from the name where the content is text that could be anything.
+/// Detects the format from the content, and from the name where the content is text that could be anything.
 /// errors  kInput: empty, or nothing that is known
 Result<Format> detect(const Source& source) {
   if (source.size() == 0) return source.error("is empty; export the part again");

@@ -2,7 +2,7 @@
 //
 // Understood: v (colours or a weight behind the position are left out) and f with corners as v, v/t, v//n or v/t/n,
 // counted from 1 or backwards from -1; polygons become fans from their first corner; lines end with LF, CRLF or CR and
-// go on after a backslash. Groups, materials, normals, lines and points do not matter to a solid. Numbers are read in
+// continue after a backslash. Groups, materials, normals, lines and points do not matter to a solid. Numbers are read in
 // double precision: other readers of this format keep floats.
 #include "stages/load/obj.h"
 
@@ -47,7 +47,7 @@ class ObjParser {
       } else if (kind == "f") {
         read = face();
       } else if (!kind.empty() && kind.front() == '#') {
-        while (at_ != end_ && !is_line_end(*at_)) ++at_;  // "# C:\\parts\\" does not go on in the next line
+        while (at_ != end_ && !is_line_end(*at_)) ++at_;  // "# C:\\parts\\" does not continue in the next line
       } else if (!kind.empty()) {
         remark_on(kind);
       }

@@ -117,7 +117,7 @@ Result<PlannedVolume> merged(std::span<const Mesh> meshes, std::span<const Insta
   return PlannedVolume{signed_mm3 + more, Known::kAbout};
 }
 
-/// Instances whose boxes overlap, directly or through others, one list after the other; false: too many to tell.
+/// Instances whose boxes overlap, directly or through others, one list after the other; false: too many to decide.
 bool find_bodies(std::span<const Mesh> meshes, std::span<const Instance> instances,
                  std::vector<std::vector<std::uint32_t>>& bodies) {
   std::vector<Box> boxes;

@@ -17,7 +17,7 @@ using SurplusAreas =
 
 enum class Known {
   kExactly,
-  kAbout,   // integrated over some 256 planes, or as many as shells ask for; less than a hundredth off as a rule
+  kAbout,   // integrated over some 256 planes, or as many as shells require; less than a hundredth off as a rule
   kSummed,  // overlaps count as often as they overlap: nothing to slice with, an open mesh, or more than can be sliced soon
 };
 
@@ -51,7 +51,7 @@ Result<PlannedVolumes> planned_volumes(std::span<const Mesh> meshes, std::span<c
                                        std::span<const Diagnosis> diagnosis, const SurplusAreas& surplus,
                                        const Effort& effort = {});
 
-/// The same for meshes that nobody has diagnosed. returns  mm3; 0 if it cannot be told
+/// The same for meshes without a diagnosis. returns  mm3; 0 if it is not known
 /// cost  a diagnosis of each mesh, and slicing for about a second
 double union_mm3(std::span<const Mesh> meshes, std::span<const Instance> instances, const SurplusAreas& surplus);
 

@@ -24,7 +24,7 @@ struct ReadWarning {
   std::string rest_left_out = {};  // note if only those are taken
 };
 
-/// A closed mesh whose volume is at most this share of its box may enclose nothing: its pieces are looked at (enclosed.h).
+/// A closed mesh whose volume is at most this share of its box may enclose nothing: its pieces are inspected (enclosed.h).
 inline constexpr double kHardlyAny = 1e-6;
 
 /// The triangles of a file in its order, turned over if the transform mirrors.

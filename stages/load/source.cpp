@@ -66,7 +66,7 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
 
   Buffer<char> input(kStep), output;
-  // One byte more than claimed, so that the end of the stream is seen without growing.
+  // One byte more than claimed, so that the end of the stream is detected without growing.
   output.resize(std::max<std::size_t>(claimed_size(compressed) + 1, kStep));
   std::uint64_t read = 0;
   std::size_t written = 0;
@@ -81,7 +81,7 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
       stream.avail_in = static_cast<uInt>(count);
     }
     if (!within_member) {
-      // Whatever follows a member and is not another one is padding; gzip ignores it too.
+      // Bytes after a member that are not another one are padding; gzip ignores it too.
       if (written > 0 && *stream.next_in != 0x1f) break;
       if (inflateReset(&stream) != Z_OK) return Error{Fault::kInternal, "zlib cannot be started"};
       within_member = true;

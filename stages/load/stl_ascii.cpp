@@ -68,7 +68,7 @@ class BlockParser {
     }
   }
 
-  /// Whether the line goes on as a facet does behind its first word.
+  /// Whether the line continues as a facet does after its first word.
   bool facet_follows() {
     const char* const here = at_;
     bool follows = is_word(word_of_line(), "normal");

@@ -192,7 +192,7 @@ bool read_block(const Source& source, const Snapper& snapper, std::uint32_t bloc
   return true;
 }
 
-/// Whether too many blocks are in disorder for who looks at edges: a file of such is better read as a list.
+/// Whether too many blocks are in disorder to inspect edges: such a file is better read as a list.
 class Disorder {
  public:
   bool is_found(const MeshBlocks& blocks, std::uint32_t block) {

@@ -18,14 +18,14 @@ inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 /// ^Z, the end of a text in DOS, counts too.
 inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0' || c == '\x1a'; }
 
-/// Whether a word is `lower_case`, in whatever case the file has it.
+/// Whether a word is `lower_case`, in any case.
 inline bool is_word(std::string_view word, std::string_view lower_case) {
   return word.size() == lower_case.size() && std::equal(word.begin(), word.end(), lower_case.begin(), [](char c, char low) {
            return (c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) == low;
          });
 }
 
-/// A number in double precision, whatever the locale. What is too large, or is one of the ways in which programs print
+/// A number in double precision, in any locale. What is too large, or is one of the ways in which programs print
 /// "not a number", is not finite; what is too small is 0. False if the word is no number at all.
 inline bool parse_number(std::string_view word, double& value) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
@@ -46,7 +46,7 @@ inline bool parse_number(std::string_view word, double& value) {
 std::uint64_t line_of(const Source& source, std::uint64_t offset);
 
 /// Gives a text to `handle(begin, end, offset of begin)` window by window, each cut where `cut(begin, end)` says: how
-/// many bytes, from the beginning, can be handled alone; 0 asks for a larger window. A byte order mark is left out.
+/// many bytes, from the beginning, can be handled alone; 0 requests a larger window. A byte order mark is left out.
 /// errors  those of `handle`; kInput if nothing can be cut off within 256 MiB
 template <class Cut, class Handle>
 Status for_each_window(const Source& source, std::size_t window, const Cut& cut, const Handle& handle) {

@@ -18,7 +18,7 @@ Cell sum(const Cell& a, const Cell& b, std::int32_t sign) {
   return {a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2]};
 }
 
-/// Parts that are joined to groups; each part knows in which box it lies as seen from its group.
+/// Parts that are joined to groups; each part knows its box relative to its group.
 class Groups {
  public:
   explicit Groups(const Parts& parts) : wraps_(parts.wraps), faces_(parts.faces), up_(parts.size()), cell_(parts.size()) {
@@ -39,7 +39,7 @@ class Groups {
     return {root, cell};
   }
 
-  /// b lies in the box that is `shift` beside that of a.
+  /// b is in the box that is `shift` from that of a.
   void join(std::uint32_t a, std::uint32_t b, const Cell& shift) {
     const auto [to, cell_a] = find(a);
     const auto [from, cell_b] = find(b);
@@ -64,7 +64,7 @@ class Groups {
   Buffer<std::uint8_t> wraps_;
   Buffer<Faces> faces_;
   Buffer<std::uint32_t> up_;
-  Buffer<Cell> cell_;  // as seen from up_
+  Buffer<Cell> cell_;  // relative to up_
 };
 
 /// Joins parts of the void that lie above each other, with no more than so many solid voxels between.
@@ -78,7 +78,7 @@ void join_over_contacts(const VoxelView& empty, const Parts& parts, std::uint32_
         const std::size_t r = y + std::size_t{empty.ny} * z, s = y + std::size_t{empty.ny} * above;
         for_each_overlap(empty.row(r), empty.row(s), [&](std::size_t i, std::size_t j) {
           const std::uint32_t a = parts.piece[empty.row_offset[r] / 2 + i], b = parts.piece[empty.row_offset[s] / 2 + j];
-          // Pieces lie in their cells as seen from their part.
+          // Cells of pieces are relative to their part.
           const Cell shift = sum(sum({0, 0, boxes}, parts.cell[b], -1), parts.cell[a], 1);
           groups.join(parts.part[a], parts.part[b], shift);
         });

@@ -8,8 +8,8 @@
 
 namespace lamina::pores {
 
-/// Whether beads that touch along their sides are welded, no plan tells. Cusps between them, which no pore meets, are cut off
-/// by good bonds and open where bonds leak: what helium finds of them lies between the two.
+/// No plan states whether beads that touch along their sides are welded. Cusps between them, which no pore meets, are cut off
+/// by good bonds and open where bonds leak: what helium finds of them is between the two.
 struct Connected {
   std::uint64_t voxels = 0;    // of the box
   std::uint64_t bonded = 0;    // void voxels that are reached where beads up to a gap apart are one
@@ -36,10 +36,10 @@ VoxelStack bond(const VoxelView& solid, Nm gap);
 // --- beads that lie closer than a given distance bond: their gaps are filled.
 
 /// The solid, and of each slice what lies between two solid voxels of a column (along y) or row (along x) whose gap is no
-/// wider than `gap`. So figures can be told for beads that bond and for those that do not. It is a morphological closing by a
-/// straight line: a gap is measured along one axis only, so one aslant looks wider, and pores close from their narrow ends.
-/// axis    0: x; 1: y, across beads that are laid along x
-/// gap     nm; whole voxels of it count, less than one leaves all as it is. Gaps that go on beyond the box stay, unless it
+/// wider than `gap`. So figures can be given for beads that bond and for those that do not. It is a morphological closing by a
+/// straight line: a gap is measured along one axis only, so one aslant appears wider, and pores close from their narrow ends.
+/// axis    0: x; 1: y, across beads that are deposited along x
+/// gap     nm; whole voxels of it count, less than one leaves all as it is. Gaps that continue beyond the box stay, unless it
 ///         repeats
 /// throws  std::length_error  2^32 changes or more
 /// source  Serra, "Image Analysis and Mathematical Morphology" (1982)

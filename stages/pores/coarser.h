@@ -8,7 +8,7 @@
 
 namespace lamina::pores {
 
-/// Unites blocks of factor[0] x factor[1] x factor[2] voxels: one is set if more than half of its voxels are. Where it is just
+/// Merges blocks of factor[0] x factor[1] x factor[2] voxels: one is set if more than half of its voxels are. Where it is just
 /// half of them, the block is as its first voxel is, the lowest along x, y and z, so that neither side grows.
 /// factor  at least 1 each; voxels beyond the last whole block are left out
 /// cost    O(runs + rows + voxels of the result), one thread

@@ -10,7 +10,7 @@
 namespace lamina::pores {
 namespace {
 
-/// Sets of runs. The smallest member stands for its set, whatever the order of the unions.
+/// Sets of runs. The smallest member represents its set, for any order of the unions.
 class Sets {
  public:
   explicit Sets(Buffer<std::uint32_t>& parent) : parent_(parent) {}
@@ -30,14 +30,14 @@ class Sets {
 
 using Cell = std::array<std::int32_t, 3>;
 
-/// Sets of pieces that know in which cell each lies, seen from the one that stands for its set.
+/// Sets of pieces that know the cell of each, relative to the one that represents its set.
 class CellSets {
  public:
   explicit CellSets(std::size_t pieces) : parent_(pieces), cell_(pieces, Cell{}), wraps_(pieces, std::uint8_t{0}) {
     for (std::size_t i = 0; i < pieces; ++i) parent_[i] = static_cast<std::uint32_t>(i);
   }
 
-  /// Afterwards the parent of a is the one that stands for its set, and the cell is seen from there.
+  /// Afterwards the parent of a is the one that represents its set, and the cell is relative to it.
   std::uint32_t find(std::uint32_t a) {
     path_.clear();
     while (parent_[a] != a) {

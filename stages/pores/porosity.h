@@ -28,7 +28,7 @@ struct Porosity {
 };
 
 /// A part of the void is open if it touches one of the faces or, on a periodic axis of these, leads around it: such a box has
-/// no end there, so that a part which goes on for ever counts as open. Of a body, parts that touch void outside of it are open
+/// no end there, so that a part without an end counts as open. Of a body, parts that touch void outside of it are open
 /// too. A part leads through the box as Parts::through() says, by its voxels within the body.
 /// body    of the size of the solid; none: the whole box
 /// throws  std::length_error  2^32 changes or more

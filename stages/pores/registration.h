@@ -19,7 +19,7 @@ struct Match {
 /// box whose walls have grown evenly lies in the middle of the places that it covers. Of equal ones that of fewest voxels that
 /// differ, then the smallest.
 ///
-/// Looks at all shifts of up to `range` voxels along each axis in voxels that are 2^k as large (pores/coarser.h), as large as
+/// Compares all shifts of up to `range` voxels along each axis in voxels that are 2^k as large (pores/coarser.h), as large as
 /// range and boxes allow, in blocks of the same size, at least a voxel; then around the best of these in finer and finer ones,
 /// two steps each way. What repeats within the range has several such places. small  voxel x, y, z lies upon x + range, ... of
 /// `large` without a shift large  2 range longer along each axis cost   O(runs + voxels / 64) for each shift, shifts in

@@ -1,4 +1,4 @@
-// stages/pores/sizes.h: pores as they are seen from above: their lengths and widths, slice by slice.
+// stages/pores/sizes.h: pores projected along z: their lengths and widths, slice by slice.
 #pragma once
 
 #include <array>
@@ -29,11 +29,11 @@ struct PoreSizes {
   Buffer<double> channels_mm;
 };
 
-/// The box of a pore is the one of least area that holds its pixels, in any direction. Rectangles and slots are measured
+/// The box of a pore is the one of minimum area that contains its pixels, in any direction. Rectangles and slots are measured
 /// exactly along rows and columns, and a disc by its diameter; turned ones to within about a voxel. A box of equal moments
-/// would be as cheap, but takes 13 % off a disc; the largest circle tells nothing of the length. A pore with cusps, as between
+/// would be as cheap, but takes 13 % off a disc; the largest circle gives no length. A pore with cusps, as between
 /// round ends of beads, is measured from tip to tip, as far as its tips are wider than a voxel.
-/// body    void counts within it, and a region beside void outside of it is cut; none: the whole box
+/// body    void counts within it, and a region next to void outside of it is cut; none: the whole box
 /// throws  std::length_error  2^32 changes or more
 /// source  Freeman, Shapira, "Determining the minimum-area encasing rectangle for an arbitrary closed curve" (1975)
 /// cost    O(runs log runs), slices in parallel, and for each pore the square of the corners of its hull

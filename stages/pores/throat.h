@@ -14,7 +14,7 @@ namespace lamina::pores {
 /// Centres of balls step from voxel to neighbour, and a wall lies half of the longest edge before the centre of a solid voxel.
 /// So between walls square to an axis an odd number of voxels is measured exactly, an even one a voxel too little, and a round
 /// hole within a voxel. Edges that are not the same: to 1/64 of the shortest edge squared.
-/// axes    those to look at; the others are 0
+/// axes    those to compute; the others are 0
 /// throws  std::length_error  2^32 changes or more
 /// source  Delerue, Perrier, "DXSoil, a library for 3D image analysis in soil science" (2002); here by bisection: voxels that
 ///         are far enough from the solid are joined as runs, until the next distance does not lead through

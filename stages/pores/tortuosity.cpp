@@ -107,7 +107,7 @@ class PathSearch {
     return true;
   }
 
-  // In each of the eight corners around a voxel, whose bits tell along which axes a neighbour lies.
+  // In each of the eight corners around a voxel, whose bits give the axes along which a neighbour is.
   std::uint64_t leave(std::size_t at, std::uint32_t way) {
     const VoxelIndex from{static_cast<std::uint32_t>(at % n_[0]), static_cast<std::uint32_t>(at / stride_[1] % n_[1]),
                           static_cast<std::uint32_t>(at / stride_[2])};

@@ -41,17 +41,16 @@ struct CompileScratch {
 /// Called for every sweep that fires, in the order in which the machine makes them.
 using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
 
-/// Compiles a layer. Every set pixel fires exactly once and no other one, whatever the angle, passes and overlap; with
+/// Compiles a layer. Every set pixel fires exactly once and no other one, for any angle, passes and overlap; with
 /// blocked nozzles the difference is `lost` and `moved` of the result, by the rule of the grid.
 ///
 /// image     of grid.image's size
 /// swaths    from the first line of the bed or of the layer, each as many lines as the head has nozzles (times passes),
 ///           neighbours sharing `overlap` lines. A line that two swaths share is divided between them by an ordered
-///           pattern of 64 places that turns from line to line, whose share goes from all to none over the overlap.
+///           pattern of 64 positions that turns from line to line, whose share goes from all to none over the overlap.
 ///           Sweeps that would fire nothing are skipped; with both directions every other sweep that is left runs back.
-/// layer     its swaths begin layer x grid.joint_shift lines earlier, modulo a swath less what it shares: joints of
-/// neighbouring
-///           layers lie apart
+/// layer     its swaths begin layer x grid.joint_shift lines earlier, modulo a swath less what it shares: stitch lines
+///           of neighbouring layers are separated
 /// blocked   lines that no nozzle of any swath can fire, by rule: left out; moved pixel by pixel to the line of the next
 ///           nozzle before or else behind it, where that pixel is free; or fired by further sweeps of the same swath with
 ///           the head shifted by whole nozzles, the shortest shift first.

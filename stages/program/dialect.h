@@ -37,7 +37,7 @@ class ProgramWriter {
   virtual void maintenance_after(ProgramBytes&) {}
 };
 
-/// What a dialect can say beside the drops and the powder of a layer, a bit each.
+/// What a dialect can express in addition to the drops and the powder of a layer, a bit each.
 enum Saying : std::uint32_t {
   kSaysBase = 1,      // layers of powder below the first one
   kSaysRefill = 2,    // a pause for a vat to be filled
@@ -71,7 +71,7 @@ struct Dialect {
   std::uint32_t says;       // bits of Saying
   /// A writer for one thread. machine and grid have to live as long as it does.
   std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
-  /// What it cannot say beside the number of nozzles. errors  kUsage
+  /// What it cannot express, apart from the number of nozzles. errors  kUsage
   Status (*check)(const Machine& machine, const HeadGrid& grid) = nullptr;
   MaintenanceRules maintenance = {};
 };

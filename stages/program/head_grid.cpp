@@ -30,7 +30,7 @@ Error wrong(const Machine& machine, std::string_view key, const std::string& wha
   return {Fault::kUsage, fmt::format("{}: {}: {}", machine.name.empty() ? "machine" : machine.name, key, what)};
 }
 
-/// Halves down, and what rounding left beside a half or a whole number counts as it.
+/// Halves down, and a value within rounding of a half or a whole number counts as it.
 double round_half_down(double value) { return std::ceil(value - 0.5 - kSlack); }
 
 /// The grid of a machine in the making; each step adds to it, in this order.

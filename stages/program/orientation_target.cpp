@@ -34,7 +34,7 @@ void add_box(const Corner& lo, const Corner& hi, std::vector<std::array<Corner, 
 Buffer<std::byte> orientation_target() {
   std::vector<std::array<Corner, 3>> triangles;
   add_box({0, 0, 0}, {6, 30, 2}, triangles);    // stem
-  add_box({5, 24, 0}, {20, 30, 2}, triangles);  // upper arm; boxes overlap, and what overlaps is united
+  add_box({5, 24, 0}, {20, 30, 2}, triangles);  // upper arm; boxes overlap and are merged
   add_box({5, 12, 0}, {14, 18, 2}, triangles);  // lower arm
   add_box({0, 0, 1}, {6, 6, 3}, triangles);     // the step
   Buffer<std::byte> file(84 + triangles.size() * 50);

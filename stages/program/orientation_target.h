@@ -11,7 +11,7 @@
 namespace lamina::program {
 
 /// A letter F, 20 x 30 x 3 mm, as a binary STL in mm: the stem lies along +y, the arms point to +x, the longer one is at
-/// the far end (+y), and a step of 1 mm on top of the foot tells top from bottom. It has no symmetry, so that a print that
+/// the far end (+y), and a step of 1 mm on top of the foot marks the top. It has no symmetry, so that a print that
 /// can be read is neither mirrored nor turned over.
 Buffer<std::byte> orientation_target();
 

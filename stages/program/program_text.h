@@ -59,7 +59,7 @@ class Carriage {
   const HeadGrid& grid_;
 };
 
-/// Tells the build vat where it stands before a base of powder is spread, so that the first layer above it begins at 0. Nothing
+/// States the position of the build vat before a base of powder is spread: the first layer above it begins at 0. Nothing
 /// without a base.
 void put_base_zero(const Machine& machine, ProgramBytes& out);
 

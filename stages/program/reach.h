@@ -12,7 +12,7 @@ namespace lamina::program {
 
 struct Outside {
   Point3 position;       // nm on the bed
-  bool above = false;    // of the build height, else beside the bed
+  bool above = false;    // of the build height, else off the bed
   double beyond_mm = 0;  // how far
 };
 
@@ -23,7 +23,7 @@ struct Outside {
 std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, const Point3& offset);
 
 /// The first set pixel of an image, row by row, whose centre lies outside of the bed; z is not known. Images of parts that are
-/// no meshes are looked at so, layer by layer. cost  O(rows), none for rectangular beds, which images never leave
+/// no meshes are checked so, layer by layer. cost  O(rows), none for rectangular beds, which images never leave
 std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, const RunsView& image);
 
 }  // namespace lamina::program

@@ -25,7 +25,7 @@ void for_difference(std::span<const std::uint32_t> one, std::span<const std::uin
   }
 }
 
-/// Mirrors columns and turns the order of rows, each if asked for.
+/// Mirrors columns and reverses the order of rows, each if requested.
 void mirror(const RunsView& image, bool columns, bool rows, Runs& result) {
   const std::uint32_t count = image.rows();
   result.columns = image.columns;

@@ -8,7 +8,7 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-/// A bead, asked about points near it.
+/// A bead, for queries of points near it.
 struct Bead {
   std::int64_t ax, ay, dx, dy;  // a, b - a
   Wide width2, length2;
@@ -93,7 +93,7 @@ void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row,
     const std::int64_t y = grid_.y.centre(rows - 1 - row);
     Interval x = estimate(bead, radius, static_cast<double>(y - bead.ay));
     if (!(x.low <= x.high)) {
-      // A row that only touches the bead's edge, as far as doubles can tell: look where it is widest.
+      // A row that only touches the bead's edge, as far as doubles can decide: test where it is widest.
       const double share =
           bead.dy == 0 ? 0.5 : std::clamp(static_cast<double>(y - bead.ay) / static_cast<double>(bead.dy), 0.0, 1.0);
       x.add(share * static_cast<double>(bead.dx), share * static_cast<double>(bead.dx));
@@ -109,7 +109,7 @@ void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row,
   }
 }
 
-/// Unites the spans of the image rows [first_row, last_row) in band_.
+/// Merges the spans of the image rows [first_row, last_row) in band_.
 void BeadRaster::merge(std::uint32_t first_row, std::uint32_t last_row) {
   const std::uint32_t rows = last_row - first_row;
   start_.assign(std::size_t{rows} + 1, 0);
@@ -173,7 +173,7 @@ void BeadRaster::runs(Runs& out) {
   });
 }
 
-// Beads of a toolpath file, and the grid to look at them.
+// Beads of a toolpath file, and the grid to inspect them.
 
 void BeadRaster::add(std::span<const DepositedBead> beads, Point2 origin) {
   const auto at = [&](Point2 p) { return Point2{p.x - origin.x, p.y - origin.y}; };

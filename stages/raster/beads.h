@@ -2,7 +2,7 @@
 //
 // A pixel is set if and only if its centre lies in a bead: no farther than half of the width from the bead's straight
 // line (round ends), or from the part of it between the two ends (square ends). Whole numbers decide; floating point
-// only finds the neighbourhood in which they are asked.
+// only finds the neighbourhood in which they are used.
 #pragma once
 
 #include <cstdint>
@@ -67,7 +67,7 @@ class BeadRaster {
   Runs band_;
 };
 
-/// A grid to look at the beads in a box: pixels of 50 um, larger ones where there were more than 20 000 along a side.
+/// A grid to inspect the beads in a box: pixels of 50 um, larger ones where there were more than 20 000 along a side.
 PixelGrid bead_grid(const Box& box);
 
 }  // namespace lamina::raster

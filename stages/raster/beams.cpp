@@ -97,7 +97,7 @@ Error failed(RTCError code, const std::string& what) {
   return {Fault::kInternal, fmt::format("Embree: {} (error {})", what, static_cast<int>(code))};
 }
 
-/// Notes the run's clusters and never reports a hit, so that the traversal goes on.
+/// Notes the run's clusters and never reports a hit, so that the traversal continues.
 void visit_run(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& source = *static_cast<const BeamSource*>(arguments->geometryUserPtr);
@@ -108,7 +108,7 @@ void visit_run(const RTCIntersectFunctionNArguments* arguments) {
                             *beam.visits);
 }
 
-/// Goes on within a copy, and never reports a hit either.
+/// Continues within a copy, and never reports a hit either.
 void visit_copy(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& all = *static_cast<const Copies*>(arguments->geometryUserPtr);

@@ -3,7 +3,7 @@
 // One ray a band runs along the middle of its rows, in the plane of the layer, towards +x. Each run of 256 clusters
 // (height_runs.h) is one user primitive whose box is grown by half a band in y, and by more than float rounding everywhere.
 // So the ray passes the box of every run that any row of the band could cross: nothing is lost to rounding. The run's own
-// table then tells which of its clusters the plane can meet. A cluster that is met without need is only looked at in vain:
+// table then gives those of its clusters that the plane can meet. A cluster that is met without need is only read in vain:
 // whether, in which rows and where a triangle is crossed is decided in integers from its corners (segment.h). And a traversal
 // reports a primitive once, so nothing is counted twice.
 //
@@ -22,7 +22,7 @@ namespace lamina::raster {
 
 class BeamIndex {
  public:
-  /// Loads Embree, which build() takes a millisecond for: any thread can do so while parts are read. build() tells errors.
+  /// Loads Embree, which build() takes a millisecond for: any thread can do so while parts are read. build() reports errors.
   static void prepare();
 
   /// placed     outlives the index

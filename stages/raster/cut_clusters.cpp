@@ -26,7 +26,7 @@ std::size_t visits_of_block(std::span<const PlacedMesh> placed, std::span<const 
 }  // namespace
 
 /// A mesh is larger than the caches, so clusters are fetched early, those of a block while those of the block before are
-/// looked at.
+/// processed.
 void cut_clusters(const Kernels& kernels, const PixelSampling& sampling, std::span<const PlacedMesh> placed,
                   std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                   Segments& out) {

@@ -3,8 +3,8 @@
 // Clusters that follow each other are neighbours in the file and ordered by height (clusters.h). So a run of them is one box
 // that a tree holds cheaply, and a plane meets few of its clusters, which a search of the run's table finds, first of 16 groups
 // and then of theirs: heights and depths in steps of 1/65536 of the run, rounded down on both sides of every comparison, so
-// that none is missed. A cluster that begins or ends in the plane's own step is asked for its box, so that no more are found
-// than a layer's bound counts; one that is found without need beside the rows is only looked at in vain.
+// that none is missed. A cluster that begins or ends in the plane's own step is tested by its box, so that no more are found
+// than a layer's bound counts; one that is found without need outside of the rows is only read in vain.
 #pragma once
 
 #include <cstdint>

@@ -69,7 +69,7 @@ CrossingSums::Table CrossingSums::table() const {
     sum.clusters += clusters_[i];
     table.slab[i] = sum;
     const bool empty = sum.segments == 0, was_empty = i > 0 && table.slab[i - 1].segments == 0;
-    if (empty && was_empty) slope = sum.depth = 0;  // whatever rounding left; the last bend lies one slab above an end
+    if (empty && was_empty) slope = sum.depth = 0;  // clears rounding errors; the last bend lies one slab above an end
     table.slab[i].depth = empty ? 0 : std::max(0.0, sum.depth);
   }
   return table;

@@ -16,7 +16,7 @@ namespace lamina::raster {
 /// clusters.
 ///
 /// A facet is cut from its lowest corner to its highest, and the depth of the cut rises evenly from nothing up to the middle
-/// corner and falls again: a tent. Its height is the facet's area seen along x, doubled, over its height. A tent over slabs is
+/// corner and falls again: a tent. Its height is twice the facet's area projected along x, over its own. A tent over slabs is
 /// four changes of slope, so the sums of all facets take four additions each and are read by adding twice.
 ///
 /// Slabs are 2^k nm high, counted from height 0 of the mesh, and no more than kMaxSlabs. Sums are made by many threads, in any
@@ -62,7 +62,7 @@ class CrossingSums {
   std::vector<std::int32_t> segments_, clusters_;
 };
 
-/// Slabs that are kept of a mesh at most: 6 bytes a triangle, so that thousands of small parts take little beside their meshes.
+/// Most slabs that are kept of a mesh: 6 bytes a triangle, so that thousands of small parts take little besides their meshes.
 constexpr std::size_t max_slabs_of(std::uint32_t clusters) { return std::size_t{64} + 4 * std::size_t{clusters}; }
 
 /// Counts all clusters of a mesh. cost: one parallel pass over its facets

@@ -10,13 +10,13 @@
 
 namespace lamina::raster {
 
-/// Images of one material each, while the solids of a layer are laid over each other.
+/// Images of one material each, while the solids of a layer are drawn over each other.
 struct MaterialImages {
   std::vector<Runs> image;  // one for each material; no pixel is set in two
   Runs scratch;
 
   void start(std::size_t materials, std::uint32_t columns, std::uint32_t rows);
-  /// Lays a solid's section over the others: it is set in `whole` and in its material's image, and in no other one.
+  /// Draws a solid's section over the others: it is set in `whole` and in its material's image, and in no other one.
   /// parity  what is set in both becomes neither (even-odd over all solids)
   void deposit(std::uint32_t material, const RunsView& section, Runs& whole, bool parity = false);
   /// Keeps only what is set in `whole`.

@@ -5,7 +5,7 @@
 
 namespace lamina::raster {
 
-/// x: columns are reversed (left becomes right); y: rows are reversed. Both may be asked for at once; mirroring twice
+/// x: columns are reversed (left becomes right); y: rows are reversed. Both may be requested at once; mirroring twice
 /// gives the image back. O(runs + rows).
 void mirror(const RunsView& runs, bool x, bool y, Runs& out);
 

@@ -9,13 +9,13 @@ namespace lamina::raster {
 
 /// Widths of beads, nm. Walls are as wide as their paths.
 struct BeadWidths {
-  bool segmented = false;  // what fills beside thick and thin stretches is `continuous`, else as wide as its path
+  bool segmented = false;  // what fills next to thick and thin segments is `continuous`, else as wide as its path
   Nm thick = 0, thin = 0, continuous = 0;
 
   Nm of(const PathInterval& s) const;
 };
 
-/// Lays the stretches of a part in a layer, in their order.
+/// Deposits the segments of a part in a layer, in their order.
 class BeadPen {
  public:
   /// beads  gains them; outlives the pen

@@ -28,7 +28,7 @@ constexpr std::uint64_t kMoreSegments = kClusterSize;
 /// Elements that a buffer for `count` of them gets: an eighth more, so that layers that need ever more move it rarely.
 std::uint64_t with_spare(std::uint64_t count) { return count + count / 8; }
 
-/// Empties the buffer and makes room. A bound is told beforehand, so buffers never double as they fill.
+/// Empties the buffer and makes room. A bound is given beforehand, so buffers never double as they fill.
 template <class T>
 void ensure_capacity(Buffer<T>& buffer, std::uint64_t count) {
   buffer.clear();

@@ -2,7 +2,7 @@
 //
 // A pixel is set if and only if the winding number of all facets together about its centre, in the plane of the layer,
 // satisfies the fill rule. That is decided exactly (segment.h), so the two engines, which only find the facets that a
-// plane cuts, give the same bits: `rays` walks an Embree tree with one ray a band of rows, `contours` looks facets up
+// plane cuts, give the same bits: `rays` walks an Embree tree with one ray a band of rows, `contours` finds facets
 // by height and needs no tree.
 #pragma once
 
@@ -30,12 +30,12 @@ struct LayerScratch {
   std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(near) + segments.bytes() + scan.bytes(); }
 };
 
-/// Immutable once built; layers may be asked for from any number of threads.
+/// Immutable once built; layers may be requested from any number of threads.
 class Rasterizer {
  public:
   /// meshes     triangles are moved out of them, into blocks: 13 to 36 bytes a triangle (mesh_blocks.h)
   /// instances  where copies stand; every corner within the grid's bed (0 <= x <= length) and below kNmReach
-  /// rays, contours  which indices to build; an engine that was not built must not be asked for
+  /// rays, contours  which indices to build; an engine that was not built must not be requested
   /// isa        instructions of the kernels; no effect on any layer
   /// errors     kInternal if Embree fails; kUsage if the processor has no such instructions
   /// cost       O(T); Embree's tree is one primitive a cluster of 16 triangles, copies share it

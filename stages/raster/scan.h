@@ -15,7 +15,7 @@ namespace lamina::raster {
 
 using ClusterVisits = Buffer<ClusterVisit>;
 
-/// What a layer told besides its runs.
+/// What a layer reported besides its runs.
 struct LayerReport {
   std::uint32_t segments = 0;
   std::uint64_t crossings = 0;
@@ -33,7 +33,7 @@ struct LayerReport {
 /// then each row is sorted and the fill rule decides where it changes. Keeps its buffers from band to band.
 ///
 /// Where a part is open (Mesh::closed), a row whose crossings of that part do not add up to zero is closed at the last
-/// of them: whatever lies beside the part is drawn as if the part ended there.
+/// of them: the row beyond is drawn as if the part ended there.
 class ScanConverter {
  public:
   /// Appends rows last_row - 1 down to first_row (image order) to `out`; `segments` lie within these rows.

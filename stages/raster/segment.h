@@ -4,8 +4,8 @@
 // to a whole number that rounding could have moved it across, integers answer instead.
 //
 // Why no crossing is lost or counted twice:
-//  - a corner with z <= Z is below the plane, so a triangle is cut through exactly two edges or not at all, whatever
-//    lies exactly in the plane;
+//  - a corner with z <= Z is below the plane, so a triangle is cut through exactly two edges or not at all, even if
+//    corners lie exactly in the plane;
 //  - the rows of a segment are the half-open range [row(end 1), row(end 2)), where row(end) is the first row at or
 //    beyond the end; it depends on the mesh edge that carries the end and on nothing else, so the segments on both
 //    sides of an edge share rows without gap or overlap;

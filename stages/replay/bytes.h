@@ -68,7 +68,7 @@ class Passes {
     turned_ = backward != anew_;
     anew_ = !anew_;
   }
-  /// The head goes to a place beside the bed. works_mm_s  how fast over its wiper; 0: as it travels
+  /// The head goes to a position off the bed. works_mm_s  how fast over its wiper; 0: as it travels
   void visit(double x_mm, double y_mm, double works_mm_s) {
     make();
     const double along = along_ ? x_mm : y_mm, across = along_ ? y_mm : x_mm;

@@ -24,8 +24,8 @@ std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t>
 Status check_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
                    std::span<const std::uint64_t> recorded, std::uint32_t feeds);
 
-/// What is left in vats of stated depth, layer by layer in their order; a pause fills all of them. Behind a layer that is left
-/// out, or that nobody could carry out, nothing is known of them until they are filled.
+/// What is left in vats of stated depth, layer by layer in their order; a pause fills all of them. After a layer that is left
+/// out, or that could not be carried out, nothing is known of them until they are filled.
 class VatLevels {
  public:
   /// They are full.

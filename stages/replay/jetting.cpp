@@ -35,7 +35,7 @@ Levels levels_of_drops(std::vector<VirtualMachine::Drop>& drops, std::uint32_t c
   return levels;
 }
 
-/// A layer's program carried out, and what is looked at.
+/// A layer's program carried out, and the results inspected.
 struct Carried {
   std::vector<VirtualMachine::Drop> drops;  // in the order of the program
   std::map<std::uint32_t, SweepCheck> sweeps;

@@ -26,14 +26,14 @@ std::uint32_t drop_bits(std::uint32_t max_drops);
 /// The pixels of a machine, derived independently from its profile.
 class VirtualMachine {
  public:
-  /// columns, rows  of the images. layers: of the job; 0: whatever programs say.
+  /// columns, rows  of the images. layers: of the job; 0: as programs say.
   /// errors  kVerification if the profile cannot be this job's
   static Result<VirtualMachine> build(const Machine& machine, std::uint32_t columns, std::uint32_t rows,
                                       std::uint32_t layers = 0);
 
   const Machine& profile() const { return machine_; }
   std::uint32_t layers() const { return layers_; }
-  /// Sizes that headers of programs tell. steps: of a pixel; drop_bits: of a nozzle's drops at a place
+  /// Sizes that headers of programs state. steps: of a pixel; drop_bits: of a nozzle's drops at a position
   struct Counts {
     std::uint32_t nozzles, positions, lines, steps, drop_bits;
     double step_um;

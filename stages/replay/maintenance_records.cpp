@@ -1,4 +1,4 @@
-// stages/program/raw/README.md and planes/README.md tell the format.
+// stages/program/raw/README.md and planes/README.md have the format.
 #include "stages/replay/maintenance_records.h"
 
 #include <fmt/format.h>

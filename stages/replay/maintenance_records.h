@@ -1,4 +1,4 @@
-// stages/replay/maintenance_records.h: care of head and powder in programs of raw and planes, as their READMEs tell it.
+// stages/replay/maintenance_records.h: maintenance of head and powder in programs of raw and planes, as in their READMEs.
 #pragma once
 
 #include "stages/replay/bytes.h"

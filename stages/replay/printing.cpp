@@ -357,7 +357,7 @@ std::string Printing::describe_position(std::uint32_t column, std::uint32_t row)
 }
 
 // Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
-// nobody fires is not known; what no sweep comes over may be one.
+// no nozzle fires is not known; lines that no sweep comes over may be one.
 void Printing::coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const {
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
@@ -442,7 +442,7 @@ void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, st
   }
 }
 
-// Care of head and powder on the virtual machine, whatever the dialect: stages/replay/printing.h.
+// Maintenance of head and powder on the virtual machine, in any dialect: stages/replay/printing.h.
 
 void Printing::leaves_wiper(std::string_view what) {
   if (own_ > 0) fault(fmt::format("{} before all lines of the machine's own stand there", what));
@@ -611,8 +611,8 @@ void Printing::check_stated() {
   }
 }
 
-// The powder of a layer: the order and the places of roller, vats and head. What is wrong is told by check_cycle alone, which
-// knows the layer's heights for true.
+// The powder of a layer: the order and the positions of roller, vats and head. Errors are reported by check_cycle alone, which
+// knows the layer's true heights.
 
 void Printing::wrong_cycle(std::string_view what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); }
 

@@ -98,17 +98,17 @@ class Printing {
   void head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops = 1);
   /// Whether a sweep has the profile's ramp before its first drops and behind its last, each so many mm long; a fault if not.
   bool has_ramps(double before_mm, double behind_mm, double adjacent_mm = 1e-3);
-  /// works_mm_s  how fast it came, of a G1 beside sweeps; 0: by a travel, or in a sweep
+  /// works_mm_s  how fast it came, of a G1 outside of sweeps; 0: by a travel, or in a sweep
   void head_is_at(double x_mm, double y_mm, double works_mm_s);
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_is_at(double mm);
-  /// The same, where a program tells but how far from where the layer before left it.
+  /// The same, where a program states only the distance from where the layer before left it.
   void build_vat_goes_down(double mm);
   /// may_spread  such a movement can be that over the powder
   void roller_is_at(double mm, bool may_spread = true);
-  /// What is wrong with the powder, the first of all; told at the layer's end, where its heights are known for true.
+  /// The first error of the powder; reported at the layer's end, where its true heights are known.
   void wrong_powder(std::string what);
-  /// Powder is spread now: the build vat stands where it is told, vats have fed so much, and the spreader goes so far above
+  /// Powder is spread now: the build vat is at its stated position, vats have fed so much, and the spreader goes so far above
   /// both.
   void spreads(double build_mm, double fed_mm, double clearance_mm);
   /// The last ways of the axes of pistons that have play, and come to each place from below.
@@ -216,7 +216,7 @@ class Printing {
   std::set<std::uint32_t> added_, left_out_;
   std::uint32_t sweep_max_ = 0;  // drops of a nozzle at a step of the sweep at hand
   std::vector<Sweep> sweeps_;
-  bool based_ = false;                 // told a base
+  bool based_ = false;                 // with a stated base
   std::uint32_t strokes_ = 0;          // of the roller to its far end
   double spat_s_ = -1, wiped_s_ = -1;  // when the layer's last care ended; -1: none yet
   std::uint64_t spat_here_ = 0;        // drops of a nozzle since the head stands

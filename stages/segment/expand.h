@@ -24,7 +24,7 @@ struct LayerCut {
   std::uint32_t continuous = 1;     // lines between two segmented ones
   std::int32_t first = 0;           // number of a segmented line
   std::int64_t shift = 0;           // nm: closed curves begin so much further along than they are stored
-  bool one_direction = true;        // segmented lines are all laid the same way; needs a travel where a zigzag comes back
+  bool one_direction = true;        // segmented lines are all deposited the same way; needs a travel where a zigzag comes back
 
   bool segments(PathKind kind, std::int32_t number) const {
     if (!on || number == kNoLine || (kind != PathKind::kRaster && kind != PathKind::kContour)) return false;
@@ -51,9 +51,9 @@ inline double distance(Point2 a, Point2 b) {
 
 }  // namespace expand_detail
 
-/// Calls visit(const Stretch&) for everything that is laid in a layer, in the order in which it is laid.
+/// Calls visit(const PathInterval&) for every interval of a layer, in the order of deposition.
 ///
-/// Straight lines are cut by their place along `along`, so that pores of all lines and layers lie on one grid. Lines of
+/// Straight lines are cut by their position along `along`, so that pores of all lines and layers are on one grid. Lines of
 /// several points and closed curves are cut by their length. A closed curve comes to whole periods under every rule: its
 /// thick stretches are made as much longer as that needs, and it begins and ends in the middle of one.
 /// cost  O(points + stretches), no memory
@@ -96,7 +96,7 @@ class Expander {
     return std::llround(cut_.along_x * static_cast<double>(p.x) + cut_.along_y * static_cast<double>(p.y));
   }
 
-  /// Whether the run that starts at i is a segmented straight line that is laid the other way round than it is stored.
+  /// Whether the run that starts at i is a segmented straight line that is deposited the other way round than it is stored.
   bool is_turned(std::uint32_t i, std::uint32_t last) const {
     if (!cut_.one_direction || !cut_.segments(paths_.kind[i], paths_.line[i]) || i + 1 > last) return false;
     const bool lone = i + 1 == last || paths_.kind[i + 1] != paths_.kind[i] || paths_.line[i + 1] != paths_.line[i];

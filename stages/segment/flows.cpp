@@ -58,7 +58,7 @@ struct Columns {
     return "no column of pressure drops (drop_pa, drop_kpa, drop_mbar, drop_bar, drop_psi)";
   }
 
-  /// The name of the sample that a drop belongs to; "" if there is no telling.
+  /// The name of the sample that a drop belongs to; "" if it is not known.
   std::string sample_of(const std::vector<std::string>& cells, std::size_t drop) const {
     if (sample != SIZE_MAX) return cells[sample].empty() ? "unnamed" : cells[sample];
     const auto columns = drop_units.size() - static_cast<std::size_t>(std::ranges::count(drop_units, 0.0));
@@ -66,7 +66,7 @@ struct Columns {
   }
 };
 
-constexpr std::size_t kMaxSamples = 1000;  // of a group: they are looked for one by one
+constexpr std::size_t kMaxSamples = 1000;  // of a group: they are searched one by one
 
 /// The number of a sample within its group.
 std::uint32_t number_of(const std::string& sample, FlowGroup& group) {

@@ -22,7 +22,7 @@ struct Medium {
 struct FlowGroup {
   std::string name;  // of the rows' column "configuration", if there is one
   std::vector<FlowPoint> points;
-  std::vector<std::string> samples{};  // names that the points count in; empty: the table tells none apart
+  std::vector<std::string> samples{};  // names that the points count in; empty: the table has none
 };
 
 /// A table with a header: one column of flows or velocities, one or more of pressure drops; units by their endings. Rows may
@@ -32,7 +32,7 @@ Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium&
 Result<std::vector<FlowGroup>> read_flows(FileReader& file, const Medium& medium);
 
 /// Points and parabola.
-/// gas  the points are expanded(): says so beside the axis
+/// gas  the points are expanded(): says so next to the axis
 Plot draw_fit(const FlowGroup& group, const Permeability& fit, bool gas = false);
 
 }  // namespace lamina::segment

@@ -19,7 +19,7 @@ namespace lamina::segment {
 struct CutPosition {
   bool on = false;
   std::int32_t first = 0;            // number of a segmented line
-  bool one_direction = true;         // segmented lines are all laid the same way
+  bool one_direction = true;         // segmented lines are all deposited the same way
   MicroDegrees angle = 0;            // of the lines of the layer
   double shift_mm = 0;               // of the layer's pores along its lines
   std::optional<double> first_line;  // nm along across(angle + a quarter turn): a segmented line of the layers turned by 90

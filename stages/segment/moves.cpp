@@ -18,7 +18,7 @@ MoveTable::MoveTable(const Segmentation& plan, const LayerCut& cut, const Extrud
 void MoveTable::make(const PathInterval& s, MoveEntry& entry) const {
   const auto& material = machine_.material;
   const double full = bead_area(mm(s.width), height_, material.shape()) * material.flow;
-  // What is laid is as wide as a bead of that volume; only an ellipse is another shape in truth.
+  // The deposit is as wide as a bead of that volume; only an ellipse is another shape in truth.
   const BeadShape deposited = material.shape() == BeadShape::kEllipse ? BeadShape::kEllipse : BeadShape::kStadium;
   const double width = bead_width(full, height_, deposited);
   const bool fills = s.kind != PathKind::kOuter && s.kind != PathKind::kInner;

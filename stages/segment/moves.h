@@ -1,7 +1,7 @@
 // stages/segment/moves.h: the stored toolpaths of a layer become moves of a machine, one at a time: widths, cross-sections
-// and speeds of walls, continuous lines, thick and thin stretches. Stretches are expanded here and nowhere kept.
+// and speeds of walls, continuous lines, thick and thin segments. Segments are expanded here and nowhere kept.
 //
-// There is one volume: what the machine lays at 100 % is the profile's bead_area x flow, times the extrusion of the stretch.
+// There is one volume: the extrusion at 100 % is the profile's bead_area x flow, times the extrusion of the segment.
 // E, grams, porosity and the widths of walls and continuous lines follow from it.
 #pragma once
 
@@ -55,7 +55,7 @@ class MoveTable {
   MoveEntry swept_;  // of a line of its own kind: not kept
 };
 
-/// Counts the stretches of a part in a layer, in the order in which they are laid.
+/// Counts the segments of a part in a layer, in the order of deposition.
 class SegmentCounter {
  public:
   SegmentCounter(const LayerCut& cut, SegmentCounts& counts) : cut_(cut), counts_(counts) {}
@@ -133,8 +133,8 @@ class SpeedCounter {
   double entry_ = 0, length_ = 0, speed_ = 0;
 };
 
-/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives what the move has laid, a
-/// DepositedMove, or nothing to stop: no further move is laid. sums     what was laid is added returns  false if `lay` stopped
+/// Calls deposit(const BeadMove&) for every move of the paths of a part in a layer; it returns what the move has deposited, or
+/// nothing to stop there. sums: deposits are added. returns  false if `deposit` stopped
 template <class Deposit>
 bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& table, DepositedSums& sums, Deposit&& deposit) {
   bool goes_on = true;

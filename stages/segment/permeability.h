@@ -42,7 +42,7 @@ Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const F
 struct GasPressures {
   double outlet_pa = 101325;
   double reference_pa =
-      101325;  // at which velocities and density are told: those of the outlet, of a flow meter, of a standard
+      101325;  // at which velocities and density are stated: those of the outlet, of a flow meter, of a standard
 };
 
 /// The gradients that make the law of gases linear in the coefficients as the one above:

@@ -12,13 +12,13 @@ namespace {
 
 constexpr double kLineGap = 2;  // between the lines that are measured, edge to edge
 
-/// A block that so many segmented lines fit into, each beside a continuous one: lines one distance from the wall's centre
+/// A block that so many segmented lines fit into, each next to a continuous one: lines one distance from the wall's centre
 /// and from each other, and two thirds of a distance to spare (62 and 48 mm for the document's 12 and 9).
 double width_for(std::size_t lines, double bead) {
   return std::round((2 * static_cast<double>(lines) + 1 + 2.0 / 3) * (bead + kLineGap) + bead);
 }
 
-/// Lines beside each other that are measured one by one.
+/// Adjacent lines that are measured one by one.
 TestPiece lines_to_measure(std::string name, std::string task, std::array<double, 3> size_mm) {
   TestPiece piece{std::move(name), std::move(task), size_mm};
   piece.gap_mm = kLineGap;

@@ -1,5 +1,5 @@
 // stages/segment/pore_geometry.h: the pore between a thin segment and the line next to it: of a plan (predict.h) and of
-// deposited toolpaths (laid/pores.h).
+// deposited toolpaths (deposited/pores.h).
 #pragma once
 
 namespace lamina::segment {

@@ -11,7 +11,7 @@
 
 namespace lamina::segment {
 
-/// How segmented lines are laid: the parameters of Di Nisio 2022, Table 1, in mm and %.
+/// How segmented lines are deposited: the parameters of Di Nisio 2022, Table 1, in mm and %.
 struct Segmentation {
   CutRule rule = CutRule::kAligned;
   double thick_mm = 1.5, thin_mm = 1.5;
@@ -35,7 +35,7 @@ struct Segmentation {
   }
 };
 
-/// Whether it can be laid. errors  kUsage, one line that begins with the key's name (as in [segment])
+/// Whether it can be deposited. errors  kUsage, one line that begins with the key's name (as in [segment])
 Status check(const Segmentation& segmentation, double bead_width_mm);
 
 /// What a user should know, of the code "pores": a pore that closes, speeds outside of what was measured, beads that do not

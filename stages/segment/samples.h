@@ -1,4 +1,4 @@
-// stages/segment/samples.h: how far the samples of a configuration differ, beside the one parabola through all their points.
+// stages/segment/samples.h: the differences of a configuration's samples, besides the one parabola through all their points.
 #pragma once
 
 #include <optional>
@@ -27,7 +27,7 @@ struct SampleFit {
 };
 
 /// The points of one sample lie on one parabola better than those of several do: the standard errors of the pooled fit take all
-/// points as independent, and are too small where samples differ. The spread of the samples' own fits is what tells that.
+/// points as independent, and are too small where samples differ. The spread of the samples' own fits shows that.
 struct GroupFit {
   Permeability pooled;
   std::vector<SampleFit> samples;     // in the order of the table; empty where it names fewer than two

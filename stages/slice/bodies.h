@@ -20,7 +20,7 @@ bool touch(const Box& a, const Box& b);
 /// cost  O(N log N + P) for P pairs that overlap in x
 std::vector<std::uint32_t> group_bodies(std::span<const Box> boxes);
 
-/// The same of boxes that touch seen from above, directly or through the box around those that do.
+/// The same of boxes that touch in xy, directly or through the box around those that do.
 std::vector<std::uint32_t> group_from_above(std::vector<Box> boxes);
 
 }  // namespace lamina::slice

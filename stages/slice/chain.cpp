@@ -6,7 +6,7 @@ namespace lamina::slice {
 namespace {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
-constexpr std::uint32_t kTaken = UINT32_MAX;  // of a slot: passed over, but the search goes on behind it
+constexpr std::uint32_t kTaken = UINT32_MAX;  // of a slot: passed over, but the search continues after it
 constexpr std::uint8_t kHasPrevious = 1, kVisited = 2;
 
 /// For each cut the one that starts at the edge where it ends. Where several start there, at an edge of four or more

@@ -24,7 +24,7 @@ Nm exact_between(Nm from, Nm to, std::int64_t num, std::int64_t den) {
 }
 
 /// The product of two doubles that are each off by at most 2^-53 of themselves, for ways below 2^31, then one addition: off by
-/// less than 2^-19. Whatever lies near a half is decided in integers.
+/// less than 2^-19. Values near a half are decided in integers.
 Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
   constexpr double kNear = 0x1p-17, kPositive = 0x1p32;
   const double way = share * static_cast<double>(std::int64_t{to} - from) + 0.5 + kPositive;
@@ -44,7 +44,7 @@ Point2 crossing(const Edge& edge, std::int64_t z) {
 }
 
 void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> facets, std::int64_t z, Cuts& cuts) {
-  constexpr std::size_t kAhead = 16;  // facets lie anywhere in memory: asked for before they are needed
+  constexpr std::size_t kAhead = 16;  // facets are anywhere in memory: prefetched before they are needed
   const std::size_t count = facets.size();
   cuts.from.resize(count);
   cuts.to.resize(count);

@@ -1,7 +1,7 @@
 // stages/slice/slice.h: meshes standing on the bed -> clean contours of any layer.
 //
 //   PlaneIndex ─> cut ─> chain ─> tidy ─> find_contacts ─> nest ─> order_by_outer ─> simplify ─> contours
-//                          └─> close_gaps (open meshes)      └─ unite what is in contact
+//                          └─> close_gaps (open meshes)      └─ merge what is in contact
 //
 // The plane rule is that of the bitmaps: a corner at the plane is below it. What is solid where shells overlap is
 // decided by the same fill rule. Contours that keep clear of each other go no further than whole-number comparisons;
@@ -62,7 +62,7 @@ struct SectionScratch {
   std::vector<std::uint8_t> source_done;
 };
 
-/// Bodies: instances that may overlap and are united; those of different bodies must not.
+/// Bodies: instances that may overlap and are merged; those of different bodies must not.
 class Slicer {
  public:
   /// meshes     stay where they are while the slicer lives

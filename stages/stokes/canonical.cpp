@@ -27,7 +27,7 @@ std::vector<Turn> turns_of(std::size_t axis, bool reversible) {
   return turns;
 }
 
-/// Digits that look random (S. Vigna's splitmix64, 2015).
+/// Pseudorandom digits (S. Vigna's splitmix64, 2015).
 std::uint64_t mixed(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15;
   x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9;

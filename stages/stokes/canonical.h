@@ -11,7 +11,7 @@
 
 namespace lamina::stokes {
 
-/// Axis c of a turned box is axis from[c] of the box, backwards where told. Mirrors are among the turns.
+/// Axis c of a turned box is axis from[c] of the box, backwards where stated. Mirrors are among the turns.
 struct Turn {
   std::array<std::size_t, 3> from{0, 1, 2};
   std::array<bool, 3> backwards{};
@@ -23,7 +23,7 @@ struct Turn {
 };
 
 /// A box as it is solved: the axis of the force is kAxis, and of the turns and mirrors that leave that the one whose sides,
-/// edges and voxels come first in an order that knows nothing of how the box lay.
+/// edges and voxels come first in an order that does not depend on how the box was turned.
 class Canonical {
  public:
   static constexpr int kAxis = 2;

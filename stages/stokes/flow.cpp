@@ -200,7 +200,7 @@ Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field
   Flow flow;
   const double whole = run.norm_of_force();
   if (whole > 0) {
-    // Steps are carried on in single precision: what they have lost is seen, and taken up, by starting again.
+    // Steps are carried on in single precision: what they have lost is detected, and taken up, by starting again.
     for (int rounds = 0; rounds < 8; ++rounds) {
       const double before = std::exchange(flow.residual, run.start(field) / whole);
       const bool stuck = rounds > 0 && flow.residual > 0.5 * before;

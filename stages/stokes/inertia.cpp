@@ -79,7 +79,7 @@ class SmallestSum {
 };
 
 /// Newton's method: each step by minimal residuals in the space of what creeping flow answers to inertia. That answer is smooth
-/// whatever the voxels are, so few vectors do. See the source in inertia.h.
+/// for any voxels, so few vectors do. See the source in inertia.h.
 class Newton {
  public:
   Newton(const Grid& grid, int axis, double inertia, const InertiaOptions& options, Field& field)

@@ -61,7 +61,7 @@ class Operator {
 // --- what inertia adds to Stokes' equations on the cells of a fluid; internal to stokes.
 
 /// Convection at the faces of cells: central differences of second order in skew-symmetric form. Convection takes no energy
-/// from a flow and gives it none, whatever its divergence: the sum of u . at(by, u) over all faces is zero.
+/// from a flow and gives it none, for any divergence: the sum of u . at(by, u) over all faces is zero.
 /// source  F. H. Harlow, J. E. Welch (1965), as operator.h; R. W. C. P. Verstappen, A. E. P. Veldman, "Symmetry-preserving
 ///         discretization of turbulent flow", J. Comput. Phys. 187 (2003), for the form
 class Convection {

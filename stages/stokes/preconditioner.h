@@ -1,4 +1,4 @@
-// stages/stokes/preconditioner.h: a cheap guess at what velocity and pressure a residual asks for; internal to stokes.
+// stages/stokes/preconditioner.h: a cheap estimate of the velocity and pressure that correct a residual; internal to stokes.
 #pragma once
 
 #include <vector>

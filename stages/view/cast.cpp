@@ -15,7 +15,7 @@ namespace {
 
 using RayVector = std::array<float, 3>;
 
-/// Which axis of the bed is to the right, up and towards whoever looks, and which way.
+/// Which axis of the bed is to the right, up and towards the viewer, and which way.
 struct ViewFrame {
   int right, up, towards;
   float sign;  // of `towards`
@@ -26,7 +26,7 @@ constexpr ViewFrame frame_of(ViewSide side) {
   return {1, 2, 0, 1};
 }
 
-/// Where the light comes from: left, above, and from behind whoever looks. Unit length; the rest is never quite dark.
+/// Where the light comes from: left, above, and from behind the viewer. Unit length; the rest is never quite dark.
 constexpr RayVector kLight = {-0.35f, 0.45f, 0.82f};
 constexpr float kMinLight = 0.15f;
 constexpr float kDepthShade = 0.4f;
@@ -101,11 +101,11 @@ struct Caster::State {
     const auto of = [&](int axis) { return normal[static_cast<std::size_t>(axis)]; };
     const float length = std::hypot(normal[0], normal[1], normal[2]);
     if (!(length > 0)) return kMinLight;
-    // A facet that is turned over looks like one that is not.
+    // A facet that is turned over is shaded like one that is not.
     const float turned = of(frame.towards) * frame.sign < 0 ? -1.0f : 1.0f;
     const float lit =
         (kLight[0] * of(frame.right) + kLight[1] * of(frame.up) + kLight[2] * frame.sign * of(frame.towards)) * turned;
-    // What lies deeper is darker, so that faces which look the same way can be told apart.
+    // What lies deeper is darker, so that faces of one orientation can be distinguished.
     const float depth = (ray.ray.tfar - first_depth) / std::max(last_depth - first_depth, 1e-6f);
     const float near = 1 - kDepthShade * std::clamp(depth, 0.0f, 1.0f);
     return (kMinLight + (1 - kMinLight) * std::max(0.0f, lit / length)) * near;

@@ -88,7 +88,7 @@ struct ValueRange {
   double low = 0, high = 1;
 };
 
-/// Of both sections; below 0 only if something flows back that the colours can tell.
+/// Of both sections; below 0 only if something flows back that the colours can show.
 ValueRange range_of(const PorePicture& picture) {
   ValueRange range{0, 0};
   for (const Plane* plane : {picture.across, picture.along}) {

@@ -26,14 +26,14 @@ struct PorePicture {
   const Plane* across = nullptr;             // velocity along the axis / its mean, none: no flow; over the whole box
   const Plane* along = nullptr;              // speed / that mean
   std::vector<std::array<Point2, 2>> lines;  // nm: middles of beads of the layer that a section across z cuts, on the bed
-  std::vector<double> layer_tops_mm;         // above the bottom of the box, rising: layers are drawn in two greys by turns
+  std::vector<double> layer_tops_mm;         // above the bottom of the box, rising: layers are drawn in two alternating greys
 };
 
 /// About 1280 pixels wide. What repeats is drawn around the place, several times where it is much shorter than the other
-/// side of its section. cost  parallel to nothing; some 2e6 pixels, each looked up in a row of runs
+/// side of its section. cost  parallel to nothing; some 2e6 pixels, each found in a row of runs
 Plot draw_pores(const PorePicture& picture);
 
-// --- colours for numbers, in which equal steps look equal.
+// --- colours for numbers, in which equal steps appear equal.
 
 /// "rrggbb" of a share 0 .. 1: from dark blue over violet and orange to light yellow, ever lighter, so that it reads in grey
 /// too. Lightness, hue and chroma go evenly in the colour space OKLab.

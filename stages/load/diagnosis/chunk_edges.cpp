@@ -122,7 +122,7 @@ void ChunkPieces::join(std::span<const ChunkEdges::Pair> pairs, std::span<std::u
     const std::uint16_t a = find(one), b = find(other);
     parent_[std::max(a, b)] = std::min(a, b);
   }
-  // No parent is larger than its child: whoever comes before has its root already.
+  // No parent is larger than its child: every earlier entry has its root already.
   for (std::size_t f = 0; f < parents.size(); ++f) {
     parent_[f] = parent_[parent_[f]];
     parents[f] = first + parent_[f];

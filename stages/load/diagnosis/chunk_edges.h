@@ -18,7 +18,7 @@
 
 namespace lamina::load {
 
-/// Looks at one chunk of a numbered list (vertices.h) after the other, in memory of its own: 260 KiB, which stays in a core's
+/// Inspects one chunk of a numbered list (vertices.h) after the other, in memory of its own: 260 KiB, which stays in a core's
 /// cache.
 class ChunkEdges {
  public:

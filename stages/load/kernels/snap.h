@@ -1,8 +1,8 @@
-// stages/load/kernels/snap.h: how facets in plain millimetres are snapped, whatever the instruction set; internal to load.
+// stages/load/kernels/snap.h: how facets in plain millimetres are snapped, with any instruction set; internal to load.
 //
 // A float times 1e6 = 2^6 * 15625 has at most 24 + 14 significant bits, so it is exact in double; adding a half to 38 bits is
 // exact too unless the product is below 2^-15, where any rounding ends at 0 anyway. Truncation then gives llround(x * 1e6): to
-// the nearest, halves away from zero. So nothing is rounded but once, and lanes are alike whatever the width.
+// the nearest, halves away from zero. So nothing is rounded but once, and lanes are alike for any width.
 #pragma once
 
 #include <algorithm>

@@ -16,7 +16,7 @@ Status check_solid(const Mesh& mesh, const RepairReport& report);
 /// where they belong as from each other; twice their standard deviation.
 double weld_uncertainty(const Mesh& mesh, const RepairReport& report);
 
-/// The smallest distance, doubled again and again, at which the facets become a solid that hardly hangs on caps; 0 if none is
+/// The smallest distance, doubled again and again, at which the facets become a solid that hardly depends on caps; 0 if none is
 /// found: up to a twentieth of the size, and up to what any edge allows (weld.h).
 ///
 /// tried  distances up to this one are known to close nothing

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaxSampled = std::size_t{1} << 15;
 
-/// Twice the signed area of a facet seen from above, rounded.
+/// Twice the signed area of a facet projected along z, rounded.
 inline double shadow_of(const Triangle& t) {
   const double ax = t.a.x, ay = t.a.y;
   return (t.b.x - ax) * (t.c.y - ay) - (t.c.x - ax) * (t.b.y - ay);

@@ -26,8 +26,8 @@ std::uint64_t sampled_share(std::size_t triangles);
 /// Whether two of the sampled facets differ in orientation alone (Census::reversed_twins).
 bool any_reversed(std::span<const std::uint64_t> sampled);
 
-/// Six times the signed volume of the prisms between facets and a level plane, nm3, and twice their signed area seen from
-/// above, nm2, by which the volume changes where the plane is another: sums of pieces that were taken at planes of their own.
+/// Six times the signed volume of the prisms between facets and a level plane, nm3, and twice their signed area projected
+/// along z, nm2, by which the volume changes where the plane is another: sums of pieces that were taken at planes of their own.
 struct Prisms {
   double sixfold_volume = 0, doubled_shadow = 0;
   Nm plane = 0;  // within the facets or near them, so that little cancels out

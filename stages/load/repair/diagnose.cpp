@@ -74,7 +74,7 @@ struct PointFindings {
   void add(const PointFindings& other) { box.add(other.box); }
 };
 
-/// What several tasks write while edges are looked at.
+/// What several tasks write while edges are inspected.
 struct Joined {
   explicit Joined(std::size_t facets) : sets(facets), unbalanced(facets, 0) {}
   DisjointSets sets;                     // of facets that share edges
@@ -98,7 +98,7 @@ struct EdgeFindings {
 
   std::vector<std::uint32_t> may_repeat;  // facets
 
-  /// Looks at all sides of an edge. returns  whether facets at it may be there twice
+  /// Inspects all sides of an edge. returns  whether facets at it may be there twice
   bool inspect(const Numbered& mesh, const Side* begin, const Side* end, Joined& joined) {
     ++count;
     joined.join(begin, end);
@@ -110,7 +110,7 @@ struct EdgeFindings {
     kind.add(first, mesh.vertices()[begin->low], mesh.vertices()[begin->high]);
     return end - begin > 1;
   }
-  /// Looks at edges one after the other.
+  /// Inspects edges one after the other.
   void inspect(const Numbered& mesh, std::span<const Side> sides, Joined& joined) {
     for_each_edge(sides, [&](const Side* begin, const Side* end) {
       if (!inspect(mesh, begin, end, joined)) return;
@@ -139,7 +139,7 @@ struct EdgeFindings {
   }
 };
 
-/// Of parts that tasks look at; results of one and the same parts are the same in any order.
+/// Of parts that tasks inspect; results of one and the same parts are the same in any order.
 template <class Findings, class Inspect>
 Findings find_in(const BlockedRange& range, const Findings& nothing, const Inspect& inspect) {
   return tbb::parallel_reduce(

@@ -42,13 +42,13 @@ struct Diagnosis {
 /// cost         O(T), parallel; some 30 bytes a triangle, 10 more where neighbours in the mesh are none in the list
 Diagnosis diagnose(const Mesh& mesh, std::size_t positions = 3);
 
-/// The same in the memory of the list, for a mesh whose volume alone is asked for afterwards: the list is empty where that is
+/// The same in the memory of the list, for a mesh whose volume alone is read afterwards: the list is empty where that is
 /// known without it, because shells lie apart, and as it was where they may overlap.
 /// cost: as above; no more memory than the list and a quarter of it, half of it where the list is in disorder
 Diagnosis diagnose_alone(Mesh& mesh, std::size_t positions = 3);
 
-/// The same of blocks that hold no caps. Degenerate facets are not looked for, and no places are told: the order of the file is
-/// not known. blocks: given up as soon as their vertices are numbered
+/// The same of blocks without caps. Degenerate facets are not searched for, and no positions are given: the order of the file
+/// is not known. blocks: given up as soon as their vertices are numbered
 Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks);
 
 /// What every job pays for, in one pass.
@@ -57,13 +57,13 @@ struct Census {
   /// area that the facets' boundary encloses, with hashes of the vertices as coordinates, is zero.
   bool balanced = false;
   /// Sum over all facets of a hash of their corners, the same for any order of the facets and any first corner.
-  /// Tells `--resume` that a part is still the part it was.
+  /// By which `--resume` verifies that a part is unchanged.
   std::uint64_t fingerprint = 0;
   /// Signed, of the prisms between all facets and a level plane: of the solid if the mesh is balanced, wherever the plane
   /// is; an estimate if it is open and the plane crosses it. Rounded, the same for any number of threads.
   double volume_mm3 = 0;
-  /// Some facet was seen to lie in the mesh twice, once turned over: shells may cancel each other (enclosed.h). All facets
-  /// are looked at in meshes of up to 32768, a share of them, decided by their corners, in larger ones.
+  /// Some facet was detected in the mesh twice, once turned over: shells may cancel each other (enclosed.h). All facets
+  /// are inspected in meshes of up to 32768, a share of them, decided by their corners, in larger ones.
   bool reversed_twins = false;
 };
 

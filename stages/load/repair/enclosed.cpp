@@ -1,4 +1,4 @@
-// stages/load/repair/enclosed.cpp: volumes of pieces, and facets beside their reversed twins.
+// stages/load/repair/enclosed.cpp: volumes of pieces, and facets with reversed twins.
 #include "stages/load/repair/enclosed.h"
 
 #include <tbb/parallel_sort.h>

@@ -26,8 +26,8 @@ std::string position(const Box& box) {
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", mm(at.x), mm(at.y), mm(at.z));
 }
 
-/// Repair notes end with the places of the file's own coordinates, so that they can be found in a modeller.
-/// doubt  of the weld (advice.h)
+/// Repair notes end with the positions of the file's own coordinates, so that they can be found in a modeller.
+/// uncertainty  of the weld (advice.h)
 void describe_repair(const RepairReport& report, double uncertainty, const std::string& prefix, std::vector<Note>& notes) {
   const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
   if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
@@ -216,7 +216,7 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
     const std::size_t file = source.path().size() + 2;
     const std::string reported =
         (name.size() > file ? name.substr(file) : "all of it") + " is inside out and is turned over: its volume is negative";
-    // An object that stands turned in several ways is told once.
+    // An object with instances in several orientations is reported once.
     if (std::ranges::none_of(notes, [&](const Note& note) { return note.text == reported; })) notes.push_back({true, reported});
   }
   return mesh;

@@ -1,4 +1,4 @@
-// stages/load/repair/matches.cpp: ends of open edges in cells of space, each looked up from its neighbours.
+// stages/load/repair/matches.cpp: ends of open edges in cells of space, each found from its neighbours.
 #include "stages/load/repair/matches.h"
 
 #include <tbb/blocked_range.h>
@@ -91,7 +91,7 @@ class EndCells {
 
  private:
   std::int64_t cell(std::int64_t x) const { return floor_div<std::int64_t>(x, size_); }
-  /// Cells of a block of 8 lie side by side, so that neighbours are looked up where the processor's cache has them.
+  /// Cells of a block of 8 are adjacent, so that neighbours are found where the processor's cache has them.
   std::size_t hash(std::int64_t x, std::int64_t y, std::int64_t z) const {
     std::uint64_t h = static_cast<std::uint64_t>(x >> 1) * 0x9e3779b97f4a7c15 ^
                       static_cast<std::uint64_t>(y >> 1) * 0xc2b2ae3d27d4eb4f ^
@@ -187,7 +187,7 @@ class MatchSearch {
     return off <= distance_ * distance_ && dot(between(at[side.from], at[side.to]), between(at[other.from], at[other.to])) < 0;
   }
 
-  /// Both facets rise from their common edge to the same side, within some 37 degrees, and are large enough to tell.
+  /// Both facets rise from their common edge to the same side, within some 37 degrees, and are large enough to decide.
   bool upon_each_other(const OpenSide& side, const OpenSide& other) const {
     const Vector u = inward(mesh_, side), v = inward(mesh_, other);
     const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), enough = 16 * distance_ * distance_;

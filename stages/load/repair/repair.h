@@ -16,7 +16,7 @@ struct RepairReport {
   std::uint64_t vertices_welded = 0;
   std::int64_t weld_nm = 0;          // the largest distance that closed something
   double weld_moved_mm3 = 0;         // what welding moved each facet by, as volumes, added up as errors by chance do
-  std::uint64_t sheets_dropped = 0;  // surfaces that hung on a solid and enclosed nothing
+  std::uint64_t sheets_dropped = 0;  // surfaces attached to a solid that enclosed nothing
   std::uint64_t sheet_facets_dropped = 0;
   std::uint64_t flat_dropped = 0;  // pieces that lie in a plane, and so enclose nothing
   std::uint64_t flat_facets_dropped = 0;
@@ -36,11 +36,11 @@ struct RepairReport {
 ///  2. open edges that were meant to be one are joined, over growing distances (weld.h has the rule);
 ///  3. facets are turned over so that neighbours across two-facet edges agree; per connected component the
 ///     orientation of the larger area wins; undone if it would leave more unmatched than before;
-///  4. stray sheets, which hang on a solid with a rim that is open, and loose flat pieces are dropped (sheets.h has the
+///  4. stray sheets, attached to a solid with a rim that is open, and loose flat pieces are dropped (sheets.h has the
 ///     rules);
 ///  5. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
 ///     fan of triangles from its smallest vertex.
-/// After step 5 every edge is balanced, whatever the input: the boundary of a chain of triangles is a set of cycles,
+/// After step 5 every edge is balanced, for any input: the boundary of a chain of triangles is a set of cycles,
 /// and a fan over a cycle has exactly that cycle, reversed, as its boundary. So no row of any layer can stay open.
 /// A missing triangle is restored exactly, a planar hole is filled exactly. Caps are appended after the mesh's own
 /// triangles (Mesh::repaired_from), so that later stages can report the rows that they decide.
@@ -49,7 +49,7 @@ struct RepairReport {
 /// mesh.fingerprint is not.
 /// cost  a balanced mesh: one pass; else O(T log T), about 150 bytes a triangle on top of the mesh while it works
 ///
-/// caps  false: only the first three steps, for whoever closes the mesh otherwise
+/// caps  false: only the first three steps, for callers that close the mesh otherwise
 RepairReport repair(Mesh& mesh, const WeldRange& weld, bool caps = true);
 
 /// Turns every facet over if the mesh is closed and its volume negative. Keeps mesh.volume_mm3 and mesh.fingerprint right,

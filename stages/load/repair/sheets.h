@@ -1,4 +1,4 @@
-// stages/load/repair/sheets.h: surfaces that hang on a solid without enclosing anything; internal to load.
+// stages/load/repair/sheets.h: surfaces attached to a solid without enclosing anything; internal to load.
 #pragma once
 
 #include <cstdint>

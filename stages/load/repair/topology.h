@@ -59,7 +59,7 @@ inline std::int64_t surplus(const Side* begin, const Side* end) {
 Buffer<std::uint8_t> repeats(std::span<const Indexed::Facet> facets);
 
 /// Facets in sets that are joined one by one, by several threads at a time if need be: each set's representative is its
-/// smallest member, whoever joined first.
+/// smallest member, in any order of joining.
 /// source  R. J. Anderson, H. Woll, "Wait-free parallel algorithms for the union-find problem", STOC 1991
 class DisjointSets {
  public:

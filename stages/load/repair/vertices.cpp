@@ -63,7 +63,7 @@ class PointTable {
 
   std::uint32_t& operator[](std::uint32_t slot) { return slots_[slot]; }
 
-  /// Enters the points of a chunk, and tells their slots; any thread may. false  it would fill the table
+  /// Enters the points of a chunk, and returns their slots; any thread may. false  it would fill the table
   bool enter(std::uint32_t number, std::uint32_t* slots) {
     const Chunk& chunk = chunks_[number];
     if (4 * (reserved_ += chunk.count) > 3 * slots_.size()) return false;

@@ -66,7 +66,7 @@ class Numbered {
     return {vertices_[corners[0]], vertices_[corners[1]], vertices_[corners[2]]};
   }
 
-  /// The list whose memory was taken, as it was; nothing else may be asked for afterwards.
+  /// The list whose memory was taken, as it was; nothing else may be requested afterwards.
   Buffer<Triangle> give_back_list();
 
  private:

@@ -26,18 +26,18 @@ struct Welding {
 ///  - then the end of an open edge joins that of another which runs back along it, as at a vertex that only one side has.
 /// An edge is joined once. Refused, because it would harm what is sound: ends further apart than half of the shortest
 /// edge at either; facets that would lose a corner; vertices spread wider than the distance; facets that lie upon each
-/// other, such as the two sides of a wall (unless they are too small against the distance to tell).
+/// other, such as the two sides of a wall (unless they are too small against the distance to decide).
 ///
 /// Distances grow until no edge is open. A distance after which edges with more than two facets grow by more than an
 /// eighth of what it closes, or that closes nothing, is undone; the former ends the search.
 ///
-/// mesh    facets and places are changed; places are then no longer in order: index again
+/// mesh    facets and positions are changed; positions are then no longer in order: index again
 /// sides   of mesh.facet, sorted; kept up to date
 /// cost    per distance O(T) and the sorting of sides; parallel where it searches
 Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range);
 
 /// Half of the longest of all edges that are the shortest at a vertex, nm, rounded up: vertices further apart than this are
-/// never joined, whatever the distance.
+/// never joined, at any distance.
 std::int64_t farthest_weld(const Indexed& mesh);
 
 }  // namespace lamina::load

@@ -20,7 +20,7 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// What objects that lie side by side need, and a million voids at some 200 looks a point.
+// What adjacent objects need, and a million voids at some 200 inspections a point.
 constexpr std::uint64_t kMaxWork = std::uint64_t{1} << 28;      // boxes compared
 constexpr std::uint64_t kMaxCompared = std::uint64_t{1} << 29;  // facets, and boxes of facets, that points were held against
 
@@ -176,7 +176,7 @@ class CavitySearch {
   }
 
  private:
-  /// Copies that are moved alone share a look at their triangles; sums are rounded the same either way.
+  /// Copies that are only moved share one pass over their triangles; sums are rounded the same either way.
   Extent extent(const Leaf& leaf) {
     const auto [found, is_new] = turned_.try_emplace({leaf.object, leaf.transform.linear});
     if (is_new) found->second = extent_of(package_.objects[leaf.object], {leaf.transform.linear, {}});
@@ -186,7 +186,7 @@ class CavitySearch {
     return placed;
   }
 
-  /// Some corners tell of all: a void that leaves the solid is none.
+  /// Some corners decide for all: a void that leaves the solid is none.
   bool is_within(const Leaf& leaf, const Leaf& outer) {
     const std::optional<Transform> back = inverse(outer.transform);
     if (!back) return false;

@@ -15,8 +15,8 @@ namespace lamina::load {
 /// leaves  in the order of the build
 /// source  3MF Consortium, Core Specification 1.3, sections 4.1, 4.1.1 and 3.4.3.1
 /// cost    two passes over the triangles of items that have an object of negative volume, one of others of several objects;
-///         100 bytes a triangle of the objects that such an one may lie in, once for all copies; a bounded number of looks
-///         at facets, half a minute at worst, after which the others are left, with a note
+///         100 bytes a triangle of the objects that may contain such an one, once for all copies; a bounded number of facets
+///         is inspected, half a minute at worst, after which the others are left, with a note
 void find_cavities(const ModelPackage& package, std::vector<Leaf>& leaves, std::vector<Note>& notes);
 
 }  // namespace lamina::load

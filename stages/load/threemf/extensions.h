@@ -16,7 +16,7 @@ enum class Extension {
   kSettings,    // what a program keeps for itself
   kBeams,       // refused where a package requires it and an object has them
   kSlices,      // refused where nothing else says what an object is
-  kUnknown      // refused where a package requires it, told where it is used
+  kUnknown      // refused where a package requires it, reported where it is used
 };
 Extension extension_of(std::string_view space);
 

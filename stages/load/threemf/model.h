@@ -91,8 +91,8 @@ struct ModelPackage {
 
 // --- what a model, an object or a build item says about itself; internal to load.
 
-/// The metadata of one element. Names that are not as the specification wants them are told: many programs write such ones, and
-/// readers should pass over them.
+/// The metadata of one element. Names that violate the specification are reported: many programs write such ones, and
+/// readers should ignore them.
 ///
 /// source  3MF Consortium, Core Specification 1.3, section 3.4.1
 class Metadata {
@@ -101,7 +101,7 @@ class Metadata {
   std::string begin(const XmlReader& reader, XmlAttributes attributes, ModelPackage& package);
   /// What older releases of Cura have instead.
   void begin_setting(XmlAttributes attributes);
-  /// A piece of its text; what is long matters to nobody.
+  /// A piece of its text; long texts are not needed.
   void text(std::string_view piece);
   /// It ends; an object learns what Cura says of it.
   void end(ModelObject* object);

@@ -41,7 +41,7 @@ bool read_whole(std::string_view text, Number& number) {
 
 bool read_decimal(std::string_view text, double& number) { return parse_number(trimmed(text), number); }
 
-constexpr std::size_t kMaxReported = 64;  // that are told of
+constexpr std::size_t kMaxReported = 64;  // reported at most
 
 double unit_in_mm(std::string_view unit) {
   constexpr std::pair<std::string_view, double> kUnits[] = {{"micron", 0.001}, {"millimeter", 1}, {"centimeter", 10},

@@ -21,7 +21,7 @@ using BlockedRange = tbb::blocked_range<std::size_t>;
 
 constexpr std::size_t kMaxTried = 8;  // variants that a leaf is compared with before its vertices are snapped
 
-/// Of the triangles relative to their first corner: equal for copies, whatever their place.
+/// Of the triangles relative to their first corner: equal for copies at any position.
 std::uint64_t relative_hash(const Buffer<Triangle>& triangles) {
   std::uint64_t hash = triangles.size();
   if (triangles.empty()) return hash;

@@ -17,8 +17,8 @@
 
 namespace lamina::load {
 
-/// Snaps leaf after leaf. One whose vertices all snap to the places of an earlier leaf but for a whole translation shares its
-/// mesh. Most need no look at their vertices: where translations differ by whole nanometres and less than it takes to round any
+/// Snaps leaf after leaf. One whose vertices all snap to those of an earlier leaf but for a whole translation shares its
+/// mesh. Most need no pass over their vertices: where translations differ by whole nanometres and too little to round any
 /// coordinate otherwise, the rest follows. One that is a void becomes a hollow of its container, with a note.
 ///
 /// cost  a leaf that is known to be a copy: nothing; any other one: three passes over its triangles, parallel

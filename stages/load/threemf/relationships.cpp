@@ -71,7 +71,7 @@ Status check_inside(const Source& source, std::string_view part, const Relations
                                   part.substr(1), quoted(std::string_view(one.target))));
 }
 
-/// A second print ticket makes a file invalid; what it asks for is not for lamina.
+/// A second print ticket makes a file invalid; its requests are not for lamina.
 Status check_model_relationships(const Source& source, Archive& archive, const std::string& model) {
   const std::string part = relationships_of(model);
   if (!archive.has(part)) return {};

@@ -25,7 +25,7 @@ std::uint64_t number_of(std::string_view text) {
   return number;
 }
 
-/// What it is that no program of these prints: what else there may be is left out, and told.
+/// The roles that none of these programs prints: any other is left out, and reported.
 Role role_of(std::string_view type) {
   if (type == "ModelPart" || type == "normal_part" || type == "0" || type.empty()) return Role::kPart;
   return type == "NegativeVolume" || type == "negative_part" ? Role::kNegative : Role::kModifier;

@@ -15,7 +15,7 @@ namespace lamina::load {
 /// source  Cura, resources/definitions/fdmprinter.def.json, category "meshfix" and "Mesh Fixes"
 void apply_cura_setting(std::string_view key, std::string_view value, ModelObject& object);
 
-/// Reads the settings that PrusaSlicer, SuperSlicer, Bambu Studio and OrcaSlicer put beside the model, and takes from the
+/// Reads the settings that PrusaSlicer, SuperSlicer, Bambu Studio and OrcaSlicer put alongside the model, and takes from the
 /// objects the triangles of what modifies or blocks something, and is no part to print. Ranges of triangles that the model
 /// itself names (Slic3r) are treated alike.
 ///

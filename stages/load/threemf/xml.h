@@ -29,13 +29,13 @@ class XmlHandler {
   /// An element begins.
   virtual void start(const XmlName& name, XmlAttributes attributes) = 0;
   virtual void end() = 0;
-  /// A piece of the text of an element, which may come in several. Only where XmlReader::want_text() asks for it.
+  /// A piece of the text of an element, which may come in several. Only where XmlReader::want_text() requests it.
   virtual void text(std::string_view) {}
 };
 
 /// Text that begins with a byte order mark or a declaration may be UTF-8, UTF-16 or Latin-1. Document types, and with them
 /// entities, are refused as 3MF demands. So are elements nested more than 256 deep, tags of more than 1 MiB, more than 64
-/// namespaces at once, and more than 4096 different names: expat keeps each. Prefixes are looked up here, and not by expat,
+/// namespaces at once, and more than 4096 different names: expat keeps each. Prefixes are resolved here, and not by expat,
 /// since files are read, too, that use an undeclared one where it does not matter.
 ///
 /// cost  0.3 us a tag; 2 MiB and the names

@@ -14,7 +14,7 @@ namespace lamina::load {
 /// errors  kInput: the format, and what to do about it
 Status refuse_unsupported(const Source& source, std::string_view head);
 
-/// Whether text looks like the program of a machine, which has no signature.
+/// Whether text is probably the program of a machine, which has no signature.
 bool is_machine_program(std::string_view head);
 
 }  // namespace lamina::load

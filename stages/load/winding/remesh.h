@@ -11,7 +11,7 @@ struct Remeshed {
 };
 
 /// Replaces the triangles by the surface on which the winding number is a half in size, within a thirtieth of a cell where
-/// facets are, found on a grid of so many cells along the longest side. Closed, whatever the facets were. mesh.bounds
+/// facets are, found on a grid of so many cells along the longest side. Closed, for any facets. mesh.bounds
 /// follow, mesh.fingerprint does not.
 ///
 /// source  marching tetrahedra: Doi, Koide (1991)

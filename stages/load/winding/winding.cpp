@@ -19,7 +19,7 @@ Point across(const Point& p, const Point& q) {
   return {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
 }
 
-/// Half of the solid angle of a triangle seen from the origin.
+/// Half of the solid angle of a triangle from the origin.
 double half_angle(const Point& a, const Point& b, const Point& c) {
   const double la = std::sqrt(product(a, a)), lb = std::sqrt(product(b, b)), lc = std::sqrt(product(c, c));
   const double below = la * lb * lc + product(a, b) * lc + product(b, c) * la + product(c, a) * lb;

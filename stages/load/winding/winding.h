@@ -22,7 +22,7 @@ class WindingTree {
   /// cost  O(T log T), 100 bytes a triangle
   WindingTree(std::span<const Triangle> triangles, const Point3& origin);
 
-  /// The solid angle of all facets seen from a point, over that of a sphere: 1 within a closed outward surface, 0 outside,
+  /// The solid angle of all facets from a point, over that of a sphere: 1 within a closed outward surface, 0 outside,
   /// in between near openings. Within some hundredths. Safe from any thread.
   /// inspected  boxes and facets that it took are added to it, if given
   double at(const Point& point, std::uint64_t* inspected = nullptr) const;

@@ -96,7 +96,7 @@ class BrundlefabWriter final : public ProgramWriter {
   void end(ProgramBytes& out) override { put(out, "T0\nM117 Done\n"); }
 
  private:
-  /// What a layer needs to know of the machine, whoever used it before. G10 L1 P1 sets tool 1 and, P being its pattern too,
+  /// The state that a layer needs of the machine, after any earlier use. G10 L1 P1 sets tool 1 and, P being its pattern too,
   /// the pattern 1: T1 P0 follows.
   void state(ProgramBytes& out) const {
     put(out, "G21\nG90\nG10 L1 P0 X{}\nG10 L1 P1 X{}\nG10 L1 P21 X{}\nT1 P0 S{}\nG28 Y0\n", mm_text(kPenMm), mm_text(kPenMm),
@@ -135,7 +135,7 @@ class BrundlefabWriter final : public ProgramWriter {
     put(out, "T0\nT1 P0\nG0 Y0\n");
   }
 
-  /// All nozzles that are not blocked, a drop a dot, beside the bed.
+  /// All nozzles that are not blocked, a drop a dot, next to the bed.
   void shoot(ProgramBytes& out) {
     std::uint16_t all = 0;
     for (std::uint32_t nozzle = 0; nozzle < machine_.head.nozzles; ++nozzle) {
@@ -196,7 +196,7 @@ std::string wrong_bins(const Machine& machine) {
                      kBinMm, machine.bed.build_height_mm, base > 0 ? fmt::format(" on a base of {:g}", base) : "", part, feed);
 }
 
-/// The bar runs along the whole bed, whatever Y: a shot has to be beside it in X, and begins at the bar's home.
+/// The bar runs along the whole bed, for any Y: a shot has to be outside of it in X, and begins at the bar's home.
 Status check_shots(const Machine& machine, const Carriage& carriage, const HeadGrid& grid) {
   const auto& maintenance = machine.maintenance;
   const auto wrong = [&](std::string_view key, const std::string& what) {

@@ -88,7 +88,7 @@ std::int64_t um_of_counts(std::int64_t counts, std::uint32_t per_inch) {
 
 bool whole(double value) { return std::abs(value - std::round(value)) < 1e-6; }
 
-/// Whether edges of pixels can be told apart: they lie on counts, or a count is well below a pixel.
+/// Whether edges of pixels can be distinguished: they are on counts, or a count is well below a pixel.
 bool resolves(double counts_per_inch, double pixel_um) {
   const double counts = pixel_um * counts_per_inch / kUmPerInch;
   return counts >= 1.25 || (counts > 0.5 && whole(counts));

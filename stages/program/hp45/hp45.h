@@ -15,7 +15,7 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
 
 /// Whether the controller can jet the machine's images.
 /// errors  kUsage: rows of its own, lags in ticks, more steps than its buffer holds, an encoder too coarse for its pixels,
-///         nozzles without a channel of their own, a scan speed that it cannot tell
+///         nozzles without a channel of their own, a scan speed that it cannot measure
 Status check(const Machine& machine, const HeadGrid& grid);
 
 /// Spells what the controller needs; the motion between is G-code.
@@ -23,11 +23,11 @@ class Head {
  public:
   Head(const Machine& machine, const HeadGrid& grid);
 
-  /// Mode of position, encoder, resolution, density, sides and buffer: whatever a layer needs, so that it can be sent alone.
+  /// Mode of position, encoder, resolution, density, sides and buffer: all that a layer needs, so that it can be sent alone.
   void settings(ProgramBytes& out) const;
-  /// Moves to the start, waits, sends the lines and moves over them; before that whatever care is due.
+  /// Moves to the start, waits, sends the lines and moves over them; before that any head maintenance that is due.
   void sweep(const Sweep& sweep, const SweepVectors& vectors, MaintenanceWriter& maintenance, ProgramBytes& out) const;
-  /// The host goes on when all movements have ended.
+  /// The host continues when all movements have ended.
   static constexpr std::string_view kWait = "G4 P0\n";
   static void wait(ProgramBytes& out) { put(out, "{}", kWait); }
   /// All nozzles of the cartridge fire where the head stands, by the firmware's DMAPrint::Prime; the host waits until they

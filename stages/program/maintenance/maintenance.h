@@ -57,7 +57,7 @@ class MaintenanceClock {
 
 /// How a dialect spells it.
 struct MaintenanceWords {
-  std::string_view travel;                                  // the command of a movement beside the bed
+  std::string_view travel;                                  // the command of a movement off the bed
   void (*spit)(const Machine& machine, ProgramBytes& out);  // all nozzles that are not blocked, where the head stands
   std::string_view wait;                                    // a line behind movements, "" if none is needed
   std::string_view refill;                                  // the lines of a pause for the vats to be filled
@@ -96,7 +96,7 @@ class MaintenanceWriter {
 
 // --- care of head and powder in dialects of vectors alone, as records for their hosts.
 
-/// What a record tells; the READMEs of raw and planes have the numbers that follow each.
+/// What a record states; the READMEs of raw and planes have the numbers that follow each.
 enum class MaintenanceRecord : std::uint8_t { kGo, kFill, kBase, kRoller, kWipe, kShot, kDry, kOwn };
 
 /// Writes the care of one layer after the other.

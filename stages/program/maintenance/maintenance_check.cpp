@@ -14,13 +14,13 @@ namespace {
 
 using MachinePoint = std::array<double, 2>;
 
-// What dialects add to a sweep at either end, beside its ramps: the HP45 controller's rows and measures of speed.
+// What dialects add to a sweep at either end, in addition to its ramps: the HP45 controller's rows and measures of speed.
 constexpr double kRunUpMm = 20;
 
 // The least of kPlainDigits.
 constexpr double kMinPlain = 1e-3;
 
-/// Commands that programs have, or that end them: nobody may put them between.
+/// Commands that programs have, or that end them: they must not be inserted.
 constexpr std::string_view kOfPrograms[] = {"M0",   "M1",   "M2",   "M3",   "M4",   "M5",   "M25",  "M30",  "M112", "M226",
                                             "M400", "M578", "M999", "M810", "M811", "M812", "M813", "M814", "M815", "M816"};
 
@@ -135,7 +135,7 @@ class Checker {
     return {};
   }
 
-  /// A wiper that lies where the head travels, and as fast: nobody can tell a wipe from a way to another place.
+  /// A wiper that is where the head travels, and as fast: a wipe cannot be distinguished from a travel.
   Status check_wiper_alone() const {
     const auto& motion = machine_.motion;
     if (!maintenance_.wipes() || feed_text(maintenance_.wipe_speed_mm_s) != feed_text(motion.travel_speed_mm_s)) return {};

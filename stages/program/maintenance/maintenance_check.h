@@ -1,5 +1,5 @@
-// stages/program/maintenance/maintenance_check.h: whether a dialect can say the care that a profile asks for, and a machine can
-// take it.
+// stages/program/maintenance/maintenance_check.h: whether a dialect can express the maintenance that a profile requests, and a
+// machine can do it.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace lamina::program {
 
-/// Whether a dialect can say what a profile asks for beside drops and powder, and whether it can be done: places off the bed,
+/// Whether a dialect can express what a profile requests besides drops and powder, and a machine do it: positions off the bed,
 /// limits in seconds that the longest sweep keeps. errors  kUsage, with the key and what to do
 Status check_maintenance(const Dialect& dialect, const Machine& machine, const HeadGrid& grid);
 

@@ -242,7 +242,7 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
                 [&](std::uint32_t which, __m256i v) LAMINA_AVX2 { store(facets.number[which] + i, v); });
     store(facets.facet + i, eight(found.facet + i));
   }
-  task.out.ensure_capacity(count + 4);  // four are written, whatever counts
+  task.out.ensure_capacity(count + 4);  // four are written, regardless of how many count
   Cutter cutter = cutter_for(task);
   const __m128i of_instance = _mm_set1_epi32(static_cast<int>(instance));
   for (std::uint32_t i = 0; i < found.size; i += 4) {

@@ -244,7 +244,7 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
     put(CutFacets::kTipX, _mm512_add_epi32(in_x.tip, _mm512_set1_epi32(offset.x)));
     put(CutFacets::kLeftX, in_x.left), put(CutFacets::kRightX, in_x.right);
   }
-  task.out.ensure_capacity(count + kClusterSize);  // 16 are written, whatever counts
+  task.out.ensure_capacity(count + kClusterSize);  // 16 are written, regardless of how many count
   const __m512i of_instance = _mm512_set1_epi32(static_cast<int>(instance));
   Cutter cutter = cutter_for(task);
   for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {

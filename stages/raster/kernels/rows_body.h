@@ -38,7 +38,7 @@ LAMINA_INLINE void sort_four_registers(Register (&v)[4]) {
   merge_four(v);
 }
 
-/// Merges two sorted lists of whole registers: the lesser half of two registers is next, whatever comes.
+/// Merges two sorted lists of whole registers: the lesser half of two registers is next in any case.
 LAMINA_TARGET void merge_registers(const std::uint32_t* a, const std::uint32_t* a_end, const std::uint32_t* b,
                                    const std::uint32_t* b_end, std::uint32_t* out) {
   Register low = load_row(a), high = load_row(b);

@@ -9,7 +9,7 @@
 
 namespace lamina::raster {
 
-/// A cluster as it is seen along x.
+/// A cluster projected along x.
 struct alignas(64) Sides {
   Nm z[3][kClusterSize];
   Nm y[3][kClusterSize];
@@ -27,7 +27,7 @@ struct alignas(64) Tents {
 
 /// The loops for an instruction set.
 struct TentKernels {
-  /// Looks up an indexed cluster's corners.
+  /// Fetches an indexed cluster's corners.
   void (*find)(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
   /// Slabs are 2^shift nm high and counted from `first`, and at most 2^13.
   void (*raise)(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);

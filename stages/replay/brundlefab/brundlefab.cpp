@@ -1,5 +1,5 @@
 // A layer's program as the BrundleFab's firmware carries it out (github.com/ezrec/BrundleFab-firmware at 96cc39e), with its
-// printhead's (BrundleFab-printhead at a2da357). stages/program/brundlefab/README.md tells the format.
+// printhead's (BrundleFab-printhead at a2da357). stages/program/brundlefab/README.md has the format.
 //
 // Commands of motion and tools wait until all axes and the bar stand (GCode::update), so that each is carried out alone;
 // within one command all axes move at a time (CNC::target_set).
@@ -23,7 +23,7 @@ namespace brundle {
 namespace {
 
 constexpr double kDotMm = 25.4 / 96;
-constexpr double kPenMm = 195;  // fab/brundle.py, X_OFFSET_PEN: where the pen is, whatever G10 says
+constexpr double kPenMm = 195;  // fab/brundle.py, X_OFFSET_PEN: where the pen is, regardless of G10
 constexpr double kBladeMm = 0;  // X_OFFSET_BLADE: where the recoater is
 // Axis_DCEncoder spreads 5250 ticks of 600 dpi and the 10 before home over 222.25 mm (_mm_to_position): its dots are longer.
 constexpr double kLongerDots = 5260.0 / 5250 - 1;
@@ -115,7 +115,7 @@ class Firmware {
     if (change && tool_ == kInk) bar_.select();
   }
 
-  // tool_parms. InkBar::parm_set knows P and S; Q and R are stored and used by nobody.
+  // tool_parms. InkBar::parm_set knows P and S; Q and R are stored and not used.
   void parameters(const Block& block, int tool) {
     if (tool != kInk) return;
     if (block.has('Q') || block.has('R')) return fault("the ink bar knows no Q and no R: it has 12 nozzles, those of P");
@@ -174,8 +174,8 @@ class Firmware {
     parameters(block, tool);
   }
 
-  // CNC::home. InkBar::home(float) does not override Axis::home(): the bar is not homed, but moved to Y. A layer may ask
-  // for nothing else, since homing X or a bin loses where they stand.
+  // CNC::home. InkBar::home(float) does not override Axis::home(): the bar is not homed, but moved to Y. A layer may request
+  // nothing else, since homing X or a bin loses where they stand.
   void home(const Block& block) {
     if (!block.has('Y') || block.has('X') || block.has('Z') || block.has('E')) return unknown(block);
     position_[kY] = block['Y'];
@@ -210,7 +210,7 @@ class Firmware {
     const double top = printing_.axis_positions().build_mm, below = top + printing_.profile().powder.base_mm();
     bin_is_at("feed", kLiftedMm + printing_.profile().powder.dose * below + moved_mm_[kE]);
     bin_is_at("part", below + moved_mm_[kZ]);
-    printing_.build_vat_is_at(top + moved_mm_[kZ]);  // whatever is below the first layer counts below 0
+    printing_.build_vat_is_at(top + moved_mm_[kZ]);  // positions below the first layer are negative
   }
   /// Axis_Stepper::update cuts what is beyond.
   void bin_is_at(std::string_view name, double mm) {

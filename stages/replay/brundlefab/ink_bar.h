@@ -17,7 +17,7 @@ struct Pass {
   std::int32_t dots = 0;  // that it goes over
 };
 
-/// Y is no axis: it says up to where the buffer is filled, with the pattern that T1 P set last, whatever the tool and the
+/// Y is no axis: it says up to where the buffer is filled, with the pattern that T1 P set last, for any tool and
 /// word; a smaller Y lets the head run. Nothing but the end of a reverse run empties the buffer, and what it held before stays
 /// in its memory: the head inks that if it runs out over the end.
 class InkBar {
@@ -52,7 +52,7 @@ class InkBar {
   std::int32_t loaded() const { return loaded_; }
   /// Nothing is loaded, and the head is at home.
   bool is_empty() const { return loaded_ == 0 && filled_ == 0 && head_ == 0; }
-  /// What is fired at a dot; of memory that nobody wrote, nothing.
+  /// What is fired at a dot; of memory that was never written, nothing.
   std::uint16_t dot(std::int32_t at) const {
     return at < 0 || at >= kDots || memory_[index(at)] == kUnknown ? 0 : memory_[index(at)];
   }

@@ -20,7 +20,7 @@ constexpr std::int32_t kFullDpi = 600;      // DMAPrint.cpp: SetDPI
 // DMAPrint.cpp: seven pairs of nozzles have one address and primitive in the tables; ConvertB6RawToBurst writes the second one
 // of a pair over the first, which so never fires: 8 (36), 43 (69), 132 (170), 172 (178), 184 (196), 243 (255), 293 (299).
 constexpr std::uint32_t kOverwritten[] = {8, 43, 132, 172, 184, 243, 293};
-// What stays as it was until it is told or the controller is switched on anew: how positions are counted, which nozzles, rows
+// Settings that stay until they are sent again or the controller restarts: how positions are counted, which nozzles, rows
 // and bursts fire, how the buffer is read, and what it holds.
 constexpr std::string_view kSettings[] = {"SPME", "SER", "SDP", "SDN", "SSID", "BMOD", "BCL"};
 constexpr std::uint64_t kEvenBits = 0x5555'5555'5555'5555;  // of a word of a burst: nozzles with even numbers
@@ -284,7 +284,7 @@ void Controller::skip(std::int64_t last, int direction) {
   measures_ += static_cast<std::uint32_t>(measures);
 }
 
-// Lines of the encoder's strip are taken to lie half a count beside the place where SEP was given.
+// Lines of the encoder's strip are taken to be half a count off the position where SEP was given.
 void Controller::move(double to_um, const Watch& watch) {
   const int direction = to_um < at_um_ ? -1 : 1;
   const auto count_at = [&](double um) { return raw_zero_ + std::llround((um - zero_um_) / count_um()); };

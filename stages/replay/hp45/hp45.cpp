@@ -246,7 +246,7 @@ void Hp45Reader::move(const GcodeLine& line) {
 }
 
 // BufferUpdateValues reads the first line at once after the controller was switched on, and when a row has come to it after
-// another sweep. Nothing else may hang on which it is.
+// another sweep. Nothing else may depend on which it is.
 bool Hp45Reader::begins_well(double from_um, double to_um) {
   const double way = to_um > from_um ? 1 : -1;
   if (!begins_off_) {
@@ -269,7 +269,7 @@ void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
   if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_span(firing.row);
   if (!now.any) {
     now = {firing.line, 0, firing.from_um, firing.to_um, true};
-    // The encoder's counts put the line's begin beside the edge of its step.
+    // The encoder's counts put the line's begin next to the edge of its step.
     const double begin = step_of(firing.from_um), neighbour = std::abs(begin - std::floor(begin) - 0.5) * step_um_;
     printing_.count.farthest_along_um = std::max(printing_.count.farthest_along_um, neighbour);
   }

@@ -10,7 +10,7 @@
 namespace lamina::replay::hp45 {
 namespace {
 
-constexpr double kMarginMm = 100;  // beside the bed, besides ramps
+constexpr double kMarginMm = 100;  // off the bed, besides ramps
 // PositionUpdate measures the speed every 50 counts (POSITION_STEP_COUNT); 100 ms behind the last measure it is 0
 // (POSITION_STEP_TIMEOUT), and bursts need one. It is held in whole mm/s.
 constexpr double kMinCountsPerSecond = 500;

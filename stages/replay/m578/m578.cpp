@@ -1,5 +1,5 @@
 // A layer's program as RepRapFirmware carries it out (github.com/Duet3D/RepRapFirmware, tags 1.09r to 3.4.6; taken out in
-// c781c362). stages/program/m578/README.md tells the format.
+// c781c362). stages/program/m578/README.md has the format.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// stages/program/nuferbj/README.md tells the format.
+// stages/program/nuferbj/README.md has the format.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -101,7 +101,7 @@ void fire(const Loaded& loaded, bool backward, double from, double to, Printing&
   const double low = std::min(from, to), high = std::max(from, to);
   const auto vectors = loaded.vectors();
   for (std::size_t v = 0; v < vectors.size(); ++v) {
-    // Of one that fires nothing the first and the last repeat tell all.
+    // Of one that fires nothing the first and the last repeat are enough.
     const auto words = loaded.words(v);
     const bool blank = std::ranges::all_of(words, [](std::uint64_t word) { return word == 0; });
     const std::uint32_t stride = blank ? std::max(1u, vectors[v].repeats) : 1;

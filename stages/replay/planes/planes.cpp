@@ -1,4 +1,4 @@
-// stages/program/planes/README.md tells the format.
+// stages/program/planes/README.md has the format.
 #include <array>
 #include <optional>
 #include <vector>

@@ -1,4 +1,4 @@
-// stages/program/raw/README.md tells the format.
+// stages/program/raw/README.md has the format.
 #include "stages/replay/bytes.h"
 #include "stages/replay/dialects.h"
 #include "stages/replay/maintenance_records.h"

@@ -149,7 +149,7 @@ void PoreCounter::check(const std::optional<double>& distance_mm, double other_m
 
 namespace {
 
-/// A thin stretch seen from the lines of the layer below: it lies at one place along them and reaches across.
+/// A thin segment relative to the lines of the layer below: it is at one position along them and reaches across.
 struct Over {
   Nm position, low, high;
 };

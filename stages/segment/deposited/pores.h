@@ -1,4 +1,4 @@
-// stages/segment/deposited/pores.h: the pores that thin stretches leave, counted from the toolpaths that are laid.
+// stages/segment/deposited/pores.h: the pores that thin segments leave, counted from the deposited toolpaths.
 //
 // Their sizes are those of pore_geometry.h, at the distances that the lines have.
 #pragma once
@@ -24,9 +24,9 @@ class LineNeighbours {
 
   /// Along the direction of the lines, nm.
   double along(Point2 p) const { return cut_.along_x * p.x + cut_.along_y * p.y; }
-  /// Distances between centres, mm, to the line before and the one after; absent if none lies beside all of low .. high.
-  /// run        Stretch::run of the line
-  /// low, high  along() the ends of what is asked about; curves, which are as far apart everywhere, are looked at in the middle
+  /// Distances between centres, mm, to the line before and the one after; absent if none is next to all of low .. high.
+  /// run        PathInterval::run of the line
+  /// low, high  along() the ends of the requested interval; curves, whose distance is constant, are measured in the middle
   ///            of their longest edge
   std::array<std::optional<double>, 2> of(std::uint32_t run, double low, double high);
 
@@ -46,14 +46,14 @@ class LineNeighbours {
   const LayerCut& cut_;
   std::vector<NeighbourLine> lines_;  // by kind, number and place
   std::vector<std::uint32_t> order_;  // into lines_, by run
-  // --- of the run that was asked for last
+  // --- of the run that was requested last
   std::uint32_t run_ = UINT32_MAX;
   const NeighbourLine* line_ = nullptr;
   std::array<std::span<const NeighbourLine>, 2> adjacent_;
   std::array<std::optional<double>, 2> curve_;
 };
 
-/// Takes the stretches of a part in a layer in the order in which they are laid.
+/// Takes the segments of a part in a layer in the order of deposition.
 class PoreCounter {
  public:
   /// All have to outlive it. counts  what is found is added
@@ -88,7 +88,7 @@ class PoreCounter {
   std::uint32_t run_ = UINT32_MAX;
   Point2 at_{};
   Thickness before_ = Thickness::kReference;
-  // --- the thin stretch that is being laid
+  // --- the thin segment that is being deposited
   bool thick_before_ = false;
   PathKind kind_ = PathKind::kRaster;
   std::int32_t line_ = 0;

@@ -1,4 +1,4 @@
-// stages/segment/design/gradient.h: wishes that change from the bottom of a part to its top, as regions one above the other.
+// stages/segment/design/gradient.h: targets that change from the bottom of a part to its top, as regions one above the other.
 #pragma once
 
 #include <cstdint>
@@ -28,13 +28,13 @@ Result<std::vector<double>> equal_tops(double height_mm, std::uint32_t steps, do
 /// errors  kUsage: less than two, more than kMaxRegions, or not kMinLayers above the one before
 Result<std::vector<double>> whole_tops(const std::vector<double>& tops_mm, double layer_mm);
 
-/// The wish of each region: the bottom's in the first, the top's in the last, and between them in proportion to the heights of
+/// The target of each region: the bottom's in the first, the top's in the last, and between them in proportion to heights of
 /// the regions' middles.
-/// bottom, top  wish for the same things
+/// bottom, top  targets of the same quantities
 /// tops_mm      of equal_tops() or whole_tops()
 std::vector<TargetStep> steps_of(const PoreTarget& bottom, const PoreTarget& top, const std::vector<double>& tops_mm);
 
-/// The least number of continuous lines with which slots meet the wish of every region that any number meets, unless a larger
+/// The minimum number of continuous lines whose slots meet the target of every region that any number meets, unless a larger
 /// one is much nearer to what was measured. With one number, pores of neighbouring regions lie in rows of about the same
 /// distance. 0: there is none.
 /// tolerance  relative

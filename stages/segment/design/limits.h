@@ -36,10 +36,10 @@ class DesignLimits {
   static constexpr std::uint32_t kMaxContinuous = 3;
 
   Interval extrusion() const { return extrusion_; }
-  /// The nearest choice that can be laid. Thin stretches are long enough for the machine to come to three quarters of their
+  /// The nearest choice that can be deposited. Thin segments are long enough for the machine to come to three quarters of their
   /// speed, and to keep a pore of 0.3 mm between thick beads; at most half as long as it takes the bead to be as wide as
   /// before. Pores are at least 0.03 mm wide: 0.02 mm are bonded. Thick beads overlap their neighbours by at most 0.02 mm, and
-  /// stay away by no more than 0.02 mm. Lengths of thick stretches are between 1 and 2.4 mm.
+  /// stay away by no more than 0.02 mm. Lengths of thick segments are between 1 and 2.4 mm.
   Choice nearest(Choice choice) const;
 
   /// The key's values, as they are written: lengths to a micrometre, spacings to 0.1 um, percent to 0.1.
@@ -48,8 +48,8 @@ class DesignLimits {
   Result<Segmentation> plan_of(const Choice& choice) const;
   Result<Segmentation> plan_of(const SegmentSettings& settings) const;
 
-  /// The plan with the widths that toolpaths are written with: that of continuous lines is of what 100 % lays, not what was
-  /// measured. A better model of beads has its place here.
+  /// The plan with the widths that toolpaths are written with: that of continuous lines is of the deposit at 100 %, not the
+  /// measured one. A better model of beads belongs here.
   Segmentation deposited(Segmentation plan) const;
 
   /// How far a choice is from what was measured, 0 where it was: extrusion, thick, thin, gap; 1 is far.

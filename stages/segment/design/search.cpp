@@ -8,9 +8,9 @@
 namespace lamina::segment {
 namespace {
 
-constexpr std::size_t kFree = 4, kResiduals = 8;  // four of wishes, four of the way to what was measured
-constexpr double kExact = 1e-3;                   // a wish that is missed by so much weighs as much as a length that is far off
-constexpr double kMet = 5e-3;                     // of wishes; less than what rounding the keys does
+constexpr std::size_t kFree = 4, kResiduals = 8;  // four of targets, four of the distance to what was measured
+constexpr double kExact = 1e-3;                   // a target missed by so much weighs as much as a length that is far off
+constexpr double kMet = 5e-3;                     // of targets; less than the effect of rounding the keys
 constexpr int kSteps = 30;
 
 using Residuals = std::array<double, kResiduals>;
@@ -34,7 +34,7 @@ double squares_of(const std::array<double, N>& values) {
   return sum;
 }
 
-/// Logarithms of what a plan is, over what is wished; 0 where nothing is.
+/// Logarithms of a plan's values over the targets; 0 where there is no target.
 std::array<double, 4> misses(const PoreTarget& target, const Slots& slots, const Pores& pores) {
   const auto miss = [](const std::optional<double>& requested_range, double is) {
     return requested_range ? std::log(std::max(is, 1e-30) / *requested_range) : 0.0;
@@ -162,7 +162,7 @@ class RatioSearch {
   double layer_mm_;
 };
 
-/// Whether one meets the wish better than another: both do so, and it is nearer to what was measured.
+/// Whether one meets the target better than another: both do so, and it is nearer to what was measured.
 bool better(const Design& one, const Design& other) {
   if (one.miss <= kMet && other.miss <= kMet) return one.beyond < other.beyond - 1e-3;
   return one.miss < other.miss - 1e-9;

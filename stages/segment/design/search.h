@@ -1,4 +1,4 @@
-// stages/segment/design/search.h: the segmented filling that has the pores one wishes for.
+// stages/segment/design/search.h: the segmented filling that has the target pores.
 #pragma once
 
 #include <array>
@@ -10,14 +10,14 @@
 
 namespace lamina::segment {
 
-/// What is wished for: one or two of these. A pore is that of predict_pores().
+/// The target: one or two of these. A pore is that of predict_pores().
 struct PoreTarget {
   std::optional<double> porosity;         // 0 .. 1, all void
   std::optional<double> permeability_m2;  // along z
   std::optional<double> pore_width_mm, pore_length_mm;
 };
 
-/// What a better computation says / what slots_of() says, of a plan near the one that is looked for.
+/// What a better computation says / what slots_of() says, of a plan near the one that is searched for.
 struct SlotRatio {
   double porosity = 1, permeability = 1;
 };
@@ -40,17 +40,17 @@ struct Design {
   Slots slots;  // with the ratios
   SlotRatio ratio;
   Pores pores;
-  double miss = 0;    // of the wish that is met worst: relative
+  double miss = 0;    // of the target that is met worst: relative
   double beyond = 0;  // what was measured: length of DesignLimits::beyond()
 };
 
 /// The largest relative miss of what a plan is.
 double miss_of(const PoreTarget& target, const Slots& slots, const Pores& pores);
 
-/// Of all choices within the limits that meet the wish the one nearest to what was measured; where none does, the one that
+/// Of all choices within the limits that meet the target the one nearest to what was measured; where none does, the one that
 /// misses it least (sum of squared logarithms). Nothing is random: least squares (Levenberg and Marquardt, within bounds)
 /// from a grid of beginnings for each number of continuous lines.
-/// wish    at least one; positive
+/// target  at least one; positive
 /// ratio   of plans far from all that are known; near to these the ratio is theirs: a mean of logarithms, weighted with inverse
 ///         squares of distances (D. Shepard, "A two-dimensional interpolation function for irregularly-spaced data", Proc. 23rd
 ///         ACM National Conference, 1968)

@@ -42,7 +42,7 @@ struct File::State {
   ~State() {
     if (file < 0) return;
     if (options.keep_part || streams) {
-      write_all(file, gathered);  // an error is found by whoever goes on
+      write_all(file, gathered);  // an error is found by the next caller
     } else {
       remove();
     }
@@ -66,7 +66,7 @@ struct File::State {
     return {};
   }
 
-  /// Lets the disk begin with what is written, so that the sync at the end waits for less. It tells the errors, too.
+  /// Lets the disk begin with what is written, so that the sync at the end waits for less. It reports the errors, too.
   void give(std::size_t bytes) {
     waiting += bytes;
     if (waiting < kGiven || streams || options.durable == Durable::kNo) return;
@@ -199,7 +199,7 @@ Status File::become_part(bool synced) {
   if (synced && state.options.durable != Durable::kNo) {
     if (Status status = sync(); !status) return status;
   }
-  // Nobody else knows its name yet; file systems without locks have one writer at a time.
+  // No other process knows its name yet; file systems without locks have one writer at a time.
   if (!state.options.lock) ::flock(state.file, LOCK_EX | LOCK_NB);
   const std::string part = part_of(state.target);
   if (std::rename(state.grows.c_str(), part.c_str()) != 0) return write_failure(state.path, errno);

@@ -1,6 +1,6 @@
 // stages/support/io/file.h: the one way to write a file. It appears under its name only when it is whole.
 //
-// It grows under a temporary name beside it (temporary.h), is synced, takes its name, and its folder is synced: a power cut
+// It grows under a temporary name next to it (temporary.h), is synced, takes its name, and its folder is synced: a power cut
 // leaves the older file or this one. What the name leads to is decided once, when the file is opened: a link is followed,
 // dangling or not; a directory, a device or a pipe is never replaced.
 #pragma once
@@ -21,14 +21,14 @@ namespace lamina {
 /// What of a file survives a power cut once finish() has returned.
 enum class Durable {
   kNo,     // what the system has written by then
-  kBytes,  // the bytes; whoever calls syncs the folder
+  kBytes,  // the bytes; the caller syncs the folder
   kAll
 };
 
 struct FileOptions {
   bool stream = false;     // devices, pipes and sockets take the bytes as they come; "-" is standard output
   bool hash = false;       // finish() returns the XXH3-128 of all bytes
-  bool keep_part = false;  // grows as NAME.part, which stays, whatever ends the run, until reopen(), open() or discard()
+  bool keep_part = false;  // grows as NAME.part, which stays, however the run ends, until reopen(), open() or discard()
   bool lock = true;        // off where a Claim holds the file or its directory: five system calls fewer
   bool follow = true;      // links; off for files of a job's directory, whose links are replaced
   bool replace = true;     // off: a file that is there in the end is an error
@@ -41,7 +41,7 @@ class File {
   /// errors  kOutput, one line with the path and the system's reason; another run writes the same file; the name is that
   ///         of a directory, or of a device or pipe without `stream`; NAME.part, if it is to be kept, is a link or no file
   static Result<File> open(const std::string& path, const FileOptions& options = {});
-  /// Goes on with NAME.part of an earlier run, which is cut to `size` bytes; with `hash` these are read again.
+  /// Continues NAME.part of an earlier run, which is cut to `size` bytes; with `hash` these are read again.
   /// errors  those of open(); kOutput if NAME.part is absent or shorter
   static Result<File> reopen(const std::string& path, std::uint64_t size, const FileOptions& options = {});
 
@@ -60,7 +60,7 @@ class File {
   Status sync();
   /// Gives an unfinished file, which grew under another name, the name NAME.part, locked and kept from now on; it takes
   /// the place of an older one at once.
-  /// synced  its bytes are on the disk before; false: whoever calls sees to that, and nothing is lost until then
+  /// synced  its bytes are on the disk before; false: the caller sees to that, and nothing is lost until then
   Status become_part(bool synced = true);
   /// Flushes, syncs, closes and gives the file its name. returns  its size, and its hash if it was taken
   Result<FileDigest> finish();

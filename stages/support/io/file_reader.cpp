@@ -110,7 +110,7 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
     state->file = STDIN_FILENO;
     state->own = false;
   } else {
-    // Without O_NONBLOCK, opening a pipe that nobody writes to would wait for ever.
+    // Without O_NONBLOCK, opening a pipe without a writer would wait for ever.
     state->file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
   }
   struct stat status {};

@@ -1,6 +1,6 @@
 // stages/support/io/file_reader.h: the one way to open and read a file.
 //
-// A name leads to a regular file or to one line of error: a pipe that nobody writes to, a device, a directory or a file
+// A name leads to a regular file or to one line of error: a pipe without a writer, a device, a directory or a file
 // without line ends costs neither time nor memory. Text in memory is read through the same calls, for tests and fuzzing.
 #pragma once
 
@@ -56,7 +56,7 @@ class FileReader {
   std::uint64_t line_number() const;  // of the line that next() gave, from 1
   std::uint64_t offset() const;       // bytes, behind that line and its end
   bool ended_by_break() const;        // the line that next() gave had an end
-  /// Goes on reading there, behind `lines` lines. Not of a stream.
+  /// Continues reading there, after `lines` lines. Not of a stream.
   void go_to(std::uint64_t offset, std::uint64_t lines);
 
   /// Fills all of `to` from that place; false if the file is shorter. Not of a stream; leaves next() alone.

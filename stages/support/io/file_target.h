@@ -30,7 +30,7 @@ Result<int> open_stream(const std::string& path, const FileTarget& target, bool 
 //
 // Names are followed through links. cost  a system call or two; is_replaceable reads at most 4 KiB
 
-/// What tells files and directories apart, whatever their names.
+/// The identity of a file or directory, under any name.
 struct FileId {
   std::uint64_t device = 0, inode = 0;
   friend bool operator==(const FileId&, const FileId&) = default;

@@ -24,7 +24,7 @@ Error not_started(const std::string& program, int reason) {
           fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", program, std::strerror(reason))};
 }
 
-/// The program beside this one, or its name for PATH.
+/// The program in this one's folder, or its name for PATH.
 std::string find_program(const std::string& program) {
   std::error_code error;
   const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe", error);

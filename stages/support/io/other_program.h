@@ -1,6 +1,6 @@
 // stages/support/io/other_program.h: runs a helper program, as a filter or in place of this process.
 //
-// A helper is searched beside this program, then in PATH.
+// A helper is searched in this program's folder, then in PATH.
 #pragma once
 
 #include <string>

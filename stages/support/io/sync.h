@@ -1,6 +1,6 @@
 // stages/support/io/sync.h: bytes and names that survive a power cut.
 //
-// Whatever a file system cannot sync (a folder, a file without a disk) is not an error; a failing disk is.
+// What a file system cannot sync (a folder, a file without a disk) is not an error; a failing disk is.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ int sync_folder_of(const std::string& file);
 /// most those that the kernel lets wait. Files of an earlier run that this one keeps are included.
 class FolderSync {
  public:
-  /// Opens folders that exist, before anything is written: an error of the disk is told to whoever had it open (Linux 5.8).
+  /// Opens folders that exist, before anything is written: a disk error is reported to those who had it open (Linux 5.8).
   static FolderSync of(const std::vector<std::string>& folders);
   FolderSync(FolderSync&&) noexcept;
   FolderSync& operator=(FolderSync&&) noexcept;
@@ -39,7 +39,7 @@ class FolderSync {
   /// Begins the thread with what is there by now: a file that names the job reaches the disk while the first layers are made.
   /// errors  as wrote()
   Status begin() const;
-  /// Tells how many bytes have been written since it was told before. May begin the thread.
+  /// Adds the bytes that have been written since the last call. May begin the thread.
   /// errors  of sync, as soon as the thread has met one
   Status wrote(std::uint64_t bytes) const;
   /// Ends the thread. errors  kOutput with the system's reason, also of what the thread met. cost  waits for the disk

@@ -95,7 +95,7 @@ Status remove_stale(const std::string& path, const std::string& part) {
   return reason == 0 ? Status() : Status(write_failure(part, reason));
 }
 
-/// The folder of a file, locked while a run looks around in it: of several that begin in the same instant one comes first.
+/// The folder of a file, locked while a run reads its names: of several that begin in the same instant one comes first.
 class FolderTurn {
  public:
   explicit FolderTurn(const std::string& target) {
@@ -182,7 +182,7 @@ Result<Temporary> create_temporary(const std::string& path, const std::string& t
     if (made.file < 0 && errno == EEXIST) continue;
     if (made.file < 0) return write_failure(path, errno);
     if (!lock) return made;
-    const bool held = take_lock(made.file, made.name) == Lock::kHeld;  // not where another run just looks at it
+    const bool held = take_lock(made.file, made.name) == Lock::kHeld;  // not where another run is just inspecting it
     const bool alone = held && !another_writes(turn->folder(), target, made.name, true);
     if (alone) return made;
     remove_or_note(made.name);

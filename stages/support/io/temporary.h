@@ -1,7 +1,7 @@
 // stages/support/io/temporary.h: files that grow until they take their name, and who may write them.
 //
-// NAME.lamina-XXXXXXXXXXXXX.part  a temporary file beside NAME, of a name that nobody can foresee
-// NAME.part                       a part that an interrupted run leaves for the next one to go on with
+// NAME.lamina-XXXXXXXXXXXXX.part  a temporary file next to NAME, of an unpredictable name
+// NAME.part                       a part that an interrupted run leaves for the next one to continue
 //
 // Both are created exclusively, never through a link, and locked as long as they grow. A lock ends with its process: an
 // unlocked temporary file is what a killed run left, and the next run that writes NAME removes it. File systems without
@@ -34,7 +34,7 @@ struct Temporary {
 };
 
 /// path    for errors
-/// lock    held until the descriptor is closed; without it, whoever calls holds a Claim and removes what killed runs left
+/// lock    held until the descriptor is closed; without it, the caller has a Claim and removes what killed runs left
 /// errors  kOutput: the system's reason; another run writes the same file
 /// cost    locked: reads the names in the folder
 Result<Temporary> create_temporary(const std::string& path, const std::string& target, bool lock);
@@ -51,7 +51,7 @@ Result<int> take_part(const std::string& path, const std::string& part, std::uin
 /// runs that begin in the same instant one is refused. NAME.part is the lock; it is made, empty, if it is absent.
 class Claim {
  public:
-  /// told    named by errors
+  /// reported  named by errors
   /// errors  as create_part
   static Result<Claim> take(const std::string& path, const std::string& reported);
   Claim(Claim&&) noexcept;

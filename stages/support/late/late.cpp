@@ -11,7 +11,7 @@ Status load_library(const char* file, std::span<const LateFunction> functions) {
   void* const library = ::dlopen(file, RTLD_LAZY | RTLD_LOCAL);
   if (library == nullptr) {
     const char* const reason = ::dlerror();
-    // The loader tells of memory in words alone.
+    // The loader reports lack of memory in words alone.
     for (const char* words : {"failed to map", "cannot map", "annot allocate", "cannot create"}) {
       if (std::strstr(reason, words) != nullptr) return out_of_memory();
     }

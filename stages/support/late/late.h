@@ -1,7 +1,7 @@
 // stages/support/late/late.h: shared libraries that are loaded when a job first needs them.
 //
 // A program that is linked with Embree, libzip and libtiff loads them, and the ten libraries that these name, before its first
-// line: most of the processor time of a small job. The headers beside this one declare, in namespace lamina, a pointer for each
+// line: most of the processor time of a small job. The headers of this folder declare, in namespace lamina, a pointer for each
 // function that is used, of the function's own name: calls within the namespace mean it, and read as if it were linked.
 #pragma once
 
@@ -17,7 +17,7 @@ struct LateFunction {
   void (*put)(void* address);  // into the pointer
 };
 
-/// Loads a library for good and finds its functions; whoever else loads or links it shares it.
+/// Loads a library for good and finds its functions; all who load or link it share it.
 ///
 /// file    as linking would have written it down: libzip.so.4
 /// errors  kInternal: it is not installed, or another one than was compiled with; kMemory
@@ -25,7 +25,7 @@ Status load_library(const char* file, std::span<const LateFunction> functions);
 
 }  // namespace lamina
 
-/// For the lists of functions: the pointer's declaration, its definition, and what load_library() asks for.
+/// For the lists of functions: the pointer's declaration, its definition, and the entry for load_library().
 #define LAMINA_LATE_DECLARED(function) extern decltype(&::function) function;
 #define LAMINA_LATE_DEFINED(function) decltype(&::function) function = nullptr;
 #define LAMINA_LATE_NAMED(function) \

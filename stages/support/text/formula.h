@@ -22,7 +22,7 @@ class Formula {
   ~Formula();
 
   const std::string& text() const;
-  /// Whether the formula looks at a variable.
+  /// Whether the formula uses a variable.
   bool uses(std::string_view name) const;
   /// Its value, finite or not. values  of all variables; errors  kUsage: there is none
   /// cost    some tens of nanoseconds

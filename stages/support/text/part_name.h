@@ -8,7 +8,7 @@ namespace lamina {
 
 /// The name of a part of a package as it is compared: a leading slash, lower case, "%20" decoded, "." and ".." resolved.
 ///
-/// folder  where a name without a leading slash is looked for, such as "/3d/"
+/// folder  where a name without a leading slash is searched, such as "/3d/"
 /// source  ISO/IEC 29500-2 (Open Packaging Conventions), 6.2 and 6.3
 std::string part_name(std::string_view name, std::string_view folder = "/");
 

@@ -5,7 +5,7 @@
 #define TOML_EXCEPTIONS 0
 #define TOML_ENABLE_WINDOWS_COMPAT 0
 // toml++ 3.3 asserts, and lets compilers take for granted, what does not hold for every file: that a key follows [, where an
-// error stands behind the assertion; that letters from U+00A1 to U+0499 are never asked whether they are blanks, which they are
+// error stands behind the assertion; that letters from U+00A1 to U+0499 are never tested for blanks, which they are
 // not.
 #undef NDEBUG
 #define TOML_ASSERT(expr) static_assert(true)

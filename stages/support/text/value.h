@@ -132,7 +132,7 @@ struct Word {
   Value value;
 };
 
-/// "'rastr' is none of none, raster; did you mean 'raster'?"
+/// An error that lists `words` and suggests the nearest one: "... none, raster; did you mean 'raster'?"
 std::string not_one_of(std::string_view text, std::span<const std::string_view> words);
 
 template <class Value, std::size_t N>

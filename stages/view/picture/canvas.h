@@ -16,7 +16,7 @@ struct Colour {
   std::uint8_t red, green, blue;
 };
 
-/// Pixels count from the top left. Whatever reaches beyond the canvas is cut off.
+/// Pixels count from the top left. Shapes are clipped at the canvas.
 class Canvas {
  public:
   Canvas(int width, int height, Colour ground);

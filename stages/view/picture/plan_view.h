@@ -13,7 +13,7 @@
 namespace lamina::view::picture {
 
 /// Layers side by side as PNG, all at one scale, `title` and `caption` of each below it; `box` and `width` are those of
-/// the sheet, the latter in pixels. shapes_of is asked for one after the other, so that the shapes of one layer are held at a
+/// the sheet, the latter in pixels. shapes_of is called for one after the other, so that the shapes of one layer are held at a
 /// time. errors  of shapes_of
 Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layers, const Box& box, std::uint32_t width,
                                      const std::function<Result<LayerShapes>(std::size_t)>& shapes_of);

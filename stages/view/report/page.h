@@ -10,7 +10,7 @@
 
 namespace lamina::view::report {
 
-/// A piece of data that the page's script unpacks when it is looked at.
+/// A piece of data that the page's script unpacks when it is shown.
 struct PageData {
   std::string id;
   Buffer<std::byte> deflated;
@@ -22,7 +22,7 @@ struct PageTexts {
 };
 const PageTexts& page_texts();
 
-/// One HTML file that needs no other one. `head` is JSON; whatever stands in it cannot end its script element.
+/// One HTML file that needs no other one. `head` is JSON; nothing in it can end its script element.
 std::string make_page(std::string_view title, std::string_view head, const std::vector<PageData>& data);
 
 }  // namespace lamina::view::report

@@ -12,7 +12,7 @@ const element = (name, text, parent) => {
   return made;
 };
 
-// --- data: base64 of deflated bytes, unpacked when it is looked at
+// --- data: base64 of deflated bytes, unpacked when it is shown
 async function unpack(id) {
   const bytes = Uint8Array.from(atob($(id).textContent), c => c.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));

@@ -1,4 +1,4 @@
-// stages/view/report/run_code.h: runs as few bytes, for a page that unpacks them where they are looked at.
+// stages/view/report/run_code.h: runs as few bytes, for a page that unpacks them where they are shown.
 //
 // Row by row, all numbers in base 128, low digit first, the high bit set on all bytes but the last:
 //   0 n          the next n rows are like the row before (before the first row: empty)
