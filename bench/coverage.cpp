@@ -1,5 +1,5 @@
 // bench/coverage.cpp: layers of a part at 1200 dpi on one thread as a bitmap and as shares of voxels with 4 levels, in one run.
-// Both have to tell the same of what is far from any surface.
+// Both must report the same for what is far from any surface.
 #include <chrono>
 
 #include "bench/named_parts.h"

@@ -145,7 +145,7 @@ def measure_series(name, options, work):
         say(f"  {name} {x:>11,}: {entry['wall']:7.3f} s, processor {entry['processor']:7.3f} s, "
             f"{entry['peak'] / 2**20:7.1f} MiB, {entry['layers']} layers")
         entries.append(entry)
-    # Threads are no size of a job: nothing is asked of their slope.
+    # Threads are no size of a job: their slope has no limit.
     slopes = {} if name == "threads" else {measure: slope(entries, measure) for measure in MEASURES}
     return {"entries": entries, "slopes": slopes}
 

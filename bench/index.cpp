@@ -1,4 +1,4 @@
-// bench/index.cpp: what the rays' tree of a job's part costs, and how much a layer is said to need beside what it takes.
+// bench/index.cpp: cost of the rays' tree of a job's part, and the stated memory of a layer compared with the measured one.
 #include <algorithm>
 
 #include "bench/named_parts.h"

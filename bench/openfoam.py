@@ -26,7 +26,7 @@ import tables  # noqa: E402
 CELLS = {"Raster": [20, 10, 20 / 3], "F1.5E75C1": [20, 10]}  # voxels in um; 20 / 3 takes minutes of the second cell
 FORCE = 1e-6  # a Reynolds number of about 1e-5 in voxels of side 1 and viscosity 1
 DARCY = 9.869233e-13
-PROJECT = os.environ.get("WM_PROJECT_DIR", "/usr/share/openfoam")  # Debian's; simpleFoam looks there for its controlDict
+PROJECT = os.environ.get("WM_PROJECT_DIR", "/usr/share/openfoam")  # Debian's; simpleFoam reads its controlDict there
 HEAD = "FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n"
 
 

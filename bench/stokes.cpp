@@ -1,4 +1,4 @@
-// bench/stokes.cpp: creeping flow past spheres, whose drag is published, and through a large cell of random ones, beside what
+// bench/stokes.cpp: creeping flow past spheres, whose drag is published, and through a large cell of random ones, compared with what
 // copying memory allows.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -114,7 +114,7 @@ double copy_bandwidth(std::size_t bytes) {
   return 2 * kTimes * static_cast<double>(bytes) / (processor_seconds() - start);
 }
 
-/// A figure of this process, bytes; 0 where the system does not tell.
+/// A figure of this process, bytes; 0 where the system does not report it.
 double process_bytes(const std::string& name) {
   std::ifstream file("/proc/self/status");
   for (std::string line; std::getline(file, line);)

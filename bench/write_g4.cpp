@@ -1,6 +1,6 @@
 // bench/write_g4.cpp: the G4 and PNG encoders and the G4 decoder alone, on rows of known kinds; what they write is first
-// decoded by libtiff and libpng. PNG's time is told beside that of zlib at its fastest for the same rows of bits, that of the
-// decoder beside libtiff's, which decodes into rows of bits that become runs.
+// decoded by libtiff and libpng. PNG's time is reported next to that of zlib at its fastest for the same rows of bits, that of the
+// decoder next to libtiff's, which decodes into rows of bits that become runs.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>
 #include <zlib.h>
@@ -126,7 +126,7 @@ double zlib_seconds(const Runs& runs) {
 
 void set_counters(benchmark::State& state, const Runs& runs, std::size_t bytes) {
   using benchmark::Counter;
-  const auto kPer = Counter::kIsIterationInvariantRate | Counter::kInvert;  // seconds, in units of which is told
+  const auto kPer = Counter::kIsIterationInvariantRate | Counter::kInvert;  // seconds, the unit of the report
   const double rows = runs.view().rows(), changes = static_cast<double>(runs.change.size());
   state.counters["px/s"] = Counter(rows * runs.columns, Counter::kIsIterationInvariantRate);
   state.counters["a_row"] = Counter(rows, kPer);

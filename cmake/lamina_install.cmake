@@ -9,7 +9,7 @@ if(LAMINA_SCAN)
   install(TARGETS lamina-scan COMPONENT scan)
 endif()
 install(TARGETS lamina_stages lamina_pipeline EXPORT lamina-targets COMPONENT development)
-# The public face: pipeline/lamina.h and whatever it includes, nothing else.
+# The public interface: pipeline/lamina.h and the headers that it includes, nothing else.
 function(lamina_installed_header header)
   get_property(detected GLOBAL PROPERTY lamina_installed_headers)
   if(header IN_LIST detected)

@@ -44,7 +44,7 @@ endif()
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-# What the programs load when they first need it is not seen by dpkg-shlibdeps.
+# dpkg-shlibdeps does not detect libraries that the programs load when they first need them.
 set(late_packages)
 find_program(DPKG_QUERY dpkg-query)
 mark_as_advanced(DPKG_QUERY)

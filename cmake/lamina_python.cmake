@@ -9,7 +9,7 @@ endif()
 
 set(Python_FIND_STRATEGY LOCATION)
 if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)
-  set(Python_EXECUTABLE /usr/bin/python3)  # the system's, whose numpy a package can ask for; not one that stands before it
+  set(Python_EXECUTABLE /usr/bin/python3)  # the system's, whose numpy a package can require; not an earlier one in PATH
 endif()
 set(python_default OFF)
 if(NOT LAMINA_SANITIZE)
@@ -37,7 +37,7 @@ if(LAMINA_UNITY STREQUAL "all")
 endif()
 set_target_properties(lamina_python PROPERTIES OUTPUT_NAME lamina LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python)
 target_link_libraries(lamina_python PRIVATE lamina::pipeline)
-# numpy is asked for when arrays are made; its headers are not needed. Size over speed: what is called is optimised.
+# numpy is imported when arrays are made; its headers are not needed. Size over speed: what is called is optimised.
 target_compile_options(lamina_python PRIVATE $<$<NOT:$<CONFIG:Debug>>:-Os> -Wno-conversion)
 set(LAMINA_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Where the Python module is installed, below the prefix")
 install(TARGETS lamina_python LIBRARY DESTINATION ${LAMINA_PYTHON_DIR} COMPONENT python)

@@ -146,7 +146,7 @@ if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
 endif()
 
 # Photographs need OpenCV: a program of its own too, that `lamina calibrate --scan` and `lamina compare` run as a filter. Debian's
-# core and imgproc are enough; its files for CMake come with all of OpenCV, so that they are not asked for.
+# core and imgproc are enough; its files for CMake come with all of OpenCV, so that they are not required.
 find_path(OPENCV_INCLUDE_DIR opencv2/imgproc.hpp PATH_SUFFIXES opencv4)
 find_library(OPENCV_CORE_LIBRARY opencv_core)
 find_library(OPENCV_IMGPROC_LIBRARY opencv_imgproc)

@@ -1,5 +1,5 @@
 // pipeline/scan_main.cpp: the program lamina-scan, a filter that lamina runs: a request as JSON on standard input; on
-// standard output what was seen as one line of JSON, and behind it, if asked for, a picture as PNG. Errors are one line there.
+// standard output the result as one line of JSON, followed by a PNG picture, if requested. Errors are one line there.
 #include <cstdio>
 #include <iostream>
 #include <string>

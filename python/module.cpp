@@ -121,7 +121,7 @@ class Plan {
   pipeline::LayerSource source_;
 };
 
-/// Some layers of a plan in an order, as plan[2:9:3] and its reverse: each is planned when it is asked for, and none is kept.
+/// Some layers of a plan in an order, as plan[2:9:3] and its reverse: each is planned on request, and none is kept.
 struct PlanSlice {
   std::shared_ptr<Plan> plan;
   std::int64_t first = 0, step = 1, count = 0;
@@ -140,7 +140,7 @@ struct PlanSlice {
   }
 };
 
-/// Plans a layer when it is asked for the next one, and keeps none.
+/// Plans a layer when the next one is requested, and keeps none.
 struct LayerIterator {
   PlanSlice of;
   std::int64_t next = 0;

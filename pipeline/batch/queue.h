@@ -1,6 +1,6 @@
 // pipeline/batch/queue.h: many jobs in one process, sharing a thread pool and a memory budget.
 //
-// Jobs start in list order, up to a fixed number at a time. A job starts when its expected memory fits beside the running
+// Jobs start in list order, up to a fixed number at a time. A job starts when its expected memory fits next to the running
 // jobs, or when none is running: a job that exceeds the budget runs alone.
 // A failed job is reported and the others continue. Each job is recorded as it ends (record.h), so a crash loses no
 // finished job.

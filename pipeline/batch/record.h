@@ -37,7 +37,7 @@ class BatchRecord {
   const Earlier* earlier(const BatchJob& job) const;
 
   // --- from one thread at a time; errors  kOutput
-  /// foreign  the output path holds unrecorded files: a later run must not treat them as its own
+  /// unowned  the output path holds unrecorded files: a later run must not treat them as its own
   Status begun(const BatchJob& job, bool unowned);
   Status ended(const BatchJob& job, const BatchResult& result);
 

@@ -22,7 +22,7 @@ std::string list_of(const std::vector<std::uint32_t>& nozzles) {
 
 constexpr double kReportedPixels = 0.1, kErrors = 4;  // as of single nozzles
 
-/// Nozzles that were read along the scan or across it, with those that are too uncertain to be told.
+/// Nozzles that were read along the scan or across it, and those that are too uncertain to report.
 std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* detected, const char* error) {
   std::vector<std::optional<Located>> read(nozzles.size());
   for (std::size_t n = 0; n < nozzles.size(); ++n) {
@@ -69,7 +69,7 @@ std::string positions_line(const std::vector<std::optional<Located>>& along,
                      maximum(along), maximum(across));
 }
 
-/// A length, or that it cannot be told.
+/// A length, or that it cannot be determined.
 std::string reported(const Json& json, const char* key) {
   return json.at(key).is_null() ? "unreadable" : fmt::format("{:+.0f} um", json.at(key).get<double>());
 }
@@ -126,7 +126,7 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
   const auto weak = json.at("weak").get<std::vector<std::uint32_t>>(),
              unreadable = json.at("unreadable").get<std::vector<std::uint32_t>>();
   const Json& nozzles = json.at("nozzles");
-  // Blocked stay those that were not on the chart, and those of which nothing could be seen.
+  // Nozzles that were not on the chart, or of which nothing was detected, stay blocked.
   std::set<std::uint32_t> blocked(blocked_nozzles.begin(), blocked_nozzles.end());
   for (const std::uint32_t n : machine.head.blocked) {
     if (n < nozzles.size() && nozzles[n].is_null()) blocked.insert(n);

@@ -12,8 +12,8 @@
 namespace lamina::pipeline {
 
 /// Takes over what was read: head.blocked, head.row_offset_um and head.dot_gain_um. Nozzles that the chart does not have, for
-/// the controller cannot fire them, stay blocked. Rows are told apart where the head has several. Offsets that cannot be told
-/// change nothing; their number is told.
+/// the controller cannot fire them, stay blocked. Rows are distinguished if the head has several. Uncertain offsets
+/// change nothing; their number is reported.
 /// reading  JSON of lamina-scan
 /// chart    that was read
 /// machine  that printed the chart, changed

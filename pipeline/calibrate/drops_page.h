@@ -12,7 +12,7 @@ namespace lamina::pipeline {
 /// Lines that end with LF: the pooled fit, samples and their spread, the same for gases.
 std::string as_text(const segment::DropsFit& fit);
 Json as_json(const segment::DropsFit& fit);
-/// Points and parabola, of gases if they were asked for.
+/// Points and parabola, of gases if requested.
 Plot draw(const segment::DropsFit& fit);
 
 }  // namespace lamina::pipeline

@@ -59,7 +59,7 @@ std::optional<DoseCheck::RequestedRange> DoseCheck::requested_range(const Layer&
     const Saturation own = part.saturation_percent.value_or(percent);
     targets.insert(targets.end(), {own, part.core_saturation_percent.value_or(own), core.value_or(own)});
   }
-  // What a formula asks for depends on where parts lie.
+  // What a formula requests depends on the positions of parts.
   if (std::ranges::any_of(targets, [](const Saturation& target) { return !target.formula.empty(); })) return std::nullopt;
   const auto& powder = machine_->powder;
   const double pixel_mm2 = 25.4 / head_.grid.x.dpi() * 25.4 / head_.grid.y.dpi();

@@ -1,4 +1,4 @@
-// pipeline/check/doses.h: what a manifest says of pixels to be filled and of drops asked for, against images, job and profile.
+// pipeline/check/doses.h: checks a manifest's counts of pixels and requested drops against images, job and profile.
 #pragma once
 
 #include <cstdint>

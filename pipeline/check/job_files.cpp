@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxProgramBytes = 4ull << 30;
 
-/// Empty if it cannot be read: what is missing or differs, its hash has told.
+/// Empty if it cannot be read: the check of its hash has reported what is missing or differs.
 std::string whole_file(const fs::path& path, std::uint64_t max_bytes) {
   auto text = read_file(path.string(), {.max_bytes = max_bytes});
   return text ? std::move(*text) : std::string();

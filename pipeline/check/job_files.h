@@ -18,7 +18,7 @@ namespace lamina::pipeline {
 /// errors  kVerification: missing, changed, or of another job; begins with the file's path in the directory
 Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head);
 
-/// What the drops of a pixel took of a head that fires several, as planning told; "" of another one, or without its files.
+/// The drops per pixel of a head that fires several, as planning reported them; "" for another head, or without its files.
 std::string sweeps_of_job(const std::string& directory, const Manifest& manifest);
 
 /// The text of a layer's print program, unchecked; "" if it cannot be read.

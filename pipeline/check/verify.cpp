@@ -290,7 +290,7 @@ VerifyReport verify_paths(const std::string& name, const std::string& directory,
   return report;
 }
 
-/// A file of toolpaths, by the manifest beside it.
+/// A toolpath file, by the manifest next to it.
 Result<VerifyReport> verify_file(const std::string& path) {
   const std::string manifest_path = path + ".json";
   std::error_code error;

@@ -49,7 +49,7 @@ class Context {
   virtual const std::atomic<bool>& cancel() = 0;
 };
 
-/// Lines that a call asked for: on stdout, or on stderr where stdout is for JSON; none with --quiet.
+/// Lines that a call requested: on stdout, or on stderr where stdout is for JSON; none with --quiet.
 class Answer {
  public:
   Answer(const Arguments& arguments, Context& context) : context_(context), arguments_(arguments) {}

@@ -15,7 +15,7 @@ using heights::Mode;
 bool fits_heights(Product, const Job& job) { return job.heights.mode != Mode::kUniform; }
 bool by_angle(Product, const Job& job) { return job.heights.mode == Mode::kAngle; }
 bool by_steps(Product product, const Job& job) { return fits_heights(product, job) && !by_angle(product, job); }
-/// Optimal tables look at all slopes in a layer.
+/// Optimal tables inspect all slopes in a layer.
 bool by_slopes(Product product, const Job& job) { return fits_heights(product, job) && job.heights.mode != Mode::kOptimal; }
 bool optimal(Product, const Job& job) { return job.heights.mode == Mode::kOptimal; }
 bool may_end_below(Product product, const Job& job) { return by_angle(product, job) || optimal(product, job); }
@@ -26,7 +26,7 @@ bool scaled(Product, const Job& job) {
 bool shrinks(Product product, const Job& job) { return by_steps(product, job) && scaled(product, job); }
 bool has_core(Product, const Job& job) { return job.dose.core < 1 || job.dose.core_saturation_percent || fills(job); }
 bool dithers(Product, const Job& job) { return job.levels > 0 || job.dose.saturation_percent; }
-/// Printers of filament lay a wall where nothing else is asked for.
+/// Filament printers deposit a wall unless something else is requested.
 bool deposits_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
 bool deposits_lines(Product, const Job& job) {
   const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
@@ -53,7 +53,7 @@ struct Need {
   std::string_view flag;
   bool (*met)(Product, const Job&);
   std::string_view unmet;
-  bool (*in_study)(Product, const Job&) = nullptr;  // of layers alone; nullptr: it tells something about any
+  bool (*in_study)(Product, const Job&) = nullptr;  // of layers alone; nullptr: it affects any study
 };
 constexpr std::string_view kUniform = "is of layers that fit the part, and these are uniform; add --heights and --thickness",
                            kSteps = "is of --heights cusp, stepwise and optimal; add one of them",
@@ -111,7 +111,7 @@ bool decides_in(Product product, const JobKey& key, const Job& job) {
 }  // namespace
 
 Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study) {
-  // Whoever names the pattern none knows that there are no lines.
+  // A job that selects the pattern "none" has no lines by intention.
   const bool named = arguments.has("--pattern") || arguments.has("--fill");
   for (const Need& need : kNeeds) {
     const bool beads = need.met == deposits_lines || need.met == deposits_beads;

@@ -14,8 +14,8 @@ namespace lamina::pipeline {
 
 using pipeline::Arguments;
 
-/// Refuses options that would do nothing in this job; keys of files are not looked at.
-/// study   of layers alone: what decides none may still tell something about them
+/// Refuses options that would do nothing in this job; keys of files are not checked.
+/// study   of layers alone: an option without effect on the job may still affect the study
 /// errors  kUsage with the option, why, and what to add
 Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study = false);
 /// The same for options that the printer's files do not carry.

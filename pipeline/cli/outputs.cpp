@@ -112,7 +112,7 @@ std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view op
   return inputs;
 }
 
-/// An output and the files written beside it; toolpaths may have a table of layers.
+/// An output and the files written next to it; toolpaths may have a table of layers.
 void add_output(const std::string& path, std::vector<std::string>& outputs) {
   if (path.empty()) return;
   for (const char* ending : {"", ".part", ".json", ".json.part"}) outputs.push_back(path + ending);
@@ -152,7 +152,7 @@ bool is_input_option(std::string_view flag) {
 bool is_output_option(std::string_view flag) { return std::ranges::find(kOutputs, flag) != std::end(kOutputs); }
 
 Status check_outputs(std::span<const InputFile> inputs, std::span<const std::string> outputs) {
-  const std::vector<Taken> taken = taken_by(outputs);  // looked up once, for there may be thousands of inputs
+  const std::vector<Taken> taken = taken_by(outputs);  // computed once, for there may be thousands of inputs
   if (taken.empty()) return {};
   for (const InputFile& input : inputs) {
     if (!is_file(input.path)) continue;

@@ -32,7 +32,7 @@ Status check_outputs(std::string_view command, const Arguments& arguments);
 /// The same for the files named in a job, by a job file or --set.
 Status check_outputs(const Arguments& arguments, const Job& job);
 
-/// Looks for the folder of a file before the work, not after it; "" and "-" have none. errors  kOutput
+/// Checks the folder of a file before the work, not after it; "" and "-" have none. errors  kOutput
 Status check_folder(std::string_view flag, const std::string& file);
 
 /// Allows a file to be replaced if it is absent, empty or carries one of lamina's marks. errors  kUsage
@@ -41,7 +41,7 @@ Status check_own_file(const std::string& path, std::span<const std::string_view>
 /// Refuses a table in the place of a job's own files. errors  kUsage
 Status check_quote(const Arguments& arguments, const std::string& directory);
 
-/// Writes the table that --quote asks for. errors  kInput: there is none, as layers of an earlier build have no times
+/// Writes the table that --quote requests. errors  kInput: there is none, as layers of an earlier build have no times
 Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows);
 
 /// Whether an option's value is an input file; whether it is an output file.

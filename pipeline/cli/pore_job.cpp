@@ -20,7 +20,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Tells the job beside what is told of its files, which have no name outside of the call.
+/// Reports the job next to the results of its files, which have no name outside of the call.
 class JobContext : public Context {
  public:
   /// made  the file or folder that the job became; shown  its name for people
@@ -73,7 +73,7 @@ std::string saved_command(const std::string& path) {
   return text ? std::string(pipeline::command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
 }
 
-/// errors  kUsage: no such machine, or nothing tells
+/// errors  kUsage: no such machine, or nothing names it
 Result<Product> product_of(const std::string& path, const Job& job, bool by_option) {
   if (!job.machine.profile.empty()) {
     const Result<bool> moves = names_extruder(job.machine.profile);

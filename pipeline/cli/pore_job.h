@@ -20,7 +20,7 @@ using Predict = Outcome (*)(const Arguments& arguments, Context& context, const 
 /// own, --set and --machine, and predicts what was written: G-code or bitmaps in a temporary folder, in the place of the job.
 /// The machine decides which of the two; a job without one its first line as lamina saves it, or keys that one of the two
 /// reads alone.
-/// errors  those of reading, checking and running a job, and of predict, with the job's name; kUsage: it cannot be told which
+/// errors  those of reading, checking and running a job, and of predict, with the job's name; kUsage: it is unknown which
 /// of the
 ///         two, toolpaths of another format than G-code
 Outcome predict_job(const Arguments& arguments, Context& context, Predict predict);

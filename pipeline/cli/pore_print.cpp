@@ -29,7 +29,7 @@ Result<std::vector<VoxelStack>> cut_for(bool flow, const CutWindow& cut, const W
   return all;
 }
 
-/// None where there is nothing to tell, which a note says.
+/// None where there is nothing to report; a note says so.
 Result<std::optional<Forchheimer>> inertia_of(const PoreRasters& rasters, const PoreReport& report, Context& context) {
   const std::atomic<bool>& cancel = context.cancel();
   Result<Forchheimer> found = analyse_inertia(rasters, report, [&](double) { return !cancel; });
@@ -84,7 +84,7 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   selection->part = part;
   const Result<WindowChoice> choice = choose_window(*file, *pile, *selection);
   if (!choice) return Error{choice.error().fault, fmt::format("{}: {}", path, choice.error().message)};
-  // Ways and throats take that much; what the flow takes is looked at when its void is known.
+  // Tortuosity and throats take that much; the memory of the flow is checked when its void is known.
   if (const std::uint64_t bytes = 16 * choice->window.voxels(); bytes > request.memory_bytes)
     return Error{Fault::kUsage, fmt::format("{}: {} voxels take {} at least, --memory allows {}; take a larger --voxel or a "
                                             "smaller --window",

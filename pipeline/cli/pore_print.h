@@ -8,7 +8,7 @@
 
 namespace lamina::pipeline {
 
-/// What flows through a window of the beads of a G-code file, or a scan of it beside its plan.
+/// The flow through a window of the beads of a G-code file, or a scan of it compared with its plan.
 /// part  as WindowRequest takes it
 Outcome predict_print(const Arguments& arguments, Context& context, const std::optional<Box>& part);
 

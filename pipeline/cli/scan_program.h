@@ -1,4 +1,4 @@
-// pipeline/cli/scan_program.h: asks lamina-scan, which has a package of its own.
+// pipeline/cli/scan_program.h: calls lamina-scan, which has a package of its own.
 #pragma once
 
 #include <string>

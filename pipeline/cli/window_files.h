@@ -27,7 +27,7 @@ std::vector<pipeline::OptionSpec> window_file_options();
 /// errors  kUsage: an ending of no format; kOutput: no such folder
 Status check_window_files(const pipeline::Arguments& arguments);
 
-/// Writes what was asked for; files take their names when all of them are whole.
+/// Writes the requested outputs; files get their names when all of them are complete.
 /// draw    makes the plot of --plot
 /// errors  kOutput; kInput: more facets than an STL file counts
 Result<std::vector<WindowFile>> write_window_files(const pipeline::Arguments& arguments, const VoxelView& window,

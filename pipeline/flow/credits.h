@@ -115,7 +115,7 @@ class Budget {
   const std::function<void(std::uint32_t)>& let_go_;
   std::vector<Loan> idle_;  // each with its retained bytes
   std::uint32_t in_flight_ = 0, max_in_flight_ = 0;
-  std::uint64_t used_ = 0;  // by layers in flight and beside them
+  std::uint64_t used_ = 0;  // by layers in flight and in addition to them
   std::uint64_t adjacent_ = 0;
   std::uint64_t idle_bytes_ = 0;  // of idle slots
   std::uint64_t max_bytes_ = 0;

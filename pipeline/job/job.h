@@ -137,16 +137,16 @@ struct Job {
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
   bool strict = false;                // warnings are errors
-  bool inspect = false;               // look through the layers for islands, hollows, thin places
+  bool inspect = false;               // detect islands, hollows and thin walls in the layers
   std::optional<double> min_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
   bool allow_empty = false;           // a whole job may have nothing
   bool allow_unbound = false;         // layers may get less binder than the machine's powder needs
-  bool timing = false;                // tell where the time goes
-  bool quote = false;                 // tell what each part uses up, without prices too
+  bool timing = false;                // break down the run time
+  bool quote = false;                 // report the consumption of each part, also without prices
   bool json = false;
   bool quiet = false;
   std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"
-  bool leave_to_machine = false;   // toolpaths: walls and layers that nobody named are the extruder's, not those here
+  bool leave_to_machine = false;   // toolpaths: unset walls and layers are the extruder's, not those here
   /// Profiles that its file names and that are not there, with what to say of each.
   std::vector<std::pair<std::string, std::string>> missing;
 };
@@ -158,7 +158,7 @@ Status check_job(const Job& job);
 /// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key
 Result<heights::Options> heights_options(const Job& job);
 
-/// The job's slice.tolerance_um; if absent 10 for toolpaths, whose planners look ahead over a few dozen moves, else 0.
+/// The job's slice.tolerance_um; if absent 10 for toolpaths, whose planners plan ahead over a few dozen moves, else 0.
 double tolerance_um_of(const Job& job, Product product);
 
 /// Every bleed that a job or a part of it states.

@@ -184,7 +184,7 @@ const JobKey kImageKeys[] = {
 
 // --- [machine], [dose]
 
-/// A wish of which each part may be left out.
+/// A target of which each component is optional.
 struct RangeTarget {
   std::optional<Saturation> percent, core;
 };

@@ -28,10 +28,10 @@ struct MaterialRange {
   std::string material;
 };
 
-/// What of images that are a part (docs/images-as-parts.md) their files do not tell.
+/// The properties of images used as a part (docs/images-as-parts.md) that their files do not state.
 struct PartImages {
   std::optional<std::array<std::int64_t, 2>> dpi;  // absent: by the tags of the files
-  std::optional<double> layer_mm;                  // absent: by the manifest beside them, or the job's
+  std::optional<double> layer_mm;                  // absent: by the manifest next to them, or the job's
   std::uint32_t threshold = 128;                   // grey below it is dark, 1 .. 255
   bool invert = false;                             // bright pixels are jetted
   bool missing_empty = false;                      // numbers that are missing are empty layers

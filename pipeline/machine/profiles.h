@@ -67,7 +67,7 @@ void predict_calibration(const Job& job, ExtruderProfile& profile);
 /// Whether a file, an option or --set gave the key, as in "fill.walls".
 bool is_named(const Job& job, std::string_view key);
 
-/// Replaces the defaults of powder jobs by the printer's where nobody named a value: one wall, layers of half of the nozzle.
+/// Replaces the defaults of powder jobs by the printer's where values are unset: one wall, layers of half of the nozzle.
 void leave_to_machine(const Extruder& machine, Job& job);
 
 // --- finds, changes and checks the powder printer of a job.

@@ -24,7 +24,7 @@ std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record)
 /// "", or how a layer of a job of one powder says that pixels lie in another one.
 std::string fault_of_one_powder(const LayerRecord& record);
 
-/// Refuses to tell several parts apart where layers that are kept do not say whose their pixels are. errors  kUsage
+/// Refuses to distinguish several parts if kept layers do not state the part of their pixels. errors  kUsage
 Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecord>& kept);
 
 /// Compares contours or toolpaths with their manifest: hash of each layer, in the single file or in per-layer files;

@@ -1,4 +1,4 @@
-// pipeline/manifest/images_on_record.h: what a manifest of lamina tells of the layer images beside it.
+// pipeline/manifest/images_on_record.h: what a manifest of lamina records about the layer images next to it.
 #pragma once
 
 #include <cstdint>

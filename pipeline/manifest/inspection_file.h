@@ -1,6 +1,6 @@
-// pipeline/manifest/inspection_file.h: what --inspect found, beside the manifest of the job that it is of.
+// pipeline/manifest/inspection_file.h: the findings of --inspect, next to the manifest of their job.
 //
-// The manifest is the same for all runs of a job, looked at or not, so that findings have a file of their own:
+// The manifest is the same for all runs of a job, inspected or not, so findings have their own file:
 //   {"lamina": version, "kind": "inspection", "job": id of the manifest, "inspection": {...}, "warnings": [...]}
 #pragma once
 

@@ -1,6 +1,6 @@
 // pipeline/manifest/kept.h: what an interrupted job of contours or toolpaths has on record, and still holds.
 //
-// Files a layer wait in a folder beside the begun manifest, until all are there. Then manifest.json of an earlier job goes,
+// Files a layer wait in a folder next to the begun manifest, until all are there. Then manifest.json of an earlier job goes,
 // they get their names, and the new manifest.json comes last: whenever a run is killed, one of the two records holds.
 #pragma once
 

@@ -94,7 +94,7 @@ void take_last_name(const std::string& manifest, const std::string& target) {
 }
 
 /// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one. A begun file
-/// may stand beside a finished one of another job, which it was to replace.
+/// may exist next to a finished one of another job, which it was to replace.
 Status find_kept(const LayeredFile::LayeredFileOptions& options, const ManifestHead& head, std::string_view start,
                  const std::string& target, std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
   if (!options.resume) return {};
@@ -153,7 +153,7 @@ Result<LayeredFile> LayeredFile::open(LayeredFileOptions options, const Manifest
     }
     if (Status status = check_begun_manifest(part_of(manifest_path)); !status) return status.error();
     if (Status status = check_part(path, manifest_path); !status) return status.error();
-    // A file without any record is none of an interrupted job.
+    // A file without any record does not belong to an interrupted job.
     state.options.resume = state.options.resume && has_record(manifest_path);
     if (!state.options.resume && !state.options.replace && is_there(target->file)) {
       return Error{Fault::kUsage,

@@ -59,7 +59,7 @@ class LayeredFile {
   void discard();
   std::uint64_t size() const;
 
-  /// Whether NAME.part, if there is one, has its record beside it. errors  kUsage: it is somebody else's
+  /// Whether NAME.part, if there is one, has its record next to it. errors  kUsage: it is not lamina's
   static Status check_part(const std::string& file, const std::string& manifest);
 
  private:

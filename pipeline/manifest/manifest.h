@@ -6,7 +6,7 @@
 //
 //   images        DIR/manifest.json, or DIR/manifest-2-of-5.json of a shard
 //   contours      DIR/manifest.json
-//   toolpaths     part.gcode.json beside part.gcode
+//   toolpaths     part.gcode.json next to part.gcode
 #pragma once
 
 #include <cstdint>
@@ -40,7 +40,7 @@ struct ManifestHead {
   std::string job_toml;                           // the resolved job, only keys that decide bytes of this product
   std::string format;                             // of the files: an image format, svg, cli, ..., gcode, sml
   std::string extension;                          // of a layer's file, with the dot; empty without per-layer files
-  std::string file;                               // single file of all layers, beside the manifest; empty if none
+  std::string file;                               // single file of all layers, next to the manifest; empty if none
   std::uint32_t layer_count = 0;                  // of the whole job
   std::uint32_t first_layer = 0, last_layer = 0;  // the range [first, last) that this manifest covers
   std::vector<PartSummary> parts;
@@ -53,7 +53,7 @@ struct ManifestHead {
   std::string dialect, program_extension;  // of the print programs; empty without a machine
   Hash128 program_start, program_end;      // of program/start.* and end.*
   std::vector<JobMaterial> materials;      // if there are several
-  std::uint32_t max_drops = 0;             // of a pixel; 0: no saturation was asked for, and set pixels get one
+  std::uint32_t max_drops = 0;             // of a pixel; 0: no saturation was requested, and set pixels get one
 
   std::uint32_t levels = 0;  // of shares of voxels; 0: pixels are set or not
   /// That a nozzle can fire on a pixel in one sweep, and does at the scan's speed.

@@ -42,7 +42,7 @@ struct RangePores {
 
 /// Contours and toolpaths of a layer.
 struct PathFacts {
-  std::uint64_t contours = 0, points = 0, paths = 0, merged = 0, open = 0;  // united: bodies that needed a union
+  std::uint64_t contours = 0, points = 0, paths = 0, merged = 0, open = 0;  // merged: bodies that needed a union
   double area_mm2 = 0;                                                      // within the contours
   double bead_mm = 0;                                                       // length of the stored toolpaths, of contours only
 
@@ -73,11 +73,11 @@ struct LayerRecord {
   // --- images of a job with a saturation, or of shares of voxels
   std::uint64_t dosed_pixels = 0;         // that are to be filled, whether or not drops fall on them; voxels' shares summed
   std::uint64_t drops = 0;                // of the images
-  std::uint64_t requested_drops = 0;      // by the wished saturation, rounded
+  std::uint64_t requested_drops = 0;      // by the target saturation, rounded
   std::uint32_t max_drops = 0;            // of any pixel
   std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
   std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
-  std::uint64_t half_far = 0;             // of them, those that are not beside a boundary of the image
+  std::uint64_t half_far = 0;             // of them, those that are not adjacent to a boundary of the image
 
   /// Of a job of so many materials, the first image of each: the pixels that get any drop of it.
   const ImageRecord& image_of(std::size_t material, std::size_t materials) const {

@@ -56,7 +56,7 @@ ManifestHead image_head(const Plan& plan) {
 formats::LayerTags tags_of(const Plan& plan, const Layer& layer) {
   constexpr std::string_view kAxes[] = {"", "x", "y", "xy"};
   const std::string_view axes = kAxes[static_cast<std::size_t>(plan.job.mirror)];
-  // A job without a title is told by its pixels alone: the same image is the same file in any job and any place of it.
+  // A job without a title is identified by its pixels alone: the same image is the same file in any job and position.
   const std::uint32_t layers = plan.job.title.empty() ? 0 : plan.layer_count;
   return {plan.job.title, {}, axes, layer.index, layers, layer.bottom, layer.bottom + layer.thickness};
 }
@@ -117,7 +117,7 @@ Status ImageFiles::start() {
     }
     return Status();
   };
-  // A new job's record reaches the disk beside the first layers, which nobody waits for.
+  // A new job's record reaches the disk together with the first layers; no step waits for it.
   const bool at_once = job.sync != Sync::kJob || !kept_.empty();
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head_,
                                        {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)},

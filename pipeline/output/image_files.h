@@ -1,5 +1,5 @@
 // pipeline/output/image_files.h: writes the layers of a powder job: a file per image, the print program
-// beside it, and the manifest.
+// next to it, and the manifest.
 #pragma once
 
 #include <cstdint>

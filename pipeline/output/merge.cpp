@@ -232,7 +232,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   report.shards = static_cast<std::uint32_t>(shards->size());
   head.first_layer = 0;
   head.last_layer = head.layer_count;
-  // Begun before any file comes: it tells a later merge whose files they are.
+  // Begun before any file comes: it identifies the owner of the files for a later merge.
   auto writer = ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {}, {}, std::move(*claim));
   if (!writer) return writer.error();
   for (const Shard& shard : *shards) {

@@ -14,7 +14,7 @@ struct MergeReport {
   std::uint32_t shards = 0;  // 0 if the directory was whole already
   std::uint64_t layers = 0;
   std::uint64_t linked = 0, copied = 0;  // files; the others were in place
-  std::int64_t microseconds = 0;         // of the machine, by the records; 0 without one, or if some do not tell
+  std::int64_t microseconds = 0;         // of the machine, by the records; 0 without one, or if some have no time
   std::vector<Warning> warnings;         // of the whole job
 };
 

@@ -1,4 +1,4 @@
-// pipeline/output/print_program.h: the print program of a job, one file per layer beside its image.
+// pipeline/output/print_program.h: the print program of a job, one file per layer next to its image.
 //
 // out/program/machine.toml   the profile with the job's changes
 //             start.<ext>    text before the first layer
@@ -77,7 +77,7 @@ class PrintProgram {
   std::string directory_;
   std::uint32_t layers_;
   FileOptions files_;
-  Result<replay::VirtualMachine> machine_;  // tells the time
+  Result<replay::VirtualMachine> machine_;  // computes the time
 };
 
 }  // namespace lamina::pipeline

@@ -261,7 +261,7 @@ Status check_slice_output(const Job& job) {
                      fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
       }
     }
-    // Never replaces a user's job file: a job file of lamina has a manifest beside it.
+    // Never replaces a user's job file: a job file of lamina has a manifest next to it.
     if (name == "job.toml" && fs::exists(file, error) && (!replaces || manifests.empty() || !knows_plan)) {
       return Error{Fault::kUsage,
                    fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
@@ -314,7 +314,7 @@ std::optional<fs::path> other_slice_file(const Job& job) {
 std::vector<fs::path> earlier_slices(const Job& job) {
   if (!job.overwrite && !job.resume) return {};
   std::vector<fs::path> earlier;
-  if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));  // while its manifest still tells of it
+  if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));  // while its manifest still lists it
   const OnRecord record = find_on_record(job.output);
   const bool all = job.overwrite || (job.slice.file_a_layer && !record.finished);
   for (fs::path& file : layer_files(job)) {

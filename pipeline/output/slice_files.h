@@ -1,5 +1,5 @@
 // pipeline/output/slice_files.h: writes the layers of a sliced job into one file (SVG, CLI, 3MF) or one
-// per layer, and the manifest beside them.
+// per layer, and the manifest next to them.
 #pragma once
 
 #include <cstdint>
@@ -82,7 +82,7 @@ std::string_view slice_extension(const Job& job);
 /// Name of the single file: the first part's name with the format's extension.
 std::string slice_file_name(const Job& job);
 
-/// Refuses a directory with another job, or files that no record tells of, unless job.overwrite is set. errors  kUsage, kOutput
+/// Refuses a directory with another job, or files without a record, unless job.overwrite is set. errors  kUsage, kOutput
 Status check_slice_output(const Job& job);
 
 /// Temporary directory of per-layer files until all are written.
@@ -92,7 +92,7 @@ std::filesystem::path waiting_layers(const Job& job);
 Status prepare_waiting_layers(const Job& job, bool keeps);
 
 /// The files that an earlier job leaves to this one, its manifest last: what is left of a killed removal is on record. Without
-/// job.overwrite, no layers that no record tells of.
+/// job.overwrite, no layers without a record.
 std::vector<std::filesystem::path> earlier_slices(const Job& job);
 
 /// Call when the job is complete: removes earlier files in their order, and renames the waiting layers. errors  kOutput

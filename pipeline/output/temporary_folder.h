@@ -1,4 +1,4 @@
-// pipeline/output/temporary_folder.h: a folder for files that nobody but the call that makes them reads.
+// pipeline/output/temporary_folder.h: a folder for files that only the call that makes them reads.
 #pragma once
 
 #include <string>

@@ -67,7 +67,7 @@ Result<std::string> layer_table(const Plan& plan) {
   return formats::rp3::text_of(layers, settings);
 }
 
-/// The layer of the file before which every part on the bed has laid its first `count` layers; the file's first one if it
+/// The layer of the file before which every part on the bed has its first `count` layers deposited; the file's first one if it
 /// begins above them.
 std::uint32_t after_first(const Plan& plan, std::uint32_t count) {
   if (!plan.job.heights.per_part) return std::max(count, plan.range[0]);

@@ -39,7 +39,7 @@ class DoseZones {
   const dose::Bleeds& bleeds() const { return bleeds_; }
   /// How far a zone grows along x and y at most.
   std::array<std::int64_t, 2> grows_nm(std::uint32_t zone) const { return zones_[zone].grows_nm; }
-  /// The wishes of zones 1, 2, ...
+  /// The targets of zones 1, 2, ...
   std::vector<std::optional<dose::DoseTarget>> targets() const;
 
  private:
@@ -81,9 +81,9 @@ class DosePlan {
   /// Whether a saturation or shares of voxels decide the drops, and how many a pixel can get; 0 if none does.
   bool saturates() const { return max_drops() > 0; }
   std::uint32_t max_drops() const { return rules_.max_drops; }
-  /// Level of a full voxel; 0: the job asks for no shares of voxels.
+  /// Level of a full voxel; 0: the job requests no fill fractions of voxels.
   std::uint8_t full() const { return rules_.full; }
-  /// What binder gives and was asked to give, for the summary; absent without a machine that says how large its drops are.
+  /// The binder given and requested, for the summary; absent without a machine that states the size of its drops.
   const std::optional<dose::Budget>& budget() const { return budget_; }
 
   /// What parts get; the bleed of layers.
@@ -95,7 +95,7 @@ class DosePlan {
 
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
   /// laid       work.laid has the shares of voxels of several solids
-  /// materials  of the job, whose drops are told apart if solids share voxels
+  /// materials  of the job, whose drops are distinguished if solids share voxels
   /// zone       the image of each zone, where there are several
   /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
   Result<dose::ZoneSums> saturate(const Layer& layer, bool deposited, std::uint32_t materials, Runs& image,
@@ -112,7 +112,7 @@ class DosePlan {
   std::uint64_t parted_pixels(const Runs& image, const dose::DropWork& work) const;
   /// What drops make of it. sizes  its edges moved
   dose::DropBound bound(const dose::DropSizes& sizes) const { return dose::bound_of(rules_, sizes); }
-  /// Whether formulas may lay the parts of a layer one by one.
+  /// Whether formulas may deposit the parts of a layer one by one.
   bool has_copies() const { return !copies_.empty(); }
 
  private:
@@ -126,7 +126,7 @@ class DosePlan {
   PixelGrid grid_;
   std::optional<dose::DoseTargets> targets_;
   dose::Binder binder_;
-  std::uint32_t limit_ = 0, full_drops_ = 1;  // full_drops: of a full pixel without a wish
+  std::uint32_t limit_ = 0, full_drops_ = 1;  // full_drops: of a full pixel without a target
   double min_percent_ = 0;                    // that binds, of a job that has to; 0: it has not
   Mirror mirror_;
   std::vector<std::vector<dose::ZoneBox>> copies_;  // of each zone with formulas of its own

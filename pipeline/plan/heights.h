@@ -14,7 +14,7 @@ namespace lamina::pipeline {
 /// The index of a scene's surface; angles are those of the parts before --shrink.
 heights::SurfaceIndex index_scene(const Job& job, const Scene& scene, const heights::Options& options);
 
-/// Whether layers that cover a part are to be laid wherever their middle lies.
+/// Whether layers that cover a part are deposited regardless of the position of their middle.
 bool covers_top(const Job& job);
 
 /// The height at which a layer samples the parts, nm; `top` is that of the highest one.

@@ -37,7 +37,7 @@ struct LayerSchedule {
 /// cost    28 bytes per layer and 4 bytes per plane
 Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table);
 
-/// Removes layers at the tops of parts that end below the planes that they are cut by: nothing would be laid in them. That is
+/// Removes layers at the tops of parts that end below their cutting planes: nothing would be deposited in them. That is
 /// the middle, or with kInside the top, and with kOutside the bottom. A part keeps its first layer.
 /// returns  how many
 std::uint32_t drop_empty_top(const Scene& scene, Containment containment, LayerSchedule& schedule);

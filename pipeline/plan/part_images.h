@@ -12,7 +12,7 @@
 
 namespace lamina::pipeline {
 
-/// A part's images, opened, and what a manifest of lamina beside them and the job's keys say of them.
+/// The opened images of a part, with the data of a lamina manifest next to them and of the job's keys.
 struct OpenImages {
   std::shared_ptr<const formats::LayerImages> images;
   std::array<std::int64_t, 2> dots{};  // an inch, or the bed's where they are the same
@@ -21,10 +21,10 @@ struct OpenImages {
   std::vector<Note> notes;
 };
 
-/// errors  kInput, kUsage: what the files, the manifest and the keys do not tell together
+/// errors  kInput, kUsage: what the files, the manifest and the keys together leave open
 Result<OpenImages> open_images(const Job& job, const PartRequest& part, const PixelGrid* grid);
 
-/// The nearest whole pixel; told in a note if it is another place than asked.
+/// The nearest whole pixel; a note reports it if it differs from the request.
 PlacedImages placed_images(const OpenImages& open, const PartRequest& part, const PixelGrid& grid, std::int64_t x_nm,
                            std::int64_t y_nm, std::vector<Note>& notes);
 

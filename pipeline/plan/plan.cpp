@@ -137,7 +137,7 @@ class Planner {
     progress_({ProgressEvent::Stage::kIndexing});
     if (machine() != nullptr) {
       Status status = check_reach(*machine(), *plan_.scene);
-      if (!status && takes_blocks()) {  // which of equal places is told follows the order of the file
+      if (!status && takes_blocks()) {  // the order of the file decides which of equal positions is reported
         if (Status listed = read_parts_as(false); !listed) return listed;
         status = check_reach(*machine(), *plan_.scene);
       }
@@ -230,7 +230,7 @@ class Planner {
 
   Status index_sections() {
     if (images() && !beads_) return {};
-    Job cut = job();  // the job itself stays as asked, so that a file of it means the same in another command
+    Job cut = job();  // job() stays as requested: its file means the same in another command
     if (images()) cut.slice = SliceRequest();  // of contours and toolpaths
     cut.slice.tolerance_um = tolerance_um_of(cut, plan_.product);
     auto sections = Sections::make(cut, *plan_.scene, std::move(schedule_), std::move(fillings_));
@@ -300,7 +300,7 @@ class Planner {
     return {};
   }
 
-  /// What can be said of the beads before any is laid.
+  /// What can be reported about the beads before any is deposited.
   Status foresee_beads() {
     if (plan_.product == Product::kContours && job().slice.format == "3mf" && plan_.sections->fills()) {
       plan_.warnings.push_back(

@@ -44,12 +44,12 @@ struct ImagePlan {
 /// Data for toolpaths only.
 struct MovePlan {
   ExtruderProfile profile;
-  std::uint32_t left_out = 0;  // layers whose middles lie above their parts: nothing would be laid there
+  std::uint32_t left_out = 0;  // layers whose middles are above their parts: nothing would be deposited
 };
 
 /// Scene, sections and segments keep their addresses when the plan moves, because other members refer to them.
 struct Plan {
-  Job job;  // as asked
+  Job job;  // as requested
   Product product = Product::kImages;
   Bed bed;
   std::unique_ptr<Scene> scene;
@@ -74,7 +74,7 @@ struct Plan {
 
 /// A job and its machine with the job's changes.
 struct Resolved {
-  Job job;  // as asked
+  Job job;  // as requested
   Product product = Product::kImages;
   Bed bed;
   std::optional<PowderPrinter> printer;     // of images

@@ -9,7 +9,7 @@
 
 namespace lamina::pipeline {
 
-// getrusage() starts from the peak of the process that called exec: a small job of a large caller would be told as large.
+// getrusage() starts from the peak of the process that called exec: a small job of a large caller would be reported as large.
 std::uint64_t peak_resident_bytes() {
   constexpr std::string_view kPeak = "VmHWM:";
   std::ifstream status("/proc/self/status");

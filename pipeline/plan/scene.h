@@ -52,7 +52,7 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request);
 /// A part with a position stays there; its copies follow along x at their width plus the gap. All other parts are
 /// arranged in rows from the front left, in job order and gap_mm apart; this block is centred on the bed. Positions are
 /// whole nm.
-/// blocks  meshes may come as Mesh::blocks: for whoever only rasterizes them
+/// blocks  meshes may come as Mesh::blocks: for callers that only rasterize them
 /// grid    of the bed's pixels: parts may be images then
 /// errors  kUsage if a part does not fit the bed (with the excess and a remedy); kInput from load
 Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false, const PixelGrid* grid = nullptr);

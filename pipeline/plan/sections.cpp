@@ -226,7 +226,7 @@ Error Sections::failed(const Area& area, const Error& error) const {
 }
 
 std::uint64_t Sections::bytes_bound(std::uint32_t index) const {
-  // A contour point takes at most 50 bytes of text, which is kept beside the contours.
+  // A contour point takes at most 50 bytes of text, which is kept in addition to the contours.
   const ScheduledLayer& scheduled = schedule_.layers[index];
   const auto bound = [&](const slice::Slicer& slicer) {
     return 3 * (slicer.layer_bytes_bound(scheduled.low) +

@@ -34,7 +34,7 @@ class Sections {
     slice::SectionScratch scratch;
     slice::LayerContours contours;
     slice::LayerContours highest;            // section at the layer's top, if steps must stay on one side
-    slice::LayerContours parts;              // of areas in bodies with several parts, united part by part
+    slice::LayerContours parts;              // of areas in bodies with several parts, merged part by part
     std::vector<Contours> surface;           // of these areas: the region without earlier parts
     std::vector<infill::Outlines> outlines;  // of each area: where the centres of beads lie
     Toolpaths paths;

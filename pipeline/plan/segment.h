@@ -39,7 +39,7 @@ struct SegmentPlan {
 /// errors   kUsage, one line that begins with the key
 Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill);
 
-/// What can be said of toolpaths before any is laid: `no-bead`, `pores`, `calibration`. fills  walls or lines are asked for
+/// Warnings before any toolpath is deposited: `no-bead`, `pores`, `calibration`. fills  walls or lines are requested
 void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profile, bool fills, std::vector<Warning>& warnings);
 
 }  // namespace lamina::pipeline

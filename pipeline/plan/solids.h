@@ -23,7 +23,7 @@ struct Solid {
   std::uint32_t zone = 0;  // of DoseZones
   raster::Rasterizer rasterizer;
   std::vector<std::uint32_t> instance;         // scene index of each of its instances; empty: all in order
-  std::optional<coverage::Coverage> coverage;  // if the job asks for shares of voxels
+  std::optional<coverage::Coverage> coverage;  // if the job requests fill fractions of voxels
 };
 
 /// All solids of a scene. A scene of one material and one dose is one solid. Otherwise parts with the same materials at all

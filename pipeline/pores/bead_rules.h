@@ -11,14 +11,14 @@
 namespace lamina::pipeline {
 
 struct BeadRules {
-  std::optional<bead::DepositionRules> rules;  // none: beads are as wide as the file tells
+  std::optional<bead::DepositionRules> rules;  // none: beads are as wide as the file states
   std::string reported;                        // for people: where widths come from
 };
 
-/// beads    "spread": by the model of a bead (docs/bead.md); "laid": the same, which do not spread along their lines; "told" by
+/// beads    "spread": by the model of a bead (docs/bead.md); "deposited": the same, without spread along their lines; "stated" by
 ///          the file; or "": spread where the printer is known
 /// machine  as --machine takes it; "": the one that the file names, if a profile of that name is shipped
-/// errors   kUsage: an unknown printer or word; "laid" or "spread" without a printer
+/// errors   kUsage: an unknown printer or word; "deposited" or "spread" without a printer
 Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& beads, const std::string& machine);
 
 }  // namespace lamina::pipeline

@@ -38,7 +38,7 @@ bool passes_near(const Box& box, Point2 from, Point2 to, std::int64_t reach) {
   return aside <= std::abs(y) * mm(box.width()) / 2 + std::abs(x) * mm(box.depth()) / 2 + length * mm(reach);
 }
 
-/// Whether a piece goes on where the one before ended, in another direction.
+/// Whether a piece continues where the previous one ended, in another direction.
 bool bends(const bead::DepositedPiece& before, const bead::DepositedPiece& piece) {
   if (before.to != piece.from) return false;
   const double ax = (mm(before.to.x) - mm(before.from.x)), ay = (mm(before.to.y) - mm(before.from.y));
@@ -163,7 +163,7 @@ class LayerBeads {
     return static_cast<std::int64_t>(1e6 * std::clamp(way, 10.0, 200.0));
   }
 
-  /// Beads far from the window, by the way along the line too, lay nothing there, and the melt remembers nothing of them.
+  /// Beads far from the window, also along the line, deposit nothing there, and the melt stores nothing of them.
   void keep_lines(Buffer<BeadFeed>& feeds) {
     const std::int64_t reach = memory(feeds);
     keep_.assign(beads_.size(), false);

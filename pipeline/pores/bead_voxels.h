@@ -1,4 +1,4 @@
-// pipeline/pores/bead_voxels.h: what a toolpath file lays, as voxels of a window: for all who ask what its pores are like.
+// pipeline/pores/bead_voxels.h: the deposited beads of a toolpath file as voxels of a window, for pore analysis.
 #pragma once
 
 #include <array>
@@ -37,9 +37,9 @@ Result<Pile> pile_of(const formats::GcodeFile& file);
 /// Cuts the voxels whose centres lie in a bead.
 /// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h, contacts.h); heights are those of
 /// the pile.
-///         None: a bead is a stadium, as high as its layer and as wide as the file tells, with round ends; one that is narrower
+///         None: a bead is a stadium, as high as its layer and as wide as the file states, with round ends; one narrower
 ///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap
-/// left_out  by rules, the share of what is laid about the window that finds no room beside its neighbours, and is left out
+/// left_out  by rules, the share of material around the window that has no room next to its neighbours, and is left out
 /// errors  kUsage: a layer cannot be read; kInput: 2^32 runs and more
 /// cost    O(runs) and reading the window's layers; 8 bytes a run. By rules, 150 bytes for each 20 um of line about the window.
 /// y of the voxels rises as that of the bed does
@@ -51,7 +51,7 @@ struct Repeat {
   std::array<std::int64_t, 2> length{};  // nm along x and y; 0: not found
   std::uint32_t layers = 0;              // after so many a layer is as it was; 0: not found
 };
-/// Looks at a square of 9 mm, or what there is of the part, in the middle layer, and at up to eight layers above it.
+/// Analyses a square of 9 mm, or the smaller part, in the middle layer and up to eight layers above it.
 /// errors  of bead_voxels
 Result<Repeat> find_repeat(const formats::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer);
 

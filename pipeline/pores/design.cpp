@@ -66,7 +66,7 @@ std::string designed_job_text(const std::string& machine, const ExtruderProfile&
   return text;
 }
 
-/// Of the wish that a forward run meets worst: relative.
+/// Of the target that a forward run misses by most: relative.
 double miss_of(const segment::PoreTarget& target, const ForwardRun& forward) {
   segment::Slots slots{forward.porosity, forward.permeability_m2, 0};
   segment::Pores pores{};
@@ -176,7 +176,7 @@ Result<DesignedJob> design_step(DesignRequest request, const segment::TargetStep
   return shared;
 }
 
-/// Neighbouring regions are not taken for each other: a quarter of the way from one wish to the next is near enough.
+/// Neighbouring regions must stay distinct: a quarter of the way from one target to the next is near enough.
 double near_of(const std::vector<segment::TargetStep>& steps, double maximum) {
   const auto way = [](const std::optional<double>& one, const std::optional<double>& next) {
     return one && next ? std::abs(*next / *one - 1) : 0.0;

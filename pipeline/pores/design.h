@@ -17,10 +17,10 @@ namespace lamina::pipeline {
 struct DesignRequest {
   std::string machine;  // as --machine takes it
   segment::PoreTarget target;
-  double tolerance = 0.05;  // of what the forward run says of each wish, relative
+  double tolerance = 0.05;  // of the forward run's result for each target, relative
   std::uint32_t max_runs = 20;
   ForwardGrid grid;
-  double near = 0.04;                   // a run that misses the wish by so little ends the search
+  double near = 0.04;                   // a run that misses the target by so little ends the search
   segment::SlotRatio ratio{1, 0.85};    // as most plans have it: where the search begins
   std::vector<segment::RatioAt> known;  // of forward runs with the same machine and grid
   segment::LineBounds lines;
@@ -29,7 +29,7 @@ struct DesignRequest {
 struct DesignedJob {
   segment::Design design;  // as the corrected model says
   ForwardRun forward;      // of this design
-  double miss = 0;         // of the wish that the forward run meets worst: relative
+  double miss = 0;         // of the target that the forward run misses by most: relative
   bool met = false;        // within the tolerance
   std::uint32_t runs = 0;
   std::vector<segment::RatioAt> known;  // what forward runs said, of earlier searches too
@@ -43,8 +43,8 @@ struct DesignedJob {
 Result<ExtruderProfile> designable_extruder(const std::string& machine);
 
 /// Searches by slots (segment/design/slots.h), runs the plan forward, corrects the slots by what that says, and searches again
-/// until every wish is met, or the corrected slots say that none within the machine's limits meets them.
-/// returns  the best that was run forward, whether it meets the wish or not
+/// until every target is met, or the corrected slots show that none within the machine's limits meets them.
+/// returns  the best forward run, even if it misses the target
 /// tell     is told how far it is, 0 .. 1; false stops
 /// errors   kUsage: no such machine, or no calibration of segmented lines; of run_forward(); kInterrupted
 /// cost     of up to max_runs forward runs
@@ -57,7 +57,7 @@ struct GradientStep {
 
 struct GradientJob {
   std::vector<GradientStep> steps;  // from the bottom up
-  double miss = 0;                  // of the step that misses its wish by most
+  double miss = 0;                  // of the step that misses its target by most
   bool met = false;                 // all of them
   std::uint32_t lines = 0;          // continuous ones in all regions; 0: not the same ones
   std::uint32_t runs = 0;           // forward runs, of the one file one for each region
@@ -66,10 +66,10 @@ struct GradientJob {
   std::string toml;                 // of the job file: ranges of heights
 };
 
-/// Designs each step as design_job() does, with what the runs of the steps below told of the slots, writes one job with a range
-/// of heights for each, plans a block as high as all of them with it, and looks at one period in the middle of each region of
+/// Designs each step as design_job() does, with the slots found in the runs of the steps below, writes one job with a range
+/// of heights for each, plans a block as high as all of them with it, and analyses one period in the middle of each region of
 /// that one file.
-/// request  its wish counts for nothing
+/// request  its target is ignored
 /// steps    of segment::steps_of(), in whole layers of the machine's calibration
 /// returns  the nearest of steps that cannot be met
 /// errors   those of design_job() and run_forward()

@@ -29,7 +29,7 @@ Json segment_json(const segment::SegmentSettings& keys) {
           {"thin_speed_percent", keys.thin_speed}};
 }
 
-/// What is wished for, as options.
+/// The targets, as options.
 std::string target_text(const segment::PoreTarget& target) {
   std::string text;
   const auto add = [&](const std::string& part) { text += (text.empty() ? "" : " ") + part; };

@@ -20,10 +20,10 @@ Json as_json(const DesignedJob& found, const std::string& output);
 std::string as_text(const GradientJob& found);
 Json as_json(const GradientJob& found, const std::string& output);
 
-/// What the nearest is, of what was wished, as options: "--porosity 26.14".
+/// The nearest values to the targets, as options: "--porosity 26.14".
 std::string nearest_text(const segment::PoreTarget& target, const DesignedJob& found);
 
-/// Which steps miss their wish, and what is nearest to the first of them; one line.
+/// Which steps miss their target, and what is nearest to the first of them; one line.
 std::string missed_text(const GradientJob& found);
 
 }  // namespace lamina::pipeline

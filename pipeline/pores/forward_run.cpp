@@ -54,7 +54,7 @@ Result<Json> print_block(Job job, double height_mm, const TemporaryFolder& folde
   return summary->facts.contains("pores") ? summary->facts.at("pores") : Json::array();
 }
 
-/// Voxels of a region, looked at in each place.
+/// Voxels of a region, inspected at each position.
 Result<ForwardRun> analyse_region(const formats::GcodeFile& file, const Pile& pile, const Pile::PileLayer& layer,
                                   const bead::DepositionRules* rules, const ForwardRegion& region, const ForwardGrid& grid,
                                   const std::function<bool(double)>& advance) {

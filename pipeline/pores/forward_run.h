@@ -1,4 +1,4 @@
-// pipeline/pores/forward_run.h: what a job of segmented lines lays, and lets through: planned, cut into voxels and solved.
+// pipeline/pores/forward_run.h: voxels and flow of the beads of a job of segmented lines, planned and solved.
 #pragma once
 
 #include <functional>
@@ -27,15 +27,15 @@ struct ForwardRun {
   double pore_length_mm = 0, pore_width_mm = 0;           // means of the pores that the written toolpaths leave; 0 without any
 };
 
-/// Layers of a job that are looked at.
+/// Layers of a job that are analysed.
 struct ForwardRegion {
   segment::Segmentation plan;  // as the job's keys are resolved: it gives the period
   double middle_mm = 0;        // within a layer between others of the same plan
-  std::string heights;         // as the summary tells its pores: "3 to 5.7 mm", or "" of what is in no range
+  std::string heights;         // as in the summary: "3 to 5.7 mm", or "" outside of all ranges
 };
 
-/// Plans a block of that height with the job through to toolpaths in a temporary folder, and looks at one period in the layer
-/// of each region, of beads as the machine lays them (bead_rules.h).
+/// Plans a block of that height with the job through to toolpaths in a temporary folder, and analyses one period in the layer
+/// of each region, of beads as the machine deposits them (bead_rules.h).
 /// job      of extrusion, without parts and output; all layers at one angle of 90 degrees
 /// machine  as --machine takes it
 /// tell     is told how far it is, 0 .. 1; false stops

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kMaxSlices = 4'000'000;
 
-/// The first thing that a manifest of lamina tells is which lamina wrote it.
+/// A manifest of lamina begins with the version of lamina that wrote it.
 bool begun_by_lamina(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string head;

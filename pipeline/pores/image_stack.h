@@ -1,4 +1,4 @@
-// pipeline/pores/image_stack.h: which folders are stacks of images, and which window of one to look at.
+// pipeline/pores/image_stack.h: detects folders that are image stacks, and selects the window to analyse.
 #pragma once
 
 #include <array>

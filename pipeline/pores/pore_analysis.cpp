@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr Nm kBond = static_cast<Nm>(segment::kBondGap * 1e6);
 constexpr std::uint32_t kMaxSections = 8;
-constexpr std::int64_t kMaxContact = 1'000'000;    // nm, of two beads one beside the other
+constexpr std::int64_t kMaxContact = 1'000'000;    // nm, of two adjacent beads
 constexpr std::int64_t kMaxSide = 9'000'000;       // nm, of a section
 constexpr double kVoxelUm = 10, kMaxVoxels = 8e6;  // of a window
 
@@ -61,7 +61,7 @@ Result<LayerSections> sections_of(const formats::GcodeFile& file, const Pile& pi
   return sections;
 }
 
-constexpr std::uintmax_t kMaxBytes = 16'000'000;  // of a file that is looked at without being asked
+constexpr std::uintmax_t kMaxBytes = 16'000'000;  // of a file that is analysed without a request
 constexpr int kBins = 8;                          // about so many of a histogram
 
 pores::Distribution histogram(const pores::PoreSizes& sizes, bool of_lengths) {
@@ -273,7 +273,7 @@ void add_pores(const std::string& path, Summary& summary) {
   const Result<PrintAnalysis> print = [&]() -> Result<PrintAnalysis> {
     try {
       return analyse_print(path, 0);
-    } catch (const std::exception& fault) {  // the file is whole: what is told of it must not end the command
+    } catch (const std::exception& fault) {  // the file is whole: an error in its report must not end the command
       return Error{Fault::kInput, std::string("cannot be told: ") + fault.what()};
     }
   }();

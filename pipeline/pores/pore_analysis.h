@@ -1,4 +1,4 @@
-// pipeline/pores/pore_analysis.h: what toolpaths leave open, looked at without computing a flow.
+// pipeline/pores/pore_analysis.h: the pores that toolpaths leave open, analysed without a flow.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ namespace lamina::pipeline {
 
 /// Pores as sections through the middle of layers show them, over the whole height of a print.
 struct LayerSections {
-  std::uint32_t layers = 0;         // looked at, evenly spread
-  std::array<double, 2> side_mm{};  // of what is looked at, around the middle of the print
+  std::uint32_t layers = 0;         // analysed, evenly spread
+  std::array<double, 2> side_mm{};  // of the analysed window, around the middle of the print
   double voxel_um = 0;
   pores::PoreSizes sizes;
 };
@@ -40,7 +40,7 @@ using CutWindow = std::function<Result<VoxelStack>(const Window&)>;
 Result<PoreAnalysis> analyse_deposited(const formats::GcodeFile& file, const Pile& pile, const VoxelView& window,
                                        const CutWindow& cut);
 
-/// What lamina permeability tells of a window beside the flow: lines that end with LF.
+/// The report of lamina permeability on a window, without the flow: lines that end with LF.
 std::string as_text(const PoreAnalysis& analysis);
 /// Adds the same to an object.
 void add_to(const PoreAnalysis& analysis, Json& json);
@@ -50,14 +50,14 @@ bool names_toolpaths(const std::string& path);
 
 /// All that can be said of a file of toolpaths without options: what repeats in it, in voxels of 10 um or larger ones.
 struct PrintAnalysis {
-  double fed_mm3 = 0, density_g_cm3 = 0;  // 0: untold
+  double fed_mm3 = 0, density_g_cm3 = 0;  // 0: unknown
   std::uint32_t layers = 0;               // with beads
   std::string beads;                      // where their widths come from
   WindowChoice choice;
   PoreReport pores;  // without a flow
   PoreAnalysis analysis;
 };
-/// density_g_cm3  of the filament; 0: what the file tells
+/// density_g_cm3  of the filament; 0: the file's value
 /// sections       none, or where a picture of the window goes
 /// errors         kInput: no layer above the bed; of GcodeFile::open(), choose_window() and bead_voxels()
 /// cost           reads the file, and some twenty of its layers once more; about a second at 8 million voxels
@@ -72,8 +72,8 @@ struct AnalysisPage {
 };
 AnalysisPage analysis_page(const std::string& path);
 
-/// Adds four lines and an object "laid" to the summary of a job that wrote toolpaths; none for other files, and for those above
-/// 16 MB, of which lamina info tells the same in more than a second.
+/// Adds four lines and an object "deposited" to the summary of a job that wrote toolpaths; none for other files and those above
+/// 16 MB, of which lamina info reports the same in more than a second.
 /// path  of the file
 void add_pores(const std::string& path, Summary& summary);
 

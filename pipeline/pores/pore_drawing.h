@@ -11,9 +11,9 @@
 namespace lamina::pipeline {
 
 /// Sections through the fastest place of the report's section; without one, through the widest pore of the middle slice.
-/// source  the file or folder that they are of; its last name is told
+/// source  the file or folder that they are of; its last name is printed
 /// voxels  of the window: those of rasters.fine where there was a flow
-/// file    whose layers are told apart, with its pile; none: images
+/// file    whose layers are distinguished, with its pile; none: images
 /// errors  of GcodeFile::layer()
 /// cost    of draw_pores() and void_through()
 Result<Plot> draw_window(const std::string& source, const WindowChoice& choice, const PoreReport& report,

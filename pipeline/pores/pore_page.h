@@ -13,7 +13,7 @@ namespace lamina::pipeline {
 /// Lines that end with LF; k1 in darcy and m2.
 std::string as_text(const WindowChoice& choice, const PoreReport& report);
 
-/// The same, k1 as a tensor: a row for each axis of the force that was asked for.
+/// The same, k1 as a tensor: a row for each axis of the requested force.
 Json as_json(const WindowChoice& choice, const PoreReport& report);
 
 /// k2 along z, and what it was fitted on.

@@ -24,7 +24,7 @@ struct Darcy {
   bool resolved = true;  // voxels twice as large say about the same; else nothing is extrapolated, the error is the value
 };
 
-/// Voxels of the flow are cut so many times finer along each edge, to tell where in them walls stand.
+/// Voxels of the flow are cut so many times finer along each edge, to locate walls in them.
 inline constexpr std::uint32_t kFiner = 3;
 
 /// One window in three ways.
@@ -40,7 +40,7 @@ struct PoreReport {
   pores::Porosity porosity;
   double surface_per_mm = 0;                 // mm2 in a mm3
   std::array<double, 3> throat_mm{};         // the largest ball that passes along x, y, z; 0: none does
-  std::array<std::optional<Darcy>, 3> flow;  // along the axes that were asked for
+  std::array<std::optional<Darcy>, 3> flow;  // along the axes that were requested
   std::optional<stokes::Section> section;    // along z, or where nothing leads through along it, of the largest k1
 };
 

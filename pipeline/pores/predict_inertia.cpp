@@ -53,7 +53,7 @@ Result<Forchheimer> analyse_inertia(const PoreRasters& rasters, const PoreReport
   if (!result) return result.error();
   const Result<Forchheimer> rough = sweep_through(rasters.coarse, report.surface_per_mm, advance);
   if (!rough && rough.error().fault != Fault::kInput) return rough.error();
-  // Where pores are lost in larger voxels, these tell nothing: the error is the value.
+  // Where pores are lost in larger voxels, these give no estimate: the error is the value.
   segment::Permeability& fit = result->fit;
   fit.k1_error_m2 = std::max(fit.k1_error_m2, std::abs(fit.k1_m2 - (rough ? rough->fit.k1_m2 : 0)));
   fit.k2_error_m = std::max(fit.k2_error_m, std::abs(fit.k2_m - (rough ? rough->fit.k2_m : 0)));

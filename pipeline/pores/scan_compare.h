@@ -1,4 +1,4 @@
-// pipeline/pores/scan_compare.h: a tomography beside the plan of what was scanned.
+// pipeline/pores/scan_compare.h: compares a tomography with the plan of the scanned print.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct ScanComparison {
   }
 };
 
-/// Lays the middle of the print upon the middle of the scan and searches for the shift
+/// Places the middle of the print upon the middle of the scan and searches for the shift
 /// at which they have most nearly the same solid. Nothing
 /// is turned or scaled.
 /// size_mm  of the window; 0: 2 mm, or what print and scan have

@@ -32,7 +32,7 @@ Result<WindowChoice> choose_window(const formats::GcodeFile& file, const Pile& p
   const Point3 middle = print.middle();
   Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
   if (!repeat) return repeat.error();
-  // Where beads touch, the middle of a layer is the same all over: that tells nothing of the cusps above and below it.
+  // Where beads touch, the middle of a layer is the same all over: that says nothing about the cusps above and below it.
   if (repeat->length[0] <= kSameAllAlong && repeat->length[1] <= kSameAllAlong) repeat->length = {};
   WindowChoice choice;
   const bool requested = selection.size_mm[2] > 0;

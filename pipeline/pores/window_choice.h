@@ -1,4 +1,4 @@
-// pipeline/pores/window_choice.h: which box of a print to look at.
+// pipeline/pores/window_choice.h: selects the box of a print to analyse.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace lamina::pipeline {
 struct WindowRequest {
   double voxel_um = 10;             // edge
   std::array<double, 3> size_mm{};  // of the box; 0: what repeats
-  std::optional<Box> part = {};     // that it lies in the middle of, if there are others beside it
+  std::optional<Box> part = {};     // whose middle contains it, if there are other parts next to it
 };
 
 struct WindowChoice {
@@ -22,7 +22,7 @@ struct WindowChoice {
   std::uint32_t first_layer = 0, layers = 0;  // in the pile
 };
 
-/// A box around the middle of the print, or of a part, of whole layers from the middle one upwards. Without a wish for its size
+/// A box around the middle of the print, or of a part, of whole layers from the middle one upwards. Without a requested size
 /// it is one period of what repeats; along an axis where nothing does, 2 mm, or eight layers, or the print. pile    not empty
 /// errors  kUsage: larger than the print, or more than 2^31 voxels; kInput: a print without width; of find_repeat()
 /// cost    of find_repeat()

@@ -37,21 +37,21 @@ std::string csv_text(std::span<const std::vector<std::string>> rows);
 std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
                                                           std::span<const QuotedPart> parts);
 
-/// Layers that do not say whose their pixels are, are told of several parts.
+/// Layers that do not state the part of their pixels, although there are several parts.
 /// An object: hours, litres and, with prices, the currency's units of the job; the same of each part under "parts", if there
 /// are prices or several.
 Json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const QuotedPart> parts);
 
 class Account {
  public:
-  /// title  of all parts, which are told as one if they are not told `apart`
+  /// title  of all parts, which are reported as one if not `apart`
   Account(const Machine& machine, const PixelGrid& grid, std::span<const PartSummary> parts, bool apart,
           const std::string& title);
   Account(const Account&) = delete;
 
   /// Adds up the layers, in any order.
   Tally& tally() { return tally_; }
-  /// Parts that are told apart; 1 if they are told as one.
+  /// Parts that are reported separately; 1 if they are reported as one.
   std::size_t parts() const { return parts_.size(); }
 
   using Rows = std::vector<std::vector<std::string>>;

@@ -28,7 +28,7 @@ using Lines = std::vector<std::pair<std::string, std::string>>;
 void report_deposited(const DepositedSums& sums, const std::vector<DepositedRange>& ranges, const Extruder& machine,
                       std::uint64_t points_first_layer, Lines& lines, Json& facts);
 
-/// What 100 % of extrusion is, and how many layers are left out at the top, before anything is laid; as above.
+/// What 100 % of extrusion is, and how many layers at the top are left out, before any deposition; as above.
 /// cut_at  "middle" or "top", the place of a layer that decides whether it is empty
 void report_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines, Json& facts);
 

@@ -177,7 +177,7 @@ std::string study_json(const StudiedParts& parts, const std::vector<Study>& stud
 std::string comparison_page(const std::vector<Study>& studies) {
   const Study& first = studies.front();
   const double whole = first.evaluation.seconds;
-  const bool saves = first.options.estimates_time;  // beside the first
+  const bool saves = first.options.estimates_time;  // in addition to the first
   std::string text = fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step",
                                  "mean step", "flats missed", "largest miss", "top",
                                  saves       ? "        time    saved"

@@ -31,7 +31,7 @@ struct FullLayer {
 };
 
 /// What follows from a profile, one fact a line, for people.
-/// full  absent: its time is not told
+/// full  absent: its time is not reported
 std::string explain(const Machine& machine, const HeadGrid& grid, const std::optional<FullLayer>& full);
 
 }  // namespace lamina::program

@@ -136,7 +136,7 @@ class FilamentObserver : public MoveObserver {
 
 bool has_ranges_by_layer(const Plan& plan) {
   if (plan.segments->ranges.empty() || !plan.segments->any()) return false;
-  // A layer that goes on above a part is in that part's topmost range, whatever range others are in.
+  // A layer that continues above a part is in that part's topmost range, regardless of the range of others.
   if (covers_top(plan.job) || plan.job.heights.containment == Containment::kOutside) return true;
   const auto& areas = plan.sections->areas();
   return std::ranges::any_of(areas, [&](const Sections::Area& area) { return area.box.lo.z != areas.front().box.lo.z; });

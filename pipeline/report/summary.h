@@ -29,7 +29,7 @@ struct Summary {
   std::uint64_t bytes_written = 0;
   double load_seconds = 0, index_seconds = 0, layer_seconds = 0;  // wall
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step, over all threads
-  std::shared_ptr<Timing> timing;                                 // null unless the job asks for it
+  std::shared_ptr<Timing> timing;                                 // null unless the job requests it
   std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, memory_budget_bytes = 0, peak_resident_bytes = 0;
   std::uint32_t max_layers_in_flight = 0;
   std::uint32_t oversized_layers = 0;  // held more than the budget by themselves, and ran alone

@@ -1,4 +1,4 @@
-// pipeline/report/timing.h: where the time of a run went, beside what no program could go below. `--timing`
+// pipeline/report/timing.h: the run time's breakdown and its hardware limit. `--timing`
 #pragma once
 
 #include <cstdint>

@@ -23,7 +23,7 @@ class ImageMaker : public Maker {
   }
 
   std::uint64_t bytes_of(std::uint32_t layer) const override {
-    // What is to be dosed is told before the dose, unless no layer is made.
+    // What is to be dosed is reported before the dose, unless no layer is made.
     return bytes_of(plan_.layer(layer), plan_.job.dry_run && !times_dry_runs() ? LayerImager::kUnknown : 0);
   }
 

@@ -1,4 +1,4 @@
-// pipeline/run/inspector.h: looks through the layers of a powder job on request (stages/checks/).
+// pipeline/run/inspector.h: inspects the layers of a powder job on request (stages/checks/).
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ namespace lamina::pipeline {
 
 class Inspector : public ImageObserver {
  public:
-  /// Idle unless the job asks for it. The plan must outlive this object.
+  /// Idle unless the job requests it. The plan must outlive this object.
   explicit Inspector(const Plan& plan);
   bool on() const { return inspection_.has_value(); }
 
@@ -24,7 +24,7 @@ class Inspector : public ImageObserver {
   void record(const Layer& layer, const checks::LayerInspection& layer_inspection) {
     inspection_->add(layer, layer_inspection);
   }
-  /// Beside the looks at layers.
+  /// In addition to the inspection of layers.
   std::uint64_t bytes() const { return on() ? inspection_->bytes() : 0; }
 
   // --- observer
@@ -37,7 +37,7 @@ class Inspector : public ImageObserver {
   void warn(const Summary& summary, std::vector<Warning>& warnings) override;
   void report(Summary& summary) const override;
 
-  // --- DIR/inspection.json, for reports: of whole jobs that were looked at from the first layer to the last
+  // --- DIR/inspection.json, for reports: of whole jobs that were inspected from the first layer to the last
   /// Before the first layer. errors  kUsage: a file of somebody else has that name
   Status check_file() const;
   /// After warn(). Without findings of this run the file stays if it is of the same job, and is removed if it is of another.

@@ -1,4 +1,4 @@
-// pipeline/run/job_checks.h: looks at a whole job before it is finished: is what was planned what the parts hold?
+// pipeline/run/job_checks.h: checks a whole job before it is finished: does the plan match the parts?
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@
 
 namespace lamina::pipeline {
 
-/// The solids of a scene. Those whose boxes overlap seen from above, directly or through others, share a group.
+/// The solids of a scene. Those whose boxes overlap in x and y, directly or through others, share a group.
 std::vector<checks::Solid> solids_from_above(const Scene& scene);
 /// How images on a grid see the solids of a job, or contours if it is null. Names of parts are left to the caller.
 checks::Sampling sampling_of(const Job& job, const PixelGrid* grid);
@@ -38,7 +38,7 @@ class JobChecks {
 
   // --- from many threads at once
   void add_image(const Layer& layer, const Runs& image) { tally_->add_image(layer, image); }
-  /// The image without its bleed, mirrored as the job asks.
+  /// The image without its bleed, mirrored as the job requests.
   void add_left(const Layer& layer, const Runs& image);
   /// returns  mm2 between the contours
   double add_contours(const Layer& layer, const slice::LayerContours& contours);

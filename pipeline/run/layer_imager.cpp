@@ -311,7 +311,7 @@ std::uint64_t LayerImager::min_vanished() const {
   return widest > 0 ? std::max<std::uint64_t>(1, static_cast<std::uint64_t>(pixels)) : 0;
 }
 
-/// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
+/// Where an edge moved inwards, the voxels that it left and adjacent ones that are less than half full are emptied.
 void LayerImager::empty_removed(const Runs& before, bool deposited, ImageWork& work) {
   combine(before, work.runs, SetOperation::kDifference, work.second);
   const dose::Reach neighbour{{1, 1}};

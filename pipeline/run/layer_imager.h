@@ -25,7 +25,7 @@ struct ImageWork {
   Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
-  dose::DropWork drops;  // if a saturation or shares of voxels are asked for
+  dose::DropWork drops;  // if a saturation or fill fractions of voxels are requested
   coverage::CoverageScratch coverage;
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
@@ -48,7 +48,7 @@ class LayerImager {
   Status raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
   /// Of a job of shares of voxels: the image becomes that of voxels half full or more.
   void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
-  /// Unites the layer with those of the parts that are images, whose pixels it adds to notes.part_pixels, if those are wanted.
+  /// Merges the layer with those of the parts that are images, whose pixels it adds to notes.part_pixels, if those are wanted.
   /// errors  kInput: an image cannot be read; kUsage: it sets pixels outside of the bed
   Status images(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   Status contours(const Layer& layer, ImageWork& work) const;
@@ -66,7 +66,7 @@ class LayerImager {
   std::span<const Levels> levels(const ImageWork& work) const;
 
   /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
-  /// The plan's job asks for levels.
+  /// The plan's job requests levels.
   coverage::CoverageReport levels(const Layer& layer, coverage::CoverageScratch& scratch, Levels& image) const;
 
   static constexpr std::uint64_t kUnknown = UINT64_MAX;

@@ -49,7 +49,7 @@ struct LayerSource::State {
     if (contour_plan) return contour_plan->sections.get();
     Job job = plan.job;
     job.shard.reset();
-    // Isolated: while it waits, this thread takes no work of the caller's, which may ask for contours too.
+    // Isolated: while it waits, this thread takes no work of the caller's, which may request contours too.
     auto made = tbb::this_task_arena::isolate([&] { return plan_of(job, Product::kContours, &plan.bed); });
     if (!made) return made.error();
     contour_plan.emplace(std::move(*made));

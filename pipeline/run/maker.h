@@ -58,7 +58,7 @@ class Maker {
   virtual void warn(const Summary& so_far, std::vector<Warning>& warnings) const = 0;
   /// Closes the files. returns  total bytes written
   virtual Status finish() = 0;
-  /// Whether --resume can go on with finished layers.
+  /// Whether --resume can resume from finished layers.
   virtual bool keeps() const { return true; }
   /// Ends recording early. keep  true: finished layers stay for a resumed run; false: started files are removed
   virtual Status stop(bool keep) = 0;

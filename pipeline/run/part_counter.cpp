@@ -28,7 +28,7 @@ PartCounter::PartCounter(const Plan& plan) : plan_(plan) {
   std::vector<cost::Body> bodies;
   for (std::size_t i = 0; i < solids.size(); ++i) bodies.push_back({boxes[i], solids[i].part, group[i]});
   const Mirror mirror = plan.job.mirror;
-  // What images set is nobody's window: beside them windows are of the meshes alone, before anything is mirrored.
+  // Pixels set by images belong to no window: with images, windows are of the meshes alone, before anything is mirrored.
   const bool mirrored = mirror != Mirror::kNone && plan.scene->images.empty();
   windows_.emplace(bodies, parts, plan.images->grid, mirrored && mirror != Mirror::kY, mirrored && mirror != Mirror::kX);
 }

@@ -19,7 +19,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Lays the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one, with beads or not.
+/// Adds the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one, with beads or not.
 void deposit_skirt(const Plan& plan, const Layer& layer, formats::LayerMoves& out) {
   const Extruder& machine = plan.moves->profile.machine;
   const FillSettings& fill = plan.job.fill.all;
@@ -59,7 +59,7 @@ AreaCut cut_of(const Plan& plan, std::uint32_t area_number, const Layer& layer) 
   return {range, layer_cut(range, plan.sections->filling(area, layer), layer, area.box)};
 }
 
-/// The pores of a layer by segmented range, in a job that tells them so.
+/// The pores of a layer by segmented range, in a job that reports them by range.
 class PoresByRange {
  public:
   explicit PoresByRange(const Plan& plan) {

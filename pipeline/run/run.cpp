@@ -123,7 +123,7 @@ bool cut_short(const Status& status) {
   return !status && (status.error().fault == Fault::kInterrupted || status.error().fault == Fault::kMemory);
 }
 
-/// Collects the warnings while the files are unfinished still, and refuses what is empty or, if strict, doubtful. Then
+/// Collects the warnings while the files are unfinished still, and refuses empty jobs or, if strict, any warning. Then
 /// nothing stays, unless an earlier run had made a part of it.
 Status check_job(const Plan& plan, Maker& maker, const JobChecks& checks, bool shared, Summary& summary) {
   maker.warn(summary, summary.warnings);

@@ -14,7 +14,7 @@
 namespace lamina::pipeline {
 
 /// Runs a job and writes job.output. A dry run ends before the first layer with the summary's estimates;
-/// with a printer it makes the layers, tells their time, and writes nothing.
+/// with a printer it makes the layers, reports their time, and writes nothing.
 /// job     checked (check_job)
 /// cancel  read between layers: once set, no new layer starts, the layers in flight finish and are kept for --resume, and
 ///         the error is kInterrupted

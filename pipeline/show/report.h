@@ -23,7 +23,7 @@ struct Report {
   std::string without_parts;           // why views use layers instead of part files; empty if the files are used
 };
 
-/// Reads a finished directory of lamina jet, or a G-code file of lamina extrude with its manifest beside it. Every file is
+/// Reads a finished directory of lamina jet, or a G-code file of lamina extrude with its manifest next to it. Every file is
 /// read and must match the manifest. The virtual machine replays print programs and computes the time of each layer.
 /// Toolpaths appear as the area of their beads at true width.
 ///

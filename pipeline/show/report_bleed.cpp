@@ -25,7 +25,7 @@ std::unique_ptr<ReportBleed> ReportBleed::make(const Manifest& manifest, const J
   return report;
 }
 
-// What cannot be made again is not told.
+// Bleed that cannot be computed again is not reported.
 void ReportBleed::inspect(const Layer& layer) {
   const LayerImager imager(plan_);
   ImageWork& work = work_.local();

@@ -29,7 +29,7 @@ struct ReportSource {
   std::function<Result<ReportLayer>(std::uint32_t position, bool timed)> layer;
 };
 
-/// path  a directory of lamina jet, or a G-code file of lamina extrude with its manifest beside it
+/// path  a directory of lamina jet, or a G-code file of lamina extrude with its manifest next to it
 /// errors  kVerification: no manifest, an unfinished job, a job of contours, a job without images, a changed G-code file;
 ///         of the readers
 Result<ReportSource> report_source(const std::string& path);

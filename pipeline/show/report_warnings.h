@@ -1,4 +1,4 @@
-// pipeline/show/report_warnings.h: the sanity pass of a finished job, from its files.
+// pipeline/show/report_warnings.h: the warnings of a finished job, from its files.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@ class ReportWarnings {
 
   const Manifest& manifest_;
   Job job_;
-  std::vector<Warning> reports_;        // by the plan and the records of layers, as lamina jet tells them
+  std::vector<Warning> reports_;        // by the plan and the records of layers, as lamina jet reports them
   std::unique_ptr<ReportBleed> bleed_;  // null: it takes nothing, or the parts are not there
   std::unique_ptr<checks::Tally> tally_;
   std::vector<std::uint8_t> crossed_;                       // by layer: whether it may not be empty

@@ -33,7 +33,7 @@ TEST(Placement, PartAsLargeAsTheBedFitsAndOneNanometreMoreDoesNot) {
 }
 
 TEST(Placement, RowsFillFromTheFrontLeftInOrder) {
-  // Two fit beside each other with a gap of 1, so three make two rows, and the second row stands behind the deeper box.
+  // Two fit next to each other with a gap of 1, so three make two rows, and the second row is behind the deeper box.
   const auto positions = placed({{.width = 4, .depth = 2}, {.width = 4, .depth = 3}, {.width = 2, .depth = 1}}, 9, 9, 1);
   ASSERT_EQ(positions.size(), 3u);
   EXPECT_EQ(positions[0].x, 0);

@@ -1,4 +1,4 @@
-// tests/bead/anet.h: the test pieces of Di Nisio 2022 as stretches, and what the model lays of them.
+// tests/bead/anet.h: the test pieces of Di Nisio 2022 as line segments, and the beads that the model deposits for them.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ inline std::vector<StableAfter> stabilisation_column() {
   return rows;
 }
 
-/// 100 % lays the set width of 0.4 mm at the set height (3.1.2), or what the profile feeds: 85 % of the rectangle.
+/// 100 % deposits the set width of 0.4 mm at the set height (3.1.2), or what the profile feeds: 85 % of the rectangle.
 inline double set_area() { return bead_area(0.4, kHeight); }
 constexpr double kProfileArea = 0.85 * 0.4 * 0.3;
 

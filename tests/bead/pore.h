@@ -1,4 +1,4 @@
-// tests/bead/pore.h: the pore between a thin stretch and the even line beside it.
+// tests/bead/pore.h: the pore between a thin segment and the even line next to it.
 //
 // Both beads have the widths that they have alone: what neighbours push aside is neighbours.h. Widths are at the middle of the
 // layer's height, where beads are widest. How long a pore is depends on where it is said to end: its sides close slowly.

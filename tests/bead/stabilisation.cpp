@@ -26,7 +26,7 @@ double area_after(const BeadMachine& machine, double from, const StableAfter& ro
 
 double time_constant(const BeadMachine& machine, const StabilisationTest& test, const StableAfter& row) {
   const double before = width_of(machine.area_mm2, true, test.height_mm);
-  double low = 0, high = 10;  // s; nothing that lays beads lags longer
+  double low = 0, high = 10;  // s; no bead printer lags longer
   for (int i = 0; i < 60; ++i) {
     const double tau = (low + high) / 2;
     const double area = area_after(machine, test.speed_mm_s, row, tau);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kAlongHeight = 0.3, kAlongSpacing = 0.44;  // mm
 
-/// Three lines of 4 mm beside each other, `thick` wide between 1.8 and 2.2 mm, else 0.40 mm.
+/// Three lines of 4 mm next to each other, `thick` wide between 1.8 and 2.2 mm, else 0.40 mm.
 Buffer<DepositedPiece> crowded_lines(double thick) {
   Buffer<DepositedPiece> pieces;
   for (int line = 0; line < 3; ++line)

@@ -1,4 +1,4 @@
-// Beads beside each other on a bed: their sections hold what was laid, and agree with those of whole rows.
+// Beads next to each other on a bed: their sections contain the deposited area and agree with those of whole rows.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// The beads of a layer as a file commands them: what is fed is laid, where the line leads.
+// The beads of a layer as a file commands them: what is fed is deposited along the line.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -106,7 +106,7 @@ TEST(DepositedBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
   }
 }
 
-/// The melt keeps what it held when the line before ended: all that is fed is laid, but for what the last line leaves behind.
+/// The melt keeps its content from the end of the previous line: all that is fed is deposited, except what the last line leaves.
 TEST(DepositedBeads, ALineBeginsWithWhatTheLineBeforeLeftBehind) {
   CommandedWay one, both;
   one.add(0, 0, 15, 0, 30, kDepositedArea, false);
@@ -121,7 +121,7 @@ TEST(DepositedBeads, ALineBeginsWithWhatTheLineBeforeLeftBehind) {
   EXPECT_NEAR(volume_of_pieces(together), 30 * kDepositedArea, kDepositedLag * kDepositedArea * 8);
 }
 
-/// Fed in addition between two lines is laid where the second begins; a purge is not.
+/// Material fed in addition between two lines is deposited where the second begins; a purge is not.
 TEST(DepositedBeads, WhatIsPrimedIsDepositedWhereALineBegins) {
   const DepositionRules rules = deposition_rules(400);
   const auto volume_of_second = [&](double primed) {

@@ -1,4 +1,4 @@
-// A pattern in its steady state: the widths told are those of a long line.
+// A pattern in its steady state: the reported widths are those of a long line.
 #include <gtest/gtest.h>
 
 #include "stages/bead/predicted_tables.h"

@@ -1,4 +1,4 @@
-// Tables of a calibration that the model predicts, beside those that Di Nisio measured and beside themselves.
+// Tables of a calibration that the model predicts, compared with those that Di Nisio measured and with each other.
 #include <gtest/gtest.h>
 
 #include "stages/bead/predicted_tables.h"

@@ -1,4 +1,4 @@
-// A bead spreads along its line: volume, evenness, the shape of its end, and that cells come while the line is laid.
+// A bead spreads along its line: volume, evenness, the shape of its end, and that cells come during its deposition.
 #include <gtest/gtest.h>
 
 #include <algorithm>

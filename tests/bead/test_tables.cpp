@@ -1,7 +1,7 @@
 // The model against the measured tables of Di Nisio 2022. The lag comes from the distances of Table 11; no width is read for
 // it.
 //
-// What 100 % lays is taken both ways that are known: the set width (0.1007 mm2), and what the profile feeds (0.102 mm2).
+// Both known values of the area at 100 % are tested: the set width (0.1007 mm2), and what the profile feeds (0.102 mm2).
 // Two readings of the acceleration are kept apart, because no single one meets all tables: "speed acts at once" is what
 // section 4.1.2 saw (the bead narrows and swells where the speed changes), 500 mm/s2 is the profile's, which is the maker's.
 #include <gtest/gtest.h>
@@ -71,7 +71,7 @@ TEST(TimeConstant, ItIsThatOfTheStabilisationColumn) {
   for (const double area : {set_area(), kProfileArea}) {
     EXPECT_NEAR(anet(area, kAtOnce).tau_s, 0.052, 0.001);
     EXPECT_NEAR(anet(area, kProfile).tau_s, 0.047, 0.001);
-    // Every row from 175 % on tells it by itself.
+    // Every row from 175 % on shows it by itself.
     for (std::size_t i = 2; i < rows.size(); ++i) {
       const double tau = time_constant({area, 0, kAtOnce}, {kHeight, kReference, 0.01}, rows[i]);
       EXPECT_NEAR(tau, 0.0525, 0.003) << rows[i].speed_mm_s;
@@ -125,7 +125,7 @@ TEST(Tables, WidthsOfThinIntervalsByExtrusion) {  // Table 12
 }
 
 TEST(Tables, WidthsOfRepeatedIntervals) {  // Tables 13 to 15
-  // The document does not say where along a stretch it measured. Table 16 tells: its pores are as wide as thin stretches of
+  // Di Nisio does not state where along a segment he measured. By Table 16: its pores are as wide as thin stretches of
   // 0.22 (B100) and 0.20 mm (B75) leave, those of Tables 14 and 13 are 0.31 and 0.28 mm wide: means, not middles.
   for (const bool spread : {false, true}) {
     EXPECT_LE(errors_of_tables_13_to_15(anet(set_area(), kProfile), spread).mean, 0.0351);

@@ -1,4 +1,4 @@
-// An inspection that may take so many bytes: it holds no more, stops where it would, and tells what it saw until then.
+// An inspection with a memory limit: it takes no more, stops at the limit, and reports its findings until then.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ Volume noisy_plate() {
 
 class BoundedInspection : public testing::Test {
  protected:
-  /// The findings of the first layers, each looked at in the scratch that layers take in turn.
+  /// The findings of the first layers, each inspected in the scratch memory that layers use in sequence.
   Findings inspect(std::uint64_t max_bytes, std::uint32_t layers = kLayers, std::size_t slots = 1) {
     const std::int64_t side = 20 * kNmPerMm, up = 100'000;
     const Box box{{0, 0, 0}, {static_cast<Nm>(side), static_cast<Nm>(side), static_cast<Nm>(kLayers * up)}};
@@ -59,7 +59,7 @@ class BoundedInspection : public testing::Test {
   const PixelGrid grid_{PixelAxis(254, 20 * kNmPerMm), PixelAxis(254, 20 * kNmPerMm)};
   const Volume volume_ = noisy_plate();
   std::vector<std::uint64_t> held_;  // after each layer
-  std::uint64_t inspected_ = 0;      // by the look at any layer
+  std::uint64_t inspected_ = 0;      // by the inspection of any layer
 };
 
 TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
@@ -80,7 +80,7 @@ TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
     EXPECT_EQ(found.stop->layer, found.layers);
     EXPECT_GT(found.stop->bytes, may);
     EXPECT_EQ(held_.back(), 0u) << "it lets go";
-    // Of the layers below all is known but what becomes of bodies that go on.
+    // Of the layers below all is known except the end of bodies that continue.
     const Findings below = inspect(UINT64_MAX, found.layers);
     EXPECT_EQ(found.islands.count, below.islands.count);
     EXPECT_EQ(found.hollows.count, below.hollows.count);
@@ -108,7 +108,7 @@ TEST_F(BoundedInspection, StopsWhereItDoesRegardlessOfTheScratchOfLayers) {
   }
 }
 
-/// What is told as needed is enough for that layer.
+/// The memory reported as needed is enough for that layer.
 TEST_F(BoundedInspection, GetsFurtherWithWhatItRequests) {
   std::uint64_t may = 1000;
   std::uint32_t requested = 0;

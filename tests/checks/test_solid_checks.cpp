@@ -1,4 +1,4 @@
-// Which jobs are doubted, and which are not.
+// Which jobs give a warning, and which do not.
 #include <gtest/gtest.h>
 
 #include "stages/checks/solid_checks.h"

@@ -55,7 +55,7 @@ TEST(Tally, CountsEveryPixelOfLowSolids) {
   std::mt19937 random(7);
   const PixelGrid grid = grid_of(40, 30);
   for (int trial = 0; trial < 50; ++trial) {
-    // Up to 15 rows are all looked at.
+    // Up to 15 rows are all inspected.
     const auto left = random() % 20, right = left + 1 + random() % 20, top = random() % 15, bottom = top + 1 + random() % 15;
     const std::array<std::uint32_t, 4> window{static_cast<std::uint32_t>(left), static_cast<std::uint32_t>(right),
                                               static_cast<std::uint32_t>(top), static_cast<std::uint32_t>(bottom)};

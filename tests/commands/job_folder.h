@@ -16,13 +16,13 @@ class JobFolder : public testing::Test {
   Outcome lamina(const std::string& line) const { return run_lamina(words_of(line), folder_.path()); }
   /// The call succeeds.
   void done(const std::string& line) const;
-  /// The same, and what it tells with --json.
+  /// The same, with its --json report.
   nlohmann::json facts(const std::string& line) const;
   /// Names and contents of all files of a job.
   std::string tree(const std::string& output) const { return tree_text(folder_.path() / output); }
 
   /// The job is the same with any threads, engine and memory, as merged shards, and resumed after its fourth layer; verify
-  /// takes it. job  a call of jet without --output returns  what the resumed run tells; the job lies in `one`, and again in
+  /// takes it. job  a call of jet without --output returns  what the resumed run reports; the job lies in `one`, and again in
   /// `other` and `shards`
   nlohmann::json expect_same_however_made(const std::string& job) const;
 

@@ -104,7 +104,7 @@ TEST(Documentation, EveryKeyOfAMachineIsDocumented) {
   EXPECT_GT(checked, 40u);
 }
 
-// Whatever stands behind "lamina COMMAND" on a line, up to what ends a command there.
+// The text after "lamina COMMAND" on a line, up to what ends a command there.
 TEST(Documentation, EveryCommandLineInItCanBeTyped) {
   const std::regex line("(?:^|[^-/a-z])lamina ([a-z]+)((?: [^\\n`|;&#()]*)?)", std::regex::multiline),
       flag("(?:^| )(--[a-z][a-z0-9-]*)");

@@ -84,7 +84,7 @@ const Row kRows[] = {
     {"manual", "-o,--output", "manual --markdown -o @", nullptr, "/jet.md", true},
 };
 
-/// Values of options that name no file, beside lists of words to choose from.
+/// Values of options that name no file, in addition to lists of words to choose from.
 const std::set<std::string_view> kNoFiles = {"A:B",
                                              "AXES",
                                              "DARCY",
@@ -406,7 +406,7 @@ TEST_F(EveryOutput, AFullDiskIsOneLineAndNothingUnderAFinalName) {
       }
       ::close(file);
     } else {
-      const rlimit none{0, before.rlim_max};  // also of the message, which is not looked at then
+      const rlimit none{0, before.rlim_max};  // also of the message, which is not checked then
       ::setrlimit(RLIMIT_FSIZE, &none);
     }
     const Outcome outcome = run(line_of(row, "disk/x"));

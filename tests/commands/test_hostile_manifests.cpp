@@ -114,7 +114,7 @@ TEST_F(HostileManifests, OfImagesAreRefusedByAllThatReadThem) {
     refused_everywhere(mutation.name, turn == 0 ? all : std::vector{all[turn % 6], all[(turn + 3) % 6]});
     ++turn;
   }
-  // What only a look at the files tells.
+  // Errors that only a check of the files reports.
   write_again(path, *sound, {"", [](Manifest& manifest) { manifest.layers[1].bytes = UINT64_MAX; }});
   refused_everywhere("a layer of many bytes", {all[0], all[1], all[3]});
   write_again(path, *sound, {"", [](Manifest&) {}});

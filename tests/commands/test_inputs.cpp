@@ -1,5 +1,5 @@
-// tests/commands/test_inputs.cpp: whatever lies in place of a file that a command reads ends it in one line, soon and in
-// little memory: a pipe that nobody writes to, a folder, a device, a key of 100,000 parts, a line of 6 GiB.
+// tests/commands/test_inputs.cpp: any substitute of an input file ends a command in one line, soon and in
+// little memory: a pipe without a writer, a folder, a device, a key of 100,000 parts, a line of 6 GiB.
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <signal.h>
@@ -27,7 +27,7 @@ constexpr bool kMemoryIsMeasurable = false;
 constexpr bool kMemoryIsMeasurable = true;
 #endif
 
-/// Kills a program that goes on for too long. returns  kB that it held at most
+/// Kills a program that runs for too long. returns  peak memory in kB
 std::uint64_t watch_over(int process) {
   const auto handle = static_cast<int>(::syscall(SYS_pidfd_open, process, 0));
   EXPECT_GE(handle, 0) << "a kernel since 5.3 has it";

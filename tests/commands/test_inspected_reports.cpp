@@ -1,4 +1,4 @@
-// What lamina jet --inspect found is kept beside the manifest and shown by lamina report, with its places.
+// What lamina jet --inspect found is kept next to the manifest and shown by lamina report, with its positions.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -118,7 +118,7 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
   ASSERT_EQ(lamina(job({"--overwrite", "--layer", "0.2"})).code, 0);
   EXPECT_FALSE(fs::exists(directory_ / "out/inspection.json")) << "another job";
   EXPECT_TRUE(head()["locations"].empty());
-  // A file of another job, or no file of lamina's form, tells nothing or is told.
+  // A file of another job, or no file of lamina's form, reports nothing or is reported.
   write_text(directory_ / "out/inspection.json", found);
   EXPECT_TRUE(head()["locations"].empty());
   ASSERT_EQ(lamina(job({"--overwrite", "--inspect"})).code, 0);

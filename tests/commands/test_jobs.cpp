@@ -268,7 +268,7 @@ TEST_F(Jobs, VerifyFindsEveryKindOfDamage) {
   found("layers/notes.txt");
   fs::remove(directory_ / "out/layers/notes.txt");
   EXPECT_EQ(lamina({"verify", "out"}).code, 0);
-  // A manifest that tells another number of pixels: every byte is in place, the picture is not.
+  // A manifest that states another number of pixels: every byte is in place, the picture is not.
   std::string manifest = read_text(directory_ / "out/manifest.json");
   const std::size_t at = manifest.find("\"set_pixels\": ", manifest.find("000007.tif")) + 14;
   manifest[at] = manifest[at] == '1' ? '2' : '1';

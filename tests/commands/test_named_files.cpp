@@ -1,4 +1,4 @@
-// Files that a job file names lie beside it: parts, profiles, presets and the output, wherever lamina runs.
+// Files that a job file names are relative to its folder: parts, profiles, presets and the output, regardless of the working folder.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// jobs/job.toml names a part, a profile and a preset beside it; files of their names elsewhere are others.
+/// jobs/job.toml names a part, a profile and a preset next to it; files of their names elsewhere are others.
 class NamedFiles : public JobFolder {
  protected:
   NamedFiles() {

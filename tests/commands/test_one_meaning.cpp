@@ -22,7 +22,7 @@ struct OneMeaning : testing::Test {
 
 TEST_F(OneMeaning, AJobFileAndACommandLineOfTheSameWordsGiveTheSameToolpaths) {
   const struct {
-    const char *words, *file;  // beside the part
+    const char *words, *file;  // next to the part
   } rows[] = {
       {"", ""},
       {"--machine anet-a8", "[machine]\nprofile = 'anet-a8'\n"},

@@ -41,7 +41,7 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
   done("extrude part.stl --machine anet-a8 --layer 0.3 -o part.gcode --quiet");
   fs::create_directory(directory_ / "own");
   fs::copy(fs::path(LAMINA_TEST_DIR) / "corpus/arrow_scaled_mirrored.3mf", directory_ / "own/arrow.3mf");
-  // A toolpath file of SML has its layer table beside it, under its own name but for the ending.
+  // A toolpath file of SML has its layer table next to it, under its own name except the extension.
   fs::create_directory(directory_ / "sml");
   fs::copy(directory_ / "part.stl", directory_ / "sml/part.rp3");
   fs::copy(fs::path(LAMINA_TEST_DIR) / "../pipeline/machine/shipped/extruders/fdm-2000.toml", directory_ / "sml/printer.rp3");

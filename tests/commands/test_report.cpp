@@ -132,7 +132,7 @@ TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
   const std::size_t layers = head["layers"]["volume"].size();
   EXPECT_EQ(layers, head["layer_count"]);
   const double pixel_mm2 = head["pixel_mm"][0].get<double>() * head["pixel_mm"][1].get<double>();
-  // Beads 0.4 mm wide and 0.3 mm high have round sides; seen from above they cover their width.
+  // Beads 0.4 mm wide and 0.3 mm high have round sides; their projection along z covers their width.
   const double section = 0.4 * 0.3, rounded = section - (1 - std::numbers::pi / 4) * 0.3 * 0.3;
   double all_covered = 0, all_deposited = 0;
   for (std::size_t i = 0; i < layers; ++i) {
@@ -275,7 +275,7 @@ TEST_F(JobsReported, ThreeSidesAreThePartsThemselvesIfTheyAreStillThose) {
     EXPECT_GT(bytes[0], 128);
     ++i;
   }
-  // Not found, or no longer what was planned: the layers from three sides, or an error where the part was asked for.
+  // Not found, or no longer what was planned: the layers from three sides, or an error if the part was requested.
   ASSERT_EQ(lamina({"report", "out", "-o", "layers.html"}).code, 0);
   EXPECT_GT(head_of(read_text(directory_ / "layers.html"))["views"]["top"][2], 0);
   write_box(directory_ / "parts/part.stl", {0, 0, 0}, {8, 4.5, 2});

@@ -1,4 +1,4 @@
-// The page of a finished job doubts what lamina jet doubts, with the same words and cause.
+// The page of a finished job gives the warnings of lamina jet, with the same words and cause.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -80,7 +80,7 @@ TEST_F(Resume, FilesALayerGoOnFromEveryStateOfTheirEnd) {
   EXPECT_EQ(planned(job + "a"), 3);
   EXPECT_EQ(tree("a"), whole);
 
-  // The same beside an older job, whole or half removed.
+  // The same next to an older job, whole or half removed.
   for (const bool whole_still : {true, false}) {
     for (const char* older : {"older", "single"}) {
       copy(older, "c");
@@ -88,7 +88,7 @@ TEST_F(Resume, FilesALayerGoOnFromEveryStateOfTheirEnd) {
       write_text(directory_ / "c/manifest.json.part", begun(manifest, 4));
       if (!whole_still) fs::remove(directory_ / "c/manifest.json");
       if (!whole_still) fs::remove(directory_ / "c/layers/000001.svg");
-      const bool stray = !whole_still && std::string_view(older) == "single";  // of which nothing tells any more
+      const bool stray = !whole_still && std::string_view(older) == "single";  // without a record any more
       EXPECT_EQ(planned(job + "c"), 3);
       if (stray) fs::remove(directory_ / "c/tall.cli");
       EXPECT_EQ(tree("c"), whole) << older << whole_still;
@@ -199,7 +199,7 @@ TEST_F(Resume, ContoursThatNoRecordReportsAreKept) {
     const std::string file = std::string("out/part.") + format;
     fs::create_directory(directory_ / "out/layers");
     write_text(directory_ / "out/layers/000007.svg", "precious");
-    EXPECT_EQ(planned(job), 0) << format;  // beside a finished job
+    EXPECT_EQ(planned(job), 0) << format;  // next to a finished job
     fs::remove(directory_ / file);
     EXPECT_EQ(planned(job), 6) << format;  // made anew
     EXPECT_EQ(read_text(directory_ / "out/layers/000007.svg"), "precious");

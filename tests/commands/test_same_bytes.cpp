@@ -1,4 +1,4 @@
-// The same job gives the same bytes and stays within its memory, whatever the threads, the engine and the budget; and
+// The same job gives the same bytes and stays within its memory, regardless of threads, engine and budget; and
 // every part of the models ends as its row in tests/corpus/outcomes.tsv says.
 #include <gtest/gtest.h>
 

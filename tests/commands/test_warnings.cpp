@@ -1,4 +1,4 @@
-// Jobs that plan something else than their parts: told with a code, refused if empty, errors if strict.
+// Jobs that plan something else than their parts: reported with a code, refused if empty, errors if strict.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -162,7 +162,7 @@ TEST_F(Quotes, KeptLayersThatSayNothingAreNoTable) {
   EXPECT_EQ(run(job + " --overwrite --quote q.csv").code, 0);
   EXPECT_EQ(run(job + " --resume --quote again.csv").code, 0);
   EXPECT_EQ(test::read_text(directory_ / "again.csv"), test::read_text(directory_ / "q.csv"));
-  // A job of both kinds of layers is told as what it is.
+  // A job of both kinds of layers is reported as such.
   std::string manifest = test::read_text(directory_ / "out/manifest.json");
   const std::size_t list = manifest.find("\"part_pixels\": ["), end = manifest.find("]", list);
   ASSERT_NE(end, std::string::npos);
@@ -217,7 +217,7 @@ TEST_F(Quotes, ThePageHasTheRowsOfTheFiles) {
   EXPECT_EQ(nlohmann::json::parse(page.substr(begin, end + 2 - begin)).get<Rows>(), rows);
 }
 
-// Without prices money and grams are empty, and parts are told apart all the same.
+// Without prices money and grams are empty, and parts are still reported separately.
 TEST_F(Quotes, AmountsNeedNoPrices) {
   ASSERT_EQ(run("jet a.stl b.stl --machine free.toml --layer 1 --quote q.csv --dry-run --quiet").code, 0);
   const Rows rows = table("q.csv");

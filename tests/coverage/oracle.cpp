@@ -33,7 +33,7 @@ Shape cut_off(Shape shape, int axis, std::int64_t at, int side) {
   return result;
 }
 
-/// Area seen from above, doubled, counter-clockwise; and the same times the mean of z.
+/// Area of the projection along z, doubled, counter-clockwise; and the same times the mean of z.
 void measure(const Shape& shape, mpq_class& area, mpq_class& moment) {
   area = moment = 0;
   for (std::size_t k = 1; k + 1 < shape.size(); ++k) {
@@ -61,7 +61,7 @@ mpq_class volume_above(const Triangle& t, const VoxelBox& box) {
   result = area * number(box.hi[2] - box.lo[2]);
   measure(within, area, moment);
   result += area * number(box.hi[2]) - moment;
-  return -result / 2;  // above a facet that looks up nothing is solid
+  return -result / 2;  // nothing is solid above a facet whose normal points up
 }
 
 using Wide = __int128;

@@ -1,4 +1,4 @@
-// What a layer is told to have at most holds for solids on edges of voxels, for noise, and for real parts.
+// The reported maximum memory of a layer is satisfied by solids on edges of voxels, by noise and by real parts.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

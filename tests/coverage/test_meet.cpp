@@ -1,4 +1,4 @@
-// Kernels that look at pairs of facets against an exact test of each pair in whole numbers, of facets that share, touch and
+// Kernels on pairs of facets compared with an exact test of each pair in whole numbers, of facets that share, touch and
 // cross.
 #include <gtest/gtest.h>
 
@@ -92,7 +92,7 @@ Reported predicted_lines(const PairKernels& kernels, const FacetGroup& a, const 
   return reported;
 }
 
-/// What is told of two facets is true. returns  whether planes parted them
+/// The reported relation of two facets is true. returns  whether planes separated them
 bool check_pair(const Triangle& f, const Triangle& g, const Pair& pair, const Reported& reported) {
   const std::array<Point3, 3> p{f.a, f.b, f.c}, q{g.a, g.b, g.c};
   int shared = 0;

@@ -136,7 +136,7 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
     bool outwards = here, inwards = here, lost = true;
     for (double by = kStepMm; by < kReachMm; by += kStepMm) {
       const bool out = is_solid(by), in = is_solid(-by);
-      // From solid to empty, seen outwards.
+      // From solid to empty, along the outward direction.
       if ((outwards && !out) || (!inwards && in)) {
         sum += (by - kStepMm / 2) * (by - kStepMm / 2);
         lost = false;

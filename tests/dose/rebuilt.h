@@ -52,7 +52,7 @@ struct SurfaceDistance {
 SurfaceDistance distance_of_filled(const DropStack& stack, const std::vector<SurfacePoint>& points);
 SurfaceDistance distance_of_blurred(const DropStack& stack, const std::vector<SurfacePoint>& points);
 
-/// A part, and points of the surface that is looked at: away from edges of the part.
+/// A part, and points of the surface that is inspected: away from edges of the part.
 struct RebuiltShape {
   const char* name;
   double bed_mm, height_mm;

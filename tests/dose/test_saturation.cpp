@@ -138,7 +138,7 @@ std::vector<double> radial_power(const std::vector<int>& pattern) {
   return power;
 }
 
-// 6 dB is a factor of 3.98; the neighbourhood of a radius is the mean of those two to four beside it.
+// 6 dB is a factor of 3.98; the neighbourhood of a radius is the mean of those two to four next to it.
 TEST(BlueNoise, SpectrumOfFlatGreyHasNoPeakAndLittleAtLowFrequencies) {
   for (const double share : {0.1, 0.3, 0.5, 0.7, 0.9}) {
     const std::vector<double> power = radial_power(tile_pattern(share, 0));

@@ -1,4 +1,4 @@
-// Images of shares of voxels against images of pixels, each pixel looked at by itself.
+// Images of fill fractions compared with images of pixels, each pixel computed by itself.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -169,7 +169,7 @@ TEST(Shares, SurplusAndMaskAreThoseOfEachPixel) {
   }
 }
 
-/// Random parts of three materials that share voxels, and what a full voxel of each asks for.
+/// Random parts of three materials that share voxels, and the request of a full voxel of each.
 void add_random_parts(std::uint32_t seed, std::uint8_t full, DropWork& work) {
   work.deposited.clear();
   for (std::uint32_t i = 0; i < 5; ++i) work.deposited.push_back({random_shares(100 * seed + i, full), {}, i % 2, (i * 2) % 3});
@@ -214,7 +214,7 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
   }
 }
 
-// What lies over others takes from them; laid one by one it is as laid at once.
+// Upper parts take from lower ones; the result of depositing one by one is that of depositing at once.
 TEST(Shares, DepositedOneByOneAreThoseDepositedAtOnce) {
   for (std::uint32_t seed = 1; seed <= 30; ++seed) {
     DropWork at_once, one_by_one;

@@ -28,7 +28,7 @@ inline double filament_for(double length_mm, double width_mm, double height_mm, 
   return length_mm * area / (std::numbers::pi * diameter_mm * diameter_mm / 4);
 }
 
-/// A G-code file that a slicer wrote and that cannot be kept in this repository: in corpus/gcode beside the folder that
+/// A G-code file that a slicer wrote and that cannot be kept in this repository: in corpus/gcode next to the folder that
 /// LAMINA_MODELS names; empty if it is not there.
 inline std::string third_party_gcode(const std::string& name) {
   const char* models = std::getenv("LAMINA_MODELS");

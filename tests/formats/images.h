@@ -38,7 +38,7 @@ inline Row random_row(std::mt19937& random, std::uint32_t columns, std::uint32_t
   return row;
 }
 
-/// The row with some changes moved a little, some runs gone and some new: what neighbouring rows of a part look like.
+/// The row with some changes moved a little, some runs gone and some new: similar to neighbouring rows of a part.
 inline Row neighbour(std::mt19937& random, std::uint32_t columns, const Row& row) {
   std::vector<bool> set(columns, false);
   for (std::size_t i = 0; i + 1 < row.size(); i += 2) {

@@ -9,7 +9,7 @@
 namespace lamina::formats {
 namespace {
 
-/// The share of each part by looking at every pixel, in floating point.
+/// The fraction of each part by testing every pixel, in floating point.
 std::vector<double> shares_by_pixels(const Runs& runs, const PixelWindow& window, std::uint32_t columns, std::uint32_t rows) {
   std::vector<double> shares(std::size_t{columns} * rows);
   const auto overlap = [](double pixel, double part, double size) {

@@ -58,7 +58,7 @@ class G4Test : public ::testing::Test {
     }
     TIFFClose(tiff);
   }
-  /// A strip of these bytes, whatever they are.
+  /// A strip of arbitrary bytes.
   void save_coded(const Tags& tags, std::vector<std::uint8_t> coded) const {
     TIFF* tiff = create(tags);
     ASSERT_GE(TIFFWriteRawStrip(tiff, 0, coded.data(), static_cast<tmsize_t>(coded.size())), 0);

@@ -47,7 +47,7 @@ void expect_on_circle(const PlantedArc& arc, const formats::GcodeLayer& layer) {
   ASSERT_GE(layer.beads.size(), 1u);
   EXPECT_LE(std::abs(complex_mm(layer.beads.front().from) - arc.at(arc.start)), 2e-6);
   EXPECT_LE(std::abs(complex_mm(layer.beads.back().to) - arc.at(arc.start + arc.sweep)), 2e-6);
-  // R of half a circle tells the centre to the root of its last digit.
+  // R of half a circle gives the centre to the root of its last digit.
   const double slack = arc.by_radius && std::abs(std::abs(arc.sweep) - kPi) < 0.1 ? 3e-4 : 0;
   double turned = 0, end_off = 0, middle_off = 0;
   bool joined = true, forward = true;
@@ -75,7 +75,7 @@ TEST(GcodeArcs, ChordsOfPlantedCirclesDeviateByFiveMicrometresNoMoreThan) {
     for (const double turn : {0.02, 0.5, 0.77, 0.999, 1.0}) {
       for (int way = 0; way < 16; ++way) {
         const bool by_radius = way & 1;
-        if (by_radius && turn == 1) continue;  // R tells no full circle
+        if (by_radius && turn == 1) continue;  // R defines no full circle
         const PlantedArc arc{radius, 0.3 + way, (way & 2 ? -2 : 2) * kPi * turn, by_radius, (way & 4) != 0, (way & 8) != 0};
         const auto file = gcode_file(directory, arc.text());
         ASSERT_TRUE(file) << file.error().message;
@@ -148,7 +148,7 @@ TEST(GcodeArcs, BadArcsGoAsInMarlinWithAWord) {
 
 TEST(GcodeArcs, TravelsMayBeArcsOfAnyKind) {
   const Directory directory;
-  // BambuStudio lifts along one; an arc of another plane ends where it says, whatever its direction is.
+  // BambuStudio lifts along one; an arc of another plane ends where it says, regardless of its direction.
   const auto file =
       gcode_file(directory, "M83\nG1 X10 Y10 Z0.2\nG2 Z0.6 I1.2 J0 P1 F600\nG18\nG3 X20 Z5 I5 K0\nG17\nG0 Z0.2\nG1 Y20 E1\n");
   ASSERT_TRUE(file) << file.error().message;

@@ -1,4 +1,4 @@
-// tests/formats/test_gcode_filament.cpp: widths of beads by the filament that files tell, or a person.
+// tests/formats/test_gcode_filament.cpp: widths of beads by the filament that files or users state.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,7 +31,7 @@ TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsReported) {
   ASSERT_TRUE(file.ok());
   EXPECT_NEAR(file->fed_mm3(), 2.5 * area, 1e-9);
   EXPECT_EQ(file->density_g_cm3(), 0);
-  // A diameter that is told behind the beads counts; E of M200 is mm3.
+  // A diameter stated after the beads counts; E of M200 is mm3.
   EXPECT_NEAR(gcode_file(directory, beads + "; filament_diameter = 2.85\n")->fed_mm3(), 2.5 * 2.85 * 2.85 * test::kPi / 4,
               1e-9);
   EXPECT_NEAR(gcode_file(directory, "M200 D1.75\n" + beads)->fed_mm3(), 2.5, 1e-9);

@@ -95,7 +95,7 @@ TEST(GcodeSpirals, AGivenHeightCutsThem) {
     ASSERT_TRUE(layer);
     for (const formats::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.02) << "turns are 0.2 mm high";
   }
-  // Of a file with tags as well, without what start code lays.
+  // Also of a file with tags, without the deposits of the start code.
   const auto tagged = gcode_file(directory, "M83\nG1 Z5\nG1 X9 E1\n;LAYER:0\n" + text, {.layer_height_mm = 2});
   ASSERT_TRUE(tagged);
   EXPECT_EQ(tagged->count(), 5u);

@@ -253,7 +253,7 @@ TEST(GreyImages, ArePlacedAndMergedPixelByPixel) {
   }
 }
 
-// Files that systems and people leave beside images, and names that are easily misread.
+// Files that systems and people leave next to images, and names that are easily misread.
 TEST(Stacks, OfOddFoldersAreReadRightOrRefusedInALine) {
   const auto open = [](const test::Directory& folder) { return LayerImages::open(folder.path().string(), {}); };
   const Pixels one{{0, 255}};

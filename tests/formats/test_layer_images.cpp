@@ -99,7 +99,7 @@ TEST_F(LayerImagesTest, FilesThatChangeAfterTheyWereInspectedAreRefused) {
   EXPECT_FALSE(stack->read(0).ok());
 }
 
-// A thumbnail beside a page is no layer.
+// A thumbnail next to a page is no layer.
 TEST_F(LayerImagesTest, ReducedPagesAreNoLayers) {
   save("a1.tif", square(20, 5), "tiff-g4");
   const std::string path = (folder_ / "pages.tif").string();

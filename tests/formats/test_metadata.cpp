@@ -203,7 +203,7 @@ TEST(Null, WritesNothing) {
 
 // The files of tests/golden/write hold small_image() in each format at 1200 x 600 dpi. They change only if a format
 // changes on purpose (or if libtiff orders its directory anew): set LAMINA_WRITE_GOLDEN to write
-// them again, look at the difference, and say so in CHANGELOG.md, because finished jobs cannot be resumed across it.
+// them again, inspect the difference, and say so in CHANGELOG.md, because finished jobs cannot be resumed across it.
 // small.tiff-g4.tif holds from offset 8:
 //   row 0  001 00110101 10    horizontal: white 0, black 3
 //          001 1000 00011     horizontal: white 3, black 7

@@ -1,4 +1,4 @@
-// The PNG encoder's own deflate: zlib inflates it to the rows of bits, whatever changes in them.
+// The PNG encoder's own deflate: zlib inflates it to the rows of bits, regardless of their changes.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -20,7 +20,7 @@ std::uint32_t big_endian(const Bytes& file, std::size_t at) {
   return value;
 }
 
-/// The content of every IDAT chunk of a PNG; checks and order of chunks are looked at on the way.
+/// The content of every IDAT chunk of a PNG; checksums and order of chunks are tested as well.
 std::vector<Bytes> image_chunks(const Bytes& file) {
   std::vector<Bytes> chunks;
   std::string names;

@@ -73,7 +73,7 @@ double shoelace(const std::vector<std::array<double, 2>>& points) {
 }
 
 /// The Oasis controller (Yvo de Haas), ImageConverter.py, SVGGetData, SVGLayerToArray, ArrayAddPolygon and ArrayConvert, as
-/// kept in ZoeJ9/Oasis_3DPrinter at 8dd0087: it looks at how lines begin, cuts attributes at quotes, takes slic3r:z times a
+/// kept in ZoeJ9/Oasis_3DPrinter at 8dd0087: it tests how lines begin, cuts attributes at quotes, takes slic3r:z times a
 /// million, and toggles a pixel for every edge that a column meets.
 struct Oasis {
   double width = 0, height = 0, dpi = 600;

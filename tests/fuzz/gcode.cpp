@@ -1,4 +1,4 @@
-// G-code of extrusion printers, by whatever slicer.
+// G-code of extrusion printers, by any slicer.
 #include "stages/formats/gcode/read_gcode.h"
 
 #include "tests/fuzz/laws.h"

@@ -36,7 +36,7 @@ bool read_image(std::string_view bytes) {
   const auto image = formats::image(file.hold(bytes));
   if (!image) return check_error(image.error()), false;
   check_runs(image->runs);
-  // Whatever was read is written and read as the same image, unless it is so large that this takes long.
+  // Any image that was read is written and read as the same image, unless it is so large that this takes long.
   const std::uint64_t pixels = std::uint64_t{image->runs.columns} * image->runs.view().rows();
   if (pixels > 1 << 16) return true;
   constexpr std::string_view kFormats[] = {"tiff-g4", "tiff-packbits", "png", "pbm", "bmp"};

@@ -1,4 +1,4 @@
-// tests/fuzz/laws.h: what holds for whatever any reader gives back.
+// tests/fuzz/laws.h: properties of the result of any reader.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace lamina::fuzz {
 
-/// A text for a person says something; what control characters it quotes, whoever shows it leaves out (one_line).
+/// A text for users is not empty; the function that shows it (one_line) removes control characters that it quotes.
 inline void check_line(std::string_view text) { law(!one_line(text).empty(), "an error or note says nothing"); }
 
 /// A refusal says something, and does not call itself a fault of lamina.

@@ -17,7 +17,7 @@ struct Target {
   std::string_view name;                // of the reader, and of its folder in tests/corpus/fuzz
   bool (*run)(std::string_view bytes);  // reads, asserts laws; whether the reader accepted the bytes
   std::vector<std::string> (*seeds)();  // inputs that it accepts, at least one
-  std::string_view sources;             // prefixes of paths, with blanks between: a change there asks for a new campaign
+  std::string_view sources;             // prefixes of paths, with blanks between: a change there requires a new campaign
   std::string_view files;               // endings of files that are good seeds, with blanks between
   std::string_view dictionary = {};     // in tests/fuzz/dictionaries
   std::size_t max_bytes = 4096;
@@ -55,7 +55,7 @@ class Dice {
 /// Bytes under a path, for readers that take one: a regular file in memory (tmpfs), so that no execution waits for a disk.
 class MemoryFile {
  public:
-  /// name  of the file, as "part.stl": readers look at its ending
+  /// name  of the file, as "part.stl": readers use its extension
   explicit MemoryFile(const std::string& name);
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;

@@ -43,7 +43,7 @@ TEST_P(Fuzz, AcceptsItsSeedsAndKeepsItsLawsForTheStoredCorpus) {
     EXPECT_TRUE(accepts(seeds[i])) << "seed " << i << ":\n" << seeds[i].substr(0, 2000);
     EXPECT_LE(seeds[i].size(), target().max_bytes) << "seed " << i;
   }
-  const char* const own = std::getenv("LAMINA_FUZZ_INPUTS");  // a file or a folder instead, to look into a finding
+  const char* const own = std::getenv("LAMINA_FUZZ_INPUTS");  // a file or a folder instead, to reproduce a finding
   const fs::path inputs = own != nullptr ? fs::path(own) : fs::path(LAMINA_TEST_DIR) / "corpus/fuzz" / target().name;
   if (fs::is_regular_file(inputs)) accepts(bytes_of(inputs));
   if (!fs::is_directory(inputs)) return;

@@ -1,4 +1,4 @@
-// tests/geometry/test_blocks.cpp: blocks hold what the list held, whatever it is.
+// tests/geometry/test_blocks.cpp: blocks contain what the list contained, for any list.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 

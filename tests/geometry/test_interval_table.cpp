@@ -1,4 +1,4 @@
-// Laws of tables of intervals: they find exactly what a look at every interval finds, each once.
+// Properties of tables of intervals: they find exactly what a scan of all intervals finds, each once.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -82,7 +82,7 @@ TEST(OffsetContours, RegionIsThatOfClippersOffsetToWithinItsRounding) {
   EXPECT_GT(pieces, 1500);
 }
 
-/// Squares in one another around a point, half as wide as told, mm, outer contours and holes by turns.
+/// Squares in one another around a point, of the given half width, mm, alternating outer contours and holes.
 Contours squares(std::initializer_list<int> halves) {
   Contours out;
   bool hole = false;
@@ -145,7 +145,7 @@ double clippers_area_mm2(const Contours& contours, double distance) {
   return area * 1e-12;
 }
 
-// Where boxes share edges, boolean operations leave spikes and put holes behind outer contours beside theirs.
+// Where boxes share edges, boolean operations leave spikes and put holes after other outer contours than theirs.
 TEST(OffsetContours, HolesCountAnywhereInTheList) {
   const std::vector<std::vector<BoxMm>> known = {
       {{0, 6, 1, 12}, {6, 1, 8, 6}, {1, 2, 7, 8}, {3, 3, 5, 7, true}, {5, 1, 9, 6, true}},

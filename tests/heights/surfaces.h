@@ -28,7 +28,7 @@ inline ThicknessSet range_of(double low, double high, double step) {
   return set;
 }
 
-/// A profile in x and z (mm), 10 mm deep, its outside on the right of its way (x right, z up). Layers look at slopes and
+/// A profile in x and z (mm), 10 mm deep, its outside on the right of its direction (x right, z up). Layers use slopes and
 /// heights only, so it need not be closed.
 inline Mesh strip(const std::vector<std::pair<double, double>>& profile) {
   Mesh mesh;

@@ -82,7 +82,7 @@ TEST(NominalSlopes, StepsAreThoseThatArePrintedOrThoseThatAreLeft) {
     EXPECT_NEAR(angle_of(found.layers[0].flattest), std::asin(0.6) * 180 / std::numbers::pi, 1e-4);
     EXPECT_NEAR(index.area_mm2, of_nominal ? 50 : 10 * std::hypot(3.3, 5), 1e-6);
   }
-  // The limit is kept by the steps that were asked for.
+  // The requested steps keep the limit.
   options.mode = Mode::kCusp;
   options.set = test::range_of(0.05, 0.5, 0.001);
   for (const bool of_nominal : {false, true}) {

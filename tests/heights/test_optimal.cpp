@@ -28,7 +28,7 @@ struct Facet {
   Steepness steepness;
 };
 
-// Every stack of thicknesses, by trying each; the rules are those of the header, told again.
+// Every stack of thicknesses, by trying each; the rules are those of the header, restated.
 class Enumeration {
  public:
   Enumeration(const SurfaceIndex& index, const Options& options, std::int64_t hit, bool measure = false)

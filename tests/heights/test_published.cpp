@@ -82,7 +82,7 @@ TEST(PublishedHeights, ThreeThicknessesStopAtThePeakAndGoDownOnASlope) {
   EXPECT_EQ(layers(1.03, 2.0, {0.254, 0.305, 0.356}), (List{0.356, 0.356, 0.305, 0.356, 0.356, 0.254}));
   EXPECT_EQ(layers(1.016, 2.0, {0.178, 0.254}), (List{0.254, 0.254, 0.254, 0.178, 0.254, 0.254, 0.254, 0.254}));
   EXPECT_EQ(layers(0.3, 1.2, {0.178, 0.254}), (List{0.254, 0.254, 0.254, 0.254, 0.178}));
-  // A slope asks for the least thickness at once, whatever lies between: the document calls that a limitation.
+  // A slope requests the minimum thickness at once, regardless of the heights between: Di Nisio calls that a limitation.
   Options options = document();
   options.set = set_of({0.1, 0.2, 0.3});
   const auto ramp = test::thicknesses(plan_heights(test::index_of(test::strip({{0, 0}, {4, 2}})), options)->table);

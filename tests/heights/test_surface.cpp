@@ -125,7 +125,7 @@ TEST(HeightSurface, PartThatIsThinnerThanTheMinThicknessIsOneLayer) {
 }
 
 TEST(PerPartHeights, EachPartHasItsOwnLayersWithinCommonSlabs) {
-  // A wall and a slope of the same height beside each other.
+  // A wall and a slope of the same height next to each other.
   const Mesh meshes[] = {test::strip({{0, 0}, {0, 6.03}}), test::strip({{0, 0}, {20, 5}})};
   const Instance instances[] = {{0, {0, 0, 0}}, {1, {30'000'000, 0, 0}}};
   const std::uint32_t parts[] = {0, 1};

@@ -15,7 +15,7 @@ using infill::FillContext;
 using infill::FillParameters;
 using infill::Pattern;
 
-/// Whether the stretch ab lies in the region but for `slack` nm, looked at in many points.
+/// Whether the segment ab is in the region within `slack` nm, tested at many points.
 bool stays_inside(const ContoursView& region, Point2 a, Point2 b, double slack) {
   constexpr int kSteps = 7;
   for (int k = 0; k <= kSteps; ++k) {
@@ -56,7 +56,7 @@ TEST(Fill, NoBeadCentreLeavesItsRegionForAnyOutlinePatternAngleAndGap) {
             ASSERT_GE(paths.view()[p].size(), 2u);
             const bool wall = paths.kind[paths.offset[p]] == PathKind::kOuter;
             const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(region);
-            // Looking is slow: some hundred stretches of each filling, others each time.
+            // The test is slow: some hundred segments of each filling, different ones each time.
             const auto step = static_cast<std::uint32_t>(1 + paths.point.size() * within.point.size() / 10'000);
             for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(intervals % step); i + 1 < paths.offset[p + 1];
                  i += step) {

@@ -1,4 +1,4 @@
-// tests/infill/test_outlines.cpp: walls and regions keep their depth below the surface within the tolerance told.
+// tests/infill/test_outlines.cpp: walls and regions keep their depth below the surface within the given tolerance.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,7 +38,7 @@ double furthest(const ContoursView& contours, const ContoursView& from) {
 
 double area_nm2(const ContoursView& contours) { return static_cast<double>(doubled_area(contours)) / 2; }
 
-/// All that is laid below `surface`, of contours that have been simplified by nine tenths of a tolerance: as a job does.
+/// All deposits below `surface`, of contours that have been simplified by nine tenths of a tolerance, as in a job.
 void expect_within(const Outline& surface, Nm tolerance) {
   FillParameters parameters;
   parameters.walls = 3;

@@ -57,7 +57,7 @@ TEST(Skirt, KeepsToTheBedAndClearOfTheParts) {
   ASSERT_EQ(closer.size(), 1u) << "no room for the second";
   EXPECT_EQ(closer[0].front().x, kWidth / 2);
   expect_free(closer, near, 2'000'000);
-  // At the corner of the bed: a line where there is most room, as long as asked.
+  // At the corner of the bed: a line where there is most room, of the requested length.
   const Box corner = box_at(0, 0, 30, 20);
   const Contours line = infill::skirt_around(corner, {1, 5, 100}, kWidth, kBed);
   ASSERT_EQ(line.size(), 1u);

@@ -57,7 +57,7 @@ double volume_by_rays(const std::vector<const Buffer<Triangle>*>& meshes, const 
 
 enum class Ends {
   kSolid,       // planned, within 3 % of the volume
-  kReportedOr,  // that, or the share on caps is told and a note says so, or it is refused
+  kReportedOr,  // that, or the share on caps is reported with a note, or it is refused
   kNamed,       // planned, and a note says what is lost
   kRefused,     // exit 3
 };

@@ -1,4 +1,4 @@
-// tests/load/test_diagnose.cpp: diagnose() against one that looks everything up in ordered maps.
+// tests/load/test_diagnose.cpp: diagnose() compared with one that uses ordered maps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -134,7 +134,7 @@ void take_bounds(Mesh& mesh) {
     for (const Point3& corner : {t.a, t.b, t.c}) mesh.bounds.add(corner);
 }
 
-/// Lists of more than a task looks at, whose memory goes back piece by piece; in the order of the mesh and in none.
+/// Lists of more than one task processes, whose memory goes back piece by piece; in the order of the mesh and in none.
 TEST(Diagnose, InTheMemoryOfTheListFindsTheSameAndGivesItBackWhereShellsMayOverlap) {
   std::mt19937 random(3);
   for (const auto& [rise, shuffled] : {std::pair{0, false}, {5, false}, {0, true}, {5, true}}) {
@@ -209,7 +209,7 @@ void expect_positions(const load::Diagnosis& found, const std::vector<Triangle>&
   EXPECT_EQ(positions_of(found.duplicate_facets), expected.duplicate.first(50));
 }
 
-/// Facets of a list in no order are looked at in a spatial one; blocks bring vertices of their own.
+/// Facets of a list in no order are processed in a spatial one; blocks bring vertices of their own.
 TEST(Diagnose, ListsInAnyOrderAndBlocksFindTheSame) {
   std::mt19937 random(8);
   for (int faults = 0; faults < 3; ++faults) {
@@ -253,7 +253,7 @@ TEST(Diagnose, AreasAndVolumesOfTheLargestFacetsAreExact) {
   }
 }
 
-/// A strip of steps that is longer than what one task looks at, and a fan whose middle is in all of its facets.
+/// A strip of steps that is longer than what one task processes, and a fan whose middle is in all of its facets.
 TEST(Diagnose, StripsAndFansOfManyFacetsAreOneShell) {
   Mesh strip, fan;
   constexpr Nm kFacets = 60'000;

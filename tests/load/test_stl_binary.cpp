@@ -1,4 +1,4 @@
-// tests/load/test_stl_binary.cpp: binary STL, whatever its header says.
+// tests/load/test_stl_binary.cpp: binary STL, regardless of its header.
 #include <cmath>
 #include <random>
 

@@ -25,7 +25,7 @@ Buffer<Triangle> all_triangles(const Mesh& mesh) {
   return all;
 }
 
-/// Loads a file both ways and compares all that a job could tell. returns  whether it came as blocks
+/// Loads a file both ways and compares all that a job could detect. returns  whether it came as blocks
 bool expect_same_either_way(const std::string& path, const load::LoadOptions& options = {}) {
   SCOPED_TRACE(path);
   const Result<Part> list = load::load(path, options), blocks = load::load(path, as_blocks(options));

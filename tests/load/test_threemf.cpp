@@ -159,7 +159,7 @@ TEST(Read3mf, ComponentsThatExpandToBillionsAreFoundHoweverTheyAreWritten) {
     coded += components(id, id == 10 ? component(9) : part + part);
   }
   EXPECT_CONTAINS(refusal(write_3mf(coded, item(49))), why);
-  // The model under another name, which the relationships tell.
+  // The model under another name, which the relationships state.
   for (const std::string& name : {std::string("3D/3dmodel.MODEL"), std::string("3D/model.xml")}) {
     auto entries = package(model(doubled("", "", 42), item(41)));
     for (auto& [entry, text] : entries) {

@@ -1,4 +1,4 @@
-// tests/load/test_threemf_extensions.cpp: what a 3MF file holds besides core meshes is read, told or refused by name.
+// tests/load/test_threemf_extensions.cpp: content of a 3MF file other than core meshes is read, reported or refused by name.
 #include <fmt/format.h>
 
 #include "stages/load/threemf/archive.h"

@@ -1,4 +1,4 @@
-// tests/load/test_threemf_packages.cpp: ZIP files and XML of 3MF packages as programs write them, and as nobody should.
+// tests/load/test_threemf_packages.cpp: ZIP files and XML of 3MF packages as programs write them, and malformed ones.
 #include <fmt/format.h>
 
 #include "tests/load/archives.h"

@@ -157,7 +157,7 @@ TEST(Read3mfRoles, InsideOutWithinAnotherObjectIsAVoid) {
   EXPECT_EQ(cubic_mm(assembled(within, "-1 0 0 0 1 0 0 0 1 0 0 0")), 1000 - 64) << "mirrored";
   EXPECT_EQ(cubic_mm(assembled(neighbour)), 1000 + 64);
   EXPECT_EQ(cubic_mm(assembled(across)), 1000 + 64) << "it leaves the solid";
-  // Items are united after each of them is filled.
+  // Items are merged after each of them is filled.
   const Part items = loaded(roles_file(model(outer + inner, item(1) + item(2, within))));
   EXPECT_EQ(cubic_mm(items), 1000 + 64);
   EXPECT_CONTAINS(notes_of(items), "is turned over");

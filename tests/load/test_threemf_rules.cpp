@@ -1,4 +1,4 @@
-// tests/load/test_threemf_rules.cpp: 3MF files that do not follow the specification are refused, or told where programs write
+// tests/load/test_threemf_rules.cpp: 3MF files that do not follow the specification are refused, or reported if programs write
 // such ones and geometry is what it is.
 #include <fmt/format.h>
 

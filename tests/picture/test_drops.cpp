@@ -163,7 +163,7 @@ TEST_F(DropPictures, ASwathShowsThoseRequestedAndThoseThatFell) {
   const auto alike = [](const Rgb& a, const Rgb& b) {
     return std::abs(a[0] - b[0]) <= 2 && std::abs(a[1] - b[1]) <= 2 && std::abs(a[2] - b[2]) <= 2;
   };
-  std::array<std::array<int, kMax + 1>, kMax + 1> detected{};  // pixels by drops asked for and fallen
+  std::array<std::array<int, kMax + 1>, kMax + 1> detected{};  // pixels by drops requested and fallen
   for (int r = 0; r < 1011; ++r) {
     for (int c = 0; c < 1011; ++c) {
       const int requested = drops[static_cast<std::size_t>(r) * 1011 + static_cast<std::size_t>(c)];
@@ -210,7 +210,7 @@ TEST_F(DropPictures, AMaterialKeepsItsColourAndOneCellALayer) {
   }
 }
 
-// Nobody plans such an image: a reader must not draw it as if the job could have it.
+// No job plans such an image: a reader must not draw it as if the job could have it.
 TEST_F(DropPictures, AnImageOfMoreDropsThanTheJobHasIsNamed) {
   plan(several_ + " --format tiff-8", "grey");
   plan("--saturation 300 --format tiff-8", "more");  // 11 or 12 drops: of 15 levels too

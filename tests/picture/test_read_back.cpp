@@ -54,7 +54,7 @@ TEST(OpenImageIO, SeesBlackExactlyWhereRunsAreInEveryFormat) {
       double dpi[2] = {};
       ASSERT_EQ(pixels_by_openimageio(path, runs, dpi), expected);
       if (format->extension == ".pbm") continue;  // has no place for it but a comment
-      if (format->extension == ".bmp") {          // whose resolution OpenImageIO does not tell: pixels a metre, bytes 38 to 45
+      if (format->extension == ".bmp") {          // whose resolution OpenImageIO does not report: pixels a metre, bytes 38 to 45
         std::ifstream file(path, std::ios::binary);
         std::int32_t metre[2] = {};
         file.seekg(38).read(reinterpret_cast<char*>(metre), sizeof metre);
@@ -68,7 +68,7 @@ TEST(OpenImageIO, SeesBlackExactlyWhereRunsAreInEveryFormat) {
   }
 }
 
-// Level l of 15 is l seventeenths of 255 away from white, whatever the file's own idea of it.
+// Level l of 15 is l seventeenths of 255 away from white, regardless of the file's own scale.
 TEST(OpenImageIO, SeesLevelsAsGreyInEveryFormatThatCarriesThem) {
   const testing::Folder folder;
   for (const std::uint32_t columns : {1u, 8u, 63u, 1001u}) {

@@ -1,4 +1,4 @@
-// Boxes of voxels for tests of pores, and what is true of them by looking at every voxel.
+// Boxes of voxels for tests of pores, and their properties by a test of every voxel.
 #pragma once
 
 #include <array>
@@ -57,7 +57,7 @@ inline VoxelStack stack_of(const Voxels& box, std::array<bool, 3> periodic = {},
   return stack;
 }
 
-/// Axis i of the result is axis order[i] of the box, backwards where told.
+/// Axis i of the result is axis order[i] of the box, reversed where requested.
 inline Voxels turned(const Voxels& box, std::array<int, 3> order, std::array<bool, 3> backwards = {}) {
   const std::array<std::uint32_t, 3> size{box.nx, box.ny, box.nz};
   Voxels out(size[order[0]], size[order[1]], size[order[2]]);

@@ -15,7 +15,7 @@ using testing::stack_of;
 using testing::turned;
 using testing::Voxels;
 
-// Fills a gap if solid voxels lie before and behind it, by looking along each column.
+// Fills a gap if solid voxels are before and after it, by a scan along each column.
 Voxels slow_closing(const Voxels& box, bool periodic, std::uint32_t gap) {
   const auto near = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z, int side) {
     for (std::uint32_t away = 1; away <= gap; ++away) {

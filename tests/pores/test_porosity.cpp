@@ -178,7 +178,7 @@ TEST(Porosity, ABoxThatRepeatsOpensWhatGoesOnForEver) {
   const Porosity p = porosity(stack_of(with_holes(), {true, true, true}));
   EXPECT_EQ(p.open, 60u);
   EXPECT_EQ(p.cavities, 2u);  // the blind hole ends on both sides
-  // A slit in x y goes on for ever, but not along z.
+  // A slit in x y is infinite, but not along z.
   const Voxels slit = Voxels(4, 5, 6).fill([](auto, auto, auto z) { return z != 2; });
   EXPECT_EQ(porosity(stack_of(slit, {true, true, true})).open, 0u);
   EXPECT_EQ(porosity(stack_of(slit, {true, true, true}), nullptr, kAllFaces).open, 20u);

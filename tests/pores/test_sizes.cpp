@@ -19,7 +19,7 @@ using testing::Voxels;
 
 constexpr double kVoxel = 0.01;  // mm
 
-// One pore in a slice: where a point is, seen from the middle and turned by an angle, in voxels.
+// One pore in a slice: where a point is, relative to the middle and turned by an angle, in voxels.
 template <class Is>
 Pore only_pore(std::uint32_t side, double degrees, const Is& is, double dx = 0, double dy = 0) {
   const double c = std::cos(degrees * std::numbers::pi / 180), s = std::sin(degrees * std::numbers::pi / 180);

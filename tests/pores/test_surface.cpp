@@ -68,7 +68,7 @@ TEST(Surface, OfABodyCountsPairsWithinIt) {
   EXPECT_EQ(within.crofton, expected.crofton);
 }
 
-// Differences between neighbours by looking at each pair.
+// Differences between neighbours by testing each pair.
 TEST(Surface, CrossingsAreThoseOfEveryPairOfVoxels) {
   for (std::uint32_t seed = 0; seed < 100; ++seed) {
     const Voxels box = random_box(seed);

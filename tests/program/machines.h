@@ -55,7 +55,7 @@ inline Machine small_machine(std::uint32_t nozzles, double tilt_deg, double colu
   return machine;
 }
 
-/// Gives a machine what the firmware of its dialect can do, beside nozzles: the dots, axes and place of its head.
+/// Gives a machine the features of its dialect's firmware, in addition to nozzles: the dots, axes and position of its head.
 inline void fit_firmware(Machine& machine) {
   if (machine.dialect == "hp45" || machine.dialect == "oasis") {
     machine.motion.scan_speed_mm_s = 30;

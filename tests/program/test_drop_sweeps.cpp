@@ -139,7 +139,7 @@ TEST(DropSweeps, AddedOnesAreThoseBeyondTheHeadsOwn) {
       ASSERT_EQ(grid.sweep_drops, allowed);
       for (std::uint32_t drops = 1; drops <= 9; ++drops) {
         const std::string row = std::string("00") + static_cast<char>('0' + drops) + "00000";
-        // Planes are those of the job, whatever the layer has.
+        // Planes are those of the job, regardless of the layer.
         const FiredSweeps fired = sweeps_fired_by(grid, planes_of({row, "00000000", "00000000", "00000000"}, 12));
         const std::uint32_t sweeps = (drops + allowed - 1) / allowed, own = (drops + maximum - 1) / maximum;
         EXPECT_EQ(fired.sweeps.size(), sweeps);

@@ -16,7 +16,7 @@ bool end_is_at_or_before(const Point3& p, const Point3& q, Int128 z, Int128 row_
   return left <= right;
 }
 
-/// The plane equation of the triangle at a point; zero in the plane, positive on the side the facet looks to.
+/// The plane equation of the triangle at a point; zero in the plane, positive on the side of its normal.
 Int128 plane_side(const Triangle& t, Int128 x, Int128 y, Int128 z) {
   const Int128 ux = Int128{t.b.x} - t.a.x, uy = Int128{t.b.y} - t.a.y, uz = Int128{t.b.z} - t.a.z;
   const Int128 vx = Int128{t.c.x} - t.a.x, vy = Int128{t.c.y} - t.a.y, vz = Int128{t.c.z} - t.a.z;
@@ -47,7 +47,7 @@ Runs reference_layer(std::span<const Triangle> triangles, const PixelGrid& grid,
           end_is_at_or_before(cut[1].first, cut[1].second, plane, y)) {
         continue;
       }
-      // Outside of the solid lies the side the facet looks to; walking to +x, the sign at far right tells the way.
+      // The side of the facet's normal is outside; along +x, the sign at the far right gives the direction.
       const bool leaves = plane_side(t, Int128{1} << 40, y, plane) > 0;
       std::int64_t below = -1, at = columns;  // crossing is right of centre `below`, left of or on centre `at`
       while (at - below > 1) {

@@ -8,7 +8,7 @@
 namespace lamina::raster {
 namespace {
 
-/// Whether a point lies in a bead, asked in the widest integers there are and for every pixel.
+/// Whether a point is in a bead, computed in the widest integers there are and for every pixel.
 bool covers(Point2 a, Point2 b, std::int64_t width, BeadEnds ends, std::int64_t px, std::int64_t py) {
   __extension__ using Wide = __int128;
   const Wide dx = b.x - a.x, dy = b.y - a.y, x = px - a.x, y = py - a.y, w2 = static_cast<Wide>(width) * width;

@@ -64,7 +64,7 @@ Point3 corner_of(Kind kind, const Bed& bed, const Point3& near, std::mt19937& ra
   return {below(30'000'000), below(25'000'000), below(2'000'000)};
 }
 
-/// Facets of which none has to do with another, in the frame of a mesh that stands at the offset.
+/// Unconnected facets, in the frame of a mesh that is placed at the offset.
 Mesh random_facets(Kind kind, const Bed& bed, const Point3& offset, unsigned seed, std::uint32_t count) {
   std::mt19937 random(seed);
   Triangles facets;

@@ -34,7 +34,7 @@ std::vector<Triangle> facets_at(const Part& part, const Point3& origin) {
   return all;
 }
 
-/// At least 12 heights: the first and the last layer, planes exactly through the largest flat faces and 1 nm beside
+/// At least 12 heights: the first and the last layer, planes exactly through the largest flat faces and 1 nm off
 /// them, exactly through corners, and evenly spread ones.
 std::vector<Nm> planes_through(const std::vector<Triangle>& facets) {
   Nm top = 0;
@@ -81,7 +81,7 @@ void check_part(const fs::path& file, const std::string& name, Checked& checked)
     return;
   }
   const std::int64_t side = std::max({part->bounds.width(), part->bounds.depth(), std::int64_t{1}});
-  if (side > 1'000'000'000) {  // the reference looks at every pixel
+  if (side > 1'000'000'000) {  // the reference tests every pixel
     ++checked.too_large;
     return;
   }

@@ -31,7 +31,7 @@ class Hp45Port {
   };
 
   /// along, across  letters of the axes
-  /// origin, pitch  a raster along the scan, in um, at whose points rows are looked at
+  /// origin, pitch  a raster along the scan, in um, at whose points rows are inspected
   Hp45Port(char along, char across, double origin_um, double pitch_um)
       : along_(along), across_(across), origin_(origin_um), pitch_(pitch_um) {}
 

@@ -19,7 +19,7 @@ using program::testing::Random;
 constexpr double kDot = 25.4 / 96;
 constexpr int kCoasts[] = {0, 9, 15};  // ticks that the motor may run on for when it is braked
 
-/// What the port fires beside the image. Every pixel has to be sprayed on at least six ticks of its dot, both ways.
+/// What the port fires outside of the image. Every pixel has to be sprayed on at least six ticks of its dot, both ways.
 struct BarFaults {
   std::size_t drops = 0, missing = 0, added = 0, travelling = 0;
   bool operator==(const BarFaults&) const = default;

@@ -204,7 +204,7 @@ std::uint32_t word_at(const std::string& text, std::size_t at) {
   return value;
 }
 
-// As the READMEs of the dialects tell it: 5 = 101 and 6 = 110, the least significant bit first.
+// As in the READMEs of the dialects: 5 = 101 and 6 = 110, the least significant bit first.
 TEST(GreyPrograms, OfPlanesAreSpeltByHand) {
   const std::string text = five_and_six(six_drops("planes"));
   const std::size_t grey = 6 * 4;  // behind the layer's head

@@ -1,4 +1,4 @@
-// Layers of parts for the HP45 controller against its firmware: the decoder of stages/replay/hp45 and the port beside this
+// Layers of parts for the HP45 controller against its firmware: the decoder of stages/replay/hp45 and the port next to this
 // file.
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 namespace lamina::hp45_bench {
 namespace {
 
-/// What the port fires, beside the pixels that are wanted: those that no drop falls on, drops beside them, and on the way
+/// Differences of the port's drops from the wanted pixels: pixels without a drop, drops outside of pixels, and drops on the way
 /// between sweeps.
 struct Difference {
   std::uint64_t missing = 0, added = 0, fired = 0;
@@ -127,7 +127,7 @@ TEST(Hp45, TwelveLayersOfFivePartsAreFiredExactlyByTheDecoderAndByThePort) {
 }
 
 // The firmware's bursts come by the clock: the numbers of drops are those of the image to a percent or so, and none falls more
-// than a pixel beside it.
+// than a pixel from it.
 TEST(Hp45, BurstsOfTheClockFallWithinAPixelOfTheImage) {
   Machine machine = shipped_by_name("hp45");
   machine.bed.size_mm = {20, 12};

@@ -1,4 +1,4 @@
-// What is wrong with a program of hp45 or with its machine is found and told.
+// Faults of a program of hp45 or of its machine are found and reported.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

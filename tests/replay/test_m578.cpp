@@ -12,7 +12,7 @@ namespace {
 
 using printed_parts::Program;
 
-/// Drops beside the image by GCodes::HandleMcode, case 578, and Platform::Inkjet: where the axes stand, S alone, 12 bits.
+/// Drops outside of the image by GCodes::HandleMcode, case 578, and Platform::Inkjet: axis positions, S alone, 12 bits.
 struct InkjetFaults {
   std::size_t missing = 0, added = 0, doubled = 0;
 };
@@ -75,7 +75,7 @@ TEST(M578, TwelveLayersOfFivePartsAreFiredAndNothingElse) {
   EXPECT_GT(drops, 50'000u);
 }
 
-// Without a ramp a sweep's first drop falls where its movement begins, whatever the bits of the ways before it.
+// Without a ramp a sweep's first drop falls where its movement begins, regardless of the bits of the moves before it.
 TEST(M578, SweepsWithoutARampAreFiredEitherWay) {
   for (int i = 0; i < 40; ++i) {
     const Side from = i % 2 == 0 ? Side::kLeft : Side::kRight;

@@ -1,4 +1,4 @@
-// Care of head and powder in programs: what is written is found to be sound, and what was left out or done elsewhere is told.
+// Head and powder maintenance in programs: what is written is valid, and omitted or misplaced maintenance is reported.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -62,7 +62,7 @@ TEST(Maintenance, LayersThatAreNotDueHaveNone) {
   }
 }
 
-// nuferbj with sweeps of 5 mm/s, of which one takes some 8 s: whatever the limit, no sweep ends later, and as few are made as
+// nuferbj with sweeps of 5 mm/s, of which one takes some 8 s: for any limit, no sweep ends later, and as few are made as
 // that takes but for 3 % of room.
 TEST(Maintenance, NoSweepEndsLaterThanTheLimitOfSeconds) {
   for (const char* machine : {"nuferbj", "hp45", "oasis"}) {
@@ -123,7 +123,7 @@ TEST(Maintenance, ShotsElsewhereOrOnTheBedAreFound) {
     EXPECT_NE(bench.fault(bench.with("M816", drops)).find("drops off the bed, where 40 are a shot"), std::string::npos)
         << drops;
   }
-  // The profile itself says a place over the bed: its reader finds it, whoever wrote it.
+  // The profile itself defines a position over the bed: any reader finds it, also in a profile by another writer.
   MaintenanceBench wrong("nuferbj");
   wrong.resolved.machine.maintenance.spit_mm = {{65, 12}};
   const std::string text = wrong.with("G0 X-45.0000 Y-10.0000", "G0 X65.0000 Y12.0000 F24000\n");
@@ -456,7 +456,7 @@ TEST(Maintenance, VatsAreEmptiedAndFilledByWhatProgramsFeed) {
   for (std::uint32_t layer = 0; layer < 4; ++layer) EXPECT_TRUE(levels.take(layer, count).ok());
   EXPECT_EQ(levels.take(4, count).error().message, "layer 4: takes 0.5 mm of the first vat, where 0 of 2 are left");
   EXPECT_TRUE(levels.take(5, count).ok()) << "once";
-  // A layer that nobody could carry out, or that is of a shard elsewhere, may have filled them.
+  // A layer that could not be carried out, or that is of a shard elsewhere, may have filled them.
   for (const bool missing : {false, true}) {
     replay::VatLevels unsure(machine);
     for (std::uint32_t layer = 0; layer < 10; ++layer) {

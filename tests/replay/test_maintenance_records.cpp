@@ -176,7 +176,7 @@ TEST_P(MaintenanceRecords, VatsAreFilledUnderTheCapAndTheBaseIsReported) {
   EXPECT_LT(alone->seconds(), spread + 2.5 + 20);
 }
 
-// The timer sees sweeps and records alone, and tells what a replay of the whole program finds.
+// The timer sees sweeps and records alone, and reports what a replay of the whole program finds.
 TEST_P(MaintenanceRecords, AreTimedWithoutVectors) {
   for (const double limit : {0.0, 12.0}) {
     const MaintenanceBench bench(GetParam(), [&](Machine& m) {
@@ -253,7 +253,7 @@ TEST_P(MaintenanceRecords, VatsAreEmptiedByTheHost) {
 
 INSTANTIATE_TEST_SUITE_P(Dialects, MaintenanceRecords, testing::Values("xaar128-raw", "jet1000"));
 
-// Whatever the limit, no sweep ends later, by the clock of the replay; and as few shots as that takes.
+// For any limit, no sweep ends later, by the clock of the replay; and as few shots as that takes.
 TEST(Maintenance, ClocksAreKeptWhereSweepsAreNoEvenMovement) {
   const struct {
     const char* machine;
@@ -289,7 +289,7 @@ TEST(Maintenance, ClocksAreKeptWhereSweepsAreNoEvenMovement) {
   }
 }
 
-/// Ticks of sprays, by carriage and nozzle, of which none may fall on the bed.
+/// Ticks of sprays, by carriage and nozzle, that must not fall on the bed.
 std::map<long, std::map<int, int>> sprays_of(const std::string& text) {
   brundlefab_port::Printhead head(9, 12345);
   brundlefab_port::Board(head).run(text);

@@ -1,4 +1,4 @@
-// The order of head, roller, vats and lamp, what is loaded before a travel, and what programs count: each is told by name.
+// The order of head, roller, vats and lamp, what is loaded before a travel, and what programs count: each is reported by name.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -156,7 +156,7 @@ TEST(Order, SpeedsAreThoseOfTheProfile) {
   expect_in(Reordered(bench).replace(fmt::format(" F{:.0f}", scan), fmt::format(" F{:.0f}", scan / 2)).reported(), "scans at");
 }
 
-// What the controller keeps from another print has to be told before the first line, and at its rest alone it forgets a sweep.
+// State that the controller keeps from another print must be set before the first line, and at its rest alone it forgets a sweep.
 TEST(Order, OfLinesForTheHp45IsHeld) {
   const TamperBench bench("hp45", [](Machine& m) {
     printed_parts::all_maintenance_of(m);

@@ -1,4 +1,4 @@
-// What a layer's program does with the powder, beside its drops: edited programs of the dialects that move axes by G-code.
+// What a layer's program does with the powder, in addition to its drops: edited programs of the dialects that move axes by G-code.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -183,7 +183,7 @@ TEST(PowderCycle, FeedingToAHeightAndALayerThatEndsRelativeAreFound) {
   }
 }
 
-// SerialGRBL.py, NewLayer: 0.25 mm below the top of a layer from 0.7 to 0.8 mm, and 0.25 mm beside 1.1 layers fed.
+// SerialGRBL.py, NewLayer: 0.25 mm below the top of a layer from 0.7 to 0.8 mm, and 0.25 mm in addition to 1.1 layers fed.
 TEST(PowderCycle, WherePistonsAreWhilePowderIsSpreadIsHeld) {
   const CycleBench bench("oasis");
   ASSERT_EQ(bench.fault(bench.program.text), "");

@@ -58,7 +58,7 @@ TEST(Replay, PrintsTheImageBitForBitOnEveryShippedProfile) {
   }
 }
 
-/// A closed part as large as asked across its larger side, standing in the middle of a bed; nothing if it is not closed.
+/// A closed part of the requested size across its larger side, standing in the middle of a bed; nothing if it is not closed.
 struct AxisPositions {
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
@@ -230,7 +230,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     if (number < program::dialects().size()) {
       EXPECT_NE(printed.error().message.find("layer 7, swath 1, step 40: "), std::string::npos) << printed.error().message;
     }
-    // Any byte of the vectors changed: never a crash, hardly ever unnoticed, and the place told.
+    // Any byte of the vectors changed: never a crash, hardly ever unnoticed, and the position is reported.
     std::size_t unnoticed = 0, tried = 0;
     const std::size_t stride = 13 + program.text.size() / 500;
     for (std::size_t at = program.text.size() / 4; at < program.text.size() * 3 / 4; at += stride, ++tried) {

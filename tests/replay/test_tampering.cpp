@@ -1,4 +1,4 @@
-// What verify tells of programs in which something is missing or says another number: all, but for what the machine takes
+// What verify reports about programs in which something is missing or says another number: all, but for what the machine takes
 // without harm, which is named with the reason.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST(Tampering, WhatIsLeftOutIsReported) {
   }
 }
 
-/// The lines that come if one number of a line is greater by 1, but for that of a command and a speed; times tell speeds.
+/// The lines that come if one number of a line is greater by 1, but for that of a command and a speed; times show speeds.
 std::vector<std::string> greater_by_one(const std::string& line) {
   std::vector<std::string> changed;
   for (std::size_t at = line.find(' '); at != std::string::npos; at = line.find(' ', at + 1)) {

@@ -24,7 +24,7 @@ struct GcodeLayer {
 struct GcodeFile {
   std::string error;
   std::vector<GcodeLayer> layers;
-  std::vector<GcodeBead> skirt;  // beside the parts; in no layer
+  std::vector<GcodeBead> skirt;  // next to the parts; in no layer
   double drawn_back = 0, widest_retraction = 0;
   double lo_x = 1e9, lo_y = 1e9, hi_x = -1e9, hi_y = -1e9, hi_z = 0;  // of all moves within layers
   std::uint64_t lines = 0;

@@ -1,4 +1,4 @@
-// tests/segment/test_design.cpp: fillings from wishes: the model of slots, the limits, the search.
+// tests/segment/test_design.cpp: fillings from targets: the model of slots, the limits, the search.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ PoreTarget porous(double porosity, double darcy) {
   return target;
 }
 
-/// The pores of a found design, and that the machine can lay it without a warning.
+/// The pores of a found design, and that the machine can deposit it without a warning.
 void expect_sound(const Design& design) {
   EXPECT_TRUE(check(design.plan, 0.4).ok());
   for (const Warning& warning : warnings(design.plan, anet_a8_calibration())) ADD_FAILURE() << warning.text;
@@ -34,7 +34,7 @@ void expect_sound(const Design& design) {
   EXPECT_GE(design.pores.width_mm, 0.0299);
   EXPECT_GE(design.pores.length_mm, 0.299);
   EXPECT_LE(design.plan.thin_mm, 4.45 / 2 + 1e-3);
-  // A thin stretch begins and ends at the speed of the thick one; the machine comes near to what it is told.
+  // A thin segment begins and ends at the speed of the thick one; the machine comes near to its commands.
   const double slow = 15 * design.plan.thick_speed / 100, reported = 15 * design.plan.thin_speed / 100;
   EXPECT_GE(std::sqrt(slow * slow + 400 * design.plan.thin_mm), 0.76 * reported);
   EXPECT_LE(design.plan.continuous, DesignLimits::kMaxContinuous);
@@ -72,7 +72,7 @@ TEST(SlotModel, CuspsAreVoidThatLeadsNowhere) {
   plan.thick_width_mm = plan.thin_width_mm = plan.continuous_width_mm = 0.4;
   plan.spacing_sc_mm = 0.4;
   const Slots slots = slots_of(plan, 0.3);
-  const double corners = 0.3 * 0.3 * (1 - std::acos(-1) / 4);  // beside two half circles, of each bead
+  const double corners = 0.3 * 0.3 * (1 - std::acos(-1) / 4);  // next to two half circles, of each bead
   EXPECT_NEAR(slots.porosity, corners / (0.4 * 0.3), 2e-3);
   EXPECT_LT(slots.permeability_m2, 1e-14);
 }

@@ -1,4 +1,4 @@
-// tests/segment/test_gradient.cpp: regions of a wish that changes over the height.
+// tests/segment/test_gradient.cpp: regions of a target that changes over the height.
 #include <gtest/gtest.h>
 
 #include <cmath>

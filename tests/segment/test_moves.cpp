@@ -109,7 +109,7 @@ TEST(Moves, AreAllThatIsDepositedWithTheSpeedAndAreaOfTheirKind) {
   }
   EXPECT_NEAR(sums.porosity.extruded_mm3, fed, 1e-9);
 
-  // A first layer is laid no faster than its limit, and a sink that stops is given nothing more.
+  // A first layer is deposited no faster than its limit, and a sink that stops is given nothing more.
   MoveTable first(plan, cut, machine, {0, 0, 300'000});
   std::size_t deposited = 0;
   EXPECT_FALSE(for_each_move(all, cut, first, sums, [&](const BeadMove& move) -> std::optional<DepositedMove> {
@@ -122,7 +122,7 @@ TEST(Moves, AreAllThatIsDepositedWithTheSpeedAndAreaOfTheirKind) {
   EXPECT_EQ(deposited, 3u);
 }
 
-/// What is laid of 1 mm of wall of 0.4 x 0.3 mm, and how wide it is told to be.
+/// The deposit of 1 mm of wall of 0.4 x 0.3 mm, and its stated width.
 MoveTable::MoveEntry wall_of(const Extruder& machine) {
   const Segmentation plan;
   const LayerCut cut;
@@ -140,7 +140,7 @@ TEST(Moves, OneVolumeIsTheProfilesAreaTimesItsFlowAndTheWidthsAreThoseOfThatVolu
   machine.material.flow = 0.85;
   EXPECT_NEAR(wall_of(machine).area, 0.102, 1e-12);
   EXPECT_EQ(wall_of(machine).width, 404'381);  // 0.102 / 0.3 + 0.3 (1 - pi / 4), where two walls measured 0.80
-  machine.material.feed_ratio = 1.1;           // of the machine: it changes E, not what is laid
+  machine.material.feed_ratio = 1.1;           // of the machine: it changes E, not the deposit
   EXPECT_NEAR(wall_of(machine).area, 0.102, 1e-12);
   EXPECT_NEAR(machine.material.mm3_of_e(), 1.1 * std::numbers::pi / 4 * 1.75 * 1.75, 1e-12);
   machine.material.bead_area = BeadShape::kEllipse;

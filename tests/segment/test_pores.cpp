@@ -1,4 +1,4 @@
-// Pores of laid toolpaths: which close, how long and wide they are, which cross those of the next layer.
+// Pores of deposited toolpaths: which close, how long and wide they are, which cross those of the next layer.
 #include <gtest/gtest.h>
 
 #include <cmath>

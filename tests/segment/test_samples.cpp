@@ -82,7 +82,7 @@ TEST(Gases, OneSampleByHand) {
   ASSERT_TRUE(fit.ok());
   EXPECT_NEAR(fit->k1_m2, 1.8e-5 / 858000, 1e-19);
   EXPECT_NEAR(fit->k2_m, 1.2 / 242000, 1e-14);
-  // Of a flow told at 2 bar the velocities are half of those at 1 bar, where they would be told for the same gas.
+  // A flow stated at 2 bar has half the velocities of one at 1 bar, if stated for the same gas.
   const auto meter = expanded(points, 0.02, {1e5, 2e5});
   EXPECT_NEAR((*meter)[1].gradient_pa_m, 1.342e6, 1e-6);
   const auto refused = expanded(std::vector<FlowPoint>{{1, -1.1e5 / 0.02}}, 0.02, {1e5, 1e5});

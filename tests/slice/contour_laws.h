@@ -57,7 +57,7 @@ inline void expect_ordered(const ContoursView& contours, const std::string& wher
 }
 
 /// Every contour has an area, and lies inside an even number of others if it is an outer one, else inside an odd
-/// number; whatever is just inside an outer contour has winding number 1, just inside a hole 0.
+/// number; a point just inside an outer contour has winding number 1, just inside a hole 0.
 inline void expect_clean(const ContoursView& contours, const std::string& where) {
   expect_ordered(contours, where);
   for (std::uint32_t c = 0; c < contours.size(); ++c) {

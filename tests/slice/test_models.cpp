@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A contour lies within 0.71 nm of the true cut and a union rounds its corners once more: a pixel's centre nearer than
-/// this to a contour may be told apart.
+/// this to a contour may be classified differently.
 constexpr double kNearNm = 1.5;
 
 struct Checked {

@@ -1,4 +1,4 @@
-// tests/slice/test_simplify.cpp: contours with points left out beside the full ones, in whole numbers.
+// tests/slice/test_simplify.cpp: contours with points left out compared with the full ones, in whole numbers.
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
@@ -177,7 +177,7 @@ TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
     Contours less = full;
     SimplifyScratch scratch;
     simplify(less, 10'000, scratch);
-    // 8 x 18 looks a point, then stretches of at most 7/8: 89 levels. All teeth looked at for each are 25,000 a point.
+    // 8 x 18 tests per point, then intervals of at most 7/8: 89 levels. Testing all teeth for each takes 25,000 a point.
     EXPECT_LT(scratch.inspections, 400 * full.point.size());
     EXPECT_EQ(less.point.size(), static_cast<std::size_t>(2 * teeth + 1));
     Measured measured;

@@ -113,7 +113,7 @@ TEST(Slice, UnionFollowsTheFillRule) {
 }
 
 TEST(Slice, WhatIsInContactIsMergedWhereverItLies) {
-  // Crossing boxes within a solid, within a hole of it, and within an island in that hole; whole ones beside them.
+  // Crossing boxes within a solid, within a hole of it, and within an island in that hole; whole ones next to them.
   const Triangles crossing = joined({box({0, 0, 0}, {100, 100, 1000}), box({50, 50, 0}, {150, 150, 1000})});
   const Triangles holes = reversed(moved(crossing, {1300, 300, 0}));
   const Triangles all =

@@ -157,7 +157,7 @@ TEST(CanonicalBox, PositionsAreFoundBothDirections) {
   EXPECT_EQ(detected.size(), box.view().voxels());
 }
 
-/// Inertia tells upstream from downstream: the end that the flow comes from stays.
+/// Inertia distinguishes upstream from downstream: the end that the flow comes from stays.
 TEST(CanonicalBox, WhatInertiaBendsIsNotReversed) {
   const Lying lying{odd_blobs(12, 12, 12, 9), {true, true, true}, {1000, 1000, 1000}};
   std::set<bool> reversed;

@@ -27,7 +27,7 @@ stokes::Grid grid_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const
   return *stokes::make_grid(box, 4);
 }
 
-/// A wedge, which looks another way upstream than downstream, and a block aside of it.
+/// A wedge, which has another shape upstream than downstream, and a block to one side of it.
 stokes::Grid lopsided() {
   return grid_of(24, 20, 1, [](double x, double y, double) {
     return (x > 4 && x < 14 && std::abs(y - 11) < 0.5 * (x - 4)) || (x < 3 && y < 4);
@@ -160,9 +160,9 @@ TEST(Inertia, WhatTheForceDoesIsDissipated) {
   EXPECT_NEAR(dissipated / static_cast<double>(grid.cells.voxels()) / flow.permeability[0], 1, 1e-4);
 }
 
-/// The mean velocity lacks a term of first order in inertia, whatever the pores look like; that of second order follows from
+/// The mean velocity lacks a term of first order in inertia, for any shape of pores; that of second order follows from
 /// two creeping flows, by reciprocity (C. C. Mei, J.-L. Auriault, "The effect of weak inertia on flow through a porous medium",
-/// J. Fluid Mech. 222 (1991), section 3). So does it for flow the other way; only terms of higher order tell the ways apart.
+/// J. Fluid Mech. 222 (1991), section 3). So does it for flow the other way; only terms of higher order differ by direction.
 TEST(Inertia, WeakInertiaGoesWithTheCubeOfVelocity) {
   const stokes::Grid grid = lopsided();
   const Field u0 = creeping(grid, nullptr), force1 = convected(grid, u0, u0, -1), u1 = creeping(grid, &force1);

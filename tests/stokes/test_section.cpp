@@ -92,7 +92,7 @@ TEST(Section, TheFastestPositionIsInBothPlanesAndSpeedIsNoLessThanVelocity) {
   }
 }
 
-/// Poiseuille: 1.5 times the mean of the slit, 16 of 20 voxels wide. The nearest velocities lie half a voxel beside its middle,
+/// Poiseuille: 1.5 times the mean of the slit, 16 of 20 voxels wide. The nearest velocities lie half a voxel off its middle,
 /// where it is 1 / 16^2 slower; the scheme is of second order.
 TEST(Section, TheMiddleOfASlitIsHalfAsFastAgainAsItsMean) {
   const VoxelStack solid =

@@ -1,4 +1,4 @@
-// tests/stokes/test_turned_plans.cpp: a plan that is laid at 30 degrees has the permeability of the one at 0 degrees, turned.
+// tests/stokes/test_turned_plans.cpp: a plan at 30 degrees has the permeability of the one at 0 degrees, turned.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -27,7 +27,7 @@ class Job:
     over: bool = False         # an older job of another kind stands there at first
     counts_layers: bool = False  # its --json names the layers that a second run keeps
     ends: int = 0              # exit code of a whole run
-    when_done: int = None      # exit code of going on with what is finished, if it is another one
+    when_done: int = None      # exit code of resuming finished work, if it is another one
     cut_short: list = dataclasses.field(default_factory=list)  # commands of `before` that are killed too
 
 
@@ -228,7 +228,7 @@ def fresh(folder):
 class Reference:
     files: dict        # of the uninterrupted run
     seconds: float
-    in_flight: int     # layers at once at most, 0 where the command does not tell
+    in_flight: int     # layers at once at most, 0 where the command does not report it
 
 
 def reference(program, job, folder):

@@ -27,7 +27,7 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::uint64_t kMinBatchBytes = 48ull << 20;  // the layers of one job, and what it holds beside them
+constexpr std::uint64_t kMinBatchBytes = 48ull << 20;  // the layers of one job, and its other memory
 
 CommandSpec batch_spec() {
   CommandSpec spec;

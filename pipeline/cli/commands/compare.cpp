@@ -1,4 +1,4 @@
-// lamina compare: a photograph of a printed layer beside the layer.
+// lamina compare: compares a photograph of a printed layer with the layer.
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"

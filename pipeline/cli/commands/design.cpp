@@ -1,4 +1,4 @@
-// lamina design: the job of segmented lines whose pores, porosity or permeability are as wished.
+// lamina design: computes the job of segmented lines for target pores, porosity or permeability.
 #include <fmt/format.h>
 
 #include <functional>
@@ -54,7 +54,7 @@ CommandSpec design_spec() {
   return spec;
 }
 
-/// A wish at the bottom and at the top; the same where it has no gradient.
+/// A target at the bottom and at the top; the same where it has no gradient.
 struct TargetEnds {
   segment::PoreTarget bottom, top;
   bool gradient = false;
@@ -86,7 +86,7 @@ std::string read_pore(std::string_view text, segment::PoreTarget& target) {
   return {};
 }
 
-/// A number, times what it is told in.
+/// A number, multiplied by the unit in which it is given.
 auto number_reader(const Limits& limits, double unit, std::optional<double> segment::PoreTarget::*member) {
   return [limits, unit, member](std::string_view text, segment::PoreTarget& target) {
     double value = 0;
@@ -155,7 +155,7 @@ Result<DesignRequest> read_request(const Arguments& arguments) {
   return request;
 }
 
-/// Tells what was found and writes it, if it is met or the nearest will do. missed  of the error else
+/// Reports the result and writes it, if it meets the target or the nearest is accepted. missed  of the error otherwise
 template <class Found>
 Outcome give_found(const Found& found, const std::string& missed, const Arguments& arguments, Context& context) {
   const std::string output = arguments.text("-o,--output");

@@ -55,7 +55,7 @@ Status report(const std::string& path, const std::string& text, Context& context
   return path.empty() ? context.print(text) : write_file(path, text, {.stream = true});
 }
 
-/// The job as asked, and with what the command sets by itself.
+/// The job as requested, and with the values that the command sets by itself.
 struct HeightsJob {
   Job requested, studied;
 };

@@ -181,14 +181,14 @@ Status refuse(const Arguments& arguments, std::span<const std::string_view> flag
   return {};
 }
 
-/// What can be told of one file or folder. part  as predict_print() takes it
+/// What can be reported about one file or folder. part  as predict_print() takes it
 Outcome analyse_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   if (arguments.operands.size() != 1)
     return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
   const std::string& operand = arguments.operands.front();
   std::error_code ignored;
   const std::filesystem::path path = operand;
-  if (!path.has_extension() && !std::filesystem::exists(path, ignored))  // a table's name has one; its reader tells
+  if (!path.has_extension() && !std::filesystem::exists(path, ignored))  // a table's name has one; its reader reports the error
     return Error{Fault::kInput, fmt::format("{}: no such file or folder", one_line(operand))};
   const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && names_toolpaths(operand);
   Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")

@@ -209,7 +209,7 @@ const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted
 
 const OptionSpec kSliceWords[] = {{"--tolerance", "", "", "0", ""}};
 
-/// A slice job saves its job file beside its manifest.
+/// A slice job saves its job file next to its manifest.
 Status complete_slice(const Arguments& arguments, Job& job) {
   if (arguments.text("--fill") == "segmented")
     return at_option("--fill", "segmented lines are of lamina extrude and lamina jet");
@@ -305,7 +305,7 @@ Status complete_extrude(const Arguments&, Job& job) {
 /// Extension of the output file named by a batch.
 std::string extrude_ending(const Arguments& arguments) {
   Job job;
-  if (arguments.has("--job")) static_cast<void>(read_job(arguments.text("--job"), job));  // the command tells what is wrong
+  if (arguments.has("--job")) static_cast<void>(read_job(arguments.text("--job"), job));  // the command reports errors
   if (arguments.has("--machine")) job.machine.profile = arguments.text("--machine");
   const auto profile = resolve_extruder(job);
   return profile && profile->machine.format == "sml" ? ".sml" : ".gcode";

@@ -44,7 +44,7 @@ void wrap(std::string_view words, std::size_t indent, std::size_t columns, std::
   text += '\n';
 }
 
-/// A term, and its meaning beside it or, where the term is too long, below it.
+/// A term, and its meaning next to it or, where the term is too long, below it.
 void add_entry(const std::string& term, const std::string& meaning, std::size_t columns, std::string& text) {
   const std::size_t indent = columns < 2 * kMeaningColumn ? 6 : kMeaningColumn;
   text += "  " + term;

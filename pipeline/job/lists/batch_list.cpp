@@ -29,7 +29,7 @@ std::string name_of(const fs::path& path) {
   return text;
 }
 
-/// The command that a saved job names in its leading comments, "jet" if none does. Reading the job tells what is wrong with it.
+/// The command that a saved job names in its leading comments, "jet" if none does. Reading the job reports its errors.
 std::string command_of(const fs::path& path) {
   auto file = FileReader::open(path.string(), {.fault = Fault::kUsage, .max_bytes = kMaxTomlBytes, .longest_line = 1 << 16});
   if (!file) return "jet";

@@ -60,7 +60,7 @@ class Profiles {
   Status replace_all(TomlValue& presets) {
     const auto text = flat_text(presets);
     std::vector<std::string> names;
-    if (!text || !read_presets(*text, names).empty()) return {};  // the reader of the key tells it
+    if (!text || !read_presets(*text, names).empty()) return {};  // the reader of the key reports the error
     TomlValue list{TomlValue::Kind::kList, {}, {}, {}, presets.position};
     for (std::size_t i = 0; i < names.size(); ++i) {
       const TextPosition position = names.size() == presets.value.size() ? presets.value[i].position : presets.position;

@@ -21,7 +21,7 @@ Result<Machine> read_machine(const ProfileFiles& files, std::span<const std::str
 /// The text with every key of a profile: equal machines have equal texts, and reading it restores the machine.
 std::string machine_text(const Machine& machine);
 
-/// The text that a job writes beside its programs: without the keys of optional equipment at their defaults.
+/// The text that a job writes next to its programs: without the keys of optional equipment at their defaults.
 std::string kept_machine_text(const Machine& machine);
 
 /// The words of powder.vat_rule. returns "" or an error message

@@ -164,7 +164,7 @@ TEST(ChartLayout, VerniersShowWholePixels) {
     const auto machine = machine_of_chart(std::string(name));
     const auto deposited = calibration::layout_chart(machine.machine, machine.grid);
     ASSERT_TRUE(deposited);
-    // Beside the dashes, which say where swaths begin.
+    // In addition to the dashes, which mark the starts of swaths.
     Chart dashes = *deposited;
     dashes.marks.clear(), dashes.bars.clear(), dashes.wedges.clear(), dashes.stitches.clear(), dashes.verniers.clear();
     const auto alone = fired(machine.grid, calibration::draw(dashes));
@@ -206,8 +206,8 @@ TEST(ChartMeasured, WedgesAreTakenForSaturations) {
   EXPECT_NEAR(pipeline::saturation_of(25, *deposited, machine.machine), 3.325, 0.003);
 }
 
-/// A reading with two rows: odd nozzles land 10 um too far, so that their row stands less far behind by as much. One is seen
-/// too faintly to tell where along the scan: its share of the row's mean, 0.5 um, follows from its error.
+/// A reading with two rows: odd nozzles land 10 um too far, so that their row is less far behind by as much. One is printed
+/// too faintly to locate along the scan: its share of the row's mean, 0.5 um, follows from its error.
 TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   Machine machine;
   machine.head.nozzles = 6;

@@ -1,5 +1,5 @@
 // tests/calibration/scan/synthetic.h: photographs of printed sheets, made up. Nothing here knows OpenCV, or what
-// stages/calibration/scan looks for.
+// stages/calibration/scan searches for.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// tests/calibration/scan/test_compare.cpp: layers beside made-up photographs. LAMINA_LAYERS=1000 measures the figures of
+// tests/calibration/scan/test_compare.cpp: layers compared with synthetic images. LAMINA_LAYERS=1000 measures the figures of
 // docs/compare.md.
 #include <gtest/gtest.h>
 

@@ -116,7 +116,7 @@ Result<calibration::ChartReading> read_trial(const PrintedChart& printed, const 
   return calibration::read_chart_photo(photo_in_memory(picture), printed.chart);
 }
 
-/// A straight line through the nozzles' offsets cannot be told from the scale of the picture: docs/calibrate.md has the one
+/// A straight line through the nozzles' offsets cannot be distinguished from the scale of the picture: docs/calibrate.md has the one
 /// that is taken off, and along which swaths count: of the slopes of all pairs of nozzles, and of what they leave, the medians.
 struct HeadLine {
   double middle = 0, slope = 0;
@@ -141,7 +141,7 @@ HeadLine line_through(const Printing& printing, std::size_t axis) {
   return {middle_of_all(rest), slope};
 }
 
-/// How often an error is larger than what is told to hold 99 in 100.
+/// How often an error is larger than its reported 99 % bound.
 struct Beyond {
   std::size_t all = 0, beyond = 0;
   void add(double off_um, double within_um) {
@@ -155,7 +155,7 @@ struct Beyond {
 
 struct Errors {
   std::vector<double> nozzle, swath, gain_um;  // pixels of the layer
-  Beyond nozzles, swaths, rows;                // also of those that are not told
+  Beyond nozzles, swaths, rows;                // also of unreported ones
   std::vector<double> row_um, ragged_um;       // of rows, and of gains where rows lie apart
   std::size_t blocked = 0, found = 0, accused = 0, unread = 0;
   std::size_t nozzles_unreadable = 0, swaths_unreadable = 0;
@@ -320,8 +320,8 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   EXPECT_LE(share_of(errors.ragged_um, 1), 30);
 }
 
-/// Little noise: what is wrong by more than a tenth of a micrometre or two is the reading's own. Dashes that are looked for
-/// where they were seen before, sample by sample, stay there: 1.5 um.
+/// Little noise: what is wrong by more than a tenth of a micrometre or two is the reading's own. Dashes that are searched for
+/// where they were detected before, sample by sample, stay there: 1.5 um.
 TEST(ScannedChart, NozzlesAreNotHeldWhereTheyWereDetectedBefore) {
   const PrintedChart printed = chart_of(false);
   for (const int i : {24, 34}) {

@@ -33,7 +33,7 @@ Machine head_of(std::uint32_t nozzles, double dpi, std::vector<double> row_offse
   return machine;
 }
 
-/// Rows, blocked nozzles and single offsets, on sheets seen sharp and blurred, sampled in other ways, as JPEG.
+/// Rows, blocked nozzles and single offsets, on sharp and blurred images of sheets, with other sampling, as JPEG.
 TEST(WarpedPhotograph, ReportsWhatAChartWasPrintedWith) {
   const Directory directory;
   const std::vector<double> row_um{0, 45, -30, 12};
@@ -46,7 +46,7 @@ TEST(WarpedPhotograph, ReportsWhatAChartWasPrintedWith) {
   ASSERT_TRUE(deposited->scan_along_x);
   std::vector<std::optional<std::uint32_t>> nozzle_of_row(deposited->rows);
   for (const ChartDash& dash : deposited->dashes) nozzle_of_row[dash.box.top] = dash.nozzle;
-  // Beside its row, each seventh nozzle strays across.
+  // Each seventh nozzle strays across, in addition to its row.
   const auto across_um = [](std::uint32_t n) { return n % 7 == 3 ? 24.0 : 0.0; };
   const InkedSheet sheet = inked_sheet(calibration::draw(*deposited), deposited->pixel_x_nm * 1e-6,
                                        deposited->pixel_y_nm * 1e-6, [&](std::uint32_t row) -> std::optional<cv::Point2d> {
@@ -91,7 +91,7 @@ TEST(WarpedPhotograph, ReportsWhatAChartWasPrintedWith) {
   }
 }
 
-/// A blot that was planted is told by place and area; a scratch narrower than half a millimetre is not.
+/// A planted blot is reported with position and area; a scratch narrower than half a millimetre is not.
 TEST(WarpedPhotograph, ReportsInkThatTheLayerDoesNotHave) {
   const Directory directory;
   const double pitch_mm = 0.1, x_mm = 47, y_mm = 33, radius_mm = 1.2;

@@ -1,4 +1,4 @@
-// tests/commands/batch/test_batch.cpp: many jobs in one queue: every one ends as it would alone, whatever the others do.
+// tests/commands/batch/test_batch.cpp: many jobs in one queue: each ends as it would alone, regardless of the others.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -234,7 +234,7 @@ TEST_F(JobsInBatch, TimeLimitStopsOneJobAndFailFastAll) {
              "jet part10.stl --bed 400x400 --dpi 1200 --layer 0.00001 --format png -o long\n"
              "jet part11.stl --bed 60x60 --dpi 100 -o b\n");
   const Outcome outcome = lamina({"batch", "list.txt", "-o", "out", "--jobs", "1", "--time-limit", "2"});
-  EXPECT_EQ(outcome.code, 3);  // of a job that failed: nobody interrupted the batch
+  EXPECT_EQ(outcome.code, 3);  // of a job that failed: the batch was not interrupted
   EXPECT_EQ(outcomes("out"), (Words{"done", "time limit", "done"}));
   EXPECT_EQ(summary("out")["jobs"][1]["reason"], "took longer than its time limit of 2 s");
   EXPECT_EQ(summary("out")["jobs"][1]["code"], 3);

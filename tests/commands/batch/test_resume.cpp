@@ -1,4 +1,4 @@
-// tests/commands/batch/test_resume.cpp: a batch that is killed, interrupted, out of disk, or beside other work goes on where
+// tests/commands/batch/test_resume.cpp: a batch that is killed, interrupted, out of disk, or concurrent with other work resumes where
 // it was, to the same bytes.
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST_F(JobsInBatch, KilledFiveTimesItIsResumedToTheSameBytesAndNothingIsDoneTwic
   ASSERT_EQ(lamina(batch("whole", {})).code, 0);
   const double all = static_cast<double>(layers_in("whole"));
 
-  // Each kill comes once so many layers are there, at whatever the batch happens to do then: the last one long before it
+  // Each kill comes once so many layers are there, at any step of the batch: the last one long before it
   // could end.
   std::mt19937 random(20261);
   std::uniform_real_distribution<> within(0.1, 0.9);
@@ -189,7 +189,7 @@ TEST_F(JobsInBatch, WithoutItsRecordABatchRecognizesWhatIsDoneAndLeavesOtherJobs
   EXPECT_NE(json["jobs"][3]["reason"].get<std::string>().find("out/d/manifest.json: belongs to another job"), std::string::npos)
       << outcome.err;
   EXPECT_EQ(tree_text(directory_ / "out/d"), others);
-  // Asking twice does not make it the batch's own.
+  // A second request does not make it the batch's own.
   const std::string slices = tree_text(directory_ / "out/e");
   EXPECT_EQ(lamina({"batch", "other.txt", "-o", "out", "--resume"}).code, 2);
   EXPECT_EQ(outcomes("out"), (Words{"kept", "kept", "kept", "failed", "kept", "kept", "kept"}));

@@ -1,4 +1,4 @@
-// Tables of pressure drops as people write them, down to what is told of them.
+// Tables of pressure drops as people write them, down to the report about them.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a manifest says of pixels to be filled and of drops asked for is worked out again by lamina verify: jobs as they are
+// What a manifest says of pixels to be filled and of requested drops is worked out again by lamina verify: jobs as they are
 // written hold, and numbers that were changed are found.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -91,7 +91,7 @@ TEST_F(DosesOnRecord, WhereEachPixelGetsADropBothNumbersAreExact) {
   }
 }
 
-// 5 % are 0.38 drops a pixel: which pixels have none the images do not tell.
+// 5 % are 0.38 drops a pixel: the images do not show which pixels have none.
 TEST_F(DosesOnRecord, WhereFewerFallTheyAreBounded) {
   Job job = prism("sparse");
   job.dose.saturation_percent = 5;
@@ -119,7 +119,7 @@ TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirTargets) {
   expect_found(with(job, {{"dosed_pixels", dosed + 1}}), "each pixel gets a drop");
 }
 
-// Ranges of heights, a part with a wish of its own, whole drops, grown and mirrored images: what is written holds.
+// Ranges of heights, a part with its own target, whole drops, grown and mirrored images: what is written is valid.
 TEST_F(DosesOnRecord, OrdinaryJobsHold) {
   Job job = prism("ranges");
   job.dose.saturation_percent = 70;

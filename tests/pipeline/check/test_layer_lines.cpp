@@ -129,7 +129,7 @@ TEST_F(LayerLines, ThicknessesThatTheJobDoesNotHaveAreFound) {
   }
 }
 
-// Which of the job's thicknesses a layer has, programs tell, and images of a job with a title.
+// The layer thickness that programs state, and images of a job with a title.
 TEST_F(LayerLines, ThicknessesOfOtherLayersAreFoundByWhatDistinguishesThem) {
   const std::string part = "jet " + corpus_file("dental_crown.stl") + " --heights optimal --thickness 0.2,0.3,0.4 --format ";
   for (const char* machine : {"nuferbj", "hp45", "oasis", "reprap-inkjet", "brundlefab", "xaar128-raw", "jet1000"}) {

@@ -1,4 +1,4 @@
-// The completion of the shells: bash is asked, as a person would at a prompt; zsh and fish check the script if they are there.
+// The completion of the shells: bash completes as at a prompt; zsh and fish check the script if they are installed.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What people and scripts are told.
+// Messages for users and scripts.
 #include <gtest/gtest.h>
 
 #include <algorithm>

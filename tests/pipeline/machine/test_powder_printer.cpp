@@ -1,4 +1,4 @@
-// What a job asks for, and what follows from it and from its machine.
+// What a job requests, and what follows from it and from its machine.
 #include "pipeline/machine/profiles.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What another run does to a directory while this one loads its parts is seen before anything is written.
+// What another run does to a directory while this one loads its parts is detected before anything is written.
 #include <gtest/gtest.h>
 
 #include <filesystem>

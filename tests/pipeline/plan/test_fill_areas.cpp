@@ -180,7 +180,7 @@ TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
   };
   const char* patterns[] = {"raster", "contour", "contour+raster", "honeycomb", "quatrefoil"};
   for (int turn = 0; turn < 60; ++turn) {
-    // A star-shaped prism of random corners and a random one beside it, turned any way by its corners.
+    // A star-shaped prism of random corners and a random one next to it, turned any way by its corners.
     const auto corners = static_cast<int>(between(3, turn % 3 == 0 ? 400 : 30));
     std::vector<std::array<double, 2>> outline;
     const double minimum = between(0.05, 1);

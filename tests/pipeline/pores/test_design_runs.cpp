@@ -1,4 +1,4 @@
-// tests/pipeline/pores/test_design_runs.cpp: a wish becomes a job whose forward run meets it.
+// tests/pipeline/pores/test_design_runs.cpp: a target becomes a job whose forward run meets it.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// tests/pipeline/pores/test_gradient_runs.cpp: a wish with two ends becomes a job of regions, each checked in the one file.
+// tests/pipeline/pores/test_gradient_runs.cpp: a target with two ends becomes a job of regions, each checked in the one file.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// tests/pipeline/pores/test_image_stack.cpp: folders of images as pores, and scans beside their plans.
+// tests/pipeline/pores/test_image_stack.cpp: folders of images as pores, and scans compared with their plans.
 #include <gtest/gtest.h>
 #include <png.h>
 
@@ -162,7 +162,7 @@ TEST_F(ImageStack, IsPicturedAlongTheAxisThatLetsThrough) {
   EXPECT_NE(test::read_text(folder / "pores.svg").find("s: no void leads through"), std::string::npos);
 }
 
-/// Some other program's manifest.json says nothing of the images beside it.
+/// Another program's manifest.json says nothing about the images next to it.
 TEST_F(ImageStack, NextToAnUnrelatedManifestIsAStackOfImages) {
   fs::create_directory(folder / "web");
   for (int z = 1; z <= 6; ++z)
@@ -176,7 +176,7 @@ TEST_F(ImageStack, NextToAnUnrelatedManifestIsAStackOfImages) {
   EXPECT_EQ(run("web --no-flow").code, 3) << "one of lamina that is cut off";
 }
 
-/// What the manifest tells no option contradicts.
+/// No option contradicts what the manifest states.
 TEST_F(ImageStack, OfAJobRefusesWhatItsManifestStates) {
   test::write_box(folder / "part.stl", {0, 0, 0}, {6, 4, 3});
   ASSERT_EQ(
@@ -191,7 +191,7 @@ TEST_F(ImageStack, OfAJobRefusesWhatItsManifestStates) {
   }
 }
 
-/// A refusal of the flow comes after the window is cut: nothing is left of what was asked for, and what was there stays.
+/// A refusal of the flow comes after the window is cut: no requested output remains, and earlier files stay.
 TEST_F(ImageStack, RefusedLeavesNoFileOfTheWindow) {
   fs::create_directory(folder / "s");
   for (int z = 1; z <= 32; ++z)
@@ -210,7 +210,7 @@ TEST_F(ImageStack, RefusedLeavesNoFileOfTheWindow) {
   EXPECT_TRUE(test::read_text(folder / "a.nrrd") == before) << "the picture cannot be written, and so nothing is";
 }
 
-/// Lines that cross, as test_predicted_flow.cpp lays them.
+/// Lines that cross, as in test_predicted_flow.cpp.
 void write_lines(const std::string& path) {
   std::ofstream file(path);
   file << "G21\nG90\nM83\n";

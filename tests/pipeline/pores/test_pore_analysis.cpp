@@ -58,7 +58,7 @@ TEST(PoreAnalysis, GroupsOfTouchingBeadsByHand) {
   EXPECT_GT(json["tortuosity"][2]["tortuosity"].get<double>(), 1);
   EXPECT_EQ(json["tortuosity"][0]["throat_mm"].get<double>(), 0);
   EXPECT_NEAR(json["tortuosity"][2]["throat_mm"], kPore, 0.011);
-  // Gaps go on: no section has an end of one.
+  // Gaps continue: no section has an end of one.
   EXPECT_EQ(json["pores"]["sections"].get<int>(), 6);
   EXPECT_EQ(json["pores"]["count"].get<int>(), 0);
   EXPECT_GT(json["pores"]["cut"].get<int>(), 30);
@@ -101,7 +101,7 @@ TEST(PoreAnalysis, CuspsThatTouchNoPoreDistinguishBondedFromUnbondedPlans) {
     std::uint64_t counted = 0;
     for (const nlohmann::ordered_json& count : pores["length_mm"]["counts"]) counted += count.get<std::uint64_t>();
     EXPECT_EQ(counted, pores["count"].get<std::uint64_t>());
-    // The summary of the job tells the same, and so does the page about it.
+    // The summary of the job reports the same, and so does the page about it.
     if (name == "F1.5E100C2") {
       const fs::path job = fs::path(LAMINA_TEST_DIR) / "../docs/examples/dinisio2022" / (name + ".toml");
       const auto again = test::run_lamina(
@@ -116,7 +116,7 @@ TEST(PoreAnalysis, CuspsThatTouchNoPoreDistinguishBondedFromUnbondedPlans) {
       EXPECT_EQ(nlohmann::ordered_json::parse(info.out)["pores"].dump(), json["pores"].dump());
       EXPECT_NEAR(nlohmann::ordered_json::parse(info.out)["fed_g"].get<double>(), json["fed_mm3"].get<double>() * 1.1e-3, 1e-9);
     }
-    // The file tells its filament's density by what it used, to 0.01 cm3.
+    // The file implies its filament's density by what it used, to 0.01 cm3.
     EXPECT_NEAR(json.value("density_g_cm3", 0.0), 1.24, 0.04);
   }
 }

@@ -14,7 +14,7 @@
 namespace lamina {
 namespace {
 
-/// Four layers of lines 0.8 mm apart, by turns along x and y.
+/// Four layers of lines 0.8 mm apart, alternating along x and y.
 void write_grid_of_lines(const std::string& path) {
   std::ofstream file(path);
   file << "G21\nG90\nM83\n";

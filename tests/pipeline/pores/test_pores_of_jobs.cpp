@@ -26,7 +26,7 @@ void write_two_jobs(const Directory& folder) {
 
 Outcome reported(const std::string& line, const Directory& folder) { return run_lamina(words_of(line), folder.path()); }
 
-/// What is told of a job but for the job itself.
+/// The report of a job without the job itself.
 nlohmann::ordered_json without_job(const std::string& text) {
   nlohmann::ordered_json json = nlohmann::ordered_json::parse(text);
   json.erase("job");

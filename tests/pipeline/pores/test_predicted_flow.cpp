@@ -144,7 +144,7 @@ TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
   EXPECT_NE(report.error().message.find("take --voxel"), std::string::npos) << report.error().message;
 }
 
-/// Voxels that see a pore in one way, and twice as large ones in another, tell so and never a negative permeability.
+/// Fine and twice as large voxels that differ about a pore report so, and never give a negative permeability.
 TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", true);
@@ -160,7 +160,7 @@ TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
   EXPECT_FALSE(report.flow[2]->steps > 0 && report.flow[2]->resolved);
 }
 
-/// Two thousand times upon itself a line finds no room; told widths do not care.
+/// Two thousand times upon itself a line finds no room; stated widths are unaffected.
 TEST(PredictedFlow, BeadsUponEachOtherAreRefusedByRulesAndNotAsStated) {
   test::Directory folder;
   std::ofstream file(folder / "heap.gcode");

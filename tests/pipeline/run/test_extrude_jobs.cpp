@@ -388,7 +388,7 @@ TEST_F(ExtrudeProgram, AFileIsNotReplacedUnrequestedItsManifestVouchesForItAndWh
   EXPECT_EQ(test::read_text(file("a.gcode.json")), manifest);
   EXPECT_FALSE(fs::exists(file("a.gcode.part")) || fs::exists(file("a.gcode.json.part")));
 
-  // One changed byte is told with its layer.
+  // A changed byte is reported with its layer.
   std::string changed = whole;
   changed[half] = changed[half] == '1' ? '2' : '1';
   test::write_text(file("a.gcode"), changed);

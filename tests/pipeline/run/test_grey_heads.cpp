@@ -181,7 +181,7 @@ TEST_F(GreyHeads, AreTheShippedOneToo) {
   done("verify out --quiet");
 }
 
-// What jet tells of all layers, merge and report tell from the manifests.
+// The statements of jet about all layers are repeated by merge and report from the manifests.
 TEST_F(GreyHeads, ReportTheSweepsThatAreAddedAfterAMergeToo) {
   const test::Outcome whole = lamina(kBox + std::string("-o whole"));
   ASSERT_EQ(whole.code, 0) << whole.err;

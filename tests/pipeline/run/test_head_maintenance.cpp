@@ -150,7 +150,7 @@ TEST_F(HeadMaintenance, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledIn
   verified(pauses);
   EXPECT_EQ(test::read_text(fs::path(pauses.output) / "program/000024.gcode"), whole);
 
-  // A program that leaves a pause out empties the vat, whatever its hash.
+  // A program that leaves a pause out empties the vat, regardless of its hash.
   const fs::path layer = fs::path(pauses.output) / "program/000012.gcode";
   std::string text = test::read_text(layer);
   text.erase(text.find("M815\n"), 5);

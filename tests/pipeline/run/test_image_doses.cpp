@@ -1,4 +1,4 @@
-// Grey images as parts beside parts of other materials and doses, whose voxels they share.
+// Grey images as parts next to parts of other materials and doses, whose voxels they share.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -55,7 +55,7 @@ class ImageDoses : public testing::Test {
   test::Directory folder_;
 };
 
-// The images of a mesh are its drops, whatever it shares voxels with.
+// The images of a mesh are its drops, regardless of parts that share its voxels.
 TEST_F(ImageDoses, AreThoseOfTheMeshesThatTheyWereMadeOf) {
   struct Case {
     const char *dose, *first, *second;
@@ -104,7 +104,7 @@ TEST_F(ImageDoses, OfOnePartAloneAreThoseOfTheJob) {
         << file;
 }
 
-// Beside a mesh of its own kind the larger share counts, so the mesh with its images is the mesh.
+// Next to a mesh of its own kind the larger share counts, so the mesh with its images is the mesh.
 TEST_F(ImageDoses, AddNothingToTheMeshOfTheirKind) {
   done("jet other.stl --at 5,2 --layer 0.1 --bed 20x12 --dpi 254 --format tiff-8 -o grey --levels 16");
   const std::string head =

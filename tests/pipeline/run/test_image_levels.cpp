@@ -114,7 +114,7 @@ TEST_F(ImageLevels, BecomeTheDropsOfTheMesh) {
   EXPECT_EQ(layers("merged"), layers("mesh"));
 }
 
-// Beside a mesh the larger share counts: with itself, nothing changes; with another one, both are there.
+// Next to a mesh the larger share counts: with itself, nothing changes; with another one, both are there.
 TEST_F(ImageLevels, AreMergedWithMeshesByTheLargerShare) {
   const std::string part = test::corpus_file("dental_crown.stl");
   const std::string rest = " --layer 0.7 --dpi 120 --bed 40x20 --levels 16 --format tiff-8";
@@ -129,7 +129,7 @@ TEST_F(ImageLevels, AreMergedWithMeshesByTheLargerShare) {
   job("both", mesh + "[20, 1]\n" + images);
   job("meshes", mesh + "[20, 1]\n" + mesh + "[1, 1]\n");
   EXPECT_EQ(layers("both"), layers("meshes"));
-  // A little beside itself: each pixel has the larger one.
+  // With a small offset from itself: each pixel has the larger one.
   job("moved", mesh + "[2.3, 1.4]\n");
   job("overlap", mesh + "[2.3, 1.4]\n" + images);
   std::uint64_t more = 0;
@@ -240,7 +240,7 @@ TEST_F(ImageLevels, ThatDoNotFitAreOneLineEach) {
   refused("jet grey --levels 4 --containment inside", "--containment");
 }
 
-// Grey of another program, whose files tell no resolution: (255 - v) 3 / 255 is 3, 2.51, 2 and 1, 0.49, 0.
+// Grey of another program, whose files state no resolution: (255 - v) 3 / 255 is 3, 2.51, 2 and 1, 0.49, 0.
 TEST_F(ImageLevels, TakeGreyOfOtherPrograms) {
   fs::create_directory(folder_.path() / "grey");
   std::string pixels = "P5 3 2 255\n";

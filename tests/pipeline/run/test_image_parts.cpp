@@ -1,5 +1,5 @@
 // Layer images as parts: what lamina jet made of a mesh and takes as images gives the same bytes, whole, resumed, in shards, on
-// a printer and beside meshes.
+// a printer and next to meshes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -79,7 +79,7 @@ TEST_F(ImageParts, AreResumedSharedOutAndMergedWithMeshes) {
   done("merge shards -o merged");
   EXPECT_EQ(layers("merged"), expected);
   done("verify merged");
-  // A second mesh beside the images is the same as both meshes.
+  // A second mesh next to the images is the same as both meshes.
   std::ofstream(folder_ / "meshes.toml") << "[[part]]\npath = \"" << mesh << "\"\nat_mm = [2, 3]\n[[part]]\npath = \"" << mesh
                                          << "\"\nat_mm = [35, 3]\n";
   std::ofstream(folder_ / "mixed.toml") << "[[part]]\npath = \"slices\"\n[[part]]\npath = \"" << mesh

@@ -1,4 +1,4 @@
-// lamina jet --inspect on parts with planted faults: each is told with its number and place, sound parts are not.
+// lamina jet --inspect on parts with planted faults: each is reported with its number and position, sound parts are not.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -140,7 +140,7 @@ TEST_F(InspectedJobs, EachPlantedFaultIsReportedAndSoundPartsAreNot) {
   }
 }
 
-// What can go wrong with powder, binder and head: each is refused with exit code 2 and a line, or done and told by a warning.
+// Possible faults of powder, binder and head: each is refused with exit code 2 and a line, or done with a warning.
 TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsReportedOrRefused) {
   const std::string block = stl("block.stl", {{{0, 0, 0}, {10, 10, 2}}}), other = stl("other.stl", {{{0, 0, 0}, {10, 10, 2}}}),
                     fin = stl("fin.stl", {{{0, 0, 0}, {10, 1, 2}}}),
@@ -228,7 +228,7 @@ TEST_F(InspectedJobs, NumbersAndPositionsAreThoseOfThePlantedBoxes) {
   EXPECT_EQ(found["bed_edge"]["layer"], 0);
 }
 
-// A wall of one pixel beside a block, by the width that is asked for.
+// A wall of one pixel next to a block, by the requested width.
 TEST_F(InspectedJobs, AWiderMinWallFindsAllThatANarrowerOneFinds) {
   const std::string part = stl("wall.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.1, 1}}, {{3, 10, 0}, {3.4, 15, 1}}});
   std::uint64_t before = 0;
@@ -241,12 +241,12 @@ TEST_F(InspectedJobs, AWiderMinWallFindsAllThatANarrowerOneFinds) {
     EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << minimum;
     EXPECT_EQ(count > 0 ? thin["locations"].size() : 0, count / 10) << "each wall is one place";
   }
-  // Two pixels are enough where nothing else is asked for.
+  // Two pixels are enough where nothing else is requested.
   EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{});
   EXPECT_EQ(codes(inspect(part)), std::set<std::string>{"thin"});
 }
 
-// Layers of random bits as a part: bodies without number, told as what was not looked at, and the job is done all the same.
+// Layers of random bits as a part: bodies without number, reported as not inspected, and the job is done all the same.
 TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsReportedAndTheJobContinues) {
   fs::create_directories(folder_ / "noise");
   std::uint32_t state = 12345;
@@ -267,7 +267,7 @@ TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsReportedAndTheJobContinues) 
   EXPECT_EQ(tight["inspection"]["stopped"]["layer"], 1);
   EXPECT_TRUE(codes(tight).contains("not-inspected"));
   EXPECT_LT(tight["peak_layer_bytes"], whole["peak_layer_bytes"]);
-  // What it asks for is enough.
+  // The memory that it requests is enough.
   const std::string text = tight["warnings"].back()["text"], give = "give --memory ";
   const std::string requested =
       text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());

@@ -1,4 +1,4 @@
-// A layer takes no more bytes than it is told to, before its dose and with it, whatever the job; and not many fewer.
+// A layer takes no more bytes than its limit, before its dose and with it, for any job; and not many fewer.
 #include <gtest/gtest.h>
 
 #include <iostream>

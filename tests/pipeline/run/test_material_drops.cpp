@@ -161,7 +161,7 @@ TEST_F(MaterialDrops, AddUpToThoseOfTheJobWithoutMaterials) {
   EXPECT_GT(both, 0u) << "no voxel has drops of both materials";
 }
 
-// Each material gets what is wished for its parts: 40 % are 2 drops of 5, and 66 % are 3.3.
+// Each material gets the target of its parts: 40 % are 2 drops of 5, and 66 % are 3.3.
 TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsTarget) {
   test::write_text(folder_ / "target.toml",
                    text_of_two_parts("[dose]\nsaturation_percent = 40\n", "saturation_percent = 66\n", 4, true));
@@ -232,7 +232,7 @@ TEST_F(MaterialDrops, GiveTheSameBytesHoweverTheyAreMade) {
   }
 }
 
-// A grey image a material tells the drops that its images of one bit do.
+// A grey image a material states the same drops as its images of one bit.
 TEST_F(MaterialDrops, AreGreyImagesToo) {
   for (const std::string dose : {"--saturation 46", "--saturation 66 --levels 16", "--saturation 17"}) {
     done(kTwoMaterials + dose + " --quiet -o bits --overwrite");
@@ -344,7 +344,7 @@ TEST_F(MaterialDrops, AreSharedOutAmongParts) {
   }
 }
 
-// A sweep for each drop, whatever lies under it; a head of one vat is told what to do.
+// A sweep for each drop, regardless of what is under it; a head of one vat gets its commands.
 TEST_F(MaterialDrops, AreCarriedByTheProgramsOfMachinesWithTwoVats) {
   const std::string parts = "jet low.stl high.stl --material steel,bronze --layer 0.1 --saturation 46 --quiet ";
   done(parts + "--machine nuferbj --vat-rule both -o gcode");

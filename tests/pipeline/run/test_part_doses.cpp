@@ -90,7 +90,7 @@ TEST(PartDoses, AreThoseOfJobsWithThePartAlone) {
   }
 }
 
-// What touches another part has no edge there, whatever its bleed.
+// What touches another part has no edge there, regardless of its bleed.
 TEST(PartDoses, NoSeamIsEatenBetweenPartsThatTouch) {
   const test::Directory folder;
   Job job = job_of_boxes(folder, "touching", 0);

@@ -1,4 +1,4 @@
-// What a job that is refused leaves, and what one of a range of layers tells.
+// The remains of a refused job, and the report of one of a range of layers.
 #include <gtest/gtest.h>
 
 #include <filesystem>

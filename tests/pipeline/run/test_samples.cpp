@@ -48,7 +48,7 @@ class Samples : public testing::Test {
 
 double length(const GcodeBead& b) { return std::hypot(b.x1 - b.x0, b.y1 - b.y0); }
 
-/// Filling lines of a layer along one axis, each as the beads that are laid without a gap on one straight line.
+/// Filling lines of a layer along one axis, each as the beads without a gap on one straight line.
 std::vector<std::vector<GcodeBead>> lines_of(const test::GcodeLayer& layer, bool along_y) {
   std::vector<std::vector<GcodeBead>> lines;
   for (const GcodeBead& b : layer.beads) {
@@ -65,7 +65,7 @@ std::vector<std::vector<GcodeBead>> lines_of(const test::GcodeLayer& layer, bool
   return lines;
 }
 
-/// Every line with thin stretches begins and ends with thick ones, and all such lines are laid the same way.
+/// Every line with thin segments begins and ends with thick ones, and all such lines are deposited in the same direction.
 void expect_thick_ends(const test::GcodeLayer& layer, double thin_feed, const std::string& name) {
   std::size_t segmented = 0;
   std::set<bool> paths;

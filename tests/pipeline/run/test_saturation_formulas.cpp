@@ -183,7 +183,7 @@ TEST_F(FormulaJobs, SharesOfPartsThatTouchComeToAFullVoxel) {
   EXPECT_TRUE(alike(image(job, "000002-drop1.tif"), image(one, "000002-drop1.tif")));
 }
 
-// Even-odd over all parts: what lies in two of them is empty, whatever their doses.
+// Even-odd over all parts: what is in two of them is empty, regardless of their doses.
 TEST_F(FormulaJobs, EvenOddConsidersPartsOfAllDoses) {
   Job zones = job_of_boxes("zones", -3), plain = job_of_boxes("plain", -3);
   for (Job* of : {&zones, &plain}) of->fill_rule = FillRule::kEvenOdd;

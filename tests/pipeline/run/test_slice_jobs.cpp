@@ -97,7 +97,7 @@ TEST(SliceProgram, AnEarlierJobIsNotReplacedUnrequested) {
   over.push_back("--overwrite");
   EXPECT_EQ(run_lamina(over, directory.path()).code, 0);
   EXPECT_EQ(tree_text(directory.path() / "out"), before);
-  // Nothing of a job of another name stays beside the one that replaces it.
+  // No file of a job of another name stays next to the one that replaces it.
   over[1] = corpus_file("dental_crown.stl");
   EXPECT_EQ(run_lamina(over, directory.path()).code, 0);
   EXPECT_FALSE(std::filesystem::exists(directory / "out/parameter_quality_nut.svg"));

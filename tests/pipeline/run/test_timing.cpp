@@ -23,7 +23,7 @@ namespace {
 
 const std::atomic<bool> never{false};
 
-/// So much to write that nobody sees the end of it, in files of 1 MB.
+/// So much to write that its end is never reached, in files of 1 MB.
 formats::Floor endless_floor() {
   formats::Floor floor;
   floor.bytes_written = std::uint64_t{1} << 50;

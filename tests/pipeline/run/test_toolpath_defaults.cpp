@@ -1,4 +1,4 @@
-// tests/pipeline/run/test_toolpath_defaults.cpp: what lamina extrude does unasked: points left out, a skirt, the firmware's
+// tests/pipeline/run/test_toolpath_defaults.cpp: what lamina extrude does by default: points left out, a skirt, the firmware's
 // name.
 #include <gtest/gtest.h>
 
@@ -131,7 +131,7 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessRequestedAndTheSameInAJobFile) {
   EXPECT_TRUE(unrequested.text == requested.text);
   EXPECT_LT(unrequested.summary["moves"].get<double>(), 0.5 * all.summary["moves"].get<double>());
   EXPECT_NEAR(unrequested.summary["volume_mm3"].get<double>() / all.summary["volume_mm3"].get<double>(), 1, 0.01);
-  // The saved job does it again, and says what was asked.
+  // The saved job does it again, and states the request.
   const Outcome saved = run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
   ASSERT_EQ(saved.code, 0) << saved.err;
   EXPECT_EQ(read_text(directory / "job.toml").find("\ntolerance_um"), std::string::npos);
@@ -144,7 +144,7 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessRequestedAndTheSameInAJobFile) {
   ASSERT_EQ(sliced.code, 0) << sliced.err;
   EXPECT_NE(read_text(directory / "out/job.toml").find("lamina slice --job FILE\n"), std::string::npos);
   EXPECT_EQ(read_text(directory / "out/job.toml").find("\ntolerance_um"), std::string::npos);
-  // A job means in each command what that command does unasked; what was asked stays.
+  // A job means in each command that command's defaults; requested values stay.
   EXPECT_EQ(extruded(directory, "--job out/job.toml --layer 0.2 --walls 1").summary["tolerance_um"], 10);
   for (const auto& [requested_um, kept] : {std::pair{"0", "\ntolerance_um = 0\n"}, {"25", "\ntolerance_um = 25\n"}}) {
     const std::string save =

@@ -174,7 +174,7 @@ TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) 
     }
     EXPECT_GT(mixed, 0u);
     EXPECT_GT(single, 0u);
-    // Whose binder falls into the other powder is told.
+    // Warnings of parts whose binder falls into the other powder.
     const auto reported = std::ranges::find(summary->warnings, "mixed-powders", &Warning::code);
     EXPECT_EQ(reported == summary->warnings.end(), rule == "both") << rule;
     if (rule == "first" || rule == "second") {
@@ -281,7 +281,7 @@ TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
   }
 }
 
-// A nut that stands on another powder is of a group of its own, which shares the mesh with the nut beside it.
+// A nut that stands on another powder is of a group of its own, which shares the mesh with the nut next to it.
 TEST_F(TwoPowders, AMeshOfTwoGroupsIsThereOnce) {
   const auto at = [](PartRequest one, double x, double bottom) {
     one.at_mm = {{x, 50}};
@@ -397,7 +397,7 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   EXPECT_NE(wrong_ranges("[{ from_mm = 2, to_mm = 4 }]").find("material is missing"), std::string::npos);
 }
 
-// Images lie beside each other as 000001-steel.tif, 000001-steel-drop2.tif.
+// Images are next to each other as 000001-steel.tif, 000001-steel-drop2.tif.
 TEST_F(TwoPowders, NamesWhoseFilesAreOneOrReadLikeADropAreRefused) {
   const auto refused = [&](const Job& job, const std::string& what) {
     const auto summary = run(job);

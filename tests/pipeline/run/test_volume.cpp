@@ -62,7 +62,7 @@ void expect_one_volume(const nlohmann::json& json, const Extruder& machine, cons
   EXPECT_NEAR((json["volume_mm3"].get<double>() + neighbour) / by_grams, 1, 1e-6) << what;
 }
 
-/// Walls are told, and so drawn by a preview, as wide as a stadium of what E feeds: to the micrometre of a tag.
+/// Walls are stated, and so drawn by a preview, as wide as a stadium of what E feeds: to the micrometre of a tag.
 void expect_widths_of_what_is_fed(const test::GcodeFile& file, double feed_ratio) {
   for (const auto& layer : file.layers) {
     for (const auto& bead : layer.beads) {
@@ -248,7 +248,7 @@ TEST_F(Volume, PoresReportedAreThoseThatAreDeposited) {
   const Made speed = extrude("--job " + examples + "speed.toml", folder / "speed.stl");
   ASSERT_EQ(speed.json["pores"].size(), 1u);
   EXPECT_EQ(speed.json["pores"][0]["closed"], 0);
-  EXPECT_EQ(speed.json["pores"][0]["open"], 23);  // both sides of 12 thin stretches, but for the one beside the wall
+  EXPECT_EQ(speed.json["pores"][0]["open"], 23);  // both sides of 12 thin segments, except the one next to the wall
   EXPECT_EQ(speed.json["pores"][0]["edges"], 1);
   test::write_box(folder / "b.stl", {0, 0, 0}, {50, 28, 0.3f});
   const auto pores = extrude("--job " + examples + "B100.toml", folder / "b.stl").json["pores"][0];
