@@ -38,7 +38,7 @@ CASES = {
     "benchies": ("benchies72.stl", 400, 0.1),
 }
 # engine, times as fast as the old build, multiple of the limit, MiB
-ASKED = {
+REQUESTED = {
     "knot800k": ("default", 2.0, 5.0, 45),
     "benchies": ("default", 2.4, 5.5, 400),
     "crowns-96": ("contours", 1.7, None, None),
@@ -78,11 +78,11 @@ class Against:
         self.options, self.work = options, work
         self.parts = os.path.join(os.path.abspath(options.cache), "parts")
         with open(os.path.join(self.parts, "parts.json"), encoding="utf-8") as file:
-            self.places = {name: part["at_nm"] for name, part in json.load(file).items()}
+            self.positions = {name: part["at_nm"] for name, part in json.load(file).items()}
 
     def command(self, case, which, more):
         part, bed, layer = CASES[case]
-        at = ",".join(f"{nm / 1e6:.6f}" for nm in self.places[part])
+        at = ",".join(f"{nm / 1e6:.6f}" for nm in self.positions[part])
         return [self.options.old if which == "old" else self.options.new, "jet", os.path.join(self.parts, part), "--bed",
                 f"{bed}x{bed}", "--dpi", "1200", "--layer", str(layer), "--at", at, "--quiet", *more]
 
@@ -131,16 +131,16 @@ class Against:
                 os.close(file)
                 os.rename(name + ".part", name)
             writes.append(time.perf_counter() - start)
-        return {"read": statistics.median(reads), "write": statistics.median(writes), "told": self.told_limit(case)}
+        return {"read": statistics.median(reads), "write": statistics.median(writes), "reported": self.reported_limit(case)}
 
-    def told_limit(self, case):
-        told = []
+    def reported_limit(self, case):
+        reported = []
         for _ in range(5):
             out = os.path.join(self.work, "out")
             shutil.rmtree(out, ignore_errors=True)
             done = subprocess.run(self.command(case, "new", ["--timing", "--json", "-o", out]), check=True, stdout=subprocess.PIPE)
-            told.append(json.loads(done.stdout)["timing"]["limit"]["seconds"])
-        return statistics.median(told)
+            reported.append(json.loads(done.stdout)["timing"]["limit"]["seconds"])
+        return statistics.median(reported)
 
     def benchmarks(self, cases):
         """What lamina_bench says of the parts: touching each crossing once (limits), the rays' tree, the bound of layers. By
@@ -177,29 +177,29 @@ def peak(runs):
     return statistics.median(run[2] for run in runs) / 2**20
 
 
-def at_most(value, most, digits=2):
-    return f"{value:.{digits}f}" + ("" if most is None else f" (at most {most:g}: {'met' if value <= most else 'NOT MET'})")
+def not_above(value, maximum, digits=2):
+    return f"{value:.{digits}f}" + ("" if maximum is None else f" (at most {maximum:g}: {'met' if value <= maximum else 'NOT MET'})")
 
 
-def at_least(value, least):
-    return f"{value:.2f}" + ("" if least is None else f" (at least {least:g}: {'met' if value >= least else 'NOT MET'})")
+def lower_bound(value, minimum):
+    return f"{value:.2f}" + ("" if minimum is None else f" (at least {minimum:g}: {'met' if value >= minimum else 'NOT MET'})")
 
 
 def rows_of(case, runs, limit):
-    engine, least, multiple, mib = ASKED.get(case, (None, None, None, None))
+    engine, minimum, multiple, mib = REQUESTED.get(case, (None, None, None, None))
     for which in ("default", "contours"):
-        asked, old, new = which == engine, runs["old " + which], runs[which]
+        requested, old, new = which == engine, runs["old " + which], runs[which]
         yield [f"`{case}`", which, f"{1e3 * wall(old):.0f}", f"{1e3 * wall(new):.0f}",
-               at_least(wall(old) / wall(new), least if asked else None), f"{processor(old) / processor(new):.2f}",
-               at_most(wall(new) / limit, multiple if asked else None) if limit else "-", f"{peak(old):.0f}",
-               at_most(peak(new), mib if which == "default" else None, 0)]
+               lower_bound(wall(old) / wall(new), minimum if requested else None), f"{processor(old) / processor(new):.2f}",
+               not_above(wall(new) / limit, multiple if requested else None) if limit else "-", f"{peak(old):.0f}",
+               not_above(peak(new), mib if which == "default" else None, 0)]
 
 
 def wide_row(case, runs):
-    return [f"`{case}`", at_least(wall(runs["old default"]) / wall(runs["plain"]), {"knot800k": 1.2}.get(case, 1.0)),
-            at_least(wall(runs["old contours"]) / wall(runs["contours plain"]), 1.0),
+    return [f"`{case}`", lower_bound(wall(runs["old default"]) / wall(runs["plain"]), {"knot800k": 1.2}.get(case, 1.0)),
+            lower_bound(wall(runs["old contours"]) / wall(runs["contours plain"]), 1.0),
             f"{wall(runs['old default']) / wall(runs['avx2']):.2f}" if "avx2" in runs else "-",
-            at_most(wall(runs["default"]) / wall(runs["contours"]), 1.15)]
+            not_above(wall(runs["default"]) / wall(runs["contours"]), 1.15)]
 
 
 def png_lines(cases):
@@ -207,10 +207,10 @@ def png_lines(cases):
     if not png:
         return
     yield from figures.table(["job", "PNG, ms", "beside G4", "times as fast as the old PNG", "size beside the old PNG"], [
-        [f"`{case}`", f"{1e3 * wall(runs['png']):.0f}", at_most(wall(runs["png"]) / wall(runs["default"]), 2.5),
+        [f"`{case}`", f"{1e3 * wall(runs['png']):.0f}", not_above(wall(runs["png"]) / wall(runs["default"]), 2.5),
          f"{wall(runs['old png']) / wall(runs['png']):.1f}", f"{sizes['png'] / sizes['old png']:.2f}"] for case, runs, sizes in png])
     both = sum(sizes["png"] for *_, sizes in png) / sum(sizes["old png"] for *_, sizes in png)
-    yield f"PNG files of these jobs together: {at_most(both, 1.2)} of the old size."
+    yield f"PNG files of these jobs together: {not_above(both, 1.2)} of the old size."
     yield ""
 
 
@@ -220,7 +220,7 @@ def limit_lines(cases, bench):
     for case, (*_, limit) in cases.items():
         touch = bench["limits"].get(case, {}).get("seconds")
         rows.append([f"`{case}`", f"{1e3 * limit['read']:.1f}", f"{1e3 * limit['write']:.1f}", f"{1e3 * touch:.1f}" if touch else "-",
-                     f"{1e3 * (limit['read'] + limit['write'] + touch):.1f}" if touch else "-", f"{1e3 * limit['told']:.1f}"])
+                     f"{1e3 * (limit['read'] + limit['write'] + touch):.1f}" if touch else "-", f"{1e3 * limit['reported']:.1f}"])
     yield "The limit, ms, and what `--timing` has for it:"
     yield ""
     yield from figures.table(["job", "read", "write", "touch each crossing", "limit", "`--timing`"], rows)
@@ -237,7 +237,7 @@ def index_lines(bench):
     for case, tree in bench["tree"].items():
         bound = bench["bound"][case]
         rows.append([f"`{case}`", f"{tree['primitives']:,.0f}", f"{tree['bytes'] / 1e6:.2f}", f"{1e3 * tree['seconds']:.1f}",
-                     f"{bound['claimed'] / 1e6:.1f} / {bound['needed'] / 1e6:.1f}", at_most(bound["claimed"] / bound["needed"], 2),
+                     f"{bound['claimed'] / 1e6:.1f} / {bound['needed'] / 1e6:.1f}", not_above(bound["claimed"] / bound["needed"], 2),
                      f"{bound['worst']:.2f}"])
     yield from figures.table(["job", "rays' tree: primitives", "MB", "ms", "layer bound: claimed / needed, MB", "ratio",
                               "of the worst layer"], rows)
@@ -272,7 +272,7 @@ def page(options, found, bench):
     if found["info"]:
         yield from figures.table(["part", "`info`, ms", "dry run, ms", "time", "memory"], [
             [f"`{case}`", f"{1e3 * wall(runs['info']):.0f}", f"{1e3 * wall(runs['dry run']):.0f}",
-             at_most(wall(runs["info"]) / wall(runs["dry run"]), 3), at_most(peak(runs["info"]) / peak(runs["dry run"]), 2)]
+             not_above(wall(runs["info"]) / wall(runs["dry run"]), 3), not_above(peak(runs["info"]) / peak(runs["dry run"]), 2)]
             for case, runs in found["info"].items()])
 
 

@@ -44,13 +44,13 @@ def bound(phases, cores):
 def shares_of_parts(program, parts, work):
     """Of each job of bench/against.py whose part is there. The largest are those of scripts/bench --large."""
     with open(os.path.join(parts, "parts.json"), encoding="utf-8") as file:
-        places = json.load(file)
+        positions = json.load(file)
     found = {}
     for case, (part, bed, layer) in CASES.items():
-        if part not in places or not os.path.exists(os.path.join(parts, part)):
+        if part not in positions or not os.path.exists(os.path.join(parts, part)):
             say(f"  {case}: NOT RUN: no {part}")
             continue
-        at = ",".join(f"{nm / 1e6:.6f}" for nm in places[part]["at_nm"])
+        at = ",".join(f"{nm / 1e6:.6f}" for nm in positions[part]["at_nm"])
         words = [os.path.join(parts, part), "--bed", f"{bed}x{bed}", "--dpi", "1200", "--layer", str(layer), "--at", at]
         timings = []
         for _ in range(RUNS + 1):

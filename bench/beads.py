@@ -39,17 +39,17 @@ def width_of(area, pressed):
     return 4 * area / (math.pi * HEIGHT) if pressed else math.sqrt(max(area, 0) * 4 / math.pi)
 
 
-def phases(form, stretches, begin, end):
+def phases(form, intervals, begin, end):
     """(length, area, speed, acceleration) of what the head does: a planner joins stretches at the slower of their speeds."""
-    joints = [begin] + [min(a[2], b[2]) for a, b in zip(stretches, stretches[1:])] + [end]
+    stitches = [begin] + [min(a[2], b[2]) for a, b in zip(intervals, intervals[1:])] + [end]
     if form.acceleration == AT_ONCE:
-        return [(length, area, speed, 0.0) for length, area, speed in stretches]
-    for i in range(len(stretches) - 1, -1, -1):
-        joints[i] = min(joints[i], math.sqrt(joints[i + 1] ** 2 + 2 * form.acceleration * stretches[i][0]))
+        return [(length, area, speed, 0.0) for length, area, speed in intervals]
+    for i in range(len(intervals) - 1, -1, -1):
+        stitches[i] = min(stitches[i], math.sqrt(stitches[i + 1] ** 2 + 2 * form.acceleration * intervals[i][0]))
     found = []
-    for i, (length, area, speed) in enumerate(stretches):
-        joints[i + 1] = min(joints[i + 1], math.sqrt(joints[i] ** 2 + 2 * form.acceleration * length))
-        first, last = (min(speed, joint + form.jump) for joint in (joints[i], joints[i + 1]))
+    for i, (length, area, speed) in enumerate(intervals):
+        stitches[i + 1] = min(stitches[i + 1], math.sqrt(stitches[i] ** 2 + 2 * form.acceleration * length))
+        first, last = (min(speed, joint + form.jump) for joint in (stitches[i], stitches[i + 1]))
         peak = max(first, last, min(speed, math.sqrt((first ** 2 + last ** 2) / 2 + form.acceleration * length)))
         up, down = ((peak ** 2 - v ** 2) / (2 * form.acceleration) for v in (first, last))
         for part, at, change in ((up, first, form.acceleration), (length - up - down, peak, 0.0), (down, peak, -form.acceleration)):
@@ -58,9 +58,9 @@ def phases(form, stretches, begin, end):
     return found
 
 
-def lay(form, parts, flow):
+def deposit(form, parts, flow):
     """(place, length, area, pressed) of short pieces."""
-    place, first, pressed, pieces = 0.0, flow, True, []
+    position, first, pressed, pieces = 0.0, flow, True, []
     for length, area, speed, change in parts:
         count = max(1, math.ceil(length / STEP))
         for i in range(count):
@@ -73,10 +73,10 @@ def lay(form, parts, flow):
                 flow = (before + first) / 2 + (flow - (before + first) / 2) * fade
             else:
                 flow = feed + (flow - feed) * fade
-            laid = flow / b
-            pressed = laid >= FULL or (pressed and area >= FULL)
-            pieces.append((place + length * (i + 1) / count, length / count, laid, pressed))
-        place += length
+            deposited = flow / b
+            pressed = deposited >= FULL or (pressed and area >= FULL)
+            pieces.append((position + length * (i + 1) / count, length / count, deposited, pressed))
+        position += length
     return pieces
 
 
@@ -93,13 +93,13 @@ def share(kind, u):
 def spread(form, pieces):
     """(place, width) along the line."""
     if not form.spread:
-        return [(place, width_of(area, pressed)) for place, _, area, pressed in pieces]
+        return [(position, width_of(area, pressed)) for position, _, area, pressed in pieces]
     volume, held = {}, {}
-    for place, length, area, pressed in pieces:
+    for position, length, area, pressed in pieces:
         reach = 0.2 if form.spread in ("bore", "behind") else width_of(area, pressed)
-        left, cell = 0.0, math.floor((place - length / 2 - 1.01 * reach) / CELL)
+        left, cell = 0.0, math.floor((position - length / 2 - 1.01 * reach) / CELL)
         while left < 1:
-            right = share(form.spread, ((cell + 1) * CELL - place + length / 2) / reach)
+            right = share(form.spread, ((cell + 1) * CELL - position + length / 2) / reach)
             right = 1.0 if right > 1 - 1e-9 else right
             volume[cell] = volume.get(cell, 0) + (right - left) * area * length
             held[cell] = held.get(cell, 0) + (right - left) * area * length * pressed
@@ -112,13 +112,13 @@ def spread(form, pieces):
     return found
 
 
-def at(widths, place):
+def at(widths, position):
     low, high = 0, len(widths) - 1
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if widths[middle][0] <= place else (low, middle)
+        low, high = (middle, high) if widths[middle][0] <= position else (low, middle)
     (a, wa), (b, wb) = widths[low], widths[high]
-    return wa + (wb - wa) * (place - a) / (b - a)
+    return wa + (wb - wa) * (position - a) / (b - a)
 
 
 def rms(errors):
@@ -133,7 +133,7 @@ def take_lag(form):
         low, high = 0.001, 0.5
         for _ in range(16):
             form.tau = (low + high) / 2
-            area = next(piece[2] for piece in lay(form, phases(form, [(10.0, AREA, REFERENCE), (30.0, AREA, speed)], REFERENCE, speed),
+            area = next(piece[2] for piece in deposit(form, phases(form, [(10.0, AREA, REFERENCE), (30.0, AREA, speed)], REFERENCE, speed),
                                                   AREA * REFERENCE) if piece[0] >= 10 + distance)
             low, high = (low, form.tau) if width_of(area, True) < 0.4 - 0.01 else (form.tau, high)
         taus.append((low + high) / 2)
@@ -142,14 +142,14 @@ def take_lag(form):
 
 
 def long_line(form, thin_area, speed):
-    stretches = [(10.0, AREA, REFERENCE), (30.0, thin_area, speed), (10.0, AREA, REFERENCE)]
-    widths = [w for place, w in spread(form, lay(form, phases(form, stretches, REFERENCE, REFERENCE), AREA * REFERENCE)) if 5 < place < 45]
+    intervals = [(10.0, AREA, REFERENCE), (30.0, thin_area, speed), (10.0, AREA, REFERENCE)]
+    widths = [w for position, w in spread(form, deposit(form, phases(form, intervals, REFERENCE, REFERENCE), AREA * REFERENCE)) if 5 < position < 45]
     return min(widths), max(widths)
 
 
 def repeated(form, extrusion, speed):
     area = AREA * extrusion / 100
-    return spread(form, lay(form, phases(form, [(1.5, area, speed), (1.5, area, 30.0)] * 8, speed, speed), area * REFERENCE))
+    return spread(form, deposit(form, phases(form, [(1.5, area, speed), (1.5, area, 30.0)] * 8, speed, speed), area * REFERENCE))
 
 
 def samples():

@@ -25,8 +25,8 @@ struct CoveredPart {
 /// Whether voxels that are full are pixels that are set, and empty ones not, but for one in a thousand: thin walls.
 bool agree(const RunsView& pixels, const LevelsView& levels, std::uint8_t top) {
   Runs full, some;
-  at_least(levels, top, full);
-  at_least(levels, 1, some);
+  threshold_levels(levels, top, full);
+  threshold_levels(levels, 1, some);
   const auto set = static_cast<double>(set_pixels(pixels));
   return static_cast<double>(set_pixels(full)) <= 1.001 * set && static_cast<double>(set_pixels(some)) >= 0.999 * set;
 }
@@ -38,13 +38,13 @@ void both(benchmark::State& state, const std::string& path, const NamedJob* job)
   covered.choose_layers(job != nullptr ? job->layer : 100'000);
   std::vector<Mesh> meshes = covered.part.meshes;
   const auto started = std::chrono::steady_clock::now();
-  auto coverage = cover::Coverage::build(meshes, covered.part.instances, covered.grid, FillRule::kNonzero, 4);
+  auto coverage = coverage::Coverage::build(meshes, covered.part.instances, covered.grid, FillRule::kNonzero, 4);
   const std::chrono::duration<double, std::milli> built = std::chrono::steady_clock::now() - started;
   auto rasterizer =
       raster::Rasterizer::build(covered.part.meshes, covered.part.instances, covered.grid, FillRule::kNonzero, true, false);
   if (!coverage || !rasterizer) return state.SkipWithError("the part could not be indexed");
   raster::LayerScratch of_pixels;
-  cover::LayerScratch of_voxels;
+  coverage::CoverageScratch of_voxels;
   Runs runs;
   Levels levels;
   std::chrono::duration<double, std::milli> pixels{}, voxels{};

@@ -32,8 +32,8 @@ GRADIENTS = ["--permeability 60:150", "--porosity 20:24"]
 HEIGHT = 25.4  # mm
 
 
-def design(wish, job, voxel):
-    words = [LAMINA, "design", *wish.split(), "--machine", "anet-a8", "--voxel", str(voxel), "--json", "--overwrite", "-o", job]
+def design(target, job, voxel):
+    words = [LAMINA, "design", *target.split(), "--machine", "anet-a8", "--voxel", str(voxel), "--json", "--overwrite", "-o", job]
     start, used = time.perf_counter(), processor_seconds()
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     return json.loads(done.stdout), done, (time.perf_counter() - start, processor_seconds() - used)
@@ -61,7 +61,7 @@ def keys_of(found):
             f"{keys['spacing_sc_mm']:g}")
 
 
-def told(found):
+def reported(found):
     return f"{100 * found['porosity']:.2f} | {found['k1_darcy']:.1f} +- {found['k1_error_darcy']:.1f} | " + "{:.3f} x {:.2f}".format(*found["pore_mm"])
 
 
@@ -69,18 +69,18 @@ def gradients(voxel, folder):
     """Lines of each region, and a line for each gradient."""
     rows, ends = [], []
     pores.write_cylinder(os.path.join(folder, "high.stl"), 25.4, HEIGHT)
-    for wish in GRADIENTS:
+    for target in GRADIENTS:
         job = os.path.join(folder, "gradient.toml")
-        found, _, seconds = design(f"{wish} --height {HEIGHT}", job, voxel)
-        print(wish, found["met"], f"{100 * found['miss']:.1f} %", f"{seconds[0]:.0f} s", file=sys.stderr)
+        found, _, seconds = design(f"{target} --height {HEIGHT}", job, voxel)
+        print(target, found["met"], f"{100 * found['miss']:.1f} %", f"{seconds[0]:.0f} s", file=sys.stderr)
         warnings, again = plan(job, folder, "high.stl") if found["met"] else ([], "-")
         for i, step in enumerate(found["steps"]):
-            asked = step["wish"]
-            asked = f"{100 * asked['porosity']:.4g} %" if "porosity" in asked else f"{asked['k1_darcy']:.4g} D"
+            requested = step["target"]
+            requested = f"{100 * requested['porosity']:.4g} %" if "porosity" in requested else f"{requested['k1_darcy']:.4g} D"
             middle = i == len(found["steps"]) // 2
-            rows.append([f"`{wish}`" if i == 0 else "", f"{step['from_mm']:g} to {step['to_mm']:g}", asked, *keys_of(step),
-                         *told(step).split(" | "), f"{100 * step['miss']:.1f}", again if middle else ""])
-        ends.append(f"`{wish} --height {HEIGHT}`: {'met' if found['met'] else 'not met'} within {100 * found['miss']:.1f} %, {found['runs']} forward "
+            rows.append([f"`{target}`" if i == 0 else "", f"{step['from_mm']:g} to {step['to_mm']:g}", requested, *keys_of(step),
+                         *reported(step).split(" | "), f"{100 * step['miss']:.1f}", again if middle else ""])
+        ends.append(f"`{target} --height {HEIGHT}`: {'met' if found['met'] else 'not met'} within {100 * found['miss']:.1f} %, {found['runs']} forward "
                     f"runs, {seconds[0]:.0f} s, {seconds[1]:.0f} s of processors; porosity of the whole {100 * found['porosity']:.2f} %, "
                     f"regions in series {found['k1_in_series_darcy']:.1f} D; {len(warnings)} warnings of `lamina extrude`.")
     return rows, ends
@@ -91,24 +91,24 @@ def page(voxel):
     longest, longest_outside = [0, 0], [0, 0]
     with tempfile.TemporaryDirectory() as folder:
         pores.write_cylinder(os.path.join(folder, "part.stl"), 25.4, 3)
-        for i, wish in enumerate(INSIDE):
+        for i, target in enumerate(INSIDE):
             job = os.path.join(folder, f"{i}.toml")
-            found, done, seconds = design(wish, job, voxel)
+            found, done, seconds = design(target, job, voxel)
             longest = list(map(max, longest, seconds))
-            print(wish, found["met"], f"{100 * found['miss']:.1f} %", f"{seconds[0]:.0f} s, {seconds[1]:.0f} of processors", file=sys.stderr)
+            print(target, found["met"], f"{100 * found['miss']:.1f} %", f"{seconds[0]:.0f} s, {seconds[1]:.0f} of processors", file=sys.stderr)
             again = "-"
             if found["met"]:
                 warnings, again = plan(job, folder)
                 warned += bool(warnings)
                 within += 1
-            inside.append([f"`{wish}`", *keys_of(found), *told(found).split(" | "), f"{100 * found['miss']:.1f}", again,
+            inside.append([f"`{target}`", *keys_of(found), *reported(found).split(" | "), f"{100 * found['miss']:.1f}", again,
                            str(found["runs"]), f"{found['k1_over_slots']:.2f}", f"{seconds[0]:.0f}, {seconds[1]:.0f}"])
-        for wish in OUTSIDE:
-            found, done, seconds = design(wish, os.path.join(folder, "none.toml"), voxel)
+        for target in OUTSIDE:
+            found, done, seconds = design(target, os.path.join(folder, "none.toml"), voxel)
             longest_outside = list(map(max, longest_outside, seconds))
             refused = done.returncode == 5 and not os.path.exists(os.path.join(folder, "none.toml"))
-            print(wish, done.returncode, f"{seconds[0]:.0f} s, {seconds[1]:.0f} of processors", file=sys.stderr)
-            outside.append([f"`{wish}`", "yes" if refused else "no", *told(found).split(" | "), str(found["runs"]), f"{seconds[0]:.0f}, {seconds[1]:.0f}"])
+            print(target, done.returncode, f"{seconds[0]:.0f} s, {seconds[1]:.0f} of processors", file=sys.stderr)
+            outside.append([f"`{target}`", "yes" if refused else "no", *reported(found).split(" | "), str(found["runs"]), f"{seconds[0]:.0f}, {seconds[1]:.0f}"])
         regions, ends = gradients(voxel, folder)
     machine = figures.machine(ROOT)
     yield "# Fillings from wishes: what is asked for, and what the solver says of it"
@@ -118,7 +118,7 @@ def page(voxel):
     yield ""
     yield "## Within what the tables span"
     yield ""
-    yield from tables.table(["wish", "thick / thin, mm", "extrusion, %", "continuous lines", "S-C, mm", "porosity, %", "k1, D", "pore, mm",
+    yield from tables.table(["target", "thick / thin, mm", "extrusion, %", "continuous lines", "S-C, mm", "porosity, %", "k1, D", "pore, mm",
                              "miss, %", "k1 again, 10 um, D", "forward runs", "k1 / slots", "seconds, of processors"], inside)
     yield ""
     yield (f"{within} of {len(INSIDE)} within 5 %, the longest took {longest[0]:.0f} s, {longest[1]:.0f} s of processors "
@@ -130,11 +130,11 @@ def page(voxel):
     yield ""
     yield (f"The longest took {longest_outside[0]:.0f} s, {longest_outside[1]:.0f} s of processors.")
     yield ""
-    yield from tables.table(["wish", "refused", "nearest: porosity, %", "k1, D", "pore, mm", "forward runs", "seconds, of processors"], outside)
+    yield from tables.table(["target", "refused", "nearest: porosity, %", "k1, D", "pore, mm", "forward runs", "seconds, of processors"], outside)
     yield ""
     yield "## From the bottom to the top"
     yield ""
-    yield from tables.table(["wish", "heights, mm", "of the region", "thick / thin, mm", "extrusion, %", "continuous lines", "S-C, mm", "porosity, %",
+    yield from tables.table(["target", "heights, mm", "of the region", "thick / thin, mm", "extrusion, %", "continuous lines", "S-C, mm", "porosity, %",
                              "k1, D", "pore, mm", "miss, %", "k1 again, 10 um, D"], regions)
     yield ""
     yield from ends

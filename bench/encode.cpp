@@ -4,9 +4,9 @@
 #include <filesystem>
 
 #include "bench/named_parts.h"
-#include "stages/read/image.h"
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/image.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::bench {
 namespace {
@@ -14,17 +14,17 @@ namespace {
 constexpr std::int64_t kDpi = 1200;
 
 /// Empty if the file that an encoder made gives the runs back.
-std::string wrong_with(const write::Bytes& file, const write::ImageFormat& format, const Runs& runs) {
+std::string wrong_with(const formats::Bytes& file, const formats::ImageFormat& format, const Runs& runs) {
   if (format.extension.empty()) return {};
   const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-layer").string() + std::string(format.extension);
-  if (auto written = write::write_file(path, file); !written) return written.error().message;
-  const auto image = read::image(path);
+  if (auto written = write_file(path, file); !written) return written.error().message;
+  const auto image = formats::image(path);
   std::filesystem::remove(path);
   if (!image) return image.error().message;
   return same_runs(image->runs, runs) ? "" : "the file does not hold the layer's pixels";
 }
 
-void encode(benchmark::State& state, const write::ImageFormat& format, const std::string& path) {
+void encode(benchmark::State& state, const formats::ImageFormat& format, const std::string& path) {
   Part part;
   if (!load_on_bed(state, path, kNmPerMm, kNmPerMm, part)) return;
   const PixelGrid grid = snug_grid(part, kDpi);
@@ -35,7 +35,7 @@ void encode(benchmark::State& state, const write::ImageFormat& format, const std
   rasterizer->layer(raster::Engine::kContours, static_cast<Nm>(part.bounds.height() / 3), scratch, runs);
 
   const auto encoder = format.make_encoder();
-  write::Bytes file;
+  formats::Bytes file;
   if (auto encoded = encoder->encode(runs, kDpi, kDpi, file); !encoded) {
     return state.SkipWithError(encoded.error().message.c_str());
   }
@@ -55,7 +55,7 @@ void encode(benchmark::State& state, const write::ImageFormat& format, const std
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part);
     if (path.empty()) continue;
-    for (const write::ImageFormat& format : write::image_formats()) {
+    for (const formats::ImageFormat& format : formats::image_formats()) {
       benchmark::RegisterBenchmark(("encode/" + std::string(part.name) + "/" + std::string(format.id)).c_str(),
                                    [&format, path](benchmark::State& state) { encode(state, format, path); })
           ->Unit(benchmark::kMicrosecond);

@@ -163,7 +163,7 @@ def pixel_rows(results):
         if not peer or not peer.get("images_compared"):
             continue
         yield [f"`{name}`", f"{result['layers']} and {peer['layers']}", str(peer["images_compared"]),
-               str(peer["pixels_different"]), str(peer["pixels_different_most"]),
+               str(peer["pixels_different"]), str(peer["pixels_different_max"]),
                f"{result['columns'] * result['rows'] / 1e6:.1f} million"]
 
 
@@ -185,7 +185,7 @@ def memory_text(root):
         summary = entry["summary"]
         own = sum(summary.get(key, 0) for key in ("mesh_bytes", "index_bytes")) / 2**20
         rows.append([f"`--memory {entry['memory']}`", f"{entry['peak_mib']:.1f} MiB", f"{own:.1f} MiB",
-                     f"{summary.get('peak_layer_bytes', 0) / 2**20:.1f} MiB", str(summary.get("most_layers_in_flight", "?")),
+                     f"{summary.get('peak_layer_bytes', 0) / 2**20:.1f} MiB", str(summary.get("max_layers_in_flight", "?")),
                      f"{entry['wall']:.2f} s"])
     yield from table(["budget", "peak resident", "mesh + index", "layers in flight, bytes", "layers in flight", "time"], rows)
 

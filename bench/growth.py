@@ -4,7 +4,7 @@
     scripts/bench growth --only NAME    this series only (can be repeated); no page is written
     --program FILE                      a lamina; else build/release/lamina, built first
     --runs N                            runs of a job, of which the least counts (default 3)
-    --most TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
+    --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
 
 Parts are made by formula (bench/shapes.py); in a series all is equal but one thing. The slope is that of least squares in
 log-log over the upper two decades, of what a job takes beyond the smallest of its series against what it has beyond that one:
@@ -42,8 +42,8 @@ def powers(first, last):
 class Jobs:
     """Command lines of the jobs of all series; parts are made when they are needed."""
 
-    def __init__(self, work, most):
-        self.work, self.most = work, most
+    def __init__(self, work, maximum):
+        self.work, self.maximum = work, maximum
 
     def path(self, name):
         return os.path.join(self.work, name)
@@ -57,7 +57,7 @@ class Jobs:
     def triangles(self):
         """Decades and their thirds of triangles; 236 layers of 22 million pixels."""
         for wanted in [1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7]:
-            if wanted > self.most:
+            if wanted > self.maximum:
                 break
             path, (around, along) = self.knot(int(wanted))
             yield 2 * around * along, [path, *BED, "--dpi", "1200", "--layer", "0.1"]
@@ -140,7 +140,7 @@ def slope(entries, measure):
 
 def measure_series(name, options, work):
     entries = []
-    for x, words in getattr(Jobs(work, options.most), name)():
+    for x, words in getattr(Jobs(work, options.maximum), name)():
         entry = dict(run_job(options, words, work), x=x)
         say(f"  {name} {x:>11,}: {entry['wall']:7.3f} s, processor {entry['processor']:7.3f} s, "
             f"{entry['peak'] / 2**20:7.1f} MiB, {entry['layers']} layers")
@@ -161,7 +161,7 @@ def read_options(arguments):
     parser.add_argument("--only", action="append", choices=[*SERIES, "shares"])
     parser.add_argument("--program")
     parser.add_argument("--runs", type=int, default=3)
-    parser.add_argument("--most", type=float, default=1e7)
+    parser.add_argument("--max", type=float, default=1e7)
     parser.add_argument("--models", default=models_default())
     parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
     options = parser.parse_args(arguments)
@@ -181,8 +181,8 @@ def main(arguments):
         for name in SERIES:
             if name in names:
                 say(f"bench: growth with {name}")
-                with tempfile.TemporaryDirectory(dir=work) as place:
-                    series[name] = measure_series(name, options, place)
+                with tempfile.TemporaryDirectory(dir=work) as position:
+                    series[name] = measure_series(name, options, position)
         shares = {}
         if "shares" in names:
             subprocess.run([sys.executable, os.path.join(ROOT, "bench/make_parts.py"), options.models,

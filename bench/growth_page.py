@@ -49,9 +49,9 @@ def bounds(found):
         phases = share["phases"]
         wall, serial = (sum(span[key] for span in phases.values()) for key in ("wall", "serial"))
         longest = max(phases, key=lambda name: phases[name]["serial"])
-        least = {int(n): least_seconds for n, least_seconds in share["bounds"].items()}
+        minimum = {int(n): min_seconds for n, min_seconds in share["bounds"].items()}
         rows.append([f"`{case}`", f"{1e3 * wall:.0f}", f"{1e3 * serial:.0f}", f"{longest}, {1e3 * phases[longest]['serial']:.0f}",
-                     *(f"{1e3 * least[n]:.0f} ({wall / least[n]:.1f} x)" for n in (16, 64)), f"{1e3 * share['limit']:.0f}"])
+                     *(f"{1e3 * minimum[n]:.0f} ({wall / minimum[n]:.1f} x)" for n in (16, 64)), f"{1e3 * share['limit']:.0f}"])
     yield (f"At least so many milliseconds on more cores, from the processor time and the seconds of one thread alone in each "
            f"phase of runs on {threads} threads (`--timing`, `bench/amdahl.py`): the bound of Amdahl, which memory and files "
            "that cores share make longer. Beside it the limit of one thread: reading, writing, touching each crossing once.")

@@ -9,10 +9,10 @@
 namespace lamina::bench {
 namespace {
 
-heights::Options options_of(heights::Mode mode, Nm least, Nm most) {
+heights::Options options_of(heights::Mode mode, Nm minimum, Nm maximum) {
   heights::Options options;
   options.mode = mode;
-  for (Nm value = least; value <= most; value += 1000) options.set.values.push_back(value);
+  for (Nm value = minimum; value <= maximum; value += 1000) options.set.values.push_back(value);
   return options;
 }
 
@@ -26,7 +26,7 @@ std::string wrong_with(const heights::Plan& plan, const heights::SurfaceIndex& i
   const heights::Evaluation found = heights::evaluate(index, heights::boundaries_of(plan.table), options);
   if (options.mode == heights::Mode::kAngle) return {};
   for (std::uint32_t i = 0; i < plan.table.size(); ++i) {
-    if (found.layers[i].cusp > options.cusp && plan.table[i].thickness > options.set.least()) return "a step is too high";
+    if (found.layers[i].cusp > options.cusp && plan.table[i].thickness > options.set.minimum()) return "a step is too high";
   }
   return options.mode == heights::Mode::kOptimal && found.flats_missed > 0 ? "a flat is missed" : "";
 }

@@ -23,8 +23,8 @@ import figures
 from measure import build, say
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-LEAST, MOST, FLAT_MM2 = 0.05, 0.3, 5
-FIRST_LAYERS = (MOST, 0.1, LEAST)
+MINIMUM, MAXIMUM, FLAT_MM2 = 0.05, 0.3, 5
+FIRST_LAYERS = (MAXIMUM, 0.1, MINIMUM)
 PARTS = {
     "3DBenchy": "3DBenchy.3mf",
     "NIST artifact": "nist_am_test_artifact_v3b.stl",
@@ -101,8 +101,8 @@ def tops_of(gcode, comment):
 def slic3r(part, folder, first):
     settings = os.path.join(folder, "slic3r.ini")
     with open(settings, "w", encoding="ascii") as file:
-        file.write(f"adaptive_slicing = 1\nadaptive_slicing_quality = 75%\nmatch_horizontal_surfaces = 1\nlayer_height = {MOST}\n"
-                   f"first_layer_height = {first}\nmin_layer_height = {LEAST}\nmax_layer_height = {MOST}\nnozzle_diameter = 0.4\n"
+        file.write(f"adaptive_slicing = 1\nadaptive_slicing_quality = 75%\nmatch_horizontal_surfaces = 1\nlayer_height = {MAXIMUM}\n"
+                   f"first_layer_height = {first}\nmin_layer_height = {MINIMUM}\nmax_layer_height = {MAXIMUM}\nnozzle_diameter = 0.4\n"
                    "fill_density = 0\nperimeters = 1\ntop_solid_layers = 0\nbottom_solid_layers = 0\nskirts = 0\n"
                    "use_relative_e_distances = 1\nretract_length = 0\nbed_shape = 0x0,400x0,400x400,0x400\n"
                    "print_center = 200,200\n")
@@ -127,7 +127,7 @@ def cura_definitions(cache):
 
 def cura(part, folder, first, definitions):
     out = os.path.join(folder, "cura.gcode")
-    middle, variation = (LEAST + MOST) / 2, (MOST - LEAST) / 2
+    middle, variation = (MINIMUM + MAXIMUM) / 2, (MAXIMUM - MINIMUM) / 2
     settings = {"adaptive_layer_height_enabled": "true", "layer_height": middle, "layer_height_0": first,
                 "adaptive_layer_height_variation": variation, "adaptive_layer_height_variation_step": 0.01,
                 "adaptive_layer_height_threshold": 0.2, "infill_line_distance": 0, "top_layers": 0, "bottom_layers": 0,
@@ -152,10 +152,10 @@ class Ours:
         return json.loads(text)["tables"]
 
     def table(self, part, way, cusp, *options):
-        return self.tables(part, "--heights", way, "--thickness", f"{LEAST}..{MOST}", "--cusp", f"{cusp:.6f}", *options)[0]
+        return self.tables(part, "--heights", way, "--thickness", f"{MINIMUM}..{MAXIMUM}", "--cusp", f"{cusp:.6f}", *options)[0]
 
     def measure(self, part, tops):
-        return self.tables(part, "--layer", str(MOST), "--measure", tops)[0]
+        return self.tables(part, "--layer", str(MAXIMUM), "--measure", tops)[0]
 
 
 def row(name, table, than=None):
@@ -169,7 +169,7 @@ def part_section(name, part, ours, folder, definitions):
     say(f"bench: {name}")
     lines = [f"## {name}", "", "| table | layers | fewer than the peer | largest step, mm | mean step, mm | flats missed | "
              "by up to, um | top off by, um |", "|---|---|---|---|---|---|---|---|"]
-    judged = []
+    verdict = []
     for (peer, slicer), first in itertools.product([("Slic3r", slic3r), ("CuraEngine", cura)], FIRST_LAYERS):
         tops = os.path.join(folder, f"{os.path.basename(part)[:-4]}-{peer}-{first}.tops")
         if not os.path.exists(tops):
@@ -183,7 +183,7 @@ def part_section(name, part, ours, folder, definitions):
         best = ours.table(part, "optimal", cusp)
         goal, fewer = GOALS.get(name, {}).get(peer), 100 * (1 - best["layers"] / theirs["layers"])
         if goal is not None:
-            judged.append(f"{peer} with a first layer of {first} mm: {fewer:.1f} % fewer layers, {goal} % asked, "
+            verdict.append(f"{peer} with a first layer of {first} mm: {fewer:.1f} % fewer layers, {goal} % asked, "
                           + ("met" if fewer >= goal else "not met"))
         lines.append(row(f"`optimal`, step {cusp:.4f}", best, theirs))
         for way in ("cusp", "stepwise"):
@@ -194,9 +194,9 @@ def part_section(name, part, ours, folder, definitions):
             table = ours.table(part, way, cusp)
             lines.append(row(f"`{way}`, step {cusp}, beside {layers} layers of {peer} that were measured with other settings",
                              table, {"layers": layers}))
-    for table in ours.tables(part, "--thickness", f"{LEAST}..{MOST}", "--cusp", "0.1", "--compare"):
+    for table in ours.tables(part, "--thickness", f"{MINIMUM}..{MAXIMUM}", "--cusp", "0.1", "--compare"):
         lines.append(row(f"`{table['name']}`, step 0.1", table))
-    return lines + ["", *(["; ".join(judged) + ".", ""] if judged else [])]
+    return lines + ["", *(["; ".join(verdict) + ".", ""] if verdict else [])]
 
 
 def times(ours, part, *options, turns=7):
@@ -240,16 +240,16 @@ def time_section(ours, models, folder):
     terrain = os.path.join(folder, "terrain.stl")
     if not os.path.exists(terrain):
         make_parts.write_stl(terrain, make_parts.read_stl(os.path.join(models, "st_helens_terrain_645k.stl.gz")))
-    ways = ("angle", "cusp", "stepwise", "optimal")
-    cases = [("terrain, binary STL, in memory", terrain, 645364, (f"{LEAST}..{MOST}",), ways),
+    paths = ("angle", "cusp", "stepwise", "optimal")
+    cases = [("terrain, binary STL, in memory", terrain, 645364, (f"{MINIMUM}..{MAXIMUM}",), paths),
              ("terrain, as published: gzipped STL", os.path.join(models, "st_helens_terrain_645k.stl.gz"), 645364,
-              (f"{LEAST}..{MOST}",), ways)]
+              (f"{MINIMUM}..{MAXIMUM}",), paths)]
     cases += [("column of 100 mm", tall_part(folder, 100, facets), facets, ("0.02..0.3",), ("cusp", "optimal"))
               for facets in (20_000, 80_000, 320_000)]
     cases += [(f"column of {height} mm", tall_part(folder, height, 80_000), 80_000, ("0.02..0.3",), ("cusp", "optimal"))
               for height in (250, 500, 1000)]
-    for name, part, triangles, (thickness,), ways in cases:
-        for way in ways:
+    for name, part, triangles, (thickness,), paths in cases:
+        for way in paths:
             load, surface, layers = times(ours, part, "--heights", way, "--thickness", thickness, "--cusp", "0.1")
             lines.append(f"| {name} | {triangles:,} | `{way}` | {1000 * load:.1f} | {1000 * surface:.1f} | {1000 * layers:.1f} | "
                          f"{(surface + layers) / load:.2f} |")
@@ -277,7 +277,7 @@ def main(arguments):
     definitions = cura_definitions(os.path.abspath(options.cache))
     lines = ["# Layer heights, measured", "", "Written by `scripts/bench heights`; edits are lost.", "",
              f"{machine['processor']}, {machine['cores']} cores; {machine['system']}. Commit {figures.commit(ROOT)}.", "",
-             f"Layers of {LEAST} to {MOST} mm in steps of 0.001. Peers: Debian's Slic3r 1.3 with adaptive slicing at its quality of "
+             f"Layers of {MINIMUM} to {MAXIMUM} mm in steps of 0.001. Peers: Debian's Slic3r 1.3 with adaptive slicing at its quality of "
              "75 % and horizontal surfaces matched, CuraEngine 4.13 with adaptive layers around 0.175 mm, variation 0.125 mm, "
              "steps of 0.01 mm, threshold 0.2 mm; both with a first layer of 0.3 mm, as by default, whose step may be the highest of "
              "all, and with one of 0.1 and 0.05 mm, so that their own choice decides. Every table is measured by the same code. A step is thickness times |n_z| of a "

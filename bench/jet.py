@@ -158,12 +158,12 @@ class Bench:
             sys.exit(f"bench: {case}: PrusaSlicer's images are {size}, ours {side} x {side}")
         if abs(len(images) - layers) > 1:
             sys.exit(f"bench: {case}: PrusaSlicer has {len(images)} layers, ours {layers}")
-        found = {"layers": len(images), "images_compared": 0, "pixels_different": 0, "pixels_different_most": 0}
+        found = {"layers": len(images), "images_compared": 0, "pixels_different": 0, "pixels_different_max": 0}
         if CASES[case][1] > 1:  # our copies stand elsewhere than the one mesh's
             return found
         different = [prusa.different_pixels(archive, images[index], pbm)
                      for index, pbm in self.some_layers(case, min(layers, len(images)))]
-        found.update(images_compared=len(different), pixels_different=sum(different), pixels_different_most=max(different))
+        found.update(images_compared=len(different), pixels_different=sum(different), pixels_different_max=max(different))
         say(f"  {found['pixels_different']} pixels of {found['images_compared']} layers differ from PrusaSlicer's")
         return found
 
@@ -183,7 +183,7 @@ class Bench:
         different = [mslicer.different_pixels(goo, index, pbm) for index, pbm in self.some_layers(case, min(layers, goo.layers))]
         say(f"  {sum(different)} pixels of {len(different)} layers differ from mslicer's")
         return {"layers": goo.layers, "images_compared": len(different), "pixels_different": sum(different),
-                "pixels_different_most": max(different)}
+                "pixels_different_max": max(different)}
 
     def limits(self, part, out):
         """What any program has to do for this job: read the part's bytes, write the layers' files."""

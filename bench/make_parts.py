@@ -85,7 +85,7 @@ def placed(axes, factors):
     return result
 
 
-def write_stl(path, axes, offsets=((0.0, 0.0),), told=True):
+def write_stl(path, axes, offsets=((0.0, 0.0),), reported=True):
     """One binary STL with a copy of the part at every (x, y) of `offsets`; `told` says so."""
     facets = len(axes[0]) // 3
     records = bytearray(RECORD * facets)  # normals and attributes stay zero
@@ -110,7 +110,7 @@ def write_stl(path, axes, offsets=((0.0, 0.0),), told=True):
             last = offset
             file.write(records)
     os.replace(path + ".part", path)
-    if told:
+    if reported:
         print(f"{path}: {facets * len(offsets)} triangles, {os.path.getsize(path)} bytes", flush=True)
 
 

@@ -55,17 +55,17 @@ class Goo:
         with open(path, "rb") as file:
             head = file.read(HEADER_BYTES)
             self.layers, self.columns, self.rows = struct.unpack_from(">IHH", head, LAYER_COUNT_AT)
-            self.places = []  # offset and bytes of the runs
+            self.positions = []  # offset and bytes of the runs
             for _ in range(self.layers):
                 size, magic = struct.unpack(">IB", file.read(LAYER_HEAD + 5)[LAYER_HEAD:])
                 if magic != 0x55:
-                    raise ValueError(f"{path}: layer {len(self.places)} does not begin as a layer of a .goo does")
-                self.places.append((file.tell(), size - 2))
+                    raise ValueError(f"{path}: layer {len(self.positions)} does not begin as a layer of a .goo does")
+                self.positions.append((file.report(), size - 2))
                 file.seek(size - 2 + 1 + 2, os.SEEK_CUR)  # checksum, delimiter
 
     def runs(self, layer):
         """(length, value) of a layer; as LayerDecoder::next reads them."""
-        at, size = self.places[layer]
+        at, size = self.positions[layer]
         with open(self.path, "rb") as file:
             file.seek(at)
             data = file.read(size)

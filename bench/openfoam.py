@@ -114,8 +114,8 @@ def write_mesh(void, folder):
     sides = numpy.array(void.shape[::-1]) + 1
     used, which = numpy.unique((faces[..., 2] * sides[1] + faces[..., 1]) * sides[0] + faces[..., 0], return_inverse=True)
     which = which.reshape(faces.shape[:2])
-    places = zip(used % sides[0], used // sides[0] % sides[1], used // (sides[0] * sides[1]))
-    write_list(folder, "points", "vectorField", [f"({x} {y} {z})" for x, y, z in places])
+    positions = zip(used % sides[0], used // sides[0] % sides[1], used // (sides[0] * sides[1]))
+    write_list(folder, "points", "vectorField", [f"({x} {y} {z})" for x, y, z in positions])
     write_list(folder, "faces", "faceList", [f"4({a} {b} {c} {d})" for a, b, c, d in which])
     write_list(folder, "owner", "labelList", [str(cell) for cell in owners])
     write_list(folder, "neighbour", "labelList", [str(cell) for cell in neighbour[order]])
@@ -155,10 +155,10 @@ relaxationFactors { equations { U 0.95; } }""")
 
 def run(command, folder, environment=None):
     """Standard output, processor seconds and the peak of memory in MB."""
-    told = os.path.join(folder, "time")
-    done = subprocess.run(["/usr/bin/time", "-f", "%U %S %M", "-o", told, *command], cwd=folder, env=environment, check=True,
+    reported = os.path.join(folder, "time")
+    done = subprocess.run(["/usr/bin/time", "-f", "%U %S %M", "-o", reported, *command], cwd=folder, env=environment, check=True,
                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    with open(told, encoding="ascii") as file:
+    with open(reported, encoding="ascii") as file:
         user, system, peak = (float(word) for word in file.read().split()[-3:])
     return done.stdout, user + system, peak / 1024
 
@@ -180,9 +180,9 @@ def compared(folder, name, voxels):
     toolpaths, rows, theirs = pores.plan(name, folder), [], []
     for voxel in sorted(voxels, reverse=True):
         path = os.path.join(folder, "void.nrrd")
-        told, seconds, peak = run([pores.LAMINA, "permeability", toolpaths, "--voxel", str(voxel), "--json", "--void", path,
+        reported, seconds, peak = run([pores.LAMINA, "permeability", toolpaths, "--voxel", str(voxel), "--json", "--void", path,
                                    "--overwrite"], folder)
-        found = json.loads(told)
+        found = json.loads(reported)
         edges = [1e3 * side / count for side, count in zip(found["window_mm"], found["voxels"])]
         if max(edges) - min(edges) > 1e-3 * voxel:
             sys.exit(f"bench openfoam: {name} has no cubes of {voxel:g} um; take another size")

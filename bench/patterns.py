@@ -60,11 +60,11 @@ def cells(name, found, of, published):
             f"{across['k1_darcy']:.0f}", f"{100 * (ratio - 1):+.0f} %" if ratio else "", published]
 
 
-def effects(told):
-    base, groups = told.of(raster(GAP)), told.of(raster(GAP, group=2))
-    largest = told.of(raster(GAP, 2 * WIDTH, 2))
+def effects(reported):
+    base, groups = reported.of(raster(GAP)), reported.of(raster(GAP, group=2))
+    largest = reported.of(raster(GAP, 2 * WIDTH, 2))
     yield cells("lines, gap 0.4 mm", base, None, "")
-    yield cells("stagger of 0.4 mm, half a pitch", told.of(raster(GAP, WIDTH)), base,
+    yield cells("stagger of 0.4 mm, half a pitch", reported.of(raster(GAP, WIDTH)), base,
                 "-57 % (Entezari 2019), -18.4 % (Walejewska 2019)")
     yield cells("groups of 2", groups, base, "+160 % (Shigueoka 2019)")
     yield cells("groups of 2, stagger of 0.8 mm, against groups of 2", largest, groups,
@@ -72,21 +72,21 @@ def effects(told):
     yield cells("the same, against lines", largest, base, "")
 
 
-def gaps(told):
+def gaps(reported):
     for gap in (0.2, 0.4, 0.8):
-        straight = told.of(raster(gap))
-        yield cells(f"lines, gap {gap} mm", straight, told.of(raster(GAP)), "the strongest parameter (Too 2001)" if gap != GAP else "")
-        yield cells("staggered by half a pitch, against the same", told.of(raster(gap, (WIDTH + gap) / 2)), straight, "lower")
+        straight = reported.of(raster(gap))
+        yield cells(f"lines, gap {gap} mm", straight, reported.of(raster(GAP)), "the strongest parameter (Too 2001)" if gap != GAP else "")
+        yield cells("staggered by half a pitch, against the same", reported.of(raster(gap, (WIDTH + gap) / 2)), straight, "lower")
 
 
-def waves(told):
+def waves(reported):
     """Quatrefoils beside lines of their porosity, in the same window."""
     window = ["--window", "4.8,4.8,1.2"]
-    bead = (WIDTH + GAP) * (1 - told.of(raster(GAP))["porosity"])  # cross-section / thickness
+    bead = (WIDTH + GAP) * (1 - reported.of(raster(GAP))["porosity"])  # cross-section / thickness
     for cell, apart in CELLS:
-        quatrefoil = told.of({"fill.pattern": '"quatrefoil"', "fill.cell_mm": cell, "fill.gap_mm": apart}, *window)
+        quatrefoil = reported.of({"fill.pattern": '"quatrefoil"', "fill.cell_mm": cell, "fill.gap_mm": apart}, *window)
         gap = round(bead / (1 - quatrefoil["porosity"]) - WIDTH, 3)
-        lines = told.of(raster(gap), *window)
+        lines = reported.of(raster(gap), *window)
         yield cells(f"lines, gap {gap:g} mm", lines, None, "")
         yield cells(f"quatrefoil, cells of {cell:g} mm, gap {apart:g} mm", quatrefoil, lines, "about x 2 (Entezari 2019, design D)")
 
@@ -96,7 +96,7 @@ HEAD = ["pattern", "porosity, %", "k1 along z, D", "along x", "k1 along z agains
 
 def page(voxel, folder):
     machine = figures.machine(ROOT)
-    told = Predictions(folder, voxel)
+    reported = Predictions(folder, voxel)
     yield "# Permeability of patterns: beside published effects"
     yield ""
     yield (f"`scripts/bench patterns --voxel {voxel:g}`, commit {figures.commit(ROOT)}, {machine['processor']}. Beads 0.4 mm wide, "
@@ -106,17 +106,17 @@ def page(voxel, folder):
     yield ""
     yield "## Stagger and groups"
     yield ""
-    yield from tables.table(HEAD, effects(told))
+    yield from tables.table(HEAD, effects(reported))
     yield "## The gap"
     yield ""
-    yield from tables.table(HEAD, gaps(told))
+    yield from tables.table(HEAD, gaps(reported))
     yield "## Quatrefoil"
     yield ""
     yield ("The source draws curves like honeycombs that are kept apart and does not define them; lamina's are cosines "
            "([filling.md](../docs/filling.md#patterns)), which do not repeat along x and y at 0 and 90 degrees in turn. So a window of "
            "4.8 x 4.8 x 1.2 mm with closed sides and voxels twice as large, beside lines of about the same porosity there.")
     yield ""
-    yield from tables.table(HEAD, waves(told))
+    yield from tables.table(HEAD, waves(reported))
 
 
 def main(arguments):

@@ -83,7 +83,7 @@ def predict(toolpaths, voxel, options):
 
 def other_machine(folder, lag, acceleration):
     """A profile that differs in these alone."""
-    with open(os.path.join(ROOT, "stages/write/machines/extrusion/anet-a8.toml"), encoding="utf-8") as file:
+    with open(os.path.join(ROOT, "pipeline/machine/shipped/extruders/anet-a8.toml"), encoding="utf-8") as file:
         text = file.read()
     for key, value in (("lag_s", lag), ("acceleration_mm_s2", acceleration)):
         text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.M)
@@ -120,9 +120,9 @@ def first_table(folder, voxel, flow, porosity):
 
 def second_table(folder, voxel, flow):
     rows = []
-    for name, options in (("widths as the file tells them, by the calibration's tables", ["--beads", "told"]),
+    for name, options in (("widths as the file tells them, by the calibration's tables", ["--beads", "stated"]),
                           ("lag 0.047 s, 500 mm/s2: the profile", []),
-                          ("the same, not spread along the lines", ["--beads", "laid"]),
+                          ("the same, not spread along the lines", ["--beads", "deposited"]),
                           ("lag 0.046 s, 400 mm/s2", (0.046, 400)), ("lag 0.053 s, 500 mm/s2", (0.053, 500)),
                           ("lag 0.050 s, 1000 mm/s2", (0.050, 1000)), ("lag 0.052 s, speed at once", (0.052, 1000000))):
         if isinstance(options, tuple):
@@ -197,13 +197,13 @@ def main(arguments):
     parser.add_argument("--voxel", type=float, default=10, help="um")
     parser.add_argument("--keep-inertia", action="store_true")
     options = parser.parse_args(arguments)
-    place, kept = os.path.join(ROOT, "bench/pores.md"), ""
+    position, kept = os.path.join(ROOT, "bench/pores.md"), ""
     if options.keep_inertia:
-        with open(place, encoding="utf-8") as file:
+        with open(position, encoding="utf-8") as file:
             text = file.read()
         kept = text[text.index("Forchheimer's k2"):].rstrip("\n")
     written = "\n".join(page(options.voxel, kept)) + "\n"
-    with open(place, "w", encoding="utf-8") as file:
+    with open(position, "w", encoding="utf-8") as file:
         file.write(written)
     print("wrote bench/pores.md")
 

@@ -42,7 +42,7 @@ def make(name, path):
     """Each stands on the bed where it shall stand; triangles."""
     if name == "dragon":  # stood up, so that y of the knot, 51 mm, is the height
         tall = 95 / 51.1
-        return shapes.write_knot(path, 318_000, place=lambda x, y, z: (110 + tall * x, 60 - tall * z, 47.5 + tall * y))
+        return shapes.write_knot(path, 318_000, position=lambda x, y, z: (110 + tall * x, 60 - tall * z, 47.5 + tall * y))
     if name == "wave":
         return shapes.write_waves(path, 1140, 1140, 112, 112, 12.1 / 0.9)
     return shapes.write_columns(path, 25, 12, 120, 100)

@@ -40,8 +40,8 @@ def page(rows):
         lines += [f"## {dpi} dpi", "", "RMS distance in um, filled / blurred.", "", "| | " + " | ".join(shapes) + " |",
                   "|---" * (len(shapes) + 1) + "|"]
         for way in dict.fromkeys(way_of(row) for row in here):
-            told = {row[0]: row for row in here if way_of(row) == way}
-            cells = [f"{told[shape][5]} / {told[shape][7]}" for shape in shapes]
+            reported = {row[0]: row for row in here if way_of(row) == way}
+            cells = [f"{reported[shape][5]} / {reported[shape][7]}" for shape in shapes]
             lines.append(f"| {way} | " + " | ".join(cells) + " |")
         lines.append("")
         for shape in shapes:

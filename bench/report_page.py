@@ -27,7 +27,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 LAMINA = os.environ.get("LAMINA_PROGRAM", os.path.join(ROOT, "build/release/lamina"))
 BROWSER = os.path.join(ROOT, "tests/report/browser.py")
 LAYERS, LAYER = 1000, 500
-MOST_BYTES, MOST_SECONDS = 20_000_000, 2.0
+MAX_BYTES, MAX_SECONDS = 20_000_000, 2.0
 BED = ["--bed", "100x100", "--dpi", "1200", "--layers", f"0:{LAYERS}"]
 
 CASES = {  # every one has 1,000 layers at least
@@ -102,7 +102,7 @@ def measure(name, words, options):
         sys.exit(f"bench: {name}: {summary['layers_planned']} layers")
     write, _ = run(["report", out, "-o", page, "--parts", part, "--quiet"])
     size = os.path.getsize(page)
-    if size >= MOST_BYTES:
+    if size >= MAX_BYTES:
         sys.exit(f"bench: {name}: the page has {size} bytes")
     runs, pixels = tiff_runs(os.path.join(out, f"layers/{LAYER:06}.tif"))
     with open(page, encoding="utf-8") as file:
@@ -131,7 +131,7 @@ def page_text(entries, options, about, busy):
            f"{options.runs} times, each time by a Chromium that has just started with an empty profile. Seconds are the page's own clock, from the "
            "begin of the navigation: until its text is parsed, until it is loaded, and until the layer in the middle, all plots and the parts "
            "from three sides are on the screen; medians, and the fastest and the slowest. Where all layers would make the page "
-           "larger than 19 MB, every second one is left out (`--most-bytes`).")
+           "larger than 19 MB, every second one is left out (`--max-bytes`).")
     yield ""
     yield (f"In every one of these runs layer {LAYER} as the page decodes it was the TIFF of layer {LAYER} as libtiff decodes it, run for "
            "run, the console stayed empty, and nothing was asked from a network.")
@@ -142,8 +142,8 @@ def page_text(entries, options, about, busy):
     yield from figures.table(["job", f"runs in layer {LAYER}", "planned, s", "page written, s", "page, MB", "layers in it", "parsed, s",
                              "loaded, s", "on the screen, s"], rows)
     slowest, largest = max(e["slowest"] for e in entries), max(e["bytes"] for e in entries)
-    yield (f"Meant: below {MOST_BYTES / 1e6:.0f} MB ({'true' if largest < MOST_BYTES else 'not true'}: {largest / 1e6:.2f} MB at most), on the "
-           f"screen within {MOST_SECONDS:.0f} s ({'true' if slowest <= MOST_SECONDS else 'not true'}: {slowest:.2f} s at most).")
+    yield (f"Meant: below {MAX_BYTES / 1e6:.0f} MB ({'true' if largest < MAX_BYTES else 'not true'}: {largest / 1e6:.2f} MB at most), on the "
+           f"screen within {MAX_SECONDS:.0f} s ({'true' if slowest <= MAX_SECONDS else 'not true'}: {slowest:.2f} s at most).")
 
 
 def main(arguments=None):

@@ -52,7 +52,7 @@ def write_facets(path, count, blocks):
         file.write(HEADER + struct.pack("<I", count))
         for block in blocks:
             file.write(block)
-        size = file.tell()
+        size = file.report()
     if size != 84 + 50 * count:
         raise ValueError(f"{path}: {size} bytes for {count} facets")
     os.replace(path + ".part", path)
@@ -67,12 +67,12 @@ def strip(here, there):
         zip(zero, here, there_next, here_next, end, zero, here, there, there_next, end)))
 
 
-def write_knot(path, triangles, scale=1.0, place=None):
+def write_knot(path, triangles, scale=1.0, position=None):
     """A torus knot of about so many triangles; how many. place: where a corner goes, if not where it is; scaled after that"""
     around, along = knot_size(triangles)
 
     def blocks():
-        rings = (packed(ring if place is None else [place(*point) for point in ring], scale)
+        rings = (packed(ring if position is None else [position(*point) for point in ring], scale)
                  for ring in knot_rings(around, along))
         first = here = next(rings)
         for there in itertools.chain(rings, [first]):

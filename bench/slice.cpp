@@ -6,7 +6,7 @@
 
 #include "bench/named_parts.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/tidy.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/slice/slice.h"
 
 namespace lamina::bench {
@@ -36,7 +36,7 @@ Stack stack_of(const Part& part) {
   options.fill_rule = FillRule::kPositive;
   const auto slicer = slice::Slicer::build(part.meshes, {&as_it_is, 1}, {&body, 1}, planes, options);
   if (!slicer) return {{}, 0, slicer.error().message};
-  slice::LayerScratch scratch;
+  slice::SectionScratch scratch;
   slice::LayerContours contours;
   double sum = 0, volume = 0, shadow = 0;
   for (std::uint32_t p = 0; p < planes.size(); ++p) {
@@ -63,7 +63,7 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
   const std::span<const Triangle> triangles = part.meshes.front().triangles;
   const Stack stack = stack_of(part);
   if (!stack.wrong.empty()) return state.SkipWithError(stack.wrong.c_str());
-  const slice::PlaneIndex index(triangles, stack.own);
+  const slice::PlaneIndex index = slice::index_crossings(triangles, stack.own);
   Buffer<std::uint32_t> facets, group;
   slice::Cuts cuts;
   slice::ChainScratch scratch;
@@ -71,13 +71,13 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
   Contours closed, open;
   for (auto _ : state) {
     if (until == Until::kIndex) {
-      const slice::PlaneIndex fresh(triangles, stack.own);
+      const slice::PlaneIndex fresh = slice::index_crossings(triangles, stack.own);
       benchmark::DoNotOptimize(fresh.bytes());
       continue;
     }
     for (std::uint32_t p = 0; p < stack.own.size(); ++p) {
       facets.clear();
-      index.find(p, facets);
+      index.append(p, facets);
       slice::cut(triangles, facets, stack.own[p], cuts);
       benchmark::DoNotOptimize(cuts.at.data());
       if (until == Until::kCut) continue;

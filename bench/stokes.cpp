@@ -164,7 +164,7 @@ void past_spheres(benchmark::State& state, const SphereLattice& lattice) {
     state.counters["published"] = lattice.drag;
     state.counters["steps"] = solved->flow.steps;
     const double surface = 4 * std::numbers::pi * std::pow(radius_of(lattice), 2) * lattice.spheres / side;
-    state.counters["least_error"] = stokes::least_error(1 - lattice.share, surface, kFiner);
+    state.counters["error_floor"] = stokes::error_floor(1 - lattice.share, surface, kFiner);
   }
 }
 

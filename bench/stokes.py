@@ -48,7 +48,7 @@ def spheres():
         published = runs[sizes[0]]["published"]
         whole = extrapolated(sizes, [runs[size]["drag"] for size in sizes])
         finest = runs[sizes[-1]]
-        error = max(abs(whole / finest["drag"] - 1), finest["least_error"])
+        error = max(abs(whole / finest["drag"] - 1), finest["error_floor"])
         yield [name.replace("_", " "), f"{published:g}"] + [f"{100 * (runs[size]['drag'] / published - 1):+.2f}" for size in sizes] + [
             f"{whole:.4g}", f"{100 * (whole / published - 1):+.2f}", f"{100 * error:.2f}",
             "yes" if abs(whole / published - 1) <= error else "no", f"{finest['steps']:.0f}"]

@@ -12,13 +12,13 @@
 #include <string>
 
 #include "bench/named_parts.h"
-#include "stages/data/handles/tiff.h"
+#include "stages/formats/g4/decode.h"
+#include "stages/formats/g4/encode.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/bits.h"
-#include "stages/read/g4.h"
-#include "stages/read/image.h"
-#include "stages/write/file.h"
-#include "stages/write/g4/encode.h"
-#include "stages/write/image_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/late/tiff.h"
 
 namespace lamina::bench {
 namespace {
@@ -74,7 +74,7 @@ double libtiff_seconds(const std::string& path, std::uint32_t columns, std::uint
                                 : nullptr);
   if (tiff == nullptr) return 0;
   RunsBuilder builder(columns);
-  write::Bytes row(row_bytes(columns));
+  formats::Bytes row(row_bytes(columns));
   for (std::uint32_t r = 0; r < rows; ++r) {
     if (TIFFReadScanline(tiff.get(), row.data(), r, 0) < 0 || !message.empty() || !builder.add_row(row, false)) return 0;
   }
@@ -84,12 +84,12 @@ double libtiff_seconds(const std::string& path, std::uint32_t columns, std::uint
 
 /// Empty if the format's library decodes the file to the runs.
 std::string wrong_with(std::string_view id, const Runs& runs, double* by_libtiff = nullptr) {
-  const write::ImageFormat& format = *write::find_image_format(id);
-  write::Bytes file;
+  const formats::ImageFormat& format = *formats::find_image_format(id);
+  formats::Bytes file;
   if (auto encoded = format.make_encoder()->encode(runs, 1200, 1200, file); !encoded) return encoded.error().message;
   const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-runs").string() + std::string(format.extension);
-  if (auto written = write::write_file(path, file); !written) return written.error().message;
-  const auto image = read::image(path);
+  if (auto written = write_file(path, file); !written) return written.error().message;
+  const auto image = formats::image(path);
   Runs decoded;
   const double seconds = id == "tiff-g4" ? libtiff_seconds(path, runs.columns, runs.view().rows(), decoded) : 1;
   if (by_libtiff != nullptr) *by_libtiff = seconds;
@@ -108,15 +108,15 @@ double zlib_seconds(const Runs& runs) {
   const auto start = std::chrono::steady_clock::now();
   z_stream stream{};
   if (deflateInit2(&stream, 1, Z_DEFLATED, MAX_WBITS, 8, Z_RLE) != Z_OK) return 0;
-  write::Bytes row(1 + row_bytes(runs.columns)), room(64 * 1024);
+  formats::Bytes row(1 + row_bytes(runs.columns)), capacity(64 * 1024);
   for (std::uint32_t r = 0; r < runs.view().rows(); ++r) {
     row[0] = std::byte{0};
     expand_row(runs.view().row(r), std::span(row).subspan(1));
     stream.next_in = reinterpret_cast<Bytef*>(row.data());
     stream.avail_in = static_cast<uInt>(row.size());
     do {
-      stream.next_out = reinterpret_cast<Bytef*>(room.data());
-      stream.avail_out = static_cast<uInt>(room.size());
+      stream.next_out = reinterpret_cast<Bytef*>(capacity.data());
+      stream.avail_out = static_cast<uInt>(capacity.size());
       deflate(&stream, r + 1 == runs.view().rows() ? Z_FINISH : Z_NO_FLUSH);
     } while (stream.avail_out == 0);
   }
@@ -138,8 +138,8 @@ void encode_g4(benchmark::State& state, Kind kind, std::uint32_t side) {
   const Runs runs = image_of(kind, side);
   const std::string wrong = wrong_with("tiff-g4", runs);
   if (!wrong.empty()) return state.SkipWithError(wrong.c_str());
-  write::g4::Encoder encoder;
-  write::Bytes file;
+  formats::g4::Encoder encoder;
+  formats::Bytes file;
   std::size_t bytes = 0;
   for (auto _ : state) benchmark::DoNotOptimize(bytes = encoder.encode(runs, file, 0));
   set_counters(state, runs, bytes);
@@ -150,9 +150,9 @@ void decode_g4(benchmark::State& state, Kind kind, std::uint32_t side) {
   double by_libtiff = 0;
   const std::string wrong = wrong_with("tiff-g4", runs, &by_libtiff);
   if (!wrong.empty()) return state.SkipWithError(wrong.c_str());
-  write::Bytes file, coded;
-  file.resize(write::g4::Encoder().encode(runs, file, 0));
-  read::G4Decoder decoder;
+  formats::Bytes file, coded;
+  file.resize(formats::g4::Encoder().encode(runs, file, 0));
+  formats::G4Decoder decoder;
   Runs decoded;
   const auto start = std::chrono::steady_clock::now();
   for (auto _ : state) {
@@ -172,8 +172,8 @@ void encode_png(benchmark::State& state, Kind kind, std::uint32_t side) {
   const std::string wrong = wrong_with("png", runs);
   if (!wrong.empty()) return state.SkipWithError(wrong.c_str());
   const double by_zlib = zlib_seconds(runs);
-  const auto encoder = write::find_image_format("png")->make_encoder();
-  write::Bytes file;
+  const auto encoder = formats::find_image_format("png")->make_encoder();
+  formats::Bytes file;
   const auto start = std::chrono::steady_clock::now();
   for (auto _ : state) benchmark::DoNotOptimize(encoder->encode(runs, 1200, 1200, file));
   state.counters["zlib_times"] = by_zlib * static_cast<double>(state.iterations()) / seconds_since(start);

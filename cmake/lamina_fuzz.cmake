@@ -15,6 +15,6 @@ add_executable(fuzz_readers ${fuzz_sources})
 target_link_libraries(fuzz_readers PRIVATE lamina::pipeline PNG::PNG ZLIB::ZLIB TIFF::TIFF PkgConfig::LIBZIP PkgConfig::XXHASH
                       nlohmann_json::nlohmann_json)
 target_link_options(fuzz_readers PRIVATE -fsanitize=fuzzer)
-if(LAMINA_UNITE STREQUAL "all")
-  lamina_unite(fuzz_readers ${fuzz_sources})
+if(LAMINA_UNITY STREQUAL "all")
+  lamina_unity(fuzz_readers ${fuzz_sources})
 endif()

@@ -31,8 +31,8 @@ if(NOT Python_FOUND OR NOT pybind11_FOUND)
 endif()
 
 pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp python/words.cpp)
-if(LAMINA_UNITE STREQUAL "all")
-  lamina_unite(lamina_python ${PROJECT_SOURCE_DIR}/python/module.cpp ${PROJECT_SOURCE_DIR}/python/arrays.cpp
+if(LAMINA_UNITY STREQUAL "all")
+  lamina_unity(lamina_python ${PROJECT_SOURCE_DIR}/python/module.cpp ${PROJECT_SOURCE_DIR}/python/arrays.cpp
                ${PROJECT_SOURCE_DIR}/python/words.cpp)
 endif()
 set_target_properties(lamina_python PROPERTIES OUTPUT_NAME lamina LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python)

@@ -13,14 +13,14 @@ endfunction()
 function(lamina_add_included list)
   set(sources ${${list}})
   set(waiting ${sources})
-  set(seen)
+  set(detected)
   while(waiting)
     list(POP_FRONT waiting file)
     file(STRINGS ${file} lines REGEX "^#include \"(stages|pipeline|tests)/[^\"]+\\.h\"")
     foreach(line ${lines})
       string(REGEX REPLACE "^#include \"([^\"]+)\\.h\".*" "${PROJECT_SOURCE_DIR}/\\1" name "${line}")
-      if(NOT name IN_LIST seen)
-        list(APPEND seen ${name})
+      if(NOT name IN_LIST detected)
+        list(APPEND detected ${name})
         list(APPEND waiting ${name}.h)
         if(EXISTS ${name}.cpp AND NOT ${name}.cpp IN_LIST sources)
           list(APPEND sources ${name}.cpp)
@@ -33,11 +33,11 @@ function(lamina_add_included list)
 endfunction()
 
 # Compiles the sources of a folder together, in half of the time, where no two of them use one name for different things.
-function(lamina_unite target)
+function(lamina_unity target)
   foreach(source ${ARGN})
     get_filename_component(folder ${source} DIRECTORY)
     file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${folder})
-    string(REGEX REPLACE "^stages/write/.*" "stages/write" folder ${folder})
+    string(REGEX REPLACE "^stages/(formats|program|replay|support)/.*" "stages/\\1" folder ${folder})
     string(MAKE_C_IDENTIFIER ${folder} folder)
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder})
   endforeach()
@@ -49,13 +49,13 @@ include(GNUInstallDirs)
 
 # --- stages: what is done
 lamina_sources(stage_sources "stages/*.cpp")
-list(FILTER stage_sources EXCLUDE REGEX "/stages/(write/picture|scan)/")
+list(FILTER stage_sources EXCLUDE REGEX "/stages/(view/picture|calibration/scan)/")
 
 add_library(lamina_stages STATIC ${stage_sources})
 add_library(lamina::stages ALIAS lamina_stages)
-if(LAMINA_UNITE STREQUAL "all")
-  list(FILTER stage_sources EXCLUDE REGEX "/(load/stl_ascii|load/stl_binary|read/profiles/printer|slice/gaps)\\.cpp$")  # names of their own
-  lamina_unite(lamina_stages ${stage_sources})
+if(LAMINA_UNITY STREQUAL "all")
+  list(FILTER stage_sources EXCLUDE REGEX "/slice/gaps\\.cpp$")  # names of their own
+  lamina_unity(lamina_stages ${stage_sources})
 endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
@@ -63,7 +63,7 @@ target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt
                       PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::GMPXX
                               PkgConfig::XXHASH nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 
-# Embree, libtiff and libzip are loaded when a job first needs them (stages/data/handles/late.h), by the names that linking
+# Embree, libtiff and libzip are loaded when a job first needs them (stages/support/late/late.h), by the names that linking
 # would have written down.
 set(lamina_late_files)
 foreach(name embree tiff zip)
@@ -75,28 +75,22 @@ foreach(name embree tiff zip)
     message(FATAL_ERROR "${lamina_${name}_file} is no shared library; lamina loads it when a job first needs it")
   endif()
   string(TOUPPER ${name} upper)
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/handles/${name}.cpp PROPERTIES
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/late/${name}.cpp PROPERTIES
                               COMPILE_DEFINITIONS LAMINA_${upper}_FILE="${CMAKE_MATCH_1}" SKIP_PRECOMPILE_HEADERS ON)
   list(APPEND lamina_late_files ${lamina_${name}_file})
 endforeach()
 set(lamina_late_headers $<TARGET_PROPERTY:embree,INTERFACE_INCLUDE_DIRECTORIES> ${TIFF_INCLUDE_DIRS} ${LIBZIP_INCLUDE_DIRS})
 target_include_directories(lamina_stages SYSTEM PRIVATE ${lamina_late_headers})
-set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/text/version.cpp PROPERTIES
+set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/text/version.cpp PROPERTIES
                             COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)
-
-# Profiles are read once a job, and arguments once a call.
-lamina_sources(terminal_sources "stages/terminal/*.cpp")
-set_source_files_properties(${terminal_sources} ${PROJECT_SOURCE_DIR}/stages/read/profiles/extruder.cpp
-                            ${PROJECT_SOURCE_DIR}/stages/read/profiles/printer.cpp PROPERTIES
-                            COMPILE_OPTIONS $<$<NOT:$<CONFIG:Debug>>:-O1>)
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/sheet|show/swath)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|scan_main|calibrate/scan_answer|show/sheet|show/swath)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
-lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/design/*.cpp"
-               "pipeline/job/*.cpp" "pipeline/machine/*.cpp" "pipeline/show/*.cpp")
-list(FILTER once_a_job EXCLUDE REGEX "/show/(sheet|swath)\\.cpp$")
+lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
+               "pipeline/machine/*.cpp" "pipeline/pores/*.cpp" "pipeline/show/*.cpp")
+list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet|show/swath)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
 target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nlohmann_json)
@@ -105,18 +99,18 @@ if(LAMINA_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # The same checks as calls instead of in place: slower to run, compiled in two thirds of the time.
   target_compile_options(lamina_once_a_job PRIVATE --param=asan-instrumentation-with-call-threshold=0)
 endif()
-if(LAMINA_UNITE)
-  set(united ${once_a_job})
-  list(FILTER united EXCLUDE REGEX "/(cli/commands/plan|job/extrude)\\.cpp$")
-  lamina_unite(lamina_once_a_job ${united})
+if(LAMINA_UNITY)
+  set(merged ${once_a_job})
+  list(FILTER merged EXCLUDE REGEX "/(cli/commands/plan|job/profiles/printer)\\.cpp$")
+  lamina_unity(lamina_once_a_job ${merged})
 endif()
 
 add_library(lamina_pipeline STATIC ${pipeline_sources} $<TARGET_OBJECTS:lamina_once_a_job>)
 add_library(lamina::pipeline ALIAS lamina_pipeline)
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages PRIVATE nlohmann_json::nlohmann_json)
-if(LAMINA_UNITE STREQUAL "all")
+if(LAMINA_UNITY STREQUAL "all")
   list(FILTER pipeline_sources EXCLUDE REGEX "/plan/(plan|segment)\\.cpp$")
-  lamina_unite(lamina_pipeline ${pipeline_sources})
+  lamina_unity(lamina_pipeline ${pipeline_sources})
 endif()
 
 # ccache keeps nothing that was made from precompiled headers, and does better without them.
@@ -135,12 +129,12 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
-lamina_sources(picture_sources "stages/write/picture/*.cpp")
+lamina_sources(picture_sources "stages/view/picture/*.cpp")
 add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/sheet.cpp pipeline/show/swath.cpp
                ${picture_sources})
-if(LAMINA_UNITE STREQUAL "all")
+if(LAMINA_UNITY STREQUAL "all")
   list(FILTER picture_sources EXCLUDE REGEX "/(plan_view|swath_view)\\.cpp$")  # colours of their own
-  lamina_unite(lamina-preview ${PROJECT_SOURCE_DIR}/pipeline/show/sheet.cpp
+  lamina_unity(lamina-preview ${PROJECT_SOURCE_DIR}/pipeline/show/sheet.cpp
                ${PROJECT_SOURCE_DIR}/pipeline/show/swath.cpp ${picture_sources})
 endif()
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
@@ -159,16 +153,15 @@ find_library(OPENCV_IMGPROC_LIBRARY opencv_imgproc)
 mark_as_advanced(OPENCV_INCLUDE_DIR OPENCV_CORE_LIBRARY OPENCV_IMGPROC_LIBRARY)
 if(OPENCV_INCLUDE_DIR AND OPENCV_CORE_LIBRARY AND OPENCV_IMGPROC_LIBRARY)
   set(LAMINA_SCAN ON)
-  lamina_sources(scan_sources "stages/scan/*.cpp")
-  list(FILTER scan_sources EXCLUDE REGEX "/scan/main\\.cpp$")
-  add_library(lamina_scan STATIC ${scan_sources})
+  lamina_sources(scan_sources "stages/calibration/scan/*.cpp")
+  add_library(lamina_scan STATIC ${scan_sources} pipeline/calibrate/scan_answer.cpp)
   target_include_directories(lamina_scan SYSTEM PUBLIC ${OPENCV_INCLUDE_DIR})
   target_link_libraries(lamina_scan PUBLIC lamina::stages ${OPENCV_IMGPROC_LIBRARY} ${OPENCV_CORE_LIBRARY} nlohmann_json::nlohmann_json
                         PRIVATE PkgConfig::OPENIMAGEIO)
   target_compile_options(lamina_scan PRIVATE -Wno-array-bounds -Wno-stringop-overflow)
-  add_executable(lamina-scan stages/scan/main.cpp)
+  add_executable(lamina-scan pipeline/scan_main.cpp)
   target_link_libraries(lamina-scan PRIVATE lamina_scan)
-  if(LAMINA_UNITE STREQUAL "all")
+  if(LAMINA_UNITY STREQUAL "all")
     set_target_properties(lamina_scan PROPERTIES UNITY_BUILD OFF)  # helpers of one name in several files
   endif()
   if(LAMINA_TEST_SIDE STREQUAL "sanitized")

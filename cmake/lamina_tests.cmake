@@ -24,8 +24,8 @@ set_target_properties(lamina_call_log PROPERTIES PREFIX "" OUTPUT_NAME call_log)
 
 # CI runs each test program in one of its two builds, g++ release or clang with sanitizers: programs whose result depends on
 # optimisation in both, whole commands, long runs and what loads OpenImageIO or OpenCV in the release.
-set(lamina_test_both raster coverage load geometry stokes write)
-set(lamina_test_release commands picture scan run bead cost dose pores segment slice heights)
+set(lamina_test_both raster coverage load geometry stokes formats)
+set(lamina_test_release commands picture calibration run bead cost dose pores segment slice heights)
 
 lamina_sources(all_test_sources "tests/*.cpp")
 list(REMOVE_ITEM all_test_sources ${test_support_sources} ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
@@ -39,6 +39,9 @@ foreach(folder run ${folders})
     list(FILTER test_sources INCLUDE REGEX "/tests/${folder}/")
     list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/run/")
   endif()
+  if(NOT LAMINA_SCAN)
+    list(FILTER test_sources EXCLUDE REGEX "/tests/calibration/scan/")
+  endif()
   if(LAMINA_TEST_ONLY)
     list(FILTER test_sources INCLUDE REGEX "${LAMINA_TEST_ONLY}")
   endif()
@@ -46,7 +49,7 @@ foreach(folder run ${folders})
   if(folder IN_LIST lamina_test_release)
     set(side release)
   endif()
-  if(NOT test_sources OR (folder STREQUAL "scan" AND NOT LAMINA_SCAN)
+  if(NOT test_sources
      OR (LAMINA_TEST_SIDE AND NOT side STREQUAL LAMINA_TEST_SIDE AND NOT folder IN_LIST lamina_test_both))
     continue()
   endif()
@@ -54,9 +57,9 @@ foreach(folder run ${folders})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
                         PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
   target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
-  if(LAMINA_UNITE_TESTS)
+  if(LAMINA_UNITY_TESTS)
     list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp)  # options of its own
-    lamina_unite(test_${folder} ${test_sources})
+    lamina_unity(test_${folder} ${test_sources})
     list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/")
     list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/(cli|run)/")  # the other rooms have a file or two each
     if(test_sources)
@@ -70,7 +73,7 @@ foreach(folder run ${folders})
       add_dependencies(test_${folder} lamina-scan)
     endif()
   endif()
-  if(folder STREQUAL "scan")
+  if(folder STREQUAL "calibration" AND LAMINA_SCAN)
     target_link_libraries(test_${folder} PRIVATE lamina_scan)
   endif()
   if(folder STREQUAL "picture")
@@ -85,9 +88,9 @@ endforeach()
 # tests. CI builds this program with the thread sanitizer (scripts/check_threads --changed).
 if(LAMINA_SANITIZE STREQUAL "thread")
   set(thread_sources)
-  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/write/file*.cpp" "stages/write/journal*.cpp" "stages/write/replaceable*.cpp"
-                  "tests/pipeline/flow/*.cpp" "tests/pipeline/batch/*.cpp" "tests/write/test_file.cpp" "tests/write/test_journal.cpp"
-                  "tests/write/test_replaceable.cpp")
+  foreach(pattern "pipeline/flow/*.cpp" "pipeline/batch/*.cpp" "stages/support/io/file*.cpp" "stages/support/io/journal.cpp"
+                  "tests/pipeline/flow/*.cpp" "tests/pipeline/batch/*.cpp" "tests/support/test_file.cpp" "tests/support/test_journal.cpp"
+                  "tests/support/test_replaceable.cpp")
     lamina_sources(found ${pattern})
     if(NOT found)
       message(FATAL_ERROR "test_threads: no file matches ${pattern}")
@@ -103,7 +106,7 @@ if(LAMINA_SANITIZE STREQUAL "thread")
                         PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH nlohmann_json::nlohmann_json TIFF::TIFF GTest::gtest_main
                         ${CMAKE_DL_LIBS})
   target_compile_definitions(test_threads PRIVATE $<TARGET_PROPERTY:lamina_test_support,INTERFACE_COMPILE_DEFINITIONS>)
-  lamina_unite(test_threads ${thread_sources})
+  lamina_unity(test_threads ${thread_sources})
 endif()
 
 # What needs a release: other projects, other languages, other machines.
@@ -120,7 +123,7 @@ add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/scripts/threemf_outcomes ${PROJECT_SOURCE_DIR}/tests/corpus/3mf
                  --program $<TARGET_FILE:lamina>)
 add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
-         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/write/threemf_judges $<TARGET_FILE:lamina>)
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_checkers $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled

@@ -29,6 +29,6 @@ std::span<const ShippedProfile> @function@() { return kShipped; }
   target_sources(lamina_pipeline PRIVATE ${source})
 endfunction()
 
-lamina_ship_profiles(stages/write/machines shipped_machines)
-lamina_ship_profiles(stages/write/machines/presets shipped_presets)
-lamina_ship_profiles(stages/write/machines/extrusion shipped_extruders)
+lamina_ship_profiles(pipeline/machine/shipped/printers shipped_machines)
+lamina_ship_profiles(pipeline/machine/shipped/presets shipped_presets)
+lamina_ship_profiles(pipeline/machine/shipped/extruders shipped_extruders)

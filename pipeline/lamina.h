@@ -19,7 +19,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/run/layer_source.h"
 #include "pipeline/run/run.h"
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 
 namespace lamina {
 

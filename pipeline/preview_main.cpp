@@ -6,11 +6,11 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/show/sheet.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/number_text.h"
-#include "stages/write/file.h"
-#include "stages/write/picture/plot.h"
-#include "stages/write/plot.h"
+#include "stages/formats/plot/plot.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
+#include "stages/view/picture/plot.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -21,19 +21,19 @@ Outcome draw_plot(Context& context) {
     const Status status = context.print(text);
     return status ? code : static_cast<int>(status.error().fault);
   };
-  const auto text = read_file("-", {.fault = Fault::kUsage, .most_bytes = 1u << 30, .streams = true});
-  const auto plot = text ? write::read_plot(*text) : text.error();
-  const auto picture = plot ? write::picture::plot_png(*plot) : plot.error();
+  const auto text = read_file("-", {.fault = Fault::kUsage, .max_bytes = 1u << 30, .streams = true});
+  const auto plot = text ? formats::read_plot(*text) : text.error();
+  const auto picture = plot ? view::picture::plot_png(*plot) : plot.error();
   if (!picture) return end(picture.error().message, static_cast<int>(picture.error().fault));
   return end({reinterpret_cast<const char*>(picture->data()), picture->size()}, 0);
 }
 
 /// Sets `value` to the number after a flag, if present: a length in mm, or a whole number.
 template <class Value, class Number = std::conditional_t<std::is_same_v<Value, double>, double, std::uint32_t>>
-Status read_flag(const Arguments& arguments, std::string_view flag, double least, double most, Value& value) {
+Status read_flag(const Arguments& arguments, std::string_view flag, double minimum, double maximum, Value& value) {
   if (!arguments.has(flag)) return {};
   double number = 0;
-  std::string fault = read_number(arguments.text(flag), least, most, "", number);
+  std::string fault = read_number(arguments.text(flag), minimum, maximum, "", number);
   if (fault.empty() && static_cast<Number>(number) != number) fault = "give a whole number";
   if (!fault.empty()) return Error{Fault::kUsage, fmt::format("{} {}: {}", flag, arguments.text(flag), fault)};
   value = static_cast<Number>(number);
@@ -54,7 +54,7 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
        {read_flag(arguments, "--width", 200, 20'000, request.width),
         read_flag(arguments, "--layer", 0, UINT32_MAX, request.layers.layer),
         read_flag(arguments, "--every", 1, UINT32_MAX, request.layers.every),
-        read_flag(arguments, "--count", 1, view::kMostCells, request.layers.count),
+        read_flag(arguments, "--count", 1, view::kMaxCells, request.layers.count),
         read_flag(arguments, "--step", 0, UINT32_MAX, request.step),
         read_flag(arguments, "--filament", 0.5, 10, request.gcode.filament_mm),
         read_flag(arguments, "--layer-height", 0.01, 100, request.gcode.layer_height_mm),
@@ -74,9 +74,9 @@ Outcome draw(const Arguments& arguments, Context& context) {
   if (!request) return request.error();
   const auto preview = draw_preview(*request);
   if (!preview) return preview.error();
-  if (Status status = write::write_file(request->output, preview->bytes); !status) return status;
-  for (const std::string& doubt : preview->doubts) {
-    if (!arguments.has("--quiet")) context.say(doubt);
+  if (Status status = write_file(request->output, preview->bytes); !status) return status;
+  for (const std::string& warning : preview->warnings) {
+    if (!arguments.has("--quiet")) context.say(warning);
   }
   Answer answer(arguments, context);
   answer.say(preview->said);

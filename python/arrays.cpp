@@ -36,24 +36,24 @@ py::array bounds_array(const Box& box) {
   return array;
 }
 
-const write::ImageFormat& format_of(const std::string& path, const std::string& asked) {
-  if (!asked.empty()) {
-    if (const write::ImageFormat* format = write::find_image_format(asked)) return *format;
-    raise({Fault::kUsage, fmt::format("format '{}': no such format; lamina.image_formats() lists them", asked)});
+const formats::ImageFormat& format_of(const std::string& path, const std::string& requested) {
+  if (!requested.empty()) {
+    if (const formats::ImageFormat* format = formats::find_image_format(requested)) return *format;
+    raise({Fault::kUsage, fmt::format("format '{}': no such format; lamina.image_formats() lists them", requested)});
   }
   const std::string extension = std::filesystem::path(path).extension();
-  const auto formats = write::image_formats();
+  const auto formats = formats::image_formats();
   const auto found = std::ranges::find_if(
-      formats, [&](const write::ImageFormat& format) { return !extension.empty() && format.extension == extension; });
+      formats, [&](const formats::ImageFormat& format) { return !extension.empty() && format.extension == extension; });
   if (found == formats.end()) {
     raise({Fault::kUsage, fmt::format("{}: no format writes '{}'; name one, as format='tiff-g4'", path, extension)});
   }
   return *found;
 }
 
-write::Bytes encode(const Image& image, const write::ImageFormat& format) {
-  return without_lock([&]() -> Result<write::Bytes> {
-    write::Bytes file;
+formats::Bytes encode(const Image& image, const formats::ImageFormat& format) {
+  return without_lock([&]() -> Result<formats::Bytes> {
+    formats::Bytes file;
     const auto encoder = format.make_encoder();
     encoder->tag(image.tags);
     if (Status status = encoder->encode(image.runs, image.dpi_x, image.dpi_y, file); !status) return status.error();
@@ -193,14 +193,14 @@ void define_image(py::module_& module) {
       .def(
           "encode",
           [](const Image& image, const std::string& format) {
-            const write::Bytes file = encode(image, format_of("", format));
+            const formats::Bytes file = encode(image, format_of("", format));
             return py::bytes(reinterpret_cast<const char*>(file.data()), file.size());
           },
           py::arg("format") = "tiff-g4", "The bytes of the image's file, as lamina jet writes them.")
       .def(
           "save",
           [](const Image& image, const std::string& path, const std::string& format) {
-            const write::ImageFormat& as = format_of(path, format);
+            const formats::ImageFormat& as = format_of(path, format);
             without_lock([&] { return pipeline::save_image(path, image.runs, image.dpi_x, image.dpi_y, as, image.tags); });
           },
           py::arg("path"), py::arg("format") = "",
@@ -209,7 +209,7 @@ void define_image(py::module_& module) {
       "read_image",
       [](const std::string& path) {
         return without_lock([&]() -> Result<Image> {
-          Result<read::Image> read = read::image(path);
+          Result<formats::Image> read = formats::image(path);
           if (!read) return read.error();
           return Image{std::move(read->runs), read->dpi_x, read->dpi_y};
         });
@@ -219,7 +219,7 @@ void define_image(py::module_& module) {
       "image_formats",
       [] {
         py::dict formats;
-        for (const auto& format : write::image_formats())
+        for (const auto& format : formats::image_formats())
           formats[py::str(std::string(format.id))] = std::string(format.description);
         return formats;
       },

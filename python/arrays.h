@@ -51,7 +51,7 @@ void define_image(py::module_& module);
 struct Image {
   Runs runs;
   double dpi_x = 0, dpi_y = 0;
-  write::LayerTags tags = {};
+  formats::LayerTags tags = {};
 };
 
 }  // namespace lamina::python

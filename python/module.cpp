@@ -85,9 +85,9 @@ class Plan {
   const pipeline::LayerSource& of() const { return source_; }
   const PixelGrid& grid() const { return source_.grid(); }
 
-  std::uint32_t index(std::int64_t asked) const {
-    const std::int64_t count = of().layer_count(), index = asked < 0 ? asked + count : asked;
-    if (index < 0 || index >= count) throw py::index_error(fmt::format("layer {}: there are {} layers", asked, count));
+  std::uint32_t index(std::int64_t requested) const {
+    const std::int64_t count = of().layer_count(), index = requested < 0 ? requested + count : requested;
+    if (index < 0 || index >= count) throw py::index_error(fmt::format("layer {}: there are {} layers", requested, count));
     return static_cast<std::uint32_t>(index);
   }
 
@@ -126,15 +126,16 @@ struct PlanSlice {
   std::shared_ptr<Plan> plan;
   std::int64_t first = 0, step = 1, count = 0;
 
-  std::uint32_t layer(std::int64_t place) const { return static_cast<std::uint32_t>(first + place * step); }
-  PlannedLayer at(std::int64_t asked) const {
-    const std::int64_t place = asked < 0 ? asked + count : asked;
-    if (place < 0 || place >= count) throw py::index_error(fmt::format("layer {} of a slice: it has {}", asked, count));
-    return plan->layer(layer(place));
+  std::uint32_t layer(std::int64_t position) const { return static_cast<std::uint32_t>(first + position * step); }
+  PlannedLayer at(std::int64_t requested) const {
+    const std::int64_t position = requested < 0 ? requested + count : requested;
+    if (position < 0 || position >= count)
+      throw py::index_error(fmt::format("layer {} of a slice: it has {}", requested, count));
+    return plan->layer(layer(position));
   }
-  PlanSlice part(const py::slice& asked) const {
+  PlanSlice part(const py::slice& requested) const {
     py::ssize_t start = 0, stop = 0, stride = 0, length = 0;
-    if (!asked.compute(static_cast<py::ssize_t>(count), &start, &stop, &stride, &length)) throw py::error_already_set();
+    if (!requested.compute(static_cast<py::ssize_t>(count), &start, &stop, &stride, &length)) throw py::error_already_set();
     return {plan, first + start * step, step * stride, length};
   }
 };
@@ -218,11 +219,11 @@ void define_layer(py::module_& module) {
                        "counter-clockwise, those around holes clockwise.")
       .def("__len__", [](const Contours& c) { return c.size(); })
       .def("__getitem__",
-           [](const py::object& self, std::int64_t asked) {
+           [](const py::object& self, std::int64_t requested) {
              const Contours& contours = self.cast<const Contours&>();
-             const std::int64_t index = asked < 0 ? asked + contours.size() : asked;
+             const std::int64_t index = requested < 0 ? requested + contours.size() : requested;
              if (index < 0 || index >= contours.size())
-               throw py::index_error(fmt::format("contour {}: there are {}", asked, contours.size()));
+               throw py::index_error(fmt::format("contour {}: there are {}", requested, contours.size()));
              const auto points = contours[static_cast<std::uint32_t>(index)];
              return view(&points.data()->x, {static_cast<py::ssize_t>(points.size()), 2}, self);
            })
@@ -278,11 +279,11 @@ void define_plan(py::module_& module) {
       "A job with its parts loaded: a sequence of layers that are planned when they are asked "
       "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
       .def("__len__", [](const Plan& plan) { return plan.of().layer_count(); })
-      .def("__getitem__", [](const Plan& plan, std::int64_t asked) { return plan.layer(plan.index(asked)); })
+      .def("__getitem__", [](const Plan& plan, std::int64_t requested) { return plan.layer(plan.index(requested)); })
       .def(
           "__getitem__",
-          [](const std::shared_ptr<Plan>& plan, const py::slice& asked) {
-            return PlanSlice{plan, 0, 1, plan->of().layer_count()}.part(asked);
+          [](const std::shared_ptr<Plan>& plan, const py::slice& requested) {
+            return PlanSlice{plan, 0, 1, plan->of().layer_count()}.part(requested);
           },
           "A layer, or with plan[10:20] a sequence of layers, each planned when it is asked for.")
       .def("__repr__", &described)
@@ -296,7 +297,7 @@ void define_plan(py::module_& module) {
           "first"_a = 0, "end"_a = py::none(),
           "Layers first to end, each planned when it is asked for and kept by nobody else.")
       .def(
-          "contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
+          "contours", [](Plan& plan, std::int64_t requested) { return plan.contours(plan.index(requested)); }, "index"_a,
           "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
       .def_property_readonly(
           "materials", [](const Plan& plan) { return plan.of().materials(); },
@@ -372,8 +373,8 @@ PYBIND11_MODULE(lamina, module) {
   module.def(
       "heights",
       [](const py::object& parts, const py::dict& settings, const std::string& job) {
-        const pipeline::Job asked = make_job(parts, settings, py::none(), job);
-        return table_of(without_lock([&] { return pipeline::layers_of(asked); }));
+        const pipeline::Job requested = make_job(parts, settings, py::none(), job);
+        return table_of(without_lock([&] { return pipeline::layers_of(requested); }));
       },
       "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "",
       "The layers alone, as lamina heights decides them: a structured array, a row a layer: bottom and thickness in nm (int32), "

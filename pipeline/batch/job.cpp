@@ -8,9 +8,9 @@
 #include <map>
 #include <set>
 
-#include "stages/data/text/version.h"
 #include "stages/load/load.h"
-#include "stages/write/replaceable.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -69,15 +69,15 @@ class Preparation {
       return;
     }
     const fs::path below = below_batch(job.output, share_.directory);
-    job.place = below.empty() ? job.output : below.string();
+    job.position = below.empty() ? job.output : below.string();
   }
 
   void digest_inputs(BatchJob& job) {
-    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.place);
+    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.position);
     for (const std::string& word : job.entry.words) identity += fmt::format("{}:{}\n", word.size(), word);
     for (const std::string& input : std::set<std::string>(job.call.inputs.begin(), job.call.inputs.end())) {
       const auto [known, fresh] = digests_.try_emplace(input, Error{});
-      if (fresh && write::is_file(input)) known->second = digest_file(input);
+      if (fresh && is_file(input)) known->second = digest_file(input);
       const Result<FileDigest>& digest = known->second;
       if (!digest) continue;
       identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));

@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/job/lists/batch_list.h"
 #include "pipeline/plan/progress.h"
-#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
-#include "stages/data/text/json.h"
-#include "stages/read/jobs/batch_list.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
-using read::BatchEntry;
+using pipeline::BatchEntry;
 
 /// What a batch adds to a job's command line when the job starts.
 struct CallSettings {
@@ -71,7 +71,7 @@ struct BatchJob {
   BatchEntry entry;          // its name is unique and becomes the output's unless the job names one
   Call call;
   std::string output;             // file or directory; empty if the command only returns a value
-  std::string place;              // output as reported: below the batch's directory, else as given
+  std::string position;           // output as reported: below the batch's directory, else as given
   bool relative_output = false;   // the output was given relative to the batch's directory
   std::uint64_t layer_bytes = 0;  // for the layers in flight
   std::uint64_t need_bytes = 0;   // expected peak memory

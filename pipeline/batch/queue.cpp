@@ -12,7 +12,7 @@
 #include <mutex>
 #include <thread>
 
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -35,7 +35,7 @@ struct Slot {
   enum class State { kWaiting, kRunning, kEnded } state = State::kWaiting;
   std::atomic<bool> cancel{false};
   std::atomic<std::uint32_t> layers_done{0}, layers{0};
-  Clock::time_point begun, told_to_stop;
+  Clock::time_point begun, stop_requested;
   std::atomic<bool> overdue{false};
   bool abandoned = false, reported = false;
   BatchResult result;
@@ -56,7 +56,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
         summary_.interrupted = true;
         stop_all();
       }
-      look_at_clocks();
+      check_clocks();
       if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0)) break;
       changed_.wait_for(lock, milliseconds(100));
     }
@@ -80,27 +80,27 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   void stop_all() {
     stopped_ = true;
-    for (Slot& slot : slots_) tell_to_stop(slot);
+    for (Slot& slot : slots_) request_stop(slot);
     changed_.notify_all();
   }
 
   std::chrono::milliseconds grace() const { return summary_.interrupted ? kLastGrace : std::chrono::milliseconds(kGrace); }
 
-  static void tell_to_stop(Slot& slot) {
+  static void request_stop(Slot& slot) {
     if (slot.state != Slot::State::kRunning || slot.cancel) return;
-    slot.told_to_stop = Clock::now();
+    slot.stop_requested = Clock::now();
     slot.cancel = true;
   }
 
-  void look_at_clocks() {
+  void check_clocks() {
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
       Slot& slot = slots_[i];
       if (slot.state != Slot::State::kRunning) continue;
       if (options_.time_limit_seconds > 0 && !slot.cancel && seconds_since(slot.begun) > options_.time_limit_seconds) {
         slot.overdue = true;
-        tell_to_stop(slot);
+        request_stop(slot);
       }
-      if (!slot.cancel || Clock::now() - slot.told_to_stop < grace()) continue;
+      if (!slot.cancel || Clock::now() - slot.stop_requested < grace()) continue;
       slot.abandoned = summary_.abandoned = true;
       BatchResult result;
       result.code = static_cast<int>(Fault::kInterrupted);
@@ -152,8 +152,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
       slot.begun = Clock::now();
       ++running_;
       need_ += job.need_bytes;
-      summary_.most_running = std::max(summary_.most_running, running_);
-      summary_.most_need_bytes = std::max(summary_.most_need_bytes, need_);
+      summary_.max_running = std::max(summary_.max_running, running_);
+      summary_.max_need_bytes = std::max(summary_.max_need_bytes, need_);
       lock.unlock();
       BatchResult result = run_job(i);
       // Returns freed memory to the system before the next job starts.
@@ -198,13 +198,13 @@ class Queue : public std::enable_shared_from_this<Queue> {
         return result;
       }
     }
-    const bool foreign = !options_.overwrite && (earlier == nullptr || earlier->foreign) && holds_something(job.output);
+    const bool unowned = !options_.overwrite && (earlier == nullptr || earlier->unowned) && holds_something(job.output);
     {
       const std::lock_guard lock(mutex_);
-      note(record_.begun(job, foreign));
+      note(record_.begun(job, unowned));
     }
-    BatchResult result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, foreign)});
-    result.recognized = result.recognized && foreign && result.outcome == BatchOutcome::kDone;
+    BatchResult result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, unowned)});
+    result.recognized = result.recognized && unowned && result.outcome == BatchOutcome::kDone;
     if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
       const Result<TreeDigest> digest = digest_tree(job.output);
       if (!digest) return failed({Fault::kOutput, digest.error().message}, std::move(result));
@@ -216,10 +216,10 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   /// Recorded output of the same job is continued, recorded output of another job is replaced. For unrecorded output the
   /// command decides whether it is its own.
-  CallSettings::Earlier earlier_of(const BatchJob& job, const BatchRecord::Earlier* earlier, bool foreign) const {
+  CallSettings::Earlier earlier_of(const BatchJob& job, const BatchRecord::Earlier* earlier, bool unowned) const {
     const bool same = earlier != nullptr && earlier->begun == job.id;
-    if (job.call.can_continue && (foreign ? options_.resume : same)) return CallSettings::Earlier::kContinue;
-    if (!foreign && job.call.can_replace && (options_.overwrite || earlier != nullptr)) return CallSettings::Earlier::kReplace;
+    if (job.call.can_continue && (unowned ? options_.resume : same)) return CallSettings::Earlier::kContinue;
+    if (!unowned && job.call.can_replace && (options_.overwrite || earlier != nullptr)) return CallSettings::Earlier::kReplace;
     return CallSettings::Earlier::kNone;
   }
 
@@ -269,8 +269,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
 }  // namespace
 
 std::uint64_t layer_share(std::uint64_t memory_bytes, std::uint32_t jobs) {
-  constexpr std::uint64_t kLeast = 32ull << 20;
-  return std::max(memory_bytes / (2 * std::max(jobs, 1u)), kLeast);
+  constexpr std::uint64_t kMin = 32ull << 20;
+  return std::max(memory_bytes / (2 * std::max(jobs, 1u)), kMin);
 }
 
 Result<BatchSummary> run_batch(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options,

@@ -47,8 +47,8 @@ struct BatchWatcher {
 
 struct BatchSummary {
   std::vector<BatchResult> results;  // one a job
-  std::uint32_t most_running = 0;
-  std::uint64_t most_need_bytes = 0;  // of jobs running at the same time
+  std::uint32_t max_running = 0;
+  std::uint64_t max_need_bytes = 0;  // of jobs running at the same time
   double seconds = 0;
   bool interrupted = false;
   /// A job that ignored its stop is still running: the program must exit without waiting for it.

@@ -6,38 +6,38 @@
 #include <filesystem>
 #include <utility>
 
-#include "stages/data/input/text_shape.h"
-#include "stages/data/text/json.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
 
-std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id) : job.place; }
+std::string key_of(const BatchJob& job) { return job.position.empty() ? hex(job.id) : job.position; }
 
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::map<std::string, BatchRecord::Earlier>& earlier) try {
   if (!json_nests_within(line)) return;
-  const Json json = Json::parse(line);
+  const Json json = parse_json(line);
   const bool ended = json.contains("ended");
-  const std::string id = json.at(ended ? "ended" : "begun"), place = json.at("output");
+  const std::string id = json.at(ended ? "ended" : "begun").text(), position = json.at("output").text();
   BatchRecord::Earlier entry;
   if (!read_hex(id, entry.begun)) return;
   if (ended) {
-    const std::string outcome = json.at("outcome");
+    const std::string& outcome = json.at("outcome").text();
     const bool done = outcome == outcome_name(BatchOutcome::kDone) || outcome == outcome_name(BatchOutcome::kKept);
     BatchResult& result = entry.result;
     entry.ended = read_hex(json.at("hash").get<std::string>(), result.output.hash) && done;
     result.outcome = BatchOutcome::kDone;
-    result.seconds = json.at("seconds");
+    json.at("seconds").get_to(result.seconds);
     if (!json.at("files").is_number_unsigned() || !json.at("bytes").is_number_unsigned()) return;
-    result.output.files = json.at("files");
-    result.output.bytes = json.at("bytes");
+    json.at("files").get_to(result.output.files);
+    json.at("bytes").get_to(result.output.bytes);
     result.value = json.at("result");
   }
-  BatchRecord::Earlier& known = earlier[place.empty() ? id : place];
-  entry.foreign = ended ? known.foreign && !entry.ended : json.contains("foreign");
+  BatchRecord::Earlier& known = earlier[position.empty() ? id : position];
+  entry.unowned = ended ? known.unowned && !entry.ended : json.contains("unowned");
   known = std::move(entry);
-} catch (const Json::exception&) {
+} catch (const JsonError&) {
   return;
 }
 
@@ -47,7 +47,7 @@ Json result_json(const BatchJob& job, const BatchResult& result) {
   return {{"job", job.number},
           {"source", job.entry.source},
           {"words", job.entry.words},
-          {"output", job.place},
+          {"output", job.position},
           {"outcome", outcome_name(result.outcome)},
           {"code", result.code},
           {"reason", result.reason},
@@ -64,7 +64,7 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   fs::create_directories(directory, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
   const std::string path = (fs::path(directory) / "batch.jsonl").string();
-  auto journal = write::Journal::open(path, "another batch is running here right now; wait for it or name another directory");
+  auto journal = Journal::open(path, "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
   if (!journal->empty() && !resume && !overwrite) {
     return Error{Fault::kUsage, fmt::format("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, "
@@ -91,9 +91,9 @@ Status BatchRecord::append(const Json& entry) {
   return status ? status : Error{status.error().fault, status.error().message + ", and go on with --resume"};
 }
 
-Status BatchRecord::begun(const BatchJob& job, bool foreign) {
-  Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.place}};
-  if (foreign) entry["foreign"] = true;
+Status BatchRecord::begun(const BatchJob& job, bool unowned) {
+  Json entry = {{"begun", hex(job.id)}, {"job", job.number}, {"output", job.position}};
+  if (unowned) entry["unowned"] = true;
   return append(entry);
 }
 

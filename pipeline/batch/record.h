@@ -1,6 +1,6 @@
 // pipeline/batch/record.h: the progress of a batch, in a file that survives a kill at any moment.
 //
-// batch.jsonl is a journal of JSON objects (stages/write/journal.h): {"begun":ID,...} when a job starts, {"ended":ID,...}
+// batch.jsonl is a journal of JSON objects (stages/support/io/journal.h): {"begun":ID,...} when a job starts, {"ended":ID,...}
 // with its result when it ends. A line torn by a kill or a full disk is skipped, and its job runs again.
 #pragma once
 
@@ -8,10 +8,10 @@
 #include <string>
 
 #include "pipeline/batch/job.h"
-#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
-#include "stages/data/text/json.h"
-#include "stages/write/journal.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/io/journal.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -24,7 +24,7 @@ class BatchRecord {
   struct Earlier {
     Hash128 begun;         // id of the last job that wrote there
     bool ended = false;    // with exit code 0
-    bool foreign = false;  // it found files there that no batch had written, and did not finish
+    bool unowned = false;  // it found files there that no batch had written, and did not finish
     BatchResult result;    // set if it ended
   };
 
@@ -38,14 +38,14 @@ class BatchRecord {
 
   // --- from one thread at a time; errors  kOutput
   /// foreign  the output path holds unrecorded files: a later run must not treat them as its own
-  Status begun(const BatchJob& job, bool foreign);
+  Status begun(const BatchJob& job, bool unowned);
   Status ended(const BatchJob& job, const BatchResult& result);
 
  private:
-  explicit BatchRecord(write::Journal journal) : journal_(std::move(journal)) {}
+  explicit BatchRecord(Journal journal) : journal_(std::move(journal)) {}
   Status append(const Json& entry);
 
-  write::Journal journal_;
+  Journal journal_;
   std::map<std::string, Earlier> earlier_;
 };
 

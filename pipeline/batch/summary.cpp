@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "pipeline/plan/progress.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -27,7 +27,8 @@ std::size_t warnings_of(const BatchResult& result) {
 
 std::string first_warning(const BatchResult& result) {
   const Json& first = result.value["warnings"].front();
-  return first.is_object() ? first.value("text", "") : first.get<std::string>();
+  const Json* text = first.is_object() ? first.find("text") : &first;
+  return text == nullptr ? "" : text->text();
 }
 
 std::string warnings_text(std::size_t count) { return fmt::format("{} warning{}", count, count == 1 ? "" : "s"); }
@@ -89,9 +90,9 @@ Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, 
                {"bytes", totals.bytes},
                {"seconds", rounded(summary.seconds)},
                {"job_seconds", rounded(totals.job_seconds)},
-               {"most_at_work", summary.most_running},
+               {"max_running", summary.max_running},
                {"memory_budget_bytes", options.memory_bytes},
-               {"most_need_bytes", summary.most_need_bytes},
+               {"max_need_bytes", summary.max_need_bytes},
                {"peak_resident_bytes", peak_resident_bytes()}};
   Json& results = json["jobs"] = Json::array();
   for (std::size_t i = 0; i < jobs.size(); ++i) {
@@ -105,7 +106,7 @@ std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& s
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
     text += fmt::format("{}\t{}\t{}\t{:.3f}\t{}\t{}\t{}\t{}\t{}\n", jobs[i].number, outcome_name(result.outcome), result.code,
-                        result.seconds, result.output.files, result.output.bytes, cell(jobs[i].place),
+                        result.seconds, result.output.files, result.output.bytes, cell(jobs[i].position),
                         cell(jobs[i].entry.source), cell(result.reason));
   }
   return text;
@@ -153,7 +154,7 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   line("files",
        fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));
   line("time", fmt::format("{}; {:.1f} jobs/s, {} at once at most", readable_seconds(summary.seconds),
-                           summary.seconds > 0 ? (totals.done + totals.failed) / summary.seconds : 0, summary.most_running));
+                           summary.seconds > 0 ? (totals.done + totals.failed) / summary.seconds : 0, summary.max_running));
   line("memory",
        fmt::format("{} at most, budget {}", readable_bytes(peak_resident_bytes()), readable_bytes(options.memory_bytes)));
   return text;

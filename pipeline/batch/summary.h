@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pipeline/batch/queue.h"
-#include "stages/data/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <filesystem>
 
+#include "pipeline/calibrate/pieces_text.h"
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
-#include "stages/data/text/readable.h"
+#include "stages/formats/stl/mesh_stl.h"
 #include "stages/segment/widths_table.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/stl/block.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -73,10 +74,10 @@ class Written {
   Written(const Written&) = delete;
   Written& operator=(const Written&) = delete;
   ~Written() {
-    for (const std::string& path : paths_) write::remove_or_note(path);
+    for (const std::string& path : paths_) remove_or_note(path);
   }
   Status write(const std::string& path, std::string_view text) {
-    const Status status = write::write_file(path, text, options_);
+    const Status status = write_file(path, text, options_);
     if (status) paths_.push_back(path);
     return status;
   }
@@ -84,7 +85,7 @@ class Written {
   void keep() { paths_.clear(); }
 
  private:
-  write::FileOptions options_;
+  FileOptions options_;
   std::vector<std::string> paths_;
 };
 
@@ -92,7 +93,7 @@ Status write_piece(const segment::TestPiece& piece, const CalibrationRequest& re
                    Written& written) {
   const fs::path directory = request.directory;
   const std::string stem = (directory / piece.name).string();
-  if (Status status = written.write(stem + ".stl", write::stl::block(piece.size_mm)); !status) return status;
+  if (Status status = written.write(stem + ".stl", formats::stl::block(piece.size_mm)); !status) return status;
   const Job job = job_of(piece, request, stem, extension);
   const std::string text =
       fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name, job_text(job, directory.string()));
@@ -133,7 +134,7 @@ Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, c
   fs::create_directories(directory, failed);
   if (failed) return Error{Fault::kOutput, fmt::format("{}: {}", request.directory, failed.message())};
   // Begun first and finished last: another run is refused meanwhile.
-  auto widths = write::File::open(widths_path.string(), {.replace = false});
+  auto widths = File::open(widths_path.string(), {.replace = false});
   if (!widths) return widths.error();
   if (fs::exists(fs::symlink_status(widths_path, failed))) {
     return Error{Fault::kUsage, fmt::format("{}: has a widths.csv already, which may hold measurements; name another directory",
@@ -149,9 +150,9 @@ Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, c
     if (Status status = write_piece(piece, request, extension, written); !status) return status.error();
     names.push_back(piece.name);
   }
-  const std::string steps = segment::steps_text(pieces, request.pieces, extension);
+  const std::string steps = steps_text(pieces, request.pieces, extension);
   if (Status status = written.write((directory / "STEPS.md").string(), steps); !status) return status.error();
-  if (Status status = widths->append(segment::widths_text(request.pieces)); !status) return status.error();
+  if (Status status = widths->append(widths_text(request.pieces)); !status) return status.error();
   if (const auto whole = widths->finish(); !whole) return whole.error();
   written.keep();
   return names;
@@ -175,7 +176,7 @@ Result<CalibratedProfile> calibrate_profile(CalibrationRequest request, const st
   profile->own_calibration = true;
   if (found->flow) profile->machine.material.flow = std::round(*found->flow * 1000) / 1000;
   std::string toml = fmt::format("# {} with what was measured on it. Made by lamina calibrate.\n\n{}",
-                                 one_line(profile->machine.name), read::extruder_text(*profile));
+                                 one_line(profile->machine.name), pipeline::extruder_text(*profile));
   if (const auto again = read_extruder(toml, "the profile"); !again)
     return Error{Fault::kInput, fmt::format("{}: {}", widths, again.error().message)};
   return CalibratedProfile{std::move(*profile), std::move(toml), std::move(*found)};

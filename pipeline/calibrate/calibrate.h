@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/data/status.h"
 #include "stages/segment/measured.h"

@@ -8,12 +8,14 @@
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/run/run.h"
-#include "stages/chart/draw.h"
-#include "stages/chart/layout.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
-#include "stages/write/leftovers.h"
+#include "stages/calibration/chart/draw.h"
+#include "stages/calibration/chart/layout.h"
+#include "stages/formats/chart/chart.h"
+#include "stages/formats/image_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,14 +25,14 @@ namespace fs = std::filesystem;
 /// The files of one call; removed again unless all of it is done.
 struct ChartFiles {
   fs::path directory;
-  write::FileOptions options;
+  FileOptions options;
   std::vector<std::string> paths = {};
   ~ChartFiles() {
-    for (const std::string& path : paths) write::remove_or_note(path);
+    for (const std::string& path : paths) remove_or_note(path);
   }
   Status add(const std::string& name, std::span<const std::byte> bytes) {
     paths.push_back((directory / name).string());
-    const Status status = write::write_file(paths.back(), bytes, options);
+    const Status status = write_file(paths.back(), bytes, options);
     if (!status) paths.pop_back();
     return status;
   }
@@ -38,8 +40,8 @@ struct ChartFiles {
 
 Status write_images(const HeadGrid& grid, std::uint32_t count, const std::function<Runs(std::uint32_t)>& image,
                     ChartFiles& files) {
-  const auto encoder = write::find_image_format("tiff-g4")->make_encoder();
-  write::Bytes bytes;
+  const auto encoder = formats::find_image_format("tiff-g4")->make_encoder();
+  formats::Bytes bytes;
   for (std::uint32_t i = 0; i < count; ++i) {
     if (Status status = encoder->encode(image(i), grid.image.x.dpi(), grid.image.y.dpi(), bytes); !status) return status;
     if (Status status = files.add(fmt::format("images/{:06}.tif", i), bytes); !status) return status;
@@ -47,34 +49,40 @@ Status write_images(const HeadGrid& grid, std::uint32_t count, const std::functi
   return {};
 }
 
+/// drops.json: the layers that a call with --drops wrote.
+std::string drops_text(const calibration::DropLayers& wanted) {
+  return json_line(
+      {{"kind", "lamina drops 1"}, {"drops", wanted.drops}, {"drops_a_layer", wanted.a_layer}, {"layers", wanted.layers}});
+}
+
 }  // namespace
 
 Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<bool>& cancel) {
   auto machine = find_machine(request.machine);
   if (!machine) return Error{machine.error().fault, "--machine: " + machine.error().message};
-  const auto all = resolve_profile(chart::chart_machine(*machine, request.drops > 0));
+  const auto all = resolve_profile(calibration::chart_machine(*machine, request.drops > 0));
   // A controller that cannot fire some nozzles insists on them being blocked.
-  const auto printer = all || machine->head.blocked.empty() ? all : resolve_profile(chart::chart_machine(*machine, true));
+  const auto printer = all || machine->head.blocked.empty() ? all : resolve_profile(calibration::chart_machine(*machine, true));
   if (!printer) return printer.error();
-  const auto drops = chart::lay_out_drops(printer->machine, printer->grid, std::max<std::uint64_t>(request.drops, 1));
-  auto laid = request.drops > 0 ? Result<Chart>(Chart()) : chart::lay_out(printer->machine, printer->grid);
-  if (!drops || !laid) return drops ? laid.error() : drops.error();
-  laid->layer_mm = request.layer_mm;
+  const auto drops = calibration::layout_drops(printer->machine, printer->grid, std::max<std::uint64_t>(request.drops, 1));
+  auto deposited = request.drops > 0 ? Result<Chart>(Chart()) : calibration::layout_chart(printer->machine, printer->grid);
+  if (!drops || !deposited) return drops ? deposited.error() : drops.error();
+  deposited->layer_mm = request.layer_mm;
   const fs::path directory = request.directory;
   std::error_code failed;
   fs::create_directories(directory / "images", failed);
   if (failed) return Error{Fault::kOutput, fmt::format("{}: {}", one_line(request.directory), failed.message())};
   // Begun first and finished last: another run is refused meanwhile.
   const std::string record = (directory / (request.drops > 0 ? "drops.json" : "chart.json")).string();
-  auto text = write::File::open(record, {.replace = request.overwrite});
+  auto text = File::open(record, {.replace = request.overwrite});
   if (!text) return text.error();
   if (!request.overwrite && fs::exists(fs::symlink_status(record, failed)))
     return Error{Fault::kUsage, fmt::format("{}: is there already; name another directory, or add --overwrite", record)};
   ChartFiles files{directory, {.replace = request.overwrite}};
-  const std::string profile = read::machine_text(printer->machine);
+  const std::string profile = pipeline::machine_text(printer->machine);
   Status status = files.add("machine.toml", std::as_bytes(std::span(profile)));
   const auto image = [&](std::uint32_t i) {
-    return request.drops > 0 ? chart::draw_drops(*drops, printer->grid, i) : chart::draw(*laid);
+    return request.drops > 0 ? calibration::draw_drops(*drops, printer->grid, i) : calibration::draw(*deposited);
   };
   if (status) status = write_images(printer->grid, request.drops > 0 ? drops->layers : 1, image, files);
   if (!status) return status.error();
@@ -89,7 +97,7 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
   auto summary = run(
       job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   if (!summary) return summary.error();
-  const std::string json = request.drops > 0 ? chart::drops_text(*drops) : chart_text(*laid);
+  const std::string json = request.drops > 0 ? drops_text(*drops) : chart_text(*deposited);
   if (status = text->append(json); !status) return status.error();
   if (const auto whole = text->finish(); !whole) return whole.error();
   files.paths.clear();
@@ -98,7 +106,7 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
 
 Result<std::string> measured_profile(const Machine& machine) {
   std::string toml = fmt::format("# {} with what was measured on it. Made by lamina calibrate.\n\n{}", one_line(machine.name),
-                                 read::machine_text(machine));
+                                 pipeline::machine_text(machine));
   const auto again = read_machine(toml, "the profile");
   const auto grid = again ? resolve_profile(*again) : again.error();
   if (!grid) {  // without a place in a file that is not there

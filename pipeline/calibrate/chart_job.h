@@ -4,9 +4,8 @@
 #include <atomic>
 #include <string>
 
-#include "pipeline/machine/powder_printer.h"
-#include "pipeline/run/summary.h"
-#include "stages/data/picture/chart.h"
+#include "pipeline/machine/profiles.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "stages/data/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -70,15 +70,15 @@ std::string as_text(const segment::DropsFit& fit) {
   if (!fit.gas) return text;
   return text +
          fmt::format("compressible, with an outlet at {:.6g} Pa and a flow told at {:.6g} Pa\n", fit.pressures->outlet_pa,
-                     fit.pressures->told_pa) +
+                     fit.pressures->reference_pa) +
          lines_of(*fit.gas, fit.expanded.points.size());
 }
 
-nlohmann::ordered_json as_json(const segment::DropsFit& fit) {
+Json as_json(const segment::DropsFit& fit) {
   Json json = {{"configuration", fit.group.name}, {"points", fit.group.points.size()}};
   if (fit.plain) add_form(*fit.plain, json);
   if (!fit.gas) return json;
-  Json gas = {{"outlet_pa", fit.pressures->outlet_pa}, {"flow_pa", fit.pressures->told_pa}};
+  Json gas = {{"outlet_pa", fit.pressures->outlet_pa}, {"flow_pa", fit.pressures->reference_pa}};
   add_form(*fit.gas, gas);
   json["compressible"] = std::move(gas);
   return json;

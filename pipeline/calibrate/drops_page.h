@@ -1,17 +1,17 @@
 // pipeline/calibrate/drops_page.h: what there is to say of measured pressure drops, for people and for programs.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "stages/data/picture/plot.h"
+#include "stages/data/plot.h"
 #include "stages/segment/samples.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
 /// Lines that end with LF: the pooled fit, samples and their spread, the same for gases.
 std::string as_text(const segment::DropsFit& fit);
-nlohmann::ordered_json as_json(const segment::DropsFit& fit);
+Json as_json(const segment::DropsFit& fit);
 /// Points and parabola, of gases if they were asked for.
 Plot draw(const segment::DropsFit& fit);
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/job/file.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "stages/heights/on_record.h"
 
 namespace lamina::pipeline {
@@ -15,7 +15,7 @@ namespace {
 
 // Drops a pixel are rounded to 2^-24.
 constexpr double kOfDrops = 1e-12, kDropStep = 3e-8;
-constexpr double kMostDropsOfPixel = 64;
+constexpr double kMaxDropsOfPixel = 64;
 
 /// As shares and drops are taken.
 double in_millionths(double value) { return static_cast<double>(std::llround(value * 1e6)) * 1e-6; }
@@ -31,18 +31,18 @@ void DoseCheck::check_heights(const Manifest& manifest, Faults& faults) const {
   const auto options = job_ ? heights_options(*job_) : Error{};
   heights::OnRecord layers(options ? std::optional(*options) : std::nullopt);
   for (const LayerRecord& record : manifest.layers) {
-    if (std::string what = layers.fault(record.layer); !what.empty()) faults.add(std::move(what));
+    if (const Status status = layers.check(record.layer); !status) faults.add(status.error().message);
   }
 }
 
-std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {
+std::optional<DoseCheck::RequestedRange> DoseCheck::requested_range(const Layer& layer) const {
   if (!job_) return std::nullopt;
   const DoseRequest& dose = job_->dose;
   if (!dose.saturation_percent) {
     // Levels that are not dithered are drops to a head that fires several; else a full pixel gets one.
-    const bool drops = machine_ != nullptr && machine_->head.most_drops > 1 && head_.levels > 0 && !dose.dithered;
+    const bool drops = machine_ != nullptr && machine_->head.max_drops > 1 && head_.levels > 0 && !dose.dithered;
     const double full = drops ? head_.levels - 1 : 1;
-    return Wished{full, full};
+    return RequestedRange{full, full};
   }
   if (machine_ == nullptr || machine_->head.drop_pl <= 0) return std::nullopt;
   const Nm plane = layer.plane();
@@ -53,24 +53,24 @@ std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {
     percent = range.percent;
     core = range.core_percent;
   }
-  std::vector<Saturation> wishes{percent, core.value_or(percent)};
+  std::vector<Saturation> targets{percent, core.value_or(percent)};
   for (const PartRequest& part : job_->parts) {
     if (!part.saturation_percent && !part.core_saturation_percent) continue;
     const Saturation own = part.saturation_percent.value_or(percent);
-    wishes.insert(wishes.end(), {own, part.core_saturation_percent.value_or(own), core.value_or(own)});
+    targets.insert(targets.end(), {own, part.core_saturation_percent.value_or(own), core.value_or(own)});
   }
   // What a formula asks for depends on where parts lie.
-  if (std::ranges::any_of(wishes, [](const Saturation& wish) { return !wish.formula.empty(); })) return std::nullopt;
+  if (std::ranges::any_of(targets, [](const Saturation& target) { return !target.formula.empty(); })) return std::nullopt;
   const auto& powder = machine_->powder;
   const double pixel_mm2 = 25.4 / head_.grid.x.dpi() * 25.4 / head_.grid.y.dpi();
   const double voids_pl = pixel_mm2 * mm(layer.thickness) * 1e6 * (1 - in_millionths(powder.packing));
   const double stays_pl = in_millionths(machine_->head.drop_pl) * (1 - in_millionths(powder.evaporates_percent / 100));
-  const auto drops = [&](double wish) { return in_millionths(wish / 100) * voids_pl / stays_pl; };
-  const auto [least, most] = std::ranges::minmax_element(wishes, {}, &Saturation::percent);
-  return Wished{drops(least->percent), drops(most->percent)};
+  const auto drops = [&](double target) { return in_millionths(target / 100) * voids_pl / stays_pl; };
+  const auto [minimum, maximum] = std::ranges::minmax_element(targets, {}, &Saturation::percent);
+  return RequestedRange{drops(minimum->percent), drops(maximum->percent)};
 }
 
-double DoseCheck::most_pixels(const Layer& layer) const {
+double DoseCheck::max_pixels(const Layer& layer) const {
   const double bed = static_cast<double>(head_.grid.columns()) * head_.grid.rows();
   double pixels = 0;
   const auto grows = [](const std::optional<std::array<double, 2>>& um) { return um && ((*um)[0] < 0 || (*um)[1] < 0); };
@@ -98,47 +98,49 @@ std::string DoseCheck::fault(const LayerRecord& record, const LayerPicture& pict
     return said(
         fmt::format("its levels come to {} full voxels, the manifest says dosed_pixels {}", voxels, record.dosed_pixels));
   }
-  if (head_.most_drops == 0) return {};
+  if (head_.max_drops == 0) return {};
   const std::string what = fault_of_dosed(record, set_pixels(picture.front()));
   if (!what.empty()) return said(what);
-  const std::string asked = fault_of_wish(record);
-  return asked.empty() ? asked : said(asked);
+  const std::string requested = fault_of_target(record);
+  return requested.empty() ? requested : said(requested);
 }
 
 std::string DoseCheck::fault_of_dosed(const LayerRecord& record, std::uint64_t set) const {
   const auto dosed = static_cast<double>(record.dosed_pixels);
   // A level is at least one of a full voxel's.
-  const double full = std::max(1u, head_.levels > 0 ? head_.levels - 1 : 1), least = static_cast<double>(set) / full - 0.5;
-  const auto wish = wished(record.layer);
-  if (head_.levels == 0 && wish) {
-    const double sweeps = machine_ != nullptr ? machine_->head.most_drop_sweeps : 0;
-    const double limit = sweeps > 0 ? std::min(sweeps * head_.sweep_drops, kMostDropsOfPixel) : kMostDropsOfPixel;
-    const double jetted = std::min(wish->least, limit);
+  const double full = std::max(1u, head_.levels > 0 ? head_.levels - 1 : 1), minimum = static_cast<double>(set) / full - 0.5;
+  const auto target = requested_range(record.layer);
+  if (head_.levels == 0 && target) {
+    const double sweeps = machine_ != nullptr ? machine_->head.max_drop_sweeps : 0;
+    const double limit = sweeps > 0 ? std::min(sweeps * head_.sweep_drops, kMaxDropsOfPixel) : kMaxDropsOfPixel;
+    const double jetted = std::min(target->minimum, limit);
     if (jetted > (job_->dose.dithered ? 1 : 0.5) * (1 + kOfDrops) + kDropStep && record.dosed_pixels != set) {
       return fmt::format("each pixel gets a drop, and {} have one; the manifest says dosed_pixels {}", set,
                          record.dosed_pixels);
     }
   }
-  const double most = most_pixels(record.layer);
-  if (dosed >= least && dosed <= most + 0.5) return {};
+  const double maximum = max_pixels(record.layer);
+  if (dosed >= minimum && dosed <= maximum + 0.5) return {};
   return fmt::format("the manifest says dosed_pixels {}, and {} is the {} that its {} can have", record.dosed_pixels,
-                     dosed < least ? std::ceil(least) : std::floor(most), dosed < least ? "least" : "most",
-                     dosed < least ? "images" : "parts");
+                     dosed < minimum ? std::ceil(minimum) : std::floor(maximum), dosed < minimum ? "min" : "max",
+                     dosed < minimum ? "images" : "parts");
 }
 
-std::string DoseCheck::fault_of_wish(const LayerRecord& record) const {
-  const auto wish = wished(record.layer);
-  if (!wish) return {};
-  const auto dosed = static_cast<double>(record.dosed_pixels), asked = static_cast<double>(record.asked_drops);
+std::string DoseCheck::fault_of_target(const LayerRecord& record) const {
+  const auto target = requested_range(record.layer);
+  if (!target) return {};
+  const auto dosed = static_cast<double>(record.dosed_pixels), requested = static_cast<double>(record.requested_drops);
   // Both numbers are rounded, that of voxels too where they are shares.
   const double apart = head_.levels > 0 ? 0.5 : 0;
-  const double least = std::max(0.0, dosed - apart) * std::max(0.0, wish->least * (1 - kOfDrops) - kDropStep) - 0.5001;
-  const double most = (dosed + apart) * (wish->most * (1 + kOfDrops) + kDropStep) + 0.5001;
-  if (asked >= least && asked <= most) return {};
-  const std::string drops =
-      wish->least == wish->most ? fmt::format("{:.6g}", wish->least) : fmt::format("{:.6g} to {:.6g}", wish->least, wish->most);
-  return fmt::format("{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says asked_drops {}",
-                     record.dosed_pixels, drops, std::ceil(std::max(0.0, least)), std::floor(most), record.asked_drops);
+  const double minimum = std::max(0.0, dosed - apart) * std::max(0.0, target->minimum * (1 - kOfDrops) - kDropStep) - 0.5001;
+  const double maximum = (dosed + apart) * (target->maximum * (1 + kOfDrops) + kDropStep) + 0.5001;
+  if (requested >= minimum && requested <= maximum) return {};
+  const std::string drops = target->minimum == target->maximum
+                                ? fmt::format("{:.6g}", target->minimum)
+                                : fmt::format("{:.6g} to {:.6g}", target->minimum, target->maximum);
+  return fmt::format(
+      "{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says requested_drops {}",
+      record.dosed_pixels, drops, std::ceil(std::max(0.0, minimum)), std::floor(maximum), record.requested_drops);
 }
 
 }  // namespace lamina::pipeline

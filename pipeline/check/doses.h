@@ -7,8 +7,8 @@
 
 #include "pipeline/check/job_files.h"
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/machine.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
@@ -27,13 +27,13 @@ class DoseCheck {
   std::string fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const;
 
  private:
-  struct Wished {
-    double least = 1, most = 1;  // drops a full pixel, of any part, in shell or core
+  struct RequestedRange {
+    double minimum = 1, maximum = 1;  // drops a full pixel, of any part, in shell or core
   };
-  std::optional<Wished> wished(const Layer& layer) const;
-  std::string fault_of_wish(const LayerRecord& record) const;
+  std::optional<RequestedRange> requested_range(const Layer& layer) const;
+  std::string fault_of_target(const LayerRecord& record) const;
   std::string fault_of_dosed(const LayerRecord& record, std::uint64_t set) const;
-  double most_pixels(const Layer& layer) const;
+  double max_pixels(const Layer& layer) const;
 
   const ManifestHead& head_;
   const Machine* machine_;

@@ -8,22 +8,22 @@
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
-#include "stages/data/input/file_reader.h"
+#include "pipeline/report/machine_text.h"
 #include "stages/data/levels.h"
-#include "stages/program/explain.h"
 #include "stages/program/head_grid.h"
 #include "stages/raster/materials.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMostProgramBytes = 4ull << 30;
+constexpr std::uint64_t kMaxProgramBytes = 4ull << 30;
 
 /// Empty if it cannot be read: what is missing or differs, its hash has told.
-std::string whole_file(const fs::path& path, std::uint64_t most_bytes) {
-  auto text = read_file(path.string(), {.most_bytes = most_bytes});
+std::string whole_file(const fs::path& path, std::uint64_t max_bytes) {
+  auto text = read_file(path.string(), {.max_bytes = max_bytes});
   return text ? std::move(*text) : std::string();
 }
 
@@ -33,7 +33,7 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
   const std::string name = "program/machine.toml";
   std::string fault = fault_of_file(directory, name, head.machine_profile);
   if (!fault.empty()) return Error{Fault::kVerification, std::move(fault)};
-  const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name, kMostTomlBytes), name);
+  const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name, kMaxTomlBytes), name);
   if (!machine) return machine.error();
   return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows(), head.layer_count);
 }
@@ -43,7 +43,7 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
   const auto machine = machine_of_job(directory, manifest.head);
   const auto grid = machine ? program::make_head_grid(machine->profile()) : machine.error();
   if (!grid) return {};
-  program::DropSweeps sweeps{std::max(1u, manifest.head.most_drops)};
+  program::DropSweeps sweeps{std::max(1u, manifest.head.max_drops)};
   for (const LayerRecord& record : manifest.layers) {
     sweeps.added += record.program.added_sweeps;
     sweeps.added_seconds += 1e-6 * static_cast<double>(record.program.added_microseconds);
@@ -52,33 +52,34 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
 }
 
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {
-  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMostProgramBytes);
+  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMaxProgramBytes);
 }
 
-Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels) {
+Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,
+                                        Levels& levels) {
   const bool grey = head.grey_drops() || head.full_level() > 0;
-  if (!grey) return read::image(path);
-  auto image = read::levels(path, head.full_level(), levels);
+  if (!grey) return formats::image(path);
+  auto image = formats::levels(path, head.full_level(), levels);
   if (!image || !head.grey_drops()) return image;
-  if (const std::uint32_t most = highest(levels); most > head.most_drops) {
+  if (const std::uint32_t maximum = highest(levels); maximum > head.max_drops) {
     return Error{Fault::kVerification,
-                 fmt::format("{}: has pixels of {} drops, the job at most {}", path, most, head.most_drops)};
+                 fmt::format("{}: has pixels of {} drops, the job at most {}", path, maximum, head.max_drops)};
   }
-  drops.resize(head.most_drops);
-  for (std::uint32_t k = 0; k < head.most_drops; ++k) at_least(levels, static_cast<std::uint8_t>(k + 1), drops[k]);
+  drops.resize(head.max_drops);
+  for (std::uint32_t k = 0; k < head.max_drops; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), drops[k]);
   return image;
 }
 
 raster::DropPlanes planes_of(const ManifestHead& head) {
-  return {std::max(1u, head.most_drops), head.levels > 0 && head.drops_of_materials()};
+  return {std::max(1u, head.max_drops), head.levels > 0 && head.drops_of_materials()};
 }
 
-std::string add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
-                        raster::DropPlanes& picture) {
+Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
+                   raster::DropPlanes& picture) {
   if (!head.grey_drops()) return picture.add(std::move(image), static_cast<std::uint32_t>(number % head.drop_images()));
-  std::string what;
-  for (std::uint32_t drop = 0; drop < drops.size() && what.empty(); ++drop) what = picture.add(std::move(drops[drop]), drop);
-  return what;
+  Status status;
+  for (std::uint32_t drop = 0; drop < drops.size() && status; ++drop) status = picture.add(std::move(drops[drop]), drop);
+  return status;
 }
 
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
@@ -92,8 +93,9 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
       return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", files[i].name)};
     }
-    const std::string what = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
-    if (!what.empty()) return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, what)};
+    const Status added = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
+    if (!added)
+      return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, added.error().message)};
   }
   return std::move(picture.planes);
 }

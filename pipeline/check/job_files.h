@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/compare.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/formats/images/image.h"
 #include "stages/raster/materials.h"
-#include "stages/read/image.h"
 #include "stages/replay/machine.h"
-#include "stages/write/manifest/compare.h"
 
 namespace lamina::pipeline {
 
@@ -30,17 +30,17 @@ using LayerPicture = std::vector<Runs>;
 /// Reads an image of a layer; its runs are the pixels with any drop.
 /// drops   of a job whose images are grey drops: the pixels of each
 /// levels  of grey images
-/// errors  kVerification, with the file: of read::image; more drops than the job has
-Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels);
+/// errors  kVerification, with the file: of formats::image; more drops than the job has
+Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels);
 
 /// What the images of a layer are put together by, and adds the one of this number.
-/// returns  empty, or what the pixels that it sets contradict, as DropPlanes::add()
+/// errors  of DropPlanes::add()
 raster::DropPlanes planes_of(const ManifestHead& head);
-std::string add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
-                        raster::DropPlanes& picture);
+Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
+                   raster::DropPlanes& picture);
 
 /// A layer on the manifest's grid; at least one image.
-/// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel; drops without the first
+/// errors  kVerification, with the file: of formats::image; wrong size; two materials in one pixel; drops without the first
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
 
 }  // namespace lamina::pipeline

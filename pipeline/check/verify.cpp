@@ -5,22 +5,21 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <tuple>
 
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
+#include "pipeline/manifest/compare.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "pipeline/run/job_cost.h"
-#include "stages/data/input/file_reader.h"
+#include "pipeline/report/job_cost.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 #include "stages/replay/feeding.h"
 #include "stages/replay/frame/frame.h"
-#include "stages/write/manifest/compare.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -28,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // The context for comparing all layers of a directory.
-struct Inspection {
+struct Verification {
   std::string directory;
   const ManifestHead& head;
   bool quick;
@@ -43,9 +42,15 @@ struct Finding {
   std::optional<replay::Count> count;  // of its replayed program
 };
 
+/// "both vats feed"
+std::string vats_text(std::uint32_t vats) {
+  constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
+  return kTexts[vats & 3];
+}
+
 /// Empty, or what is wrong with the vats that feed a layer.
 /// feeds  the vats that do, a bit each
-std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& record, std::uint32_t feeds) {
+std::string fault_of_feeding(const Verification& inspection, const LayerRecord& record, std::uint32_t feeds) {
   const ManifestHead& head = inspection.head;
   if (head.materials.empty()) return fault_of_one_powder(record);
   std::vector<std::uint64_t> set, unfed;
@@ -57,13 +62,14 @@ std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& re
   }
   const std::uint32_t wanted =
       replay::vats_wanted(inspection.machine->profile(), record.pixels_of_materials(head.materials.size()), vats);
-  if (feeds != wanted) return fmt::format("{} where {} has to", replay::vats_text(feeds), replay::vats_text(wanted));
-  return replay::fault_of_unfed(set, vat_of_image, unfed, feeds);
+  if (feeds != wanted) return fmt::format("{} where {} has to", vats_text(feeds), vats_text(wanted));
+  const Status status = replay::check_unfed(set, vat_of_image, unfed, feeds);
+  return status ? std::string() : status.error().message;
 }
 
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
 // locates the difference.
-std::string fault_of_program(const Inspection& inspection, const LayerRecord& record, const LayerPicture* image,
+std::string fault_of_program(const Verification& inspection, const LayerRecord& record, const LayerPicture* image,
                              std::optional<replay::Count>& count) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
@@ -79,14 +85,14 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                                                    record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
-    const replay::Count told{.drops = says.drops,
-                             .sweeps = says.sweeps,
-                             .added = says.added_sweeps,
-                             .microseconds = says.microseconds,
-                             .added_microseconds = says.added_microseconds,
-                             .spat = says.spat};
-    if (std::string fault = fault_of_count(inspection.machine->profile(), told, *replay); same && !fault.empty())
-      return fmt::format("{}: {}", name, fault);
+    const replay::Count reported{.drops = says.drops,
+                                 .sweeps = says.sweeps,
+                                 .added = says.added_sweeps,
+                                 .microseconds = says.microseconds,
+                                 .added_microseconds = says.added_microseconds,
+                                 .spat = says.spat};
+    if (const Status counted = check_count(inspection.machine->profile(), reported, *replay); same && !counted)
+      return fmt::format("{}: {}", name, counted.error().message);
     if (same) {
       std::string fault = fault_of_feeding(inspection, record, replay->vats);
       if (!fault.empty()) return fmt::format("{}: layer {}: {}", name, record.layer.index, fault);
@@ -99,7 +105,7 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
 }
 
 // Empty, or the fault of the image of this number; its set pixels are added to `picture`, its levels to `sum`.
-std::string fault_of_image(const Inspection& inspection, const Layer& layer, std::size_t number, const LayerImageFile& file,
+std::string fault_of_image(const Verification& inspection, const Layer& layer, std::size_t number, const LayerImageFile& file,
                            raster::DropPlanes& picture, std::uint64_t& sum) {
   const std::string& name = file.name;
   LayerPicture drops;
@@ -108,29 +114,29 @@ std::string fault_of_image(const Inspection& inspection, const Layer& layer, std
   if (!image) return image.error().message;
   const std::uint64_t own = sum_of_levels(levels);
   sum += own;
-  if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels, layer); !what.empty())
+  if (const std::string what = formats::difference(*image, inspection.head.grid, file.record.set_pixels, layer); !what.empty())
     return fmt::format("{}: {}", name, what);
   if (file.record.drops > 0 && own != file.record.drops)
     return fmt::format("{}: has {} drops, the manifest says {}", name, own, file.record.drops);
-  const std::string what = add_picture(inspection.head, number, std::move(image->runs), std::move(drops), picture);
-  return what.empty() ? what : fmt::format("{}: sets pixels that {}", name, what);
+  const Status added = add_picture(inspection.head, number, std::move(image->runs), std::move(drops), picture);
+  return added ? std::string() : fmt::format("{}: sets pixels that {}", name, added.error().message);
 }
 
 /// Empty, or what the manifest says of a layer's drops that its images do not.
 std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, const LayerPicture& picture) {
-  if (head.most_drops == 0) return {};
+  if (head.max_drops == 0) return {};
   std::uint64_t drops = 0;
   for (const Runs& plane : picture) drops += set_pixels(plane);
   if (drops != record.drops)
     return fmt::format("layer {}: its images have {} drops, the manifest says {}", record.layer.index, drops, record.drops);
   const std::uint64_t set = set_pixels(picture.front());
-  const auto most = std::ranges::count_if(picture, [](const Runs& plane) { return !plane.change.empty(); });
-  if (set == record.set_pixels && most == record.most_drops) return {};
+  const auto maximum = std::ranges::count_if(picture, [](const Runs& plane) { return !plane.change.empty(); });
+  if (set == record.set_pixels && maximum == record.max_drops) return {};
   return fmt::format("layer {}: its images set {} pixels with up to {} drops, the manifest says {} with {}", record.layer.index,
-                     set, most, record.set_pixels, record.most_drops);
+                     set, maximum, record.set_pixels, record.max_drops);
 }
 
-std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
+std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
   raster::DropPlanes picture = planes_of(inspection.head);
   std::uint64_t levels = 0;
@@ -150,7 +156,7 @@ std::string fault_of_layer(const Inspection& inspection, const LayerRecord& reco
 }
 
 // Restores the machine that the programs were written for.
-void prepare_replay(Inspection& inspection) {
+void prepare_replay(Verification& inspection) {
   auto built = machine_of_job(inspection.directory, inspection.head);
   if (!built) return inspection.report.add(built.error().message);
   inspection.machine = std::move(*built);
@@ -158,13 +164,13 @@ void prepare_replay(Inspection& inspection) {
 }
 
 // Checks the programs before the first and after the last layer.
-void check_frame(const Inspection& inspection, VerifyReport& report) {
+void check_frame(const Verification& inspection, VerifyReport& report) {
   const ManifestHead& head = inspection.head;
   for (const auto& [stem, hash, check] : {std::tuple{"start", head.program_start, &replay::check_start},
                                           std::tuple{"end", head.program_end, &replay::check_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
     std::string fault = fault_of_file(inspection.directory, name, hash);
-    const auto text = read_file((fs::path(inspection.directory) / name).string(), {.most_bytes = kMostTomlBytes});
+    const auto text = read_file((fs::path(inspection.directory) / name).string(), {.max_bytes = kMaxTomlBytes});
     if (inspection.machine && !inspection.quick && text) {
       if (const Status status = check(*inspection.machine, *text); !status)
         fault = fmt::format("{}: {}", name, status.error().message);
@@ -174,7 +180,7 @@ void check_frame(const Inspection& inspection, VerifyReport& report) {
 }
 
 // Sums that need the profile.
-void finish_replay(const Inspection& inspection, const std::optional<JobCost>& cost) {
+void finish_replay(const Verification& inspection, const std::optional<JobCost>& cost) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
   VerifyReport& report = inspection.report;
   if (inspection.head.materials.empty() && report.replay.vats == 3)
@@ -183,23 +189,18 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
   report.use = {};
-  report.use.facts = std::make_shared<nlohmann::ordered_json>();
-  cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
-  for (const cost::PowderDrops& powder : cost->powders()) {
-    report.use.results.emplace_back("", powder.told(cost->drop_pl()));
-    (*report.use.facts)["materials"].push_back(powder.json(cost->drop_pl()));
-  }
+  cost->report(report.use);
 }
 
 /// As the program feeds, or its host.
-std::optional<replay::Count> fed_of(const Inspection& inspection, const LayerRecord& record,
+std::optional<replay::Count> fed_of(const Verification& inspection, const LayerRecord& record,
                                     const std::optional<replay::Count>& count) {
   return inspection.machine ? replay::with_fed_by_host(inspection.machine->profile(), record.layer, count) : count;
 }
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Inspection inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
+  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);
@@ -232,9 +233,10 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);
         if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
       }
-      if (std::string fault = vats ? vats->take(record.layer.index, fed_of(inspection, record, found[i].count)) : "";
-          !fault.empty())
-        report.add(std::move(fault));
+      if (vats) {
+        const Status taken = vats->take(record.layer.index, fed_of(inspection, record, found[i].count));
+        if (!taken) report.add(taken.error().message);
+      }
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));
     }
@@ -245,7 +247,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
 
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
   std::vector<std::string> strays;
-  const auto look = [&](const std::string& folder, const auto& names) {
+  const auto inspect = [&](const std::string& folder, const auto& names) {
     std::error_code error;
     for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
          entry.increment(error)) {
@@ -258,7 +260,7 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
   const auto has_layer = [](const Manifest& manifest, std::uint32_t index) {
     return index >= manifest.head.first_layer && index < manifest.head.first_layer + manifest.layers.size();
   };
-  look("layers", [&](const Manifest& manifest, const std::string& name) {
+  inspect("layers", [&](const Manifest& manifest, const std::string& name) {
     LayerRecord record;
     bool partial = false;
     if (!read_layer_file_name(fs::path(name).filename().string(), record.layer.index, partial)) return false;
@@ -266,7 +268,7 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
            std::ranges::any_of(layer_images(manifest.head, record),
                                [&](const LayerImageFile& image) { return image.name == name; });
   });
-  look("program", [&](const Manifest& manifest, const std::string& name) {
+  inspect("program", [&](const Manifest& manifest, const std::string& name) {
     const std::string& extension = manifest.head.program_extension;
     std::uint32_t index = 0;
     bool partial = false;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/replay/count.h"

@@ -1,6 +1,6 @@
 #include "pipeline/cli/command.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -13,10 +13,10 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
 #include "stages/data/shortage.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/names.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/names.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -85,9 +85,9 @@ CommandSpec spec_of(const Command& command) {
   spec.name = command.name;
   spec.brief = command.summary;
   // Each heading once, in order of first occurrence; options without one come first.
-  std::map<std::string, std::size_t> places{{"", 0}};
-  for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
-  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
+  std::map<std::string, std::size_t> positions{{"", 0}};
+  for (const OptionSpec& option : spec.options) positions.try_emplace(option.group, positions.size());
+  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return positions[option.group]; });
   return spec;
 }
 
@@ -113,7 +113,7 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
   Arguments arguments;
   arguments.given = words;
   if (!command.reads_itself) {
-    Result<Arguments> read = terminal::read_arguments(spec_of(command), words);
+    Result<Arguments> read = pipeline::read_arguments(spec_of(command), words);
     if (!read) return read.error();
     if (read->help) return console.print(*read->help);
     arguments = std::move(*read);
@@ -145,7 +145,7 @@ namespace {
   } catch (const std::exception& error) {
     if (!is_shortage(error)) std::abort();
     constexpr std::string_view kLine = "lamina: out of memory; give a smaller --memory or fewer --threads\n";
-    write::write_all(2, std::as_bytes(std::span(kLine)));
+    write_all(2, std::as_bytes(std::span(kLine)));
     std::_Exit(static_cast<int>(Fault::kMemory));
   } catch (...) {
   }
@@ -160,7 +160,7 @@ int run_program(int argument_count, char** arguments, Program program) {
   Console console;
   try {
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
-    for (const std::string& left : write::take_left_behind()) console.say("lamina: note: " + left);
+    for (const std::string& left : take_left_behind()) console.say("lamina: note: " + left);
     return outcome.error ? console.complain(*outcome.error) : outcome.code;
   } catch (const std::exception& error) {
     if (is_shortage(error)) return console.complain(out_of_memory());

@@ -3,23 +3,23 @@
 
 #include <atomic>
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
-#include "stages/terminal/arguments.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
-using terminal::Arguments;
-using terminal::at_option;
-using terminal::CommandSpec;
-using terminal::OptionSpec;
+using pipeline::Arguments;
+using pipeline::at_option;
+using pipeline::CommandSpec;
+using pipeline::OptionSpec;
 
 /// Receives a command's messages and results, and can cancel it. Implemented by the console and by a batch job.
 class Context {
@@ -40,7 +40,7 @@ class Context {
   // --- for scripts; errors  kOutput if writing fails; a closed pipe is not an error
   virtual Status print(std::string_view text) = 0;
   /// Prints a value as one line of JSON.
-  virtual Status give(const nlohmann::ordered_json& value) = 0;
+  virtual Status give(const Json& value) = 0;
 
   // --- while it runs
   /// Reports progress. Once layers have started, a signal sets cancel() instead of ending the program, to keep them.

@@ -8,29 +8,29 @@
 #include <cstring>
 #include <ctime>
 
-#include "stages/data/text/json.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/terminal.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/terminal.h"
 
 namespace lamina::pipeline {
 namespace {
 
 // 0 or the reason.
-int write_all(int file, std::string_view text) { return write::write_all(file, std::as_bytes(std::span(text))); }
+int write_all(int file, std::string_view text) { return lamina::write_all(file, std::as_bytes(std::span(text))); }
 
 std::atomic<bool> interrupted{false}, keeping{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else
 
 [[noreturn]] void end() {
-  write::remove_watched();
+  remove_watched();
   ::_exit(130);
 }
 
 /// Ends the program as the signal would, without temporary files.
 void end_by_signal(int signal) {
-  write::remove_watched();
+  remove_watched();
   ::raise(signal);  // handled as by default from the first time on, and not blocked
 }
 
@@ -134,10 +134,10 @@ void Console::progress(const ProgressEvent& event) {
     keep_on_signals();
   }
   if (!progress_) {
-    using Style = terminal::Progress::Style;
+    using Style = pipeline::Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);
   }
-  write_all(STDERR_FILENO, counted ? progress_->tell(event.done, event.total)
+  write_all(STDERR_FILENO, counted ? progress_->report(event.done, event.total)
                                    : progress_->begin(event.stage == Stage::kLoading ? "loading parts" : "indexing"));
 }
 

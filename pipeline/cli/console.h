@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/terminal/progress.h"
 #include "stages/data/status.h"
-#include "stages/terminal/progress.h"
 
 namespace lamina::pipeline {
 
@@ -17,14 +17,14 @@ class Console : public Context {
   void say_text(std::string_view text) override;
   int complain(const Error& error) override;
   Status print(std::string_view text) override;
-  Status give(const nlohmann::ordered_json& value) override;
+  Status give(const Json& value) override;
   void progress(const ProgressEvent& event) override;
   const std::atomic<bool>& cancel() override;
 
   bool quiet = false;  // suppresses progress
 
  private:
-  std::optional<terminal::Progress> progress_;
+  std::optional<pipeline::Progress> progress_;
 };
 
 /// Has every signal that ends the program remove its temporary files first, and closed pipes and limits on file sizes come

@@ -13,7 +13,7 @@ namespace {
 
 /// The help headings for the options of a section; default "Bed and layers".
 constexpr Word<std::string_view> kHeadings[] = {{"part", "Parts"},
-                                                {"place", "Parts"},
+                                                {"placement", "Parts"},
                                                 {"slice", "Contours and files"},
                                                 {"fill", "Filling"},
                                                 {"segment", "Segmented lines"},

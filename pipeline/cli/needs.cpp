@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -19,16 +19,16 @@ bool by_steps(Product product, const Job& job) { return fits_heights(product, jo
 bool by_slopes(Product product, const Job& job) { return fits_heights(product, job) && job.heights.mode != Mode::kOptimal; }
 bool optimal(Product, const Job& job) { return job.heights.mode == Mode::kOptimal; }
 bool may_end_below(Product product, const Job& job) { return by_angle(product, job) || optimal(product, job); }
-bool stretched(Product, const Job& job) {
+bool scaled(Product, const Job& job) {
   const auto nominal = [](const PartRequest& part) { return part.shrink == std::array<double, 3>{1, 1, 1}; };
   return !std::ranges::all_of(job.parts, nominal);
 }
-bool shrinks(Product product, const Job& job) { return by_steps(product, job) && stretched(product, job); }
+bool shrinks(Product product, const Job& job) { return by_steps(product, job) && scaled(product, job); }
 bool has_core(Product, const Job& job) { return job.dose.core < 1 || job.dose.core_saturation_percent || fills(job); }
 bool dithers(Product, const Job& job) { return job.levels > 0 || job.dose.saturation_percent; }
 /// Printers of filament lay a wall where nothing else is asked for.
-bool lays_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
-bool lays_lines(Product, const Job& job) {
+bool deposits_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
+bool deposits_lines(Product, const Job& job) {
   const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
   return job.fill.all.pattern != infill::Pattern::kNone || job.segment.any() || !job.fill.ranges.empty() ||
          !std::ranges::all_of(job.parts, plain);
@@ -65,7 +65,7 @@ constexpr std::string_view kUniform = "is of layers that fit the part, and these
                            kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
-    {"--cusp-of", shrinks, kShrinks, stretched},
+    {"--cusp-of", shrinks, kShrinks, scaled},
     {"--adapt-angle", by_angle, kAngle, by_angle},
     {"--peaks", by_angle, kAngle, by_angle},
     {"--cover-top", may_end_below, kCovered, may_end_below},
@@ -78,15 +78,15 @@ constexpr Need kNeeds[] = {
     {"--time-model", optimal, kOptimal, optimal},
     {"--shell", has_core, "is the depth that is not thinned, and nothing is; add --core, --core-saturation or --fill"},
     {"--no-dither", dithers, "is of drops that are not whole, and none are asked for; add --levels or --saturation"},
-    {"--bead-ends", lays_beads, kBeads},
-    {"--bead", lays_beads, kBeads},
-    {"--bead-gap", lays_lines, kLines},
-    {"--line-distance", lays_lines, kLines},
-    {"--gap-formula", lays_lines, kLines},
-    {"--angle", lays_lines, kLines},
-    {"--angle-step", lays_lines, kLines},
-    {"--stagger", lays_lines, kLines},
-    {"--print-speed", lays_lines, "is of lines that fill, and no pattern is asked for; add --fill, or give --wall-speed"},
+    {"--bead-ends", deposits_beads, kBeads},
+    {"--bead", deposits_beads, kBeads},
+    {"--bead-gap", deposits_lines, kLines},
+    {"--line-distance", deposits_lines, kLines},
+    {"--gap-formula", deposits_lines, kLines},
+    {"--angle", deposits_lines, kLines},
+    {"--angle-step", deposits_lines, kLines},
+    {"--stagger", deposits_lines, kLines},
+    {"--print-speed", deposits_lines, "is of lines that fill, and no pattern is asked for; add --fill, or give --wall-speed"},
     {"--segment-rule", cuts_lines, "is of lines; closed curves are cut by their length under every rule, leave it out"},
     {"--spacing-cc", lies_in_pairs,
      "is between continuous lines, and one lies alone between segmented ones; add --continuous 2"},
@@ -114,10 +114,10 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
   // Whoever names the pattern none knows that there are no lines.
   const bool named = arguments.has("--pattern") || arguments.has("--fill");
   for (const Need& need : kNeeds) {
-    const bool beads = need.met == lays_lines || need.met == lays_beads;
+    const bool beads = need.met == deposits_lines || need.met == deposits_beads;
     const auto met = study ? need.in_study : need.met;
     if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && named)) continue;
-    return terminal::at_option(need.flag, std::string(need.unmet));
+    return pipeline::at_option(need.flag, std::string(need.unmet));
   }
   if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off") {
     return Error{Fault::kUsage, "--no-repair and --repair exclude each other; give one of them"};
@@ -129,7 +129,7 @@ Status check_machine_needs(const Extruder& machine, const Arguments& arguments) 
   if (machine.format != "sml") return {};
   for (const std::string_view flag : kOfGcode) {
     if (arguments.has(flag)) {
-      return terminal::at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
+      return pipeline::at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
     }
   }
   return {};
@@ -140,7 +140,7 @@ std::vector<std::string> notes_on_needs(Product product, const Arguments& argume
   if (arguments.has("--layer") && !job.heights.thickness_mm.empty()) {
     notes.emplace_back("--layer does nothing here, layers are as thick as --thickness says; leave it out");
   }
-  const bool hollow = product == Product::kImages && fills(job) && !lays_lines(product, job);
+  const bool hollow = product == Product::kImages && fills(job) && !deposits_lines(product, job);
   if (hollow && !is_named(job, "fill.pattern") && !is_named(job, "segment.fill")) {
     notes.emplace_back(
         "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant");

@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/job/job.h"
 #include "stages/data/choices.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
-#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
 
-using terminal::Arguments;
+using pipeline::Arguments;
 
 /// Refuses options that would do nothing in this job; keys of files are not looked at.
 /// study   of layers alone: what decides none may still tell something about them

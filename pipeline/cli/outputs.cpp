@@ -8,12 +8,12 @@
 #include <optional>
 #include <vector>
 
-#include "stages/cost/quote_table.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/layer_files.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/voxels/image.h"
+#include "pipeline/manifest/layer_files.h"
+#include "pipeline/report/cost_report.h"
+#include "stages/formats/voxels/image.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -50,8 +50,8 @@ constexpr OwnFile kOwnFiles[] = {
     {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\":", "^Portugu"}},
     {"heights", "--plot", false, {kDrawing, kPicture}},
     {"permeability", "--plot", false, {kDrawing, kPicture}},
-    {"permeability", "--solid", false, {write::voxels::kMark}},
-    {"permeability", "--void", false, {write::voxels::kMark}},
+    {"permeability", "--solid", false, {formats::voxels::kMark}},
+    {"permeability", "--void", false, {formats::voxels::kMark}},
     {"", "--overlay", false, {kPicture}},
     {"preview", "-o,--output", false, {kDrawing, kPicture}},
     {"report", "-o,--output", false, {"name=\"generator\" content=\"lamina\""}},
@@ -61,23 +61,23 @@ constexpr OwnFile kOwnFiles[] = {
 };
 
 /// The folder of a file, or of what a link leads to.
-std::optional<write::FileId> folder_id(const std::string& file) {
+std::optional<FileId> folder_id(const std::string& file) {
   std::error_code ignored;
-  const fs::path place = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
-  return write::file_id(place.parent_path().string());
+  const fs::path position = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
+  return file_id(position.parent_path().string());
 }
 
 /// The directory read, of a job or a chart, in which a file or what a link leads to lies; "" for none.
 std::string directory_read(const std::string& file, const Arguments& arguments) {
   std::vector<std::string> read = arguments.operands;
   for (const std::string& chart : arguments.all("--chart")) {
-    const std::string folder = write::is_file(chart) ? fs::absolute(chart).parent_path().string() : chart;
+    const std::string folder = is_file(chart) ? fs::absolute(chart).parent_path().string() : chart;
     read.insert(read.end(), {folder, folder + "/images", folder + "/print"});
   }
-  const auto place = folder_id(file);
+  const auto position = folder_id(file);
   const auto found = std::ranges::find_if(read, [&](const std::string& directory) {
     return std::ranges::any_of(std::array{"", "/layers", "/program"},
-                               [&](const char* below) { return place && place == write::file_id(directory + below); });
+                               [&](const char* below) { return position && position == file_id(directory + below); });
   });
   return found == read.end() ? "" : *found;
 }
@@ -85,16 +85,16 @@ std::string directory_read(const std::string& file, const Arguments& arguments) 
 /// What no input may be, or lie in: an output that is there, and the folders in which a run would remove or replace files.
 struct Taken {
   const std::string* output;
-  write::FileId id;
+  FileId id;
   bool folder;
 };
 
 std::vector<Taken> taken_by(std::span<const std::string> outputs) {
   std::vector<Taken> taken;
   for (const std::string& output : outputs) {
-    if (const auto id = write::file_id(output)) taken.push_back({&output, *id, false});
+    if (const auto id = file_id(output)) taken.push_back({&output, *id, false});
     for (const char* below : {"/layers", "/program"}) {
-      if (const auto id = write::file_id(output + below)) taken.push_back({&output, *id, true});
+      if (const auto id = file_id(output + below)) taken.push_back({&output, *id, true});
     }
   }
   return taken;
@@ -127,18 +127,18 @@ std::vector<std::string> outputs_of(const Arguments& arguments) {
 
 /// Two outputs of one call are two files. errors  kUsage
 Status check_apart(const Arguments& arguments) {
-  std::vector<fs::path> places;
+  std::vector<fs::path> positions;
   for (const std::string_view flag : kOutputs) {
     const std::string path = arguments.text(flag);
     std::error_code ignored;
-    if (path.empty() || write::is_stream(path)) continue;
+    if (path.empty() || is_stream(path)) continue;
     for (const char* ending : {"", ".json"}) {
-      const fs::path place = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
-      if (std::ranges::find(places, place) == places.end()) continue;
+      const fs::path position = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
+      if (std::ranges::find(positions, position) == positions.end()) continue;
       return Error{Fault::kUsage, fmt::format("{}: is named for two outputs of this call; name another file", path)};
     }
     for (const char* ending : {"", ".json"}) {
-      places.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
+      positions.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
     }
   }
   return {};
@@ -155,8 +155,8 @@ Status check_outputs(std::span<const InputFile> inputs, std::span<const std::str
   const std::vector<Taken> taken = taken_by(outputs);  // looked up once, for there may be thousands of inputs
   if (taken.empty()) return {};
   for (const InputFile& input : inputs) {
-    if (!write::is_file(input.path)) continue;
-    const auto file = write::file_id(input.path), folder = folder_id(input.path);
+    if (!is_file(input.path)) continue;
+    const auto file = file_id(input.path), folder = folder_id(input.path);
     const auto found = std::ranges::find_if(taken, [&](const Taken& one) { return (one.folder ? folder : file) == one.id; });
     if (found == taken.end()) continue;
     if (!found->folder) {
@@ -179,7 +179,7 @@ Status check_folder(std::string_view flag, const std::string& file) {
 }
 
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {
-  if (write::is_replaceable(path, marks)) return {};
+  if (is_replaceable(path, marks)) return {};
   return Error{Fault::kUsage,
                fmt::format("{}: is there already, and is no such file of lamina; name another one, or replace it "
                            "with --overwrite",
@@ -196,7 +196,7 @@ Status check_quote(const Arguments& arguments, const std::string& directory) {
 Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows) {
   if (!arguments.has("--quote")) return {};
   if (rows.empty()) return Error{Fault::kInput, "--quote: the job has no machine, or layers whose time was not recorded"};
-  return write::write_file(arguments.text("--quote"), cost::csv_text(rows));
+  return write_file(arguments.text("--quote"), cost::csv_text(rows));
 }
 
 Status check_outputs(std::string_view command, const Arguments& arguments) {
@@ -214,7 +214,7 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
   for (const OwnFile& own : kOwnFiles) {
     if ((!own.command.empty() && own.command != command) || !arguments.has(own.flag)) continue;
     const std::string path = arguments.text(own.flag);
-    if (!own.stream && write::is_stream(path)) {
+    if (!own.stream && is_stream(path)) {
       return Error{Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", path,
                                                path == "-" ? "standard output" : "a device or a pipe")};
     }

@@ -6,13 +6,13 @@
 #include <string_view>
 #include <vector>
 
+#include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
-#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
 
-using terminal::Arguments;
+using pipeline::Arguments;
 
 /// An input file of a call, with its role: "the job file".
 struct InputFile {

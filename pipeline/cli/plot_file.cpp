@@ -5,9 +5,9 @@
 #include <filesystem>
 
 #include "pipeline/cli/outputs.h"
-#include "stages/write/file.h"
-#include "stages/write/other_program.h"
-#include "stages/write/plot.h"
+#include "stages/formats/plot/plot.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/other_program.h"
 
 namespace lamina::pipeline {
 
@@ -21,16 +21,15 @@ Status check_plot_name(const std::string& path) {
 }
 
 Result<std::string> plot_text(const std::string& path, const Plot& plot) {
-  auto text = std::filesystem::path(path).extension() == ".svg"
-                  ? Result<std::string>(write::plot_svg(plot))
-                  : write::filter("lamina-preview", "--plot", write::plot_json(plot));
+  auto text = std::filesystem::path(path).extension() == ".svg" ? Result<std::string>(formats::plot_svg(plot))
+                                                                : filter("lamina-preview", "--plot", formats::plot_json(plot));
   if (!text) return Error{text.error().fault, fmt::format("--plot {}: {}", path, text.error().message)};
   return text;
 }
 
 Status write_plot(const std::string& path, const Plot& plot) {
   const auto text = plot_text(path, plot);
-  return text ? write::write_file(path, *text) : text.error();
+  return text ? write_file(path, *text) : text.error();
 }
 
 }  // namespace lamina::pipeline

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "stages/data/picture/plot.h"
+#include "stages/data/plot.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

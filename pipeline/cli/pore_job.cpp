@@ -9,13 +9,13 @@
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/job.h"
+#include "pipeline/job/lists/job_command.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/temporary_folder.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/read/jobs/job_command.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -37,9 +37,9 @@ class JobContext : public Context {
   int complain(const Error& error) override { return outer_.complain(error); }
   Status print(std::string_view text) override { return outer_.print(std::exchange(line_, {}) + std::string(text)); }
   Status give(const Json& value) override {
-    Json told = value;
-    told["job"] = job_;
-    return outer_.give(told);
+    Json reported = value;
+    reported["job"] = job_;
+    return outer_.give(reported);
   }
   void progress(const ProgressEvent& event) override { outer_.progress(event); }
   const std::atomic<bool>& cancel() override { return outer_.cancel(); }
@@ -69,8 +69,8 @@ Result<Job> read_job_of(const Arguments& arguments) {
 
 /// The command that a saved job names in its first line; "" for others.
 std::string saved_command(const std::string& path) {
-  const auto text = read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .most_bytes = kMostTomlBytes});
-  return text ? std::string(read::command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
+  const auto text = read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes});
+  return text ? std::string(pipeline::command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
 }
 
 /// errors  kUsage: no such machine, or nothing tells
@@ -112,7 +112,7 @@ Arguments arguments_on(const std::string& files, const Job& job, Product product
   inner.operands = {files};
   std::erase_if(inner.options, [](const auto& option) { return option.first == "--set" || option.first == "--machine"; });
   // Toolpaths name no printer that a file describes.
-  if (product == Product::kMoves && !job.machine.profile.empty() && arguments.text("--beads") != "told")
+  if (product == Product::kMoves && !job.machine.profile.empty() && arguments.text("--beads") != "stated")
     inner.options.emplace_back("--machine", job.machine.profile);
   return inner;
 }
@@ -134,7 +134,6 @@ Outcome predict_job(const Arguments& arguments, Context& context, Predict predic
   if (const Status status = folder.status(); !status) return status;
   job->output = folder.file(moves ? "part.gcode" : "job");
   if (Status status = check_job(*job); !status) return status;
-  for (const std::string& note : job->notes) context.say("note: " + note);
   Result<Resolved> resolved = resolve(*job, *product);
   if (!resolved) return resolved.error();
   std::array<double, 2> corner_mm{};
@@ -156,18 +155,18 @@ Outcome predict_job(const Arguments& arguments, Context& context, Predict predic
   Json parts = Json::array();
   for (const PartSummary& part : summary->parts) parts.push_back(part.path);
   const std::string machine = summary->machine.empty() ? "" : ", " + one_line(summary->machine);
-  JobContext told(context, job->output, one_line(path),
-                  fmt::format("job       {}: planned as lamina {} does, {} layers {}{}\n", one_line(path),
-                              command_name(*product), summary->layers_planned, summary->layer_text, machine),
-                  {{"path", path},
-                   {"command", command_name(*product)},
-                   {"machine", summary->machine},
-                   {"layers", summary->layers_planned},
-                   {"parts", parts},
-                   {"warnings", warnings_json(summary->warnings)}});
-  Outcome outcome = predict(arguments_on(job->output, *job, *product, arguments), told,
+  JobContext reported(context, job->output, one_line(path),
+                      fmt::format("job       {}: planned as lamina {} does, {} layers {}{}\n", one_line(path),
+                                  command_name(*product), summary->layers_planned, summary->layer_text, machine),
+                      {{"path", path},
+                       {"command", command_name(*product)},
+                       {"machine", summary->machine},
+                       {"layers", summary->layers_planned},
+                       {"parts", parts},
+                       {"warnings", warnings_json(summary->warnings)}});
+  Outcome outcome = predict(arguments_on(job->output, *job, *product, arguments), reported,
                             moves ? first_part(*summary, corner_mm) : std::nullopt);
-  if (outcome.error) outcome.error->message = told.shown(outcome.error->message);
+  if (outcome.error) outcome.error->message = reported.shown(outcome.error->message);
   return outcome;
 }
 

@@ -4,15 +4,15 @@
 
 #include <vector>
 
-#include "pipeline/calibrate/bead_rules.h"
-#include "pipeline/calibrate/laid_look.h"
-#include "pipeline/calibrate/pore_drawing.h"
-#include "pipeline/calibrate/pore_page.h"
-#include "pipeline/calibrate/predict_inertia.h"
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/bead_rules.h"
+#include "pipeline/pores/pore_analysis.h"
+#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/pore_page.h"
+#include "pipeline/pores/predict_inertia.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -32,14 +32,14 @@ Result<std::vector<VoxelStack>> cut_for(bool flow, const CutWindow& cut, const W
 /// None where there is nothing to tell, which a note says.
 Result<std::optional<Forchheimer>> inertia_of(const PoreRasters& rasters, const PoreReport& report, Context& context) {
   const std::atomic<bool>& cancel = context.cancel();
-  Result<Forchheimer> found = look_at_inertia(rasters, report, [&](double) { return !cancel; });
+  Result<Forchheimer> found = analyse_inertia(rasters, report, [&](double) { return !cancel; });
   if (!found && found.error().fault != Fault::kInput) return found.error();
   if (!found) context.say("note: " + found.error().message);
   if (found && !found->settled) context.say("note: the fastest flow found no steady state; k2 is of those before");
   return found ? std::optional(std::move(*found)) : std::nullopt;
 }
 
-void say_doubts(const Pile& pile, const PoreReport& report, Context& context) {
+void print_warnings(const Pile& pile, const PoreReport& report, Context& context) {
   if (pile.skipped > 0) {
     context.say(
         fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
@@ -51,7 +51,7 @@ void say_doubts(const Pile& pile, const PoreReport& report, Context& context) {
   }
 }
 
-Error nothing_laid(const std::string& path, const Box& box) {
+Error nothing_deposited(const std::string& path, const Box& box) {
   return {
       Fault::kInput,
       fmt::format("{}: no bead lies in the window of {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, the middle of the "
@@ -70,19 +70,19 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   request.inertia = arguments.has("--inertia");
   request.section = arguments.has("--plot");
   if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
-  const Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  const Result<formats::GcodeFile> file = formats::GcodeFile::open(path);
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
   if (!pile) return pile.error();
   if (pile->layers.empty()) return Error{Fault::kInput, path + ": no layer lies above z = 0; heights count from the bed"};
   const Result<BeadRules> beads = bead_rules(*file, arguments.text("--beads"), arguments.text("--machine"));
   if (!beads) return beads.error();
-  const bead::LayRules* rules = beads->rules ? &*beads->rules : nullptr;
+  const bead::DepositionRules* rules = beads->rules ? &*beads->rules : nullptr;
   if (arguments.has("--scan")) return compare_scan(arguments, context, *file, *pile, rules);
-  Result<WindowWish> wish = read_window_wish(arguments, 10);
-  if (!wish) return wish.error();
-  wish->part = part;
-  const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
+  Result<WindowRequest> selection = read_window_request(arguments, 10);
+  if (!selection) return selection.error();
+  selection->part = part;
+  const Result<WindowChoice> choice = choose_window(*file, *pile, *selection);
   if (!choice) return Error{choice.error().fault, fmt::format("{}: {}", path, choice.error().message)};
   // Ways and throats take that much; what the flow takes is looked at when its void is known.
   if (const std::uint64_t bytes = 16 * choice->window.voxels(); bytes > request.memory_bytes)
@@ -96,31 +96,32 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   const auto cut = cut_for(flows, cut_window, choice->window);
   if (!cut) return cut.error();
   const bool empty = set_voxels(cut->front()) == 0;
-  if (empty && flows) return nothing_laid(path, choice->window.box);
+  if (empty && flows) return nothing_deposited(path, choice->window.box);
   if (left_out > 0.002)
     context.say(
         fmt::format("note: {:.1f} % of what is laid find no room beside their neighbours and are left out", 100 * left_out));
   const PoreRasters rasters{cut->front(), cut->at(flows ? 1 : 0), cut->at(flows ? 2 : 0)};
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report =
-      flows ? look_at_pores(rasters, request, [&](double) { return !cancel; }) : pores_alone(rasters.voxels);
+      flows ? analyse_pores(rasters, request, [&](double) { return !cancel; }) : pores_alone(rasters.voxels);
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", path, report.error().message)};
   const auto inertia = request.inertia ? inertia_of(rasters, *report, context) : Result(std::optional<Forchheimer>());
   if (!inertia) return inertia.error();
-  const Result<LaidLook> look = look_at_laid(*file, *pile, rasters.voxels, cut_window);
-  if (!look) return look.error();
+  const Result<PoreAnalysis> analysis = analyse_deposited(*file, *pile, rasters.voxels, cut_window);
+  if (!analysis) return analysis.error();
   const auto files = write_window_files(arguments, rasters.voxels, [&] {
     return draw_window(context.shown(path), *choice, *report, rasters.fine, &*file, &*pile);
   });
   if (!files) return files.error();
-  if (empty) context.say("note: " + nothing_laid(path, choice->window.box).message);
-  say_doubts(*pile, *report, context);
-  context.say(beads->told);
+  if (empty) context.say("note: " + nothing_deposited(path, choice->window.box).message);
+  print_warnings(*pile, *report, context);
+  context.say(beads->reported);
   if (!arguments.has("--json"))
-    return context.print(as_text(*choice, *report) + (*inertia ? as_text(**inertia) : "") + as_text(*look) + as_text(*files));
+    return context.print(as_text(*choice, *report) + (*inertia ? as_text(**inertia) : "") + as_text(*analysis) +
+                         as_text(*files));
   Json json = as_json(*choice, *report);
   if (*inertia) json["inertia"] = as_json(**inertia);
-  add_to(*look, json);
+  add_to(*analysis, json);
   if (!files->empty()) json["files"] = as_json(*files);
   return context.give(json);
 }

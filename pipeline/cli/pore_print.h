@@ -9,7 +9,7 @@
 namespace lamina::pipeline {
 
 /// What flows through a window of the beads of a G-code file, or a scan of it beside its plan.
-/// part  as WindowWish takes it
+/// part  as WindowRequest takes it
 Outcome predict_print(const Arguments& arguments, Context& context, const std::optional<Box>& part);
 
 }  // namespace lamina::pipeline

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/calibrate/pore_drawing.h"
-#include "pipeline/calibrate/pore_page.h"
-#include "pipeline/calibrate/scan_compare.h"
 #include "pipeline/cli/window_files.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/pore_page.h"
+#include "pipeline/pores/scan_compare.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -62,19 +62,19 @@ std::vector<OptionSpec> stack_options() {
       {"--range", "N", "voxels each way that the scan may be shifted by, in eights", "16", "Images"}};
 }
 
-Result<WindowWish> read_window_wish(const Arguments& arguments, double voxel_um) {
-  WindowWish wish;
-  wish.voxel_um = voxel_um;
-  if (Status status = arguments.read("--voxel", {1, 500}, wish.voxel_um); !status) return status.error();
-  if (!arguments.has("--window")) return wish;
+Result<WindowRequest> read_window_request(const Arguments& arguments, double voxel_um) {
+  WindowRequest selection;
+  selection.voxel_um = voxel_um;
+  if (Status status = arguments.read("--voxel", {1, 500}, selection.voxel_um); !status) return status.error();
+  if (!arguments.has("--window")) return selection;
   const std::string text = arguments.text("--window");
   const auto parts = split(text, ",");
   for (std::size_t a = 0; a < 3; ++a) {
     const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
-                                                : read_number(parts[a], 0.05, 100, " mm", wish.size_mm[a]);
+                                                : read_number(parts[a], 0.05, 100, " mm", selection.size_mm[a]);
     if (Status status = at_option("--window", wrong); !status) return status.error();
   }
-  return wish;
+  return selection;
 }
 
 Outcome predict_stack(const Arguments& arguments, Context& context) {
@@ -85,11 +85,11 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--memory", read_bytes, flow.memory_bytes); !status) return status;
   const Result<std::array<bool, 3>> periodic = read_periodic(arguments);
   if (!periodic) return periodic.error();
-  const Result<WindowWish> wish = read_window_wish(arguments, 0);
-  if (!wish) return wish.error();
+  const Result<WindowRequest> selection = read_window_request(arguments, 0);
+  if (!selection) return selection.error();
   const Result<ImageStack> stack = open_images(folder, arguments);
   if (!stack) return stack.error();
-  const Result<StackWindow> window = window_of_stack(*stack, *wish, *periodic);
+  const Result<StackWindow> window = window_of_stack(*stack, *selection, *periodic);
   if (!window) return window.error();
   if (!arguments.has("--no-flow") && set_voxels(window->fine) == 0)
     return Error{Fault::kInput,
@@ -98,7 +98,7 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
                              one_line(folder))};
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = arguments.has("--no-flow") ? pores_alone(window->fine)
-                                                               : look_at_pores({window->fine, window->fine, window->coarse, 1},
+                                                               : analyse_pores({window->fine, window->fine, window->coarse, 1},
                                                                                flow, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", one_line(folder), report.error().message)};
   const auto files = write_window_files(
@@ -114,18 +114,18 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   return context.give(json);
 }
 
-Outcome compare_scan(const Arguments& arguments, Context& context, const read::GcodeFile& file, const Pile& pile,
-                     const bead::LayRules* rules) {
+Outcome compare_scan(const Arguments& arguments, Context& context, const formats::GcodeFile& file, const Pile& pile,
+                     const bead::DepositionRules* rules) {
   for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--plot", "--no-flow", "--inertia", "--memory"})
     if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} does nothing beside --scan; leave it out", flag)};
   std::uint32_t range = 16;
   if (Status status = arguments.read("--range", {1, 200}, range); !status) return status;
   range = (range + 7) / 8 * 8;  // that coarse voxels hold it
-  const Result<WindowWish> wish = read_window_wish(arguments, 0);
-  if (!wish) return wish.error();
+  const Result<WindowRequest> selection = read_window_request(arguments, 0);
+  if (!selection) return selection.error();
   const Result<ImageStack> scan = open_images(arguments.text("--scan"), arguments);
   if (!scan) return scan.error();
-  const auto comparison = compare_with_scan(file, pile, *scan, wish->size_mm, range, rules);
+  const auto comparison = compare_with_scan(file, pile, *scan, selection->size_mm, range, rules);
   if (!comparison) return comparison.error();
   if (!comparison->found())
     context.say("note: the scan hardly looks like the plan at any of these shifts; is it turned, or give a larger --range?");

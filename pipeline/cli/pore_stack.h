@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "pipeline/calibrate/image_stack.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/pores/image_stack.h"
 
 namespace lamina::pipeline {
 
@@ -13,13 +13,13 @@ std::vector<OptionSpec> stack_options();
 
 /// What --window and --voxel wish for. voxel_um  where --voxel is not given
 /// errors  kUsage
-Result<WindowWish> read_window_wish(const Arguments& arguments, double voxel_um);
+Result<WindowRequest> read_window_request(const Arguments& arguments, double voxel_um);
 
 /// Permeability of a window of a folder of images.
 Outcome predict_stack(const Arguments& arguments, Context& context);
 
 /// Toolpaths beside the scan of --scan. rules  of bead_voxels()
-Outcome compare_scan(const Arguments& arguments, Context& context, const read::GcodeFile& file, const Pile& pile,
-                     const bead::LayRules* rules);
+Outcome compare_scan(const Arguments& arguments, Context& context, const formats::GcodeFile& file, const Pile& pile,
+                     const bead::DepositionRules* rules);
 
 }  // namespace lamina::pipeline

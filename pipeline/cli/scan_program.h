@@ -4,7 +4,7 @@
 #include <string>
 
 #include "stages/data/status.h"
-#include "stages/data/text/json.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 

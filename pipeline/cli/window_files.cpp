@@ -6,54 +6,54 @@
 
 #include "pipeline/cli/outputs.h"
 #include "pipeline/cli/plot_file.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
-#include "stages/write/voxels/image.h"
-#include "stages/write/voxels/surface_stl.h"
+#include "stages/formats/voxels/image.h"
+#include "stages/formats/voxels/surface_stl.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using write::voxels::Side;
+using formats::voxels::VoxelPhase;
 
 struct Choice {
   const char *flag, *content;
-  Side side;
+  VoxelPhase side;
 };
-constexpr Choice kChoices[] = {{"--solid", "solid", Side::kSolid}, {"--void", "void", Side::kVoid}};
+constexpr Choice kChoices[] = {{"--solid", "solid", VoxelPhase::kSolid}, {"--void", "void", VoxelPhase::kVoid}};
 
 bool is_stl(const std::string& path) { return lower_case(fs::path(path).extension().string()) == ".stl"; }
 
 }  // namespace
 
-std::vector<terminal::OptionSpec> window_file_options() {
+std::vector<pipeline::OptionSpec> window_file_options() {
   return {{"--solid", "FILE", "what is solid in the window, as voxels .nrrd, .mha, .vti, or as a closed surface .stl", "",
            "Result"},
           {"--void", "FILE", "the same of its void", "", "Result"},
           {"--no-flow", "", "tell pores and write files, but compute no flow", "", "Result"}};
 }
 
-Status check_window_files(const terminal::Arguments& arguments) {
+Status check_window_files(const pipeline::Arguments& arguments) {
   if (Status status = check_plot_name(arguments.text("--plot")); !status) return status;
   for (const Choice& choice : kChoices) {
     if (!arguments.has(choice.flag)) continue;
-    const std::string path = arguments.text(choice.flag), told = one_line(path);
-    if (!is_stl(path) && !write::voxels::image_kind(path))
-      return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, told)};
+    const std::string path = arguments.text(choice.flag), reported = one_line(path);
+    if (!is_stl(path) && !formats::voxels::image_kind(path))
+      return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, reported)};
     if (Status status = check_folder(choice.flag, path); !status) return status;
   }
   return {};
 }
 
-Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window,
+Result<std::vector<WindowFile>> write_window_files(const pipeline::Arguments& arguments, const VoxelView& window,
                                                    const std::function<Result<Plot>()>& draw) {
   std::vector<WindowFile> written;
-  std::vector<write::File> files;
-  const auto begin = [&](const char* flag, const char* content) -> Result<write::File*> {
+  std::vector<File> files;
+  const auto begin = [&](const char* flag, const char* content) -> Result<File*> {
     written.push_back({arguments.text(flag), content, 0, 0});
-    auto file = write::File::open(written.back().path);
+    auto file = File::open(written.back().path);
     if (!file) return file.error();
     files.push_back(std::move(*file));
     return &files.back();
@@ -64,12 +64,12 @@ Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& ar
     if (!file) return file.error();
     WindowFile& one = written.back();
     if (is_stl(one.path)) {
-      const auto counts = write::voxels::write_surface(**file, window, choice.side, version());
+      const auto counts = formats::voxels::write_surface(**file, window, choice.side, version());
       if (!counts)
         return Error{counts.error().fault, fmt::format("{} {}: {}", choice.flag, one_line(one.path), counts.error().message)};
       one.facets = counts->facets;
     } else if (Status status =
-                   write::voxels::write_image(**file, window, choice.side, *write::voxels::image_kind(one.path), version());
+                   formats::voxels::write_image(**file, window, choice.side, *formats::voxels::image_kind(one.path), version());
                !status) {
       return status.error();
     }
@@ -99,7 +99,7 @@ std::string as_text(const std::vector<WindowFile>& files) {
   return text;
 }
 
-nlohmann::ordered_json as_json(const std::vector<WindowFile>& files) {
+Json as_json(const std::vector<WindowFile>& files) {
   Json json = Json::array();
   for (const WindowFile& file : files) {
     json.push_back({{"path", file.path}, {"content", file.content}, {"bytes", file.bytes}});

@@ -3,306 +3,247 @@
 #include <tbb/flow_graph.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <new>
-#include <set>
+#include <tuple>
 
-#include "pipeline/flow/budget.h"
-#include "stages/data/handles/clocks.h"
+#include "pipeline/flow/credits.h"
+#include "stages/support/clocks.h"
 
 namespace lamina::pipeline {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 namespace flow = tbb::flow;
-using Node = flow::function_node<flow::continue_msg, flow::continue_msg>;
+using Clock = std::chrono::steady_clock;
+using Phase = LayerState::Phase;
 
-/// Layers in flight, their loans, and the graph, a node each step. The library starts the newest message of a node first, and
-/// whoever sends may have to wait for memory: so a message is a turn and names no layer, it is sent once a layer may go on,
-/// and the node takes the oldest layer that waits for its step. Later steps go before earlier ones. The library copies node
-/// bodies, which refer to this object, so its address must not change.
+Error interrupted() { return {Fault::kInterrupted, "interrupted"}; }
+
+std::size_t threads() { return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism); }
+
+constexpr std::uint32_t kAllDecided = UINT32_MAX;  // position of the message that says so
+
+struct LayerMessage {
+  LayerState* layer = nullptr;  // null until it is begun
+  std::uint32_t position = 0;
+  std::uint32_t step = 0;   // to be taken next
+  bool to_credits = false;  // before that step
+  friend bool operator>(const LayerMessage& a, const LayerMessage& b) { return a.position > b.position; }
+};
+
+/// When layers are to be left.
+class StopSignal {
+ public:
+  explicit StopSignal(const std::atomic<bool>& cancel) : cancel_(cancel) {}
+
+  void fail() { failed_.store(true, std::memory_order_relaxed); }
+  /// Whether no further layer is begun.
+  bool stopped() const { return failed() || cancel_.load(std::memory_order_relaxed); }
+  /// Whether layers in flight take no further step: they cannot be recorded, or have had their time since the cancellation.
+  bool gives_up() {
+    if (failed()) return true;
+    if (!cancel_.load(std::memory_order_relaxed)) return false;
+    std::int64_t never = 0;
+    const std::int64_t now = Clock::now().time_since_epoch().count();
+    cancelled_at_.compare_exchange_strong(never, now);
+    return Clock::duration(now - cancelled_at_.load()) > kPatience;
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kPatience{300};
+  bool failed() const { return failed_.load(std::memory_order_relaxed); }
+  const std::atomic<bool>& cancel_;
+  std::atomic<bool> failed_{false};  // an earlier layer is not on record, so no later one can be
+  std::atomic<std::int64_t> cancelled_at_{0};
+};
+
+template <class Act>
+Status timed(BusyClock& clock, Act&& act) {
+  try {
+    return clock.time(act);
+  } catch (const std::bad_alloc&) {
+    return out_of_memory();
+  }
+}
+
+/// The graph that layers.h draws. Its nodes refer to this object.
 class LayerFlow {
  public:
   LayerFlow(std::uint32_t count, const LayerSteps& steps, const FlowLimits& limits, const std::atomic<bool>& cancel)
       : count_(count),
         steps_(steps),
-        cancel_(cancel),
-        budget_(limits.budget_bytes, limits.most_in_flight, {steps.bytes_held, steps.let_go}),
-        moving_(limits.record_slots),
-        times_processor_(limits.processor_times),
-        ready_(steps.steps.size()),
-        step_ns_(steps.steps.size() + 1),
-        step_processor_ns_(steps.steps.size() + 1) {
-    for (std::size_t s = 0; s < steps.steps.size(); ++s) {
-      nodes_.push_back(std::make_unique<Node>(
-          graph_, flow::unlimited, [this, s](const flow::continue_msg&) { return take_turn(s); },
-          static_cast<flow::node_priority_t>(s + 1)));
-    }
+        stop_(cancel),
+        credits_(steps, limits, is_stopped_),
+        heights_clock_(limits.processor_times),
+        credits_clock_(limits.processor_times),
+        record_clock_(limits.processor_times),
+        heights_(graph_, [this](tbb::flow_control& control) { return next_layer(control); }),
+        decided_(graph_, flow::unlimited,
+                 [](const LayerMessage& message, Gate::output_ports_type& ports) noexcept {
+                   (message.position == kAllDecided ? std::get<1>(ports) : std::get<0>(ports)).try_put(message);
+                 }),
+        backlog_(graph_),
+        slots_(graph_, limits.record_slots),
+        credits_node_(graph_, flow::serial, [this](const LayerMessage& message, auto& ports) { lend(message, ports); }),
+        order_(graph_,
+               [first = steps.decide ? 1u : 0u](const LayerMessage& message) { return std::size_t{message.position + first}; }),
+        record_(graph_, flow::serial, [this](const LayerMessage& message) { return record(message); }) {
+    for (std::uint32_t s = 0; s < steps.steps.size(); ++s) nodes_.push_back(std::make_unique<StepNodes>(*this, s, limits));
+    make_edges();
   }
 
   Status run() {
-    {
-      const std::lock_guard lock(mutex_);
-      admit();
-    }
+    heights_.activate();
     graph_.wait_for_all();
-    if (result_ && next_ < count_) return Error{Fault::kInterrupted, "interrupted"};
+    if (result_ && !all_sent_) return interrupted();
     return result_;
   }
 
   FlowReport report() const {
-    FlowReport report{budget_.most_in_flight(), budget_.most_bytes(), oversized_, {}, {}, static_cast<double>(lock_ns_) * 1e-9};
-    for (std::size_t s = 0; s < step_ns_.size(); ++s) {
-      const bool is_record = s == steps_.steps.size();
-      report.step_seconds.emplace_back(is_record ? "record" : steps_.steps[s].name, static_cast<double>(step_ns_[s]) * 1e-9);
-      report.step_processor_seconds.push_back(static_cast<double>(step_processor_ns_[s]) * 1e-9);
-    }
+    FlowReport report{credits_.budget().max_in_flight(), credits_.budget().max_bytes(), credits_.oversized()};
+    if (steps_.decide) report.nodes.push_back({"heights", heights_clock_.total()});
+    report.nodes.push_back({"credits", credits_clock_.total()});
+    for (std::size_t s = 0; s < nodes_.size(); ++s) report.nodes.push_back({steps_.steps[s].name, nodes_[s]->clock.total()});
+    report.nodes.push_back({"record", record_clock_.total()});
     return report;
   }
 
  private:
-  /// A layer begun and not recorded. Only the thread that takes its step touches it, and under the lock whoever decides
-  /// about a layer that waits.
-  struct Moving {
-    Ticket ticket;
-    Status status;
-    Budget::Loan loan;
-    std::uint64_t estimate = 0, more = 0, held = 0;  // at its admission; from its gate on; the most so far
-    std::size_t step = 0;
-    bool asked = false;     // what the step needs is known
-    bool finished = false;  // all steps are taken
+  using CreditsNode = flow::multifunction_node<LayerMessage, std::tuple<LayerMessage, LayerMessage, flow::continue_msg>>;
+  using Gate = flow::multifunction_node<LayerMessage, std::tuple<LayerMessage, LayerMessage>, flow::queueing_lightweight>;
+
+  /// A step with what leads to it. `credits` sends to all gates; each passes on what is for its step.
+  struct StepNodes {
+    BusyClock clock;
+    Gate gate;
+    flow::priority_queue_node<LayerMessage, std::greater<>> queue;  // the oldest first
+    flow::function_node<LayerMessage, LayerMessage, flow::rejecting> step;
+
+    StepNodes(LayerFlow& flow, std::uint32_t s, const FlowLimits& limits)
+        : clock(limits.processor_times),
+          gate(flow.graph_, flow::unlimited,
+               [s](const LayerMessage& message, Gate::output_ports_type& ports) noexcept {
+                 if (message.step == s) (message.to_credits ? std::get<1>(ports) : std::get<0>(ports)).try_put(message);
+               }),
+          queue(flow.graph_),
+          step(flow.graph_, threads(), [&flow](const LayerMessage& message) { return flow.take_step(message); }) {}
   };
-  Moving& at(std::uint32_t position) { return moving_[position % moving_.size()]; }
 
-  // --- under the lock
-
-  /// Gives the node of a layer's step a turn.
-  void send(const Moving& moving) {
-    ready_[moving.step].insert(moving.ticket.position);
-    nodes_[moving.step]->try_put({});
-  }
-
-  void admit() {
-    for (;;) {
-      stopped_ |= cancel_.load(std::memory_order_relaxed);
-      if (stopped_ || next_ == count_ || next_ - recorded_ == moving_.size()) return;
-      const std::uint64_t estimate = steps_.bytes_of(next_);
-      const auto loan = budget_.take(admission_(estimate));
-      if (!loan) return;
-      const auto slot = static_cast<std::uint32_t>(next_ % moving_.size());
-      moving_[slot] = {{next_, loan->slot, slot}, {}, *loan, estimate};
-      ++next_;
-      send(moving_[slot]);
-    }
-  }
-
-  /// Whether a layer may take its next step now; raises its loan to what the step needs.
-  bool may_go(Moving& moving) {
-    const bool next_to_record = moving.ticket.position == recorded_;
-    std::uint64_t bytes = moving.loan.bytes;
-    if (moving.asked) bytes = std::max(moving.held, whole_(moving.estimate + moving.more));
-    const std::uint64_t added = bytes > moving.loan.bytes ? bytes - moving.loan.bytes : 0;
-    if (!next_to_record && moving.status && !budget_.fits(added)) return false;
-    if (moving.asked && moving.status) budget_.settle(moving.loan, bytes);
-    return true;
-  }
-
-  /// Lets waiting layers go on, the oldest first. None that needs more overtakes an older one that does.
-  void wake() {
-    bool held_up = false;
-    for (auto position = waiting_.begin(); position != waiting_.end();) {
-      Moving& moving = at(*position);
-      if ((held_up && moving.asked) || !may_go(moving)) {
-        held_up = true;
-        ++position;
-        continue;
-      }
-      send(moving);
-      position = waiting_.erase(position);
-    }
-  }
-
-  /// What cannot be recorded any more is not made.
-  void begin_turn(Moving& moving) const {
-    if (moving.status && failed_) moving.status = Error{Fault::kInterrupted, "interrupted"};
-  }
-
-  /// After a step that did not finish the layer. returns  whether this thread takes the next one, too: its turn would be the
-  /// first, and the graph takes longer to say so than some steps take
-  bool go_on(Moving& moving) {
-    if (moving.held > moving.loan.bytes) budget_.settle(moving.loan, moving.held);
-    bool first = waiting_.empty();
-    for (std::size_t s = moving.step; first && s < ready_.size(); ++s) first = ready_[s].empty();
-    if (first && may_go(moving)) {
-      begin_turn(moving);
-      return true;
-    }
-    waiting_.insert(moving.ticket.position);
-    wake();
-    return false;
-  }
-
-  void leave(Moving& moving) {
-    if (moving.status) {
-      admission_.learn(moving.estimate, moving.held);
-      whole_.learn(moving.estimate + moving.more, moving.held);
-      oversized_ += moving.held > budget_.bytes() ? 1 : 0;
-    }
-    if (!steps_.records_from_work) {
-      budget_.give_back(moving.loan, held_now(moving));
+  void make_edges() {
+    if (steps_.decide) {
+      flow::make_edge(heights_, decided_);
+      flow::make_edge(flow::output_port<0>(decided_), backlog_);
+      flow::make_edge(flow::output_port<1>(decided_), order_);
+      flow::make_edge(backlog_, slots_);
     } else {
-      budget_.settle(moving.loan, held_now(moving));
+      flow::make_edge(heights_, slots_);
     }
-    moving.finished = true;
+    flow::make_edge(slots_, credits_node_);
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+      StepNodes& nodes = *nodes_[s];
+      flow::make_edge(flow::output_port<0>(credits_node_), nodes.gate);
+      flow::make_edge(flow::output_port<0>(nodes.gate), nodes.queue);
+      flow::make_edge(flow::output_port<1>(nodes.gate), credits_node_);
+      flow::make_edge(nodes.queue, nodes.step);
+      if (s > 0) flow::make_edge(nodes_[s - 1]->step, nodes.gate);
+    }
+    flow::make_edge(nodes_.back()->step, credits_node_);
+    flow::make_edge(flow::output_port<1>(credits_node_), order_);
+    flow::make_edge(order_, record_);
+    flow::make_edge(record_, credits_node_);
+    flow::make_edge(flow::output_port<2>(credits_node_), slots_.decrementer());
   }
 
-  // --- without the lock
+  // --- the bodies of the nodes
 
-  std::uint64_t held_now(const Moving& moving) const { return steps_.bytes_held(moving.ticket.work); }
-
-  /// Takes the lock, and counts the time until it has it.
-  std::unique_lock<std::mutex> lock() {
-    std::unique_lock held(mutex_, std::try_to_lock);
-    if (held) return held;
-    const auto start = Clock::now();
-    held.lock();
-    lock_ns_ += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
-    return held;
-  }
-
-  flow::continue_msg take_turn(std::size_t s) {
-    Moving* moving = nullptr;
-    {
-      const auto held = lock();
-      moving = &at(*ready_[s].begin());
-      ready_[s].erase(ready_[s].begin());
-      begin_turn(*moving);
+  LayerMessage next_layer(tbb::flow_control& control) {
+    if (!ended_) {
+      const bool more = sent_ < count_ && !stop_.stopped();
+      if (more && (!steps_.decide || heights_clock_.time([&] { return steps_.decide(sent_); }))) return {nullptr, sent_++};
+      ended_ = true;
+      all_sent_ = sent_ == count_ || !stop_.stopped();
+      if (steps_.decide) return {nullptr, kAllDecided};
     }
-    while (take_step(*moving)) {
-    }
+    control.stop();
     return {};
   }
 
-  /// returns  whether this thread takes the layer's next step
-  bool take_step(Moving& moving) {
-    const Step& step = steps_.steps[moving.step];
-    if (moving.status && given_up()) moving.status = Error{Fault::kInterrupted, "interrupted"};
-    const Turn turn{Clock::now(), processor_seconds()};
-    if (step.needs && !moving.asked) {
-      if (moving.status) ask(step, moving);
-      moving.asked = true;
-      count_time(moving.step, turn);
-      const auto held = lock();
-      return go_on(moving);
+  void lend(const LayerMessage& message, CreditsNode::output_ports_type& ports) {
+    if (message.position == kAllDecided) return;
+    const bool ends = message.layer != nullptr && message.layer->phase == Phase::kRecorded;
+    const auto leaving = credits_clock_.time(
+        [&] { return message.layer == nullptr ? credits_.begin(message.position) : credits_.receive(*message.layer); });
+    if (ends) std::get<2>(ports).try_put({});
+    for (LayerState* const layer : leaving) {
+      const LayerMessage next{layer, layer->ticket.position, layer->step};
+      (layer->phase == Phase::kDone ? std::get<1>(ports) : std::get<0>(ports)).try_put(next);
     }
-    if (moving.status) moving.status = guarded([&] { return step.run(moving.ticket); });
-    count_time(moving.step, turn);
-    moving.held = std::max(moving.held, held_now(moving));
-    std::unique_lock held = lock();
-    if (moving.status && ++moving.step < steps_.steps.size()) {
-      moving.asked = false;
-      return go_on(moving);
-    }
-    leave(moving);
-    record(held);
-    wake();
-    admit();
-    return false;
   }
 
-  void ask(const Step& step, Moving& moving) {
-    moving.status = guarded([&]() -> Status {
-      const Result<std::uint64_t> more = step.needs(moving.ticket);
+  LayerMessage take_step(const LayerMessage& message) {
+    LayerState& layer = *message.layer;
+    if (stop_.gives_up()) {
+      layer.status = interrupted();
+    } else {
+      layer.status = timed(nodes_[layer.step]->clock, [&] { return steps_.steps[layer.step].run(layer.ticket); });
+      ++layer.step;
+      if (layer.status && layer.step < nodes_.size()) request_needs(layer);
+      layer.held = std::max(layer.held, steps_.bytes_held(layer.ticket.work));
+    }
+    if (!layer.status || layer.step == nodes_.size()) layer.phase = Phase::kDone;
+    const bool to_credits = layer.phase == Phase::kDone || layer.needs_more || layer.held > layer.loan->bytes;
+    return {&layer, message.position, message.step + 1, to_credits};
+  }
+
+  /// What the next step needs.
+  void request_needs(LayerState& layer) {
+    const Step& step = steps_.steps[layer.step];
+    layer.needs_more = static_cast<bool>(step.needs);
+    if (!layer.needs_more) return;
+    layer.status = timed(nodes_[layer.step]->clock, [&]() -> Status {
+      const Result<std::uint64_t> more = step.needs(layer.ticket);
       if (!more) return more.error();
-      moving.more = *more;
+      layer.more = *more;
       return {};
     });
-    moving.held = std::max(moving.held, held_now(moving));
   }
 
-  /// Records all finished layers that are next; one thread at a time. The lock is released while it records.
-  void record(std::unique_lock<std::mutex>& held) {
-    if (recording_) return;
-    recording_ = true;
-    while (recorded_ < next_ && at(recorded_).finished) {
-      Moving& moving = at(recorded_);
-      held.unlock();
-      if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
-        const Turn turn{Clock::now(), processor_seconds()};
-        result_ = moving.status ? guarded([&] { return steps_.record(moving.ticket); }) : moving.status;
-        count_time(steps_.steps.size(), turn);
-      }
-      const std::uint64_t retained = steps_.records_from_work ? held_now(moving) : 0;
-      const std::uint64_t beside = steps_.bytes_beside ? steps_.bytes_beside() : 0;
-      held = lock();
-      budget_.hold_beside(beside);
-      if (steps_.records_from_work) budget_.give_back(moving.loan, retained);
-      moving.finished = false;
-      ++recorded_;
-      failed_ |= !result_;
-      stopped_ |= failed_;
-      wake();
-      admit();
+  LayerMessage record(const LayerMessage& message) {
+    if (message.position == kAllDecided) {
+      result_ = all_sent_ ? timed(record_clock_, steps_.decided) : interrupted();
+    } else if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
+      result_ = message.layer->status;
+      if (result_) result_ = timed(record_clock_, [&] { return steps_.record(message.layer->ticket); });
     }
-    recording_ = false;
+    if (!result_) stop_.fail();
+    if (message.layer == nullptr) return message;
+    if (steps_.extra_bytes) message.layer->extra = steps_.extra_bytes();
+    message.layer->phase = Phase::kRecorded;
+    return message;
   }
 
-  template <class Act>
-  static Status guarded(Act&& act) {
-    try {
-      return act();
-    } catch (const std::bad_alloc&) {
-      return out_of_memory();
-    }
-  }
-
-  /// Whether layers in flight are to be left: some time after the flow was told to stop.
-  bool given_up() {
-    if (!cancel_.load(std::memory_order_relaxed)) return false;
-    std::int64_t never = 0;
-    const std::int64_t now = Clock::now().time_since_epoch().count();
-    told_at_.compare_exchange_strong(never, now);
-    return Clock::duration(now - told_at_.load()) > kPatience;
-  }
-
-  /// A step of one layer, from here on.
-  struct Turn {
-    Clock::time_point start;
-    double processor = 0;
-  };
-  double processor_seconds() const { return times_processor_ ? thread_seconds() : 0; }
-  void count_time(std::size_t step, const Turn& turn) {
-    step_ns_[step] += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - turn.start).count();
-    step_processor_ns_[step] += static_cast<std::int64_t>(1e9 * (processor_seconds() - turn.processor));
-  }
-
-  static constexpr std::chrono::milliseconds kPatience{300};
   const std::uint32_t count_;
   const LayerSteps& steps_;
-  const std::atomic<bool>& cancel_;
-  std::atomic<std::int64_t> told_at_{0};
-
-  std::mutex mutex_;  // guards the following members up to the times
-  Budget budget_;
-  Correction admission_, whole_;  // of the estimates before and after a gate
-  std::vector<Moving> moving_;    // by position, round and round
-  const bool times_processor_;
-  std::vector<std::set<std::uint32_t>> ready_;  // positions, by step: one turn each is on its way
-  std::set<std::uint32_t> waiting_;             // for bytes
-  std::uint32_t next_ = 0;                      // position of the next layer to admit
-  std::uint32_t recorded_ = 0, oversized_ = 0;
-  bool recording_ = false, stopped_ = false;  // stopped: no further admissions
-  bool failed_ = false;                       // an earlier layer is not on record, so no later one can be
-
-  std::vector<std::atomic<std::int64_t>> step_ns_, step_processor_ns_;  // of each step, and of recording
-  std::atomic<std::int64_t> lock_ns_{0};
-  Status result_;  // of `record`, which runs once at a time
+  StopSignal stop_;
+  const std::function<bool()> is_stopped_ = [this] { return stop_.stopped(); };
+  std::uint32_t sent_ = 0;                 // layers decided
+  bool ended_ = false, all_sent_ = false;  // no further layers; for they are all decided
+  Credits credits_;                        // of its node
+  Status result_;                          // of `record`
+  BusyClock heights_clock_, credits_clock_, record_clock_;
 
   flow::graph graph_;
-  std::vector<std::unique_ptr<Node>> nodes_;  // of each step
+  flow::input_node<LayerMessage> heights_;
+  Gate decided_;
+  flow::queue_node<LayerMessage> backlog_;
+  flow::limiter_node<LayerMessage> slots_;
+  CreditsNode credits_node_;
+  std::vector<std::unique_ptr<StepNodes>> nodes_;  // of each step
+  flow::sequencer_node<LayerMessage> order_;
+  flow::function_node<LayerMessage, LayerMessage> record_;
 };
 
 }  // namespace
@@ -315,8 +256,6 @@ Status flow_layers(std::uint32_t count, const LayerSteps& steps, const FlowLimit
   return status;
 }
 
-std::uint32_t layers_in_flight() {
-  return 2 * static_cast<std::uint32_t>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-}
+std::uint32_t layers_in_flight() { return 2 * static_cast<std::uint32_t>(threads()); }
 
 }  // namespace lamina::pipeline

@@ -8,33 +8,32 @@
 #include <vector>
 
 #include "pipeline/job/keys.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json_text.h"
-#include "stages/read/jobs/job_command.h"
-#include "stages/read/jobs/named_files.h"
-#include "stages/read/jobs/old_forms.h"
-#include "stages/write/file.h"
-#include "stages/write/replaceable.h"
+#include "pipeline/job/lists/job_command.h"
+#include "pipeline/job/lists/named_files.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-Error refuse(const std::string& file, const Place& at, const std::string& what) {
+Error refuse(const std::string& file, const TextPosition& at, const std::string& what) {
   return {Fault::kUsage, fmt::format("{}{}", at.text(file), what)};
 }
 
 Status read_parts(const TomlValue& list, const std::string& file, Job& job) {
   if (!list.is_list() || list.value.empty() || !std::ranges::all_of(list.value, &TomlValue::is_table)) {
-    return refuse(file, list.place, "part: write one [[part]] table for each part");
+    return refuse(file, list.position, "part: write one [[part]] table for each part");
   }
   job.parts.clear();
   for (const TomlValue& table : list.value) {
     PartRequest part;
     if (Status status = read_section(table, "part", file, part_keys(), part); !status) return status;
-    if (part.path.empty()) return refuse(file, table.place, "part.path is missing; name a file");
-    const Place& named = table.find("path")->place;
+    if (part.path.empty()) return refuse(file, table.position, "part.path is missing; name a file");
+    const TextPosition& named = table.find("path")->position;
     part.named_at = fmt::format("{}:{}:{}", file, named.line, named.column);
     job.parts.push_back(std::move(part));
   }
@@ -44,7 +43,7 @@ Status read_parts(const TomlValue& list, const std::string& file, Job& job) {
 Status no_section(const TomlValue& value, std::string_view section, const std::string& file) {
   auto names = section_names(job_keys());
   names.push_back("part");
-  return refuse(file, value.place, fmt::format("{}: {}", section, no_such_section(section, names)));
+  return refuse(file, value.position, fmt::format("{}: {}", section, no_such_section(section, names)));
 }
 
 bool has_section(std::string_view section) {
@@ -53,8 +52,7 @@ bool has_section(std::string_view section) {
 
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
-  if (Status status = read::replace_old_forms(*tree, file, job.notes); !status) return status;
-  if (Status status = read::replace_paths(*tree, file, job.missing); !status) return status;
+  if (Status status = pipeline::replace_paths(*tree, file, job.missing); !status) return status;
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
     if (section == "part") {
@@ -84,20 +82,11 @@ void change_profiles(MachineRequest& machine, const Change& change) {
   for (std::string& preset : machine.presets) preset = change(preset);
 }
 
-/// Whether a job's bytes are other ones than those of 77c7a2d, which wrote texts without the keys that are unsaid.
-bool bytes_are_new(const Job& job, Product product) {
-  const bool shrinks =
-      std::ranges::any_of(job.parts, [](const PartRequest& part) { return part.shrink != PartRequest().shrink; });
-  if (job.heights.mode == heights::Mode::kAngle && shrinks) return true;            // angles are those before the shrinkage
-  if (product != Product::kContours) return product == Product::kMoves;             // with a skirt
-  return job.slice.format.starts_with("cli") || tolerance_um_of(job, product) > 0;  // units; points left out last
-}
-
 /// The value of an assignment: text, or TOML in quotes, brackets or braces.
 TomlValue assigned_value(std::string_view text) {
   const bool toml = !text.empty() && (text.front() == '"' || text.front() == '[' || text.front() == '{');
   if (auto value = toml ? read_toml_value(text) : std::nullopt) {
-    value->place = {};
+    value->position = {};
     return *value;
   }
   if (text.size() >= 2 && text.front() == '[' && text.back() == ']') text = text.substr(1, text.size() - 2);  // [a, b]
@@ -108,7 +97,7 @@ TomlValue assigned_value(std::string_view text) {
 template <class Target>
 Status read_assigned(const TomlValue& table, std::string_view section, const std::string& option,
                      std::span<const Key<Target>> keys, Target& target) {
-  Place unused;
+  TextPosition unused;
   const std::string& name = table.name.front();
   std::string wrong;
   const auto* key = find_key(keys, section, name, wrong);
@@ -120,7 +109,7 @@ Status read_assigned(const TomlValue& table, std::string_view section, const std
 
 Status read_job(const std::string& path, Job& job) {
   const auto text =
-      read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .most_bytes = kMostTomlBytes, .streams = true});
+      read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes, .streams = true});
   return text ? read_job_text(*text, path, job) : Status(text.error());
 }
 
@@ -144,9 +133,6 @@ Status set_key(Job& job, std::string_view assignment) {
   root.kind = table.kind = TomlValue::Kind::kTable;
   table.add(names.back(), assigned_value(assignment.substr(equals + 1)));
   root.add(names[0], std::move(table));
-  const std::size_t notes_before = job.notes.size();
-  if (Status status = read::replace_old_forms(root, {}, job.notes); !status) return wrong(status.error().message);
-  for (std::size_t i = notes_before; i < job.notes.size(); ++i) job.notes[i] = "--set " + job.notes[i];
   job.named.emplace_back(assignment.substr(0, equals));
   const TomlValue& set = root.value.front();
   if (names[0] != "part") return read_assigned(set, names[0], option, job_keys(), job);
@@ -169,9 +155,9 @@ Status set_key(Job& job, std::string_view assignment) {
 
 std::string job_text(const Job& job, const std::string& directory) {
   Job named = job;
-  named.output = read::path_in(directory, named.output);
-  change_profiles(named.machine, [&](const std::string& name) { return read::profile_in(directory, name); });
-  for (PartRequest& part : named.parts) part.path = read::path_in(directory, part.path);
+  named.output = pipeline::path_in(directory, named.output);
+  change_profiles(named.machine, [&](const std::string& name) { return pipeline::profile_in(directory, name); });
+  for (PartRequest& part : named.parts) part.path = pipeline::path_in(directory, part.path);
   std::string text = sections_text(job_keys(), named, [](const JobKey&, const std::string& value) { return !value.empty(); });
   for (const PartRequest& part : named.parts) text += part_text(part);
   return text;
@@ -179,13 +165,11 @@ std::string job_text(const Job& job, const std::string& directory) {
 
 std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
-  const bool is_new = bytes_are_new(job, product);
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
-  change_profiles(whole.machine, read::profile_name);
+  change_profiles(whole.machine, pipeline::profile_name);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
-    if (key.unsaid == value && !is_new) return false;
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
   });
   for (PartRequest part : job.parts) {
@@ -195,9 +179,9 @@ std::string canonical_job_text(const Job& job, Product product) {
   return text;
 }
 
-Result<write::File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
+Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
   for (const PartRequest& part : job.parts) {
-    if (write::same_file(path, part.path)) {
+    if (same_file(path, part.path)) {
       return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
     }
     if (!is_utf8(part.path)) {
@@ -207,9 +191,9 @@ Result<write::File> write_job(const std::string& path, const Job& job, bool dura
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
   const auto& [profile, presets] = std::tie(job.machine.profile, job.machine.presets);
-  if (Status status = read::check_nameable(directory.string(), profile, presets); !status) return status.error();
-  const std::string text = read::job_command_line(command) + "\n\n" + job_text(job, directory.string());
-  auto file = write::File::open(path, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
+  if (Status status = pipeline::check_nameable(directory.string(), profile, presets); !status) return status.error();
+  const std::string text = pipeline::job_command_line(command) + "\n\n" + job_text(job, directory.string());
+  auto file = File::open(path, {.durable = durable ? Durable::kAll : Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());
   if (status) status = file->flush();
   return status ? std::move(file) : status.error();

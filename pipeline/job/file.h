@@ -9,15 +9,14 @@
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina {
 class File;
-}
+}  // namespace lamina
 
 namespace lamina::pipeline {
 
 /// Reads a job file into `job`: keys absent from the file keep their values; its parts replace the job's.
 /// Relative paths (of parts, profiles, presets and of the output) are relative to the file.
-/// Old forms are accepted with a line in job.notes.
 /// errors  kUsage, one line: file, line, column, key, reason. The job is then undefined.
 Status read_job(const std::string& path, Job& job);
 
@@ -48,6 +47,6 @@ std::string canonical_job_text(const Job& job, Product product);
 /// errors  kOutput; kUsage if a path is not UTF-8
 Status save_job(const std::string& path, const Job& job, std::string_view command = "jet");
 /// The same, but the file takes its name when it is finished.
-Result<write::File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command);
+Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command);
 
 }  // namespace lamina::pipeline

@@ -4,13 +4,13 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/data/text/changes.h"
 #include "stages/infill/settings.h"
+#include "stages/support/text/changes.h"
 
 namespace lamina::pipeline {
 
 /// The keys of one filling.
-using FillSettings = infill::Settings;
+using FillSettings = infill::FillSettings;
 using FillChanges = Changes<FillSettings>;
 using FillRange = Range<FillSettings>;
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "pipeline/job/heights.h"
 #include "pipeline/job/keys.h"
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
@@ -93,6 +92,8 @@ Status check_job(const Job& job) {
   }
   return {};
 }
+
+Result<heights::Options> heights_options(const Job& job) { return heights::options_of(job.heights, job.layer_mm); }
 
 double tolerance_um_of(const Job& job, Product product) {
   return job.slice.tolerance_um.value_or(product == Product::kMoves ? 10 : 0);

@@ -10,71 +10,22 @@
 #include <vector>
 
 #include "pipeline/job/fill.h"
+#include "pipeline/job/part.h"
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
-#include "stages/data/text/changes.h"
 #include "stages/heights/settings.h"
 #include "stages/segment/settings.h"
+#include "stages/support/text/changes.h"
 
 namespace lamina {
 enum class VatRule : std::uint8_t;  // stages/data/machine.h
 }
+namespace lamina::heights {
+struct Options;
+}
 
 namespace lamina::pipeline {
-
-/// Per cent of the powder's voids: a number, or a formula of x, y and z in mm.
-struct Saturation {
-  double percent = 0;
-  std::string formula;  // empty: the number
-
-  Saturation() = default;
-  Saturation(double of_voids) : percent(of_voids) {}
-  static Saturation of(std::string text) {
-    Saturation saturation;
-    saturation.formula = std::move(text);
-    return saturation;
-  }
-};
-
-/// A different material between two heights, in mm above the bottom of a part. Where ranges overlap, the last one counts.
-struct MaterialRange {
-  double from_mm = 0, to_mm = 0;
-  std::string material;
-};
-
-/// What of images that are a part (docs/images-as-parts.md) their files do not tell.
-struct PartImages {
-  std::optional<std::array<std::int64_t, 2>> dpi;  // absent: by the tags of the files
-  std::optional<double> layer_mm;                  // absent: by the manifest beside them, or the job's
-  std::uint32_t threshold = 128;                   // grey below it is dark, 1 .. 255
-  bool invert = false;                             // bright pixels are jetted
-  bool missing_empty = false;                      // numbers that are missing are empty layers
-  bool crop = false;                               // what sticks out of the bed is cut off
-  bool resample = false;                           // another dpi than the job's is brought to it
-  bool operator==(const PartImages&) const = default;
-};
-
-/// One [[part]] of a job.
-struct PartRequest {
-  std::string path;
-  std::string named_at = {};  // position in the job file, "job.toml:12:8"; empty without one
-  std::string unit = "mm";    // mm, cm, m, um, inch, foot: for STL and OBJ, which store no unit
-  std::uint32_t copies = 1;
-  std::optional<std::array<double, 2>> at_mm = {};  // corner of the part's box on the bed; arranged if absent
-  std::optional<double> bottom_mm = {};             // height of the part's lowest point above the bed; absent: of images as
-                                                    // their manifest has it, else 0
-  std::array<double, 3> scale{1, 1, 1};
-  std::array<double, 3> rotate_deg{0, 0, 0};
-  std::array<double, 3> shrink{1, 1, 1};            // compensation factors per axis of the bed, applied last
-  FillChanges fill = {};                            // changes to the job's filling
-  std::string material = {};                        // name of its powder; set for all parts or for none
-  std::vector<MaterialRange> material_ranges = {};  // other materials between heights above its bottom
-  PartImages images = {};                           // of a part that is images
-  // --- instead of the job's
-  std::optional<std::array<double, 2>> bleed_um = {}, hole_bleed_um = {};
-  std::optional<Saturation> saturation_percent = {}, core_saturation_percent = {};  // at all heights; by its own corner
-};
 
 enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
@@ -90,7 +41,7 @@ using HeightsRequest = heights::Settings;
 
 /// Section [slice]: contours and their files.
 struct SliceRequest {
-  std::string format = "svg";          // of write::slice_formats()
+  std::string format = "svg";          // of formats::slice_formats()
   bool file_a_layer = false;           // layers/000000.svg ... in place of one file
   bool empty_first_layer = false;      // CLI
   std::optional<double> tolerance_um;  // simplification: greatest displacement of contours; absent: tolerance_um_of()
@@ -99,7 +50,7 @@ struct SliceRequest {
 };
 
 /// The keys of one segmentation.
-using SegmentSettings = segment::Settings;
+using SegmentSettings = segment::SegmentSettings;
 
 /// Section [segment].
 struct SegmentRequest {
@@ -185,16 +136,15 @@ struct Job {
   bool resume = false;
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
-  bool strict = false;                  // warnings are errors
-  bool inspect = false;                 // look through the layers for islands, hollows, thin places
-  std::optional<double> least_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
-  bool allow_empty = false;             // a whole job may have nothing
-  bool allow_unbound = false;           // layers may get less binder than the machine's powder needs
-  bool timing = false;                  // tell where the time goes
-  bool quote = false;                   // tell what each part uses up, without prices too
+  bool strict = false;                // warnings are errors
+  bool inspect = false;               // look through the layers for islands, hollows, thin places
+  std::optional<double> min_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
+  bool allow_empty = false;           // a whole job may have nothing
+  bool allow_unbound = false;         // layers may get less binder than the machine's powder needs
+  bool timing = false;                // tell where the time goes
+  bool quote = false;                 // tell what each part uses up, without prices too
   bool json = false;
   bool quiet = false;
-  std::vector<std::string> notes;  // notes from reading it: old forms and their replacements
   std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"
   bool leave_to_machine = false;   // toolpaths: walls and layers that nobody named are the extruder's, not those here
   /// Profiles that its file names and that are not there, with what to say of each.
@@ -205,15 +155,14 @@ struct Job {
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
 
+/// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key
+Result<heights::Options> heights_options(const Job& job);
+
 /// The job's slice.tolerance_um; if absent 10 for toolpaths, whose planners look ahead over a few dozen moves, else 0.
 double tolerance_um_of(const Job& job, Product product);
 
 /// Every bleed that a job or a part of it states.
 std::vector<std::array<double, 2>> bleeds_of(const Job& job);
-
-/// Sets the materials of the parts: "steel" for all, or "steel,bronze" one per part in order.
-/// errors  kUsage: wrong number of names, or an invalid name
-Status set_materials(std::string_view names, Job& job);
 
 /// Whether any layer of any part has walls, a filling or segmented lines.
 bool fills(const Job& job);

@@ -2,17 +2,544 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+#include <vector>
+
 #include "pipeline/job/file.h"
+#include "pipeline/job/profiles/extruder.h"
+#include "pipeline/job/profiles/printer.h"
+#include "stages/data/units.h"
+#include "stages/dose/field.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/slice_format.h"
+#include "stages/geometry/isa.h"
+#include "stages/heights/heights.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 
+namespace {
+
+// --- [bed], [layers], [placement]
+
+constexpr Limits kSize{kMinMm, kMaxMm, " mm"}, kDpi{1, 25400, "", true};
+
+// With a machine, absent bed and dpi come from the machine; jobs without one show the defaults of a bare bed.
+template <auto Member, const auto& Bare>
+JobKey of_bed(const KeyName& name, const Limits& limits) {
+  JobKey key = field<Member>(name, limits);
+  key.write_text = [](const JobKey&, const Job& job) {
+    const auto& requested = job.*Member;
+    return requested || !job.machine.profile.empty() ? value_text(requested) : value_text(Bare);
+  };
+  return key;
+}
+
+const JobKey kBedKeys[] = {
+    of_bed<&Job::bed_mm, kBareBedMm>({"bed", "size_mm", "--bed", "WIDTHxDEPTH",
+                                      "size of the bed in mm; the image covers all of it", decides::images | decides::contours},
+                                     kSize),
+    of_bed<&Job::dpi, kBareDpi>(
+        {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", decides::images}, kDpi),
+    field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", decides::all}, kSize),
+};
+
+const JobKey kPlacementKeys[] = {
+    field<&Job::gap_mm>(
+        {"placement", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
+        {0, kMaxMm, " mm"}),
+};
+
+// --- [heights]
+
+using heights::Facets;
+using heights::Mode;
+
+constexpr Word<Mode> kModes[] = {{"uniform", Mode::kUniform},
+                                 {"angle", Mode::kAngle},
+                                 {"cusp", Mode::kCusp},
+                                 {"stepwise", Mode::kStepwise},
+                                 {"optimal", Mode::kOptimal}};
+constexpr Word<Facets> kFacets[] = {{"range", Facets::kRange}, {"plane", Facets::kPlane}};
+constexpr Word<heights::CuspOf> kCuspsOf[] = {{"printed", heights::CuspOf::kPrinted}, {"nominal", heights::CuspOf::kNominal}};
+constexpr Word<heights::Peaks> kPeaks[] = {{"flats", heights::Peaks::kFlats}, {"facets", heights::Peaks::kFacets}};
+constexpr Word<Containment> kContainments[] = {
+    {"across", Containment::kAcross}, {"inside", Containment::kInside}, {"outside", Containment::kOutside}};
+
+std::string read_thickness_text(std::string_view text, std::string& thickness_mm) {
+  const auto set = heights::read_thicknesses(text);
+  if (!set) return set.error().message;
+  thickness_mm = text;
+  return {};
+}
+std::string same_text(const std::string& text) { return text; }
+
+std::string read_time_model(std::string_view text, std::array<double, 2>& model) {
+  std::vector<double> read;
+  if (auto wrong = read_value(text, {0, 1e6, " s", false, 1, 2}, read); !wrong.empty()) return wrong + "; write 12 or 12,0.03";
+  model = {read[0], read.size() > 1 ? read[1] : 0};
+  return {};
+}
+std::string write_time_model(const std::array<double, 2>& model) {
+  return model[0] > 0 || model[1] > 0 ? value_text(model) : std::string();
+}
+
+using Request = HeightsRequest;
+constexpr auto kHeights = &Job::heights;
+constexpr Limits kLength{kMinMm, kMaxMm, " mm"}, kArea{0, 1e9, " mm2"};
+
+const JobKey kHeightsKeys[] = {
+    word<kModes, kHeights, &Request::mode>(
+        {"heights", "mode", "--heights", "MODE",
+         "how layers are decided: uniform, angle, cusp, stepwise, optimal; see docs/heights.md", decides::all}),
+    custom<Job, read_thickness_text, same_text, kHeights, &Request::thickness_mm>(
+        {"heights", "thickness_mm", "--thickness", "SET|RANGE",
+         "thicknesses in mm: a set as 0.178,0.254, or a range as 0.05..0.3:0.01 (step 0.001 if left out); --layer if absent",
+         decides::all},
+        Form::kString),
+    field<kHeights, &Request::cusp_mm>(
+        {"heights", "cusp_mm", "--cusp", "MM", "highest step on a slope, for cusp, stepwise and optimal", decides::all},
+        kLength),
+    word<kCuspsOf, kHeights, &Request::cusp_of>(
+        {"heights", "cusp_of", "--cusp-of", "printed|nominal",
+         "with --shrink: the steps that are printed, or those of the part once it has shrunk", decides::all}),
+    field<kHeights, &Request::adapt_angle_deg>(
+        {"heights", "adapt_angle_deg", "--adapt-angle", "DEG",
+         "angle: slopes at least this flat, before --shrink, get thinner layers; 0 is a wall, 90 a horizontal face",
+         decides::all},
+        {0, 90, " degrees"}),
+    field<kHeights, &Request::peak_angle_deg>({"heights", "peak_angle_deg", "--peak-angle", "DEG",
+                                               "facets at least this flat, and level, are horizontal faces", decides::all},
+                                              {45, 90, " degrees"}),
+    field<kHeights, &Request::normal_tolerance>(
+        {"heights", "normal_tolerance", "", "", "of the vertical component of a facet's normal, in all comparisons of angles",
+         decides::all},
+        {0, 0.1}),
+    word<kFacets, kHeights, &Request::facets>(
+        {"heights", "facets", "--facets", "range|plane",
+         "what a layer looks at: facets within it, or only those that its bounding plane cuts, as in the documents",
+         decides::all}),
+    field<kHeights, &Request::min_facet_mm2>(
+        {"heights", "facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing", decides::all}, kArea),
+    word<kPeaks, kHeights, &Request::peaks>(
+        {"heights", "peaks", "--peaks", "flats|facets",
+         "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all}),
+    field<kHeights, &Request::cover_top>({"heights", "cover_top", "--cover-top", "",
+                                          "angle and optimal: the last layer ends at the top or above it", decides::all,
+                                          "true"}),
+    field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",
+                                      "optimal: do not aim at horizontal faces and tops, only keep the step", decides::all,
+                                      "false"}),
+    field<kHeights, &Request::min_flat_mm2>(
+        {"heights", "flat_mm2", "--flat-area", "MM2", "horizontal faces smaller than this are not aimed at", decides::all},
+        kArea),
+    field<kHeights, &Request::flat_tolerance_um>(
+        {"heights", "flat_tolerance_um", "--flat-tolerance", "UM",
+         "horizontal faces that near are one, and a layer that ends that near hits it, in micrometres", decides::all},
+        {0, 1000, " um"}),
+    custom<Job, read_time_model, write_time_model, kHeights, &Request::time_model>(
+        {"heights", "time_model", "--time-model", "S[,S]",
+         "optimal: the least time instead of the fewest layers; seconds a layer, and a mm2 of its section", decides::all},
+        Form::kList),
+    word<kContainments, kHeights, &Request::containment>({"heights", "containment", "--containment", "across|inside|outside",
+                                                          "whether steps lie across the true surface, inside or outside of it",
+                                                          decides::all}),
+    field<kHeights, &Request::per_part>({"heights", "per_part", "--per-part", "",
+                                         "each part gets its own layers within common slabs (material extrusion)", decides::all,
+                                         "true"}),
+};
+
+// --- [image]
+
+constexpr Word<FillRule> kFillRules[] = {
+    {"nonzero", FillRule::kNonzero}, {"positive", FillRule::kPositive}, {"evenodd", FillRule::kEvenOdd}};
+constexpr Word<Mirror> kMirrors[] = {{"none", Mirror::kNone}, {"x", Mirror::kX}, {"y", Mirror::kY}, {"xy", Mirror::kXY}};
+
+std::vector<std::string_view> image_formats() {
+  std::vector<std::string_view> ids;
+  for (const auto& format : formats::image_formats()) ids.push_back(format.id);
+  for (const auto& format : formats::level_formats()) ids.push_back(format.id);
+  return ids;
+}
+
+std::string check_image_format(std::string_view text) {
+  return !formats::extension_of(text) ? not_one_of(text, image_formats()) : std::string();
+}
+
+std::string check_title(std::string_view) { return {}; }
+
+const JobKey kImageKeys[] = {
+    text<check_image_format, &Job::format>({"image", "format", "--format", "FORMAT", "of the layer files", decides::images})
+        .with_words(image_formats),
+    word<kFillRules, &Job::fill_rule>(
+        {"image", "fill", "--fill-rule", "RULE",
+         "what is solid where shells overlap: nonzero (any), positive (drops shells turned inside out), evenodd",
+         decides::all}),
+    word<kMirrors, &Job::mirror>({"image", "mirror", "--mirror", "x|y|xy|none",
+                                  "turn the image over: x swaps left and right, y back and front", decides::images}),
+    text<check_title, &Job::title>({"image", "title", "--title", "NAME",
+                                    "of the job: TIFF layers then tell it, the layer and z in their tags", decides::images}),
+};
+
+// --- [machine], [dose]
+
+/// A wish of which each part may be left out.
+struct RangeTarget {
+  std::optional<Saturation> percent, core;
+};
+
+constexpr Key<RangeTarget> kRangeKeys[] = {
+    structure<read_saturation, saturation_text, &RangeTarget::percent>({"saturation_range", "saturation_percent"}),
+    structure<read_saturation, saturation_text, &RangeTarget::core>({"saturation_range", "core_saturation_percent"}),
+};
+
+std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, TextPosition& at) {
+  if (auto wrong = check_tables(list, "from_mm, to_mm and saturation_percent"); !wrong.empty()) return wrong;
+  std::vector<SaturationRange> read;
+  for (TomlValue table : list.value) {
+    SaturationRange& range = read.emplace_back();
+    at = table.position;
+    if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
+    RangeTarget target;
+    if (auto wrong = read_table<RangeTarget>(table, "saturation_range", kRangeKeys, target, at); !wrong.empty()) return wrong;
+    if (!target.percent) return fmt::format("{}: saturation_percent is missing", range_name(range.from_mm, range.to_mm));
+    range.percent = *target.percent;
+    range.core_percent = target.core;
+  }
+  ranges = std::move(read);
+  return {};
+}
+
+std::string saturation_ranges_text(const std::vector<SaturationRange>& ranges) {
+  std::string text;
+  for (const auto& [from, to, percent, core] : ranges) {
+    text += fmt::format("{}{{ from_mm = {}, to_mm = {}, saturation_percent = {}", text.empty() ? "" : ", ", number_text(from),
+                        number_text(to), saturation_text(percent));
+    if (core) text += fmt::format(", core_saturation_percent = {}", saturation_text(core));
+    text += " }";
+  }
+  return text.empty() ? text : fmt::format("[{}]", text);
+}
+
+using raster::BeadEnds;
+
+std::string read_rule(std::string_view text, std::optional<VatRule>& rule) {
+  VatRule read{};
+  std::string wrong = pipeline::read_vat_rule(text, read);
+  if (wrong.empty()) rule = read;
+  return wrong;
+}
+std::string rule_text(const std::optional<VatRule>& rule) { return rule ? pipeline::vat_rule_text(*rule) : std::string(); }
+
+constexpr Word<std::uint32_t> kLevels[] = {{"off", 0}, {"2", 2}, {"4", 4}, {"16", 16}};
+
+constexpr Word<BeadEnds> kBeadEnds[] = {{"round", BeadEnds::kRound}, {"square", BeadEnds::kSquare}};
+
+const JobKey kMachineKeys[] = {
+    text<check_path, &Job::machine, &MachineRequest::profile>(
+        {"machine", "profile", "--machine", "NAME|FILE",
+         "write the print program of this machine, and take bed and dpi from it; lamina machines lists them",
+         decides::images | decides::moves}),
+    custom<Job, pipeline::read_presets, pipeline::presets_text, &Job::machine, &MachineRequest::presets>(
+        {"machine", "presets", "--preset", "NAME|FILE,...",
+         "powder, binder and process that change the machine's profile, in their order; lamina machines lists them",
+         decides::images},
+        Form::kStrings),
+    field<&Job::machine, &MachineRequest::scan_speed_mm_s>(
+        {"machine", "scan_speed_mm_s", "--scan-speed", "MM/S", "of the head over the bed, instead of the machine's",
+         decides::images},
+        {1e-3, 1e6, " mm/s"}),
+    field<&Job::machine, &MachineRequest::blocked>(
+        {"machine", "blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's",
+         decides::images},
+        {0, 65'534}),
+    custom<Job, read_rule, rule_text, &Job::machine, &MachineRequest::vat_rule>(
+        {"machine", "vat_rule", "--vat-rule", "RULE",
+         "vat that feeds a layer of two powders, instead of the machine's; refuse: there must be none", decides::images},
+        Form::kString)
+        .with_words(pipeline::vat_rule_words),
+};
+
+const JobKey kDoseKeys[] = {
+    field<&Job::dose, &DoseRequest::bleed_um>(
+        {"dose", "bleed_um", "--bleed", "UM|XxY",
+         "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it",
+         decides::images},
+        kBleedUm),
+    field<&Job::dose, &DoseRequest::hole_bleed_um>({"dose", "hole_bleed_um", "--hole-bleed", "UM|XxY",
+                                                    "the same at the edges of holes, if it differs there", decides::images},
+                                                   kBleedUm),
+    field<&Job::dose, &DoseRequest::first_bleed_um>(
+        {"dose", "first_bleed_um", "--first-bleed", "UM|XxY", "the same at all edges of the first layers, if it differs there",
+         decides::images},
+        kBleedUm),
+    field<&Job::dose, &DoseRequest::first_layers>(
+        {"dose", "first_layers", "--first-layers", "N", "that --first-bleed is of", decides::images}, {1, 1'000'000})
+        .shown_if([](const Job& job) { return job.dose.first_layers != DoseRequest().first_layers; }),
+    field<&Job::dose, &DoseRequest::shell_mm>(
+        {"dose", "shell_mm", "--shell", "MM",
+         "depth below the edge of a layer that gets all its binder (with --core or --fill)", decides::images},
+        {0, 1000, " mm"}),
+    field<&Job::dose, &DoseRequest::core>(
+        {"dose", "core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1", decides::images},
+        {0, 1}),
+    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(
+        {"dose", "saturation_percent", "--saturation", "PERCENT|FORMULA",
+         "of the voids of the powder that binder fills, by as many drops a pixel as it takes; of x, y, z in mm",
+         decides::images}),
+    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::core_saturation_percent>(
+        {"dose", "core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
+         "the same inside of the shell (with --saturation and --shell)", decides::images}),
+    structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
+        {"dose", "saturation_range", "", "[{...}]", "other saturations between two heights above the bed", decides::images}),
+    word<kLevels, &Job::levels>({"dose", "levels", "--levels", "2|4|16|off",
+                                 "of drops by how full a voxel is, exactly, instead of by its centre alone", decides::images})
+        .with_form(Form::kBare)
+        .shown_if([](const Job& job) { return job.levels > 0; }),
+    field<&Job::dose, &DoseRequest::dithered>({"dose", "dithered", "--no-dither", "",
+                                               "round drops to whole ones (with --levels or --saturation)", decides::images,
+                                               "false"}),
+    word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
+        {"dose", "bead_ends", "--bead-ends", "round|square",
+         "of the beads that fill a part, and of their thick and thin stretches", decides::images})
+        .shown_if([](const Job& job) { return job.dose.bead_ends != BeadEnds::kRound; }),
+};
+
+// --- [slice]
+
+std::vector<std::string_view> slice_format_words() {
+  std::vector<std::string_view> words;
+  for (const formats::SliceFormat& format : formats::slice_formats()) words.push_back(format.id);
+  return words;
+}
+
+std::string check_slice_format(std::string_view text) {
+  return formats::find_slice_format(text) != nullptr ? "" : not_one_of(text, slice_format_words());
+}
+
+constexpr unsigned kContour = decides::contours | decides::moves;
+
+const JobKey kSliceKeys[] = {
+    text<check_slice_format, &Job::slice, &SliceRequest::format>(
+        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none",
+         decides::contours})
+        .with_words(slice_format_words),
+    field<&Job::slice, &SliceRequest::file_a_layer>({"slice", "file_a_layer", "--file-a-layer", "",
+                                                     "one file for each layer, layers/000000.svg and up", decides::contours,
+                                                     "true"}),
+    field<&Job::slice, &SliceRequest::empty_first_layer>(
+        {"slice", "empty_first_layer", "--empty-first-layer", "",
+         "CLI: begin with an empty layer at the bottom, from which readers infer the thickness", decides::contours, "true"}),
+    field<&Job::slice, &SliceRequest::tolerance_um>(
+        {"slice", "tolerance_um", "--tolerance", "UM", "points are left out if the contour moves by no more, in micrometres",
+         kContour},
+        {0, 1e6, " um"}),
+    field<&Job::slice, &SliceRequest::bridge_mm>(
+        {"slice", "bridge_mm", "--bridge", "MM", "longest gap of an open mesh (--no-repair) that is closed, in mm", kContour},
+        {0, 1000, " mm"}),
+    field<&Job::slice, &SliceRequest::offset_mm>(
+        {"slice", "offset_mm", "--offset", "MM", "contours are moved outwards by this, inwards if negative", kContour},
+        {-1000, 1000, " mm"}),
+};
+
+// --- [extrude]
+
+std::string read_machine_changes(const TomlValue& tree, pipeline::ProfileChanges& changes, TextPosition& at) {
+  return tree.is_text() ? pipeline::read_changes(tree.text, changes) : pipeline::read_changes(tree, changes, at);
+}
+
+JobKey machine_key() {
+  JobKey key = structure<read_machine_changes, pipeline::changes_text, &Job::extrude, &ExtrudeRequest::machine>(
+      {"extrude", "machine", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in fan.from_layer=2",
+       decides::moves});
+  key.read_text = [](const JobKey&, std::string_view text, Job& job) {
+    return pipeline::read_changes(text, job.extrude.machine);
+  };
+  return key;
+}
+
+template <auto Member>
+JobKey number(std::string_view name, std::string_view flag, std::string_view unit, double low, double high,
+              std::string_view meaning) {
+  return field<&Job::extrude, Member>({"extrude", name, flag, unit, meaning, decides::moves}, {low, high});
+}
+
+const JobKey kExtrudeKeys[] = {
+    number<&ExtrudeRequest::flow>("flow", "--flow", "FACTOR", 0.01, 10, "factor on all that is extruded"),
+    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600, "of all layers"),
+    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "of all layers"),
+    number<&ExtrudeRequest::print_mm_s>("print_mm_s", "--print-speed", "MM/S", 0.1, 2000,
+                                        "of filling lines; 100 % of segmented ones"),
+    number<&ExtrudeRequest::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "of walls"),
+    number<&ExtrudeRequest::first_layer_mm_s>("first_layer_mm_s", "--first-layer-speed", "MM/S", 0.1, 2000,
+                                              "nothing of the first layer is laid faster, but thin stretches by their share"),
+    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000, "of moves without a bead"),
+    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50, "of filament, before long travels"),
+    number<&ExtrudeRequest::fan_percent>("fan_percent", "--fan", "%", 0, 100, "of the part's fan"),
+    field<&Job::extrude, &ExtrudeRequest::relative_extrusion>({"extrude", "relative_extrusion", "--relative-extrusion",
+                                                               "true|false", "count filament from move to move",
+                                                               decides::moves})
+        .with_words([] {
+          return std::vector<std::string_view>{"true", "false"};
+        }),
+    field<&Job::extrude, &ExtrudeRequest::skirt_loops>(
+        {"extrude", "skirt_loops", "--skirt", "N", "loops around all parts before the first bead; 0: none", decides::moves},
+        {0, 100}),
+    machine_key()};
+
+// --- [load], [run]
+
+constexpr Word<Engine> kEngines[] = {{"rays", Engine::kRays}, {"contours", Engine::kContours}, {"both", Engine::kBoth}};
+
+constexpr Word<Sync> kSyncs[] = {{"layer", Sync::kLayer}, {"job", Sync::kJob}, {"off", Sync::kOff}};
+
+using Pair = std::optional<std::array<std::uint32_t, 2>>;
+
+std::string write_bytes(const std::uint64_t& bytes) {
+  for (const auto& [letter, shift] : {std::pair{"G", 30}, {"M", 20}, {"K", 10}}) {
+    if (bytes % (1ull << shift) == 0) return fmt::format("{}{}", bytes >> shift, letter);
+  }
+  return fmt::format("{}", bytes);
+}
+
+constexpr Isa kIsas[] = {Isa::kAuto, Isa::kPlain, Isa::kAvx2, Isa::kAvx512};
+
+std::string read_isa(std::string_view text, Isa& isa) {
+  for (Isa one : kIsas) {
+    if (isa_name(one) == text) return isa = one, std::string();
+  }
+  return "has to be auto, plain, avx2 or avx512";
+}
+/// Jobs are saved for any processor unless one was meant.
+std::string write_isa(const Isa& isa) { return std::string(isa == Isa::kAuto ? std::string_view() : isa_name(isa)); }
+std::vector<std::string_view> isa_words() {
+  std::vector<std::string_view> words;
+  for (Isa isa : kIsas) words.push_back(isa_name(isa));
+  return words;
+}
+
+template <std::string (*Read)(std::string_view, std::array<std::uint32_t, 2>&)>
+std::string read_pair(std::string_view text, Pair& pair) {
+  std::array<std::uint32_t, 2> read{};
+  auto wrong = Read(text, read);
+  if (wrong.empty()) pair = read;
+  return wrong;
+}
+std::string write_layers(const Pair& layers) {
+  if (!layers) return {};
+  const auto [first, last] = *layers;
+  return last == UINT32_MAX ? fmt::format("{}:", first) : fmt::format("{}:{}", first, last);
+}
+
+std::string write_share(const Pair& share) {
+  return share ? fmt::format("{}/{}", (*share)[0] + 1, (*share)[1]) : std::string();
+}
+
+// true and false mean auto and off; they are what is written.
+std::string read_repair(std::string_view text, Job& job) {
+  const bool winding = text == "winding" || text == "\"winding\"", off = text == "off" || text == "false";
+  if (!winding && !off && text != "auto" && text != "true") return "has to be auto, winding or off";
+  job.repair = !off;
+  job.winding = winding;
+  return {};
+}
+std::string write_repair(const Job& job) { return !job.repair ? "false" : job.winding ? "\"winding\"" : "true"; }
+
+JobKey repair_key(const KeyName& name) {
+  JobKey key = custom<Job, read_repair, write_repair>(name, Form::kBare);
+  key.copy_value = [](const JobKey&, const Job& from, Job& to) { to.repair = from.repair, to.winding = from.winding; };
+  return key;
+}
+
+const JobKey kLoadKeys[] = {
+    repair_key({"load", "repair", "--repair", "MODE",
+                "how open meshes are closed: auto, winding (by winding number, approximate) or off", decides::all})
+        .with_words([] {
+          return std::vector<std::string_view>{"auto", "winding", "off"};
+        }),
+    // The row above decides; this one is an option only.
+    repair_key({"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", 0, "false"})
+        .shown_if([](const Job&) { return false; }),
+    field<&Job::drop_bad>({"load", "drop_bad", "--drop-bad", "",
+                           "drop facets with coordinates that are no numbers instead of refusing the file", decides::all,
+                           "true"}),
+    field<&Job::weld_um>({"load", "weld_um", "--weld", "UM",
+                          "repair joins open edges this far apart, in micrometres; 5 grows by itself", decides::all},
+                         {0, 1e6, " um"}),
+};
+
+const JobKey kRunKeys[] = {
+    text<check_path, &Job::output>({"run", "output", "-o,--output", "DIR", "directory for the layers and the manifest"}),
+    word<kEngines, &Job::engine>(
+        {"run", "engine", "--engine", "ENGINE", "rays, contours, or both to compare them; all give the same bytes"}),
+    custom<Job, read_isa, write_isa, &Job::isa>(
+        {"run", "isa", "--isa", "SET",
+         "instructions of the inner loops: auto for the processor's widest, plain, avx2 or avx512; all give the same bytes"},
+        Form::kString)
+        .with_words(isa_words),
+    field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
+    custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
+        {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G"}, Form::kString),
+    word<kSyncs, &Job::sync>({"run", "sync", "--sync", "WHEN",
+                              "what survives a power cut: job, all of it once it has ended, for some 0.1 s; layer, all but the "
+                              "layers in flight while it runs too, for some ms a layer; off, nothing for certain"}),
+    custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
+        {"run", "layers", "--layers", "A:B", "only layers A to B - 1, counted from 0 at the bottom; A: and :B are open"},
+        Form::kString),
+    field<&Job::strict>({"run", "strict", "--strict", "", "warnings are errors: exit 5, and nothing is written", 0, "true"}),
+    field<&Job::allow_empty>({"run", "allow_empty", "--allow-empty", "",
+                              "finish a whole job without a single pixel, contour or bead instead of refusing it", 0, "true"}),
+    field<&Job::inspect>({"run", "inspect", "--inspect", "",
+                          "look through the layers for what hangs on nothing, closed hollows, thin places and parts that touch",
+                          0, "true"}),
+    field<&Job::min_wall_mm>(
+        {"run", "min_wall_mm", "--min-wall", "MM", "what --inspect tells as thin; two pixels, or a drop, if absent"},
+        {0, 1000, " mm"}),
+    field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
+                                "plan a job although layers get less binder than the machine's powder needs to hold", 0,
+                                "true"})
+        .shown_if([](const Job& job) { return job.allow_unbound; }),
+    custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
+        {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
+        Form::kString),
+};
+
+}  // namespace
+
+std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, TextPosition&) {
+  if (!value.is_text()) return "is not a number of per cent or a formula of x, y and z";
+  const std::string& text = value.text;
+  const bool number = !text.empty() && text.find_first_not_of("0123456789.+-eE_") == std::string::npos;
+  double read = 0;
+  const std::string wrong = read_value(text, Limits{0, dose::kMaxPercent, " %"}, read);
+  if (wrong.empty()) {
+    percent = read;
+    return {};
+  }
+  constexpr std::size_t kLongest = 1000;
+  double any = 0;
+  if (text.empty() || (number && read_value(text, Limits{-1e300, 1e300}, any).empty())) return wrong;
+  if (text.size() > kLongest) return fmt::format("is a formula of {} characters, at most {} are read", text.size(), kLongest);
+  if (const auto parsed = dose::parse_saturation(text); !parsed) return parsed.error().message;
+  percent = Saturation::of(text);
+  return {};
+}
+
+std::string saturation_text(const std::optional<Saturation>& percent) {
+  if (!percent) return {};
+  return percent->formula.empty() ? number_text(percent->percent) : toml_string(percent->formula);
+}
+
+std::string read_fill_rule(std::string_view text, FillRule& rule) { return read_word(kFillRules, text, rule); }
+
 std::span<const JobKey> job_keys() {
-  // The order of the sections in a job file. A new group is a file job/<group>.cpp and a line here.
+  // The order of the sections in a job file.
   static const std::vector<JobKey> keys = [] {
     std::vector<JobKey> all;
-    for (const std::span<const JobKey> group :
-         {bed_keys(), heights_keys(), place_keys(), image_keys(), machine_keys(), dose_keys(), slice_keys(), fill_keys(),
-          extrude_keys(), segment_keys(), load_keys(), run_keys()}) {
+    for (const std::span<const JobKey> group : std::initializer_list<std::span<const JobKey>>{
+             kBedKeys, kHeightsKeys, kPlacementKeys, kImageKeys, kMachineKeys, kDoseKeys, kSliceKeys, fill_keys(), kExtrudeKeys,
+             segment_keys(), kLoadKeys, kRunKeys}) {
       all.insert(all.end(), group.begin(), group.end());
     }
     return all;

@@ -8,7 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "stages/data/choices.h"
-#include "stages/data/text/key.h"
+#include "stages/support/text/key.h"
 
 namespace lamina::pipeline {
 
@@ -25,41 +25,21 @@ inline constexpr unsigned all = images | contours | moves;
 std::span<const JobKey> job_keys();
 std::span<const PartKey> part_keys();
 
-// --- the groups, one file each: job/<group>.cpp
-std::span<const JobKey> bed_keys();
-std::span<const JobKey> heights_keys();
-std::span<const JobKey> place_keys();
-std::span<const JobKey> image_keys();
-std::span<const JobKey> slice_keys();
+// --- the tables of pipeline/job/fill.cpp
 std::span<const JobKey> fill_keys();
-std::span<const JobKey> extrude_keys();
 std::span<const JobKey> segment_keys();
-std::span<const JobKey> load_keys();
-std::span<const JobKey> machine_keys();
-std::span<const JobKey> dose_keys();
-std::span<const JobKey> run_keys();
-
-// --- tables within sections
 std::span<const Key<FillSettings>> fill_settings_keys();
 std::span<const Key<SegmentSettings>> segment_settings_keys();
 
 /// Reads a table of filling keys. At most one of them may set the distance between lines.
 /// returns "" or an error message; at  its place
-std::string read_fill_changes(const TomlValue& table, FillChanges& changes, Place& at);
+std::string read_fill_changes(const TomlValue& table, FillChanges& changes, TextPosition& at);
 std::string fill_changes_text(const FillChanges& changes);
-
-/// Reads an array of tables { from_mm, to_mm, material }. returns "" or an error message; at  its place
-std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at);
-std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
 inline constexpr Limits kBleedUm{-10'000, 10'000, " um", true};
 /// Reads a number of per cent or a formula of x, y and z. returns "" or an error message; at  its place
-std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, Place& at);
+std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, TextPosition& at);
 std::string saturation_text(const std::optional<Saturation>& percent);
-/// Reads an array of tables { from_mm, to_mm, saturation_percent }. returns "" or an error message; at  its place
-std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at);
-std::string saturation_ranges_text(const std::vector<SaturationRange>& ranges);
-
 /// Reads a rule for shells that overlap.
 std::string read_fill_rule(std::string_view text, FillRule& rule);
 

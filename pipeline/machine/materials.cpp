@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "stages/data/text/readable.h"
-#include "stages/data/text/value.h"
-#include "stages/read/profiles/printer.h"
+#include "pipeline/job/profiles/printer.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,7 +23,7 @@ std::string names_text(const std::vector<JobMaterial>& materials) {
 Status use(const std::string& name, const std::string& part, const Machine* machine, std::vector<JobMaterial>& used) {
   if (std::ranges::find(used, name, &JobMaterial::name) != used.end()) return {};
   for (const JobMaterial& other : used) {
-    if (const std::string what = read::check_case(other.name, name); !what.empty())
+    if (const std::string what = pipeline::check_case(other.name, name); !what.empty())
       return wrong(fmt::format("{}: {}", part, what));
   }
   JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
@@ -44,7 +44,7 @@ Status use(const std::string& name, const std::string& part, const Machine* mach
 
 std::uint32_t PartMaterial::at(Nm plane) const {
   std::uint32_t material = elsewhere;
-  for (const Range& range : ranges) {
+  for (const MaterialInterval& range : ranges) {
     if (plane >= range.from && plane < range.to) material = range.material;
   }
   return material;

@@ -16,13 +16,13 @@ namespace lamina::pipeline {
 
 /// The material of a part at each height.
 struct PartMaterial {
-  struct Range {
+  struct MaterialInterval {
     std::int64_t from, to;  // nm above the bed, [from, to)
     std::uint32_t material;
-    bool operator==(const Range&) const = default;
+    bool operator==(const MaterialInterval&) const = default;
   };
   std::uint32_t elsewhere = 0;  // number of a material
-  std::vector<Range> ranges;
+  std::vector<MaterialInterval> ranges;
   std::uint32_t at(Nm plane) const;
   bool operator==(const PartMaterial&) const = default;
 };

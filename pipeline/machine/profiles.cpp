@@ -3,44 +3,51 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <vector>
 
 #include "pipeline/job/decisions.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/names.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/job/lists/named_files.h"
+#include "stages/bead/predicted_tables.h"
+#include "stages/geometry/bead_section.h"
+#include "stages/program/dialect.h"
+#include "stages/program/head_grid.h"
 #include "stages/segment/calibration.h"
-#include "stages/write/program/dialect.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/key.h"
+#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
 
 /// The files of a profile, shipped or the user's. unknown(suggestion, names)  makes the error for an unknown name
 template <class Unknown>
-Result<read::ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
-                                const Unknown& unknown) {
-  const read::Library library = profile_library();
+Result<pipeline::ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
+                                    const Unknown& unknown) {
+  const pipeline::Library library = profile_library();
   std::vector<std::string_view> names = names_of(shipped);
-  if (!read::is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
+  if (!pipeline::is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
       !library.is_own(name_or_file)) {
     const std::vector<std::string> own = library.own_names();
     names.insert(names.end(), own.begin(), own.end());
     return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
   }
-  read::ProfileFiles files;
+  pipeline::ProfileFiles files;
   const Status status = library.add(name_or_file, files);
-  return status ? Result<read::ProfileFiles>(std::move(files)) : status.error();
+  return status ? Result<pipeline::ProfileFiles>(std::move(files)) : status.error();
 }
 
 bool is_one_of(std::span<const ShippedProfile> shipped, std::string_view name) {
   return std::ranges::find(shipped, name, &ShippedProfile::name) != shipped.end();
 }
 
-Result<ExtruderProfile> extruder_of(const read::ProfileFiles& files) {
+Result<ExtruderProfile> extruder_of(const pipeline::ProfileFiles& files) {
   if (have_section(files, "head") && !have_section(files, "material"))
     return Error{Fault::kUsage, files.back().where + ": is the profile of a powder printer; lamina jet takes it"};
   count(Decision::kMachine);
-  auto profile = read::read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
+  auto profile = pipeline::read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
   if (const Status status = segment::check(profile->calibration); !status) {
     return Error{Fault::kUsage, fmt::format("{}: calibration.{}", files.back().where, status.error().message)};
@@ -50,14 +57,14 @@ Result<ExtruderProfile> extruder_of(const read::ProfileFiles& files) {
 
 }  // namespace
 
-read::Library profile_library() {
+pipeline::Library profile_library() {
   std::vector<ShippedProfile> all;
   for (const auto shipped : {shipped_machines(), shipped_presets(), shipped_extruders()})
     all.insert(all.end(), shipped.begin(), shipped.end());
-  return {std::move(all), read::profile_folder()};
+  return {std::move(all), pipeline::profile_folder()};
 }
 
-Result<Machine> read_machine(const read::ProfileFiles& files) {
+Result<Machine> read_machine(const pipeline::ProfileFiles& files) {
   if (have_section(files, "material") && !have_section(files, "head")) {
     const auto other = extruder_of(files);
     return Error{Fault::kUsage, other ? files.back().where + ": is the profile of an extrusion printer; lamina extrude takes it"
@@ -65,13 +72,13 @@ Result<Machine> read_machine(const read::ProfileFiles& files) {
   }
   count(Decision::kMachine);
   std::vector<std::string_view> dialects;
-  for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
-  return read::read_machine(files, dialects);
+  for (const auto& dialect : program::dialects()) dialects.push_back(dialect.id);
+  return pipeline::read_machine(files, dialects);
 }
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
   auto keys = read_toml(text, where);
-  return keys ? read_machine(read::ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
+  return keys ? read_machine(pipeline::ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
 }
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
@@ -79,7 +86,7 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
   return keys ? extruder_of({{std::move(*keys), where, {}}}) : keys.error();
 }
 
-Result<read::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
+Result<pipeline::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
   auto files = find(name_or_file, shipped_machines(), [&](const std::string& near, const std::string& names) {
     if (is_one_of(shipped_extruders(), name_or_file))
       return fmt::format("'{}' is an extrusion printer, of lamina extrude; name a profile or one of {}", name_or_file, names);
@@ -116,6 +123,116 @@ Result<bool> names_extruder(const std::string& name_or_file) {
   });
   if (!files) return files.error();
   return !have_section(*files, "head") || have_section(*files, "material");
+}
+
+Result<ExtruderProfile> resolve_extruder(const Job& job) {
+  if (Status status = pipeline::check_there(job.missing, job.machine.profile, {}); !status) return status.error();
+  auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
+  if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
+  ExtruderProfile& profile = *found;
+  for (const auto& [name, value] : job.extrude.machine) {
+    if (const std::string wrong = pipeline::set_extruder_key(name, value, profile); !wrong.empty()) {
+      return Error{Fault::kUsage, fmt::format("extrude.machine: {}", wrong)};
+    }
+  }
+  const ExtrudeRequest& r = job.extrude;
+  Extruder& m = profile.machine;
+  if (r.flow) m.material.flow = *r.flow;
+  if (r.nozzle_degc) m.material.nozzle_degc = m.material.first_nozzle_degc = *r.nozzle_degc;
+  if (r.bed_degc) m.material.bed_degc = m.material.first_bed_degc = *r.bed_degc;
+  if (r.print_mm_s) m.speed.print_mm_s = *r.print_mm_s;
+  if (r.wall_mm_s) m.speed.wall_mm_s = m.speed.inner_wall_mm_s = *r.wall_mm_s;
+  if (r.first_layer_mm_s) m.speed.first_layer_mm_s = *r.first_layer_mm_s;
+  if (r.travel_mm_s) m.speed.travel_mm_s = *r.travel_mm_s;
+  if (r.retraction_mm) m.retraction.length_mm = *r.retraction_mm;
+  if (r.fan_percent) m.fan.percent = *r.fan_percent;
+  if (r.skirt_loops) m.skirt.loops = *r.skirt_loops;
+  if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
+  return found;
+}
+
+constexpr std::string_view kPublished = "Anet A8";  // whose widths Di Nisio 2022 measured
+
+constexpr double kMinLag = 1e-3;  // s; what lags less makes no thin stretches
+
+bool has_measured_widths(const ExtruderProfile& profile) {
+  return profile.own_calibration || profile.machine.name == kPublished;
+}
+
+void predict_calibration(const Job& job, ExtruderProfile& profile) {
+  const Extruder& m = profile.machine;
+  if (has_measured_widths(profile) || !(m.material.lag_s >= kMinLag)) return;
+  const double width = job.fill.all.width_mm, height = job.layer_mm;
+  const double area = bead_area(width, height, m.material.shape()) * m.material.flow;
+  if (!(area > 0)) return;  // layers that are too thick for such beads are refused elsewhere
+  profile.calibration =
+      bead::predicted_tables({area, m.material.lag_s, m.speed.acceleration_mm_s2}, width, height, m.speed.print_mm_s);
+  profile.predicted_calibration = true;
+}
+
+bool is_named(const Job& job, std::string_view key) { return std::ranges::find(job.named, key) != job.named.end(); }
+
+void leave_to_machine(const Extruder& machine, Job& job) {
+  if (!is_named(job, "fill.walls")) job.fill.all.walls = 1;
+  if (is_named(job, "layers.thickness_mm") || !job.heights.thickness_mm.empty()) return;
+  const bool listed = machine.format == "sml" && !machine.sml.pd.empty();
+  job.layer_mm = listed ? machine.sml.pd.front().thickness_mm : machine.material.nozzle_mm / 2;
+}
+
+namespace {
+
+Error wrong(const std::string& key, const std::string& what) { return {Fault::kUsage, fmt::format("{}: {}", key, what)}; }
+
+}  // namespace
+
+Result<ResolvedMachine> resolve_profile(const Machine& machine) {
+  auto grid = program::make_head_grid(machine);
+  if (!grid) return grid.error();
+  const program::Dialect* dialect = program::find_dialect(machine.dialect);
+  if (dialect == nullptr) return wrong("machine.dialect", fmt::format("there is no dialect '{}'", machine.dialect));
+  if (Status status = program::check_dialect(*dialect, machine, *grid); !status) return status.error();
+  grid->bit_order = dialect->bit_order;
+  if (!machine.powder.materials.empty() && machine.powder.materials.size() != machine.powder.vats) {
+    return wrong("powder.materials", fmt::format("{} names for {} vats of {}; name what is in each",
+                                                 machine.powder.materials.size(), machine.powder.vats, machine.name));
+  }
+  return ResolvedMachine{machine, std::move(*grid)};
+}
+
+Result<PowderPrinter> resolve_powder_printer(const Job& job) {
+  const MachineRequest& request = job.machine;
+  PowderPrinter printer;
+  if (request.profile.empty()) {
+    if (request.scan_speed_mm_s || request.blocked || request.vat_rule || !request.presets.empty())
+      return wrong("machine.profile", "is missing; name one with --machine");
+    printer.bed = bare_bed(job);
+    const auto dpi = job.dpi.value_or(kBareDpi);
+    printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
+    return printer;
+  }
+  const Status there = pipeline::check_there(job.missing, request.profile, request.presets);
+  if (!there) return there.error();
+  Result<Machine> found = find_machine(request.profile, request.presets);
+  if (!found) return found.error();
+  Machine& machine = *found;
+  if (request.scan_speed_mm_s) machine.motion.scan_speed_mm_s = *request.scan_speed_mm_s;
+  if (request.vat_rule) machine.powder.vat_rule = *request.vat_rule;
+  if (request.blocked) machine.head.blocked = *request.blocked;
+  auto resolved = resolve_profile(machine);
+  if (!resolved) return resolved.error();
+  if (job.dpi) {
+    if (Status status = program::require_dpi(machine, resolved->grid, *job.dpi); !status) return status.error();
+    resolved = resolve_profile(machine);
+    if (!resolved) return resolved.error();
+  }
+  printer.bed = {machine.bed.size_mm, true};
+  if (job.bed_mm && *job.bed_mm != machine.bed.size_mm) {
+    return wrong("bed.size_mm", fmt::format("the bed of {} is {:g} x {:g} mm; leave it out or change the profile", machine.name,
+                                            machine.bed.size_mm[0], machine.bed.size_mm[1]));
+  }
+  printer.grid = resolved->grid.image;
+  printer.machine = std::move(*resolved);
+  return printer;
 }
 
 }  // namespace lamina::pipeline

@@ -1,16 +1,22 @@
 #include "pipeline/output/directory.h"
 
+#include <fmt/core.h>
 #include <fmt/format.h>
-#include <unistd.h>
+#include <tbb/parallel_for.h>
 
+#include <unistd.h>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
 #include "pipeline/job/decisions.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/job/file.h"
+#include "pipeline/manifest/manifest.h"
+#include "pipeline/output/print_program.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -38,25 +44,25 @@ std::string manifest_name(const Job& job) {
 namespace {
 
 /// What the manifests of a directory say of who else is or was there.
-struct Neighbours {
+struct OtherRuns {
   bool begun = false, shared = false;  // an earlier run of this job or shard; other shards of the same split
 };
 
 /// claim   of the job's own manifest, if it is held
 /// errors  kOutput: another run writes now; kUsage: what is there may not be replaced
-Result<Neighbours> check_manifests(const Job& job, const write::Claim* claim) {
+Result<OtherRuns> check_manifests(const Job& job, const Claim* claim) {
   const std::string own = manifest_name(job);
-  Neighbours found;
+  OtherRuns found;
   for (const ManifestFile& file : find_manifests(job.output)) {
-    const bool claimed = claim != nullptr && file.name == write::part_of(own);
+    const bool claimed = claim != nullptr && file.name == part_of(own);
     if (claimed && !claim->found()) continue;
-    const bool is_own = file.name == own || file.name == write::part_of(own);
+    const bool is_own = file.name == own || file.name == part_of(own);
     const auto refuse = [&](std::string_view what, std::string_view advice) {
       return Error{Fault::kUsage, fmt::format("{}/{}: {}; {}", job.output, file.name, what, advice)};
     };
     if (file.partial && !claimed && !joins(job, file)) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
-      if (Status busy = write::check_not_being_written(path); !busy) return busy.error();
+      if (Status busy = check_not_being_written(path); !busy) return busy.error();
     }
     found.begun |= is_own;
     if (joins(job, file)) {
@@ -119,18 +125,17 @@ Status check_shard_fits(const Job& job, const ManifestHead& head) {
   return {};
 }
 
-Result<write::Claim> claim_output(const Job& job, write::MadeFolders& made) {
+Result<Claim> claim_output(const Job& job, MadeFolders& made) {
   if (const std::error_code error = made.make(job.output)) return cannot(job.output, error.value());
-  auto claim = write::Claim::take(job.output + "/" + manifest_name(job), job.output);
+  auto claim = Claim::take(job.output + "/" + manifest_name(job), job.output);
   if (!claim) return claim.error();
-  if (Status status = check_begun_manifest(write::part_of(job.output + "/" + manifest_name(job))); !status)
-    return status.error();
+  if (Status status = check_begun_manifest(part_of(job.output + "/" + manifest_name(job))); !status) return status.error();
   const auto found = check_manifests(job, &*claim);
   if (!found) return found.error();
   return claim;
 }
 
-Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
+Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
   auto claim = claim_output(job, made);
   if (!claim) return claim.error();
   if (Status status = check_stays_inside(job.output); !status) return status.error();
@@ -145,15 +150,15 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
   if (!fs::is_directory(layers)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; remove it", layers.string())};
   }
-  for (const fs::path& place : {directory, layers}) {
-    if (::access(place.c_str(), W_OK | X_OK) != 0) return cannot(place, errno);
+  for (const fs::path& position : {directory, layers}) {
+    if (::access(position.c_str(), W_OK | X_OK) != 0) return cannot(position, errno);
   }
   if (!job.overwrite) {
     if (!job.shard) sweep_partial_files(job.output);
     return claim;
   }
   for (const ManifestFile& file : find_manifests(job.output)) {
-    if (joins(job, file) || file.name == write::part_of(manifest_name(job))) continue;  // the claim is in that name
+    if (joins(job, file) || file.name == part_of(manifest_name(job))) continue;  // the claim is in that name
     fs::remove(directory / file.name, error);
     if (error) return cannot(directory / file.name, error.value());
   }
@@ -163,8 +168,64 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
   return claim;
 }
 
-write::FileOptions layer_file_options(const Job& job) {
-  return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? write::Durable::kBytes : write::Durable::kNo};
+FileOptions layer_file_options(const Job& job) {
+  return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? Durable::kBytes : Durable::kNo};
+}
+
+Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
+                                                  const ManifestHead& head) {
+  std::string path = directory + "/" + manifest_name;
+  if (::access(path.c_str(), F_OK) != 0) {
+    path += ".part";
+    if (!has_manifest_head(path)) return std::vector<LayerRecord>{};
+  }
+
+  auto manifest = read_manifest(path);
+  if (!manifest) return manifest.error();
+  if (!same_job(manifest->head, head)) {
+    const std::string what = difference(head, manifest->head);
+    return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); choose another directory, or --overwrite", path,
+                                            what.empty() ? "its parts or keys differ" : what)};
+  }
+  const ManifestHead& was = manifest->head;
+  if (was.first_layer < head.first_layer || was.last_layer > head.last_layer) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: is of layers {}:{}, which {}:{} would not keep; resume with the same --layers or more, or "
+                             "choose another directory and join them by lamina merge",
+                             path, was.first_layer, was.last_layer, head.first_layer, head.last_layer)};
+  }
+  const std::vector<LayerRecord>& recorded = manifest->layers;
+  std::vector<char> holds(recorded.size(), 1);
+  tbb::parallel_for(std::size_t{0}, recorded.size(), [&](std::size_t i) {
+    const LayerRecord& record = recorded[i];
+    const auto hold = [&](const std::string& file, std::uint64_t bytes, const Hash128& hash) {
+      if (file.empty()) return true;  // a format without files, a job without a machine
+      const auto digest = digest_file(directory + "/" + file, bytes);
+      return digest.ok() && digest->bytes == bytes && digest->hash == hash;
+    };
+    holds[i] = std::ranges::all_of(
+                   layer_images(head, record),
+                   [&](const LayerImageFile& image) { return hold(image.name, image.record.bytes, image.record.hash); }) &&
+               hold(program_file_name(record.layer.index, head.program_extension), record.program.bytes, record.program.hash);
+  });
+  std::vector<LayerRecord> kept;
+  for (std::size_t i = 0; i < recorded.size(); ++i) {
+    if (holds[i] != 0) kept.push_back(recorded[i]);
+  }
+  return kept;
+}
+
+ManifestHead plan_head(const Plan& plan) {
+  ManifestHead head;
+  head.product = plan.product;
+  head.version = version();
+  head.job_toml = canonical_job_text(plan.job, plan.product);
+  head.layer_count = plan.layer_count;
+  head.first_layer = plan.range[0];
+  head.last_layer = plan.range[1];
+  head.parts = plan.scene->parts;
+  for (PartSummary& part : head.parts) part.path = std::filesystem::path(part.path).filename().string();
+  return head;
 }
 
 }  // namespace lamina::pipeline

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/layer_files.h"
+#include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/plan.h"
 #include "stages/data/status.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/layer_files.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 
@@ -29,7 +29,7 @@ Result<bool> is_directory(const std::string& output);
 
 /// Creates the directory and claims it for the rest of the run, or for the job's shard of it. Fails if another run took it
 /// while this one loaded its parts. errors  kUsage, kOutput
-Result<write::Claim> claim_output(const Job& job, write::MadeFolders& made);
+Result<Claim> claim_output(const Job& job, MadeFolders& made);
 
 /// Fails if a manifest in a shard's directory belongs to another job. Of its own: a shard keeps all other layers and cannot
 /// distinguish other shards' layers from an earlier job's, so the user must clear the directory. Of another shard: the two
@@ -40,9 +40,24 @@ Status check_shard_fits(const Job& job, const ManifestHead& head);
 /// Call after check_output. Claims the directory and creates its layers/. With --overwrite, removes the output of an
 /// earlier job (a shard: only its own manifest), otherwise only the half-written files of an interrupted run.
 /// errors  those of claim_output; kOutput with the system's reason
-Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made);
+Result<Claim> prepare_output(const Job& job, MadeFolders& made);
 
 /// How a layer's file is written in a claimed directory.
-write::FileOptions layer_file_options(const Job& job);
+FileOptions layer_file_options(const Job& job);
+
+// --- finds the intact layers of an interrupted job.
+
+/// Reads the manifest of `directory` (finished or partial) and hashes the files it names.
+///
+/// returns  the records, in layer order, of complete and unchanged files; empty without a manifest
+/// errors   kUsage if the manifest belongs to another job (names the key that differs) or covers layers outside this run
+/// cost     reads every finished file once, in parallel
+Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
+                                                  const ManifestHead& head);
+
+// --- the manifest keys common to all products.
+
+/// The manifest head of a plan, without product-specific keys.
+ManifestHead plan_head(const Plan& plan);
 
 }  // namespace lamina::pipeline

@@ -8,12 +8,11 @@
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/manifest/compare.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/resume.h"
-#include "stages/data/text/version.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/compare.h"
-#include "stages/write/program/dialect.h"
+#include "stages/program/dialect.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -32,19 +31,19 @@ ManifestHead image_head(const Plan& plan) {
   const Job& job = plan.job;
   ManifestHead head = plan_head(plan);
   head.format = job.format;
-  head.extension = write::extension_of(job.format).value_or("");
+  head.extension = formats::extension_of(job.format).value_or("");
   head.fill_rule = value_of("image", "fill", job);
   head.mirror = value_of("image", "mirror", job);
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
-  head.most_drops = plan.images->dose.most_drops();
+  head.max_drops = plan.images->dose.max_drops();
   head.levels = job.levels;
   if (!plan.images->machine) return head;
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
-  if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
-  const std::string profile = read::kept_machine_text(machine);
+  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
+  const std::string profile = pipeline::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
   head.head_drops = plan.images->machine->grid.head_drops;
@@ -54,7 +53,7 @@ ManifestHead image_head(const Plan& plan) {
   return head;
 }
 
-write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
+formats::LayerTags tags_of(const Plan& plan, const Layer& layer) {
   constexpr std::string_view kAxes[] = {"", "x", "y", "xy"};
   const std::string_view axes = kAxes[static_cast<std::size_t>(plan.job.mirror)];
   // A job without a title is told by its pixels alone: the same image is the same file in any job and any place of it.
@@ -65,8 +64,8 @@ write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
 ImageFiles::ImageFiles(const Plan& plan)
     : plan_(plan),
       head_(image_head(plan)),
-      format_(write::find_image_format(plan.job.format)),
-      levels_(write::find_level_format(plan.job.format)) {
+      format_(formats::find_image_format(plan.job.format)),
+      levels_(formats::find_level_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                      layer_file_options(plan.job));
@@ -85,13 +84,13 @@ Status ImageFiles::open() {
       if (Status status = check_shares_known(head_, *kept); !status) return status;
     }
     kept_ = std::move(*kept);
-    for (LayerRecord& record : kept_) tell_unfed(record);
+    for (LayerRecord& record : kept_) report_unfed(record);
   }
-  auto stands = kept_.begin();
+  auto kept_record = kept_.begin();
   todo_.reserve(head_.last_layer - head_.first_layer - kept_.size());
   for (std::uint32_t index = head_.first_layer; index < head_.last_layer; ++index) {
-    if (stands != kept_.end() && stands->layer.index == index) {
-      ++stands;
+    if (kept_record != kept_.end() && kept_record->layer.index == index) {
+      ++kept_record;
     } else {
       todo_.push_back(index);
     }
@@ -100,12 +99,21 @@ Status ImageFiles::open() {
   if (program_) {
     if (Status status = program_->begin(); !status) return status;
   }
+  claim_.emplace(std::move(*claim));
+  return plan_.undecided ? Status() : start();
+}
+
+Status ImageFiles::start() {
+  const Job& job = plan_.job;
+  head_.layer_count = plan_.layer_count;
+  head_.first_layer = plan_.range[0];
+  head_.last_layer = plan_.range[1];
   std::vector<std::string> folders{job.output + "/layers"};
   if (program_) folders.push_back(job.output + "/program");
-  sync_ = write::FolderSync::of(folders);
+  sync_ = FolderSync::of(folders);
   const auto sync_names = [folders] {
     for (const std::string& folder : folders) {
-      if (const int reason = write::sync_folder(folder); reason != 0) return Status(write::write_failure(folder, reason));
+      if (const int reason = sync_folder(folder); reason != 0) return Status(write_failure(folder, reason));
     }
     return Status();
   };
@@ -113,20 +121,21 @@ Status ImageFiles::open() {
   const bool at_once = job.sync != Sync::kJob || !kept_.empty();
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head_,
                                        {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)},
-                                       {job.sync, at_once, sync_names}, std::move(*claim));
+                                       {job.sync, at_once, sync_names}, std::move(*claim_));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
+  claim_.reset();
   return at_once ? Status() : sync_->begin();
 }
 
-std::uint64_t ImageFiles::Work::bytes() const {
+std::uint64_t ImageFiles::FileWork::bytes() const {
   std::uint64_t total = bytes_held(file) + program.bytes();
-  for (const write::Bytes& one : files) total += bytes_held(one);
+  for (const formats::Bytes& one : files) total += bytes_held(one);
   return total;
 }
 
-Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& record) const {
-  write::LayerTags tags = tags_of(plan_, record.layer);
+Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  formats::LayerTags tags = tags_of(plan_, record.layer);
   if (levels_ == nullptr) {
     if (!work.encoder) (work.encoder = format_->make_encoder())->use(plan_.job.isa);
     work.encoder->tag(tags);
@@ -154,8 +163,8 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   return {};
 }
 
-Status ImageFiles::encode_one(const Runs& image, const Levels* levels, Work& work, const LayerRecord& record,
-                              write::Bytes& file) const {
+Status ImageFiles::encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
+                              formats::Bytes& file) const {
   file.clear();
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
   const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
@@ -164,12 +173,12 @@ Status ImageFiles::encode_one(const Runs& image, const Levels* levels, Work& wor
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
 
-Status ImageFiles::store(const LayerImages& images, Work& work, LayerRecord& record) const {
+Status ImageFiles::store(const LayerImages& images, FileWork& work, LayerRecord& record) const {
   const auto files = layer_images(head_, record);
-  const write::FileOptions how = layer_file_options(plan_.job);
+  const FileOptions how = layer_file_options(plan_.job);
   for (std::size_t m = 0; m < files.size() && !files[m].name.empty(); ++m) {
-    const write::Bytes& file = head_.named_images() == 0 ? work.file : work.files[m];
-    if (Status status = write::write_file(plan_.job.output + "/" + files[m].name, file, how); !status) return status;
+    const formats::Bytes& file = head_.named_images() == 0 ? work.file : work.files[m];
+    if (Status status = write_file(plan_.job.output + "/" + files[m].name, file, how); !status) return status;
   }
   return program(images, work, record);
 }
@@ -180,7 +189,7 @@ Result<std::vector<std::uint32_t>> ImageFiles::feeds_of(const LayerRecord& recor
   return vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
 }
 
-void ImageFiles::tell_unfed(LayerRecord& record) const {
+void ImageFiles::report_unfed(LayerRecord& record) const {
   if (!program_ || head_.materials.empty()) return;
   const auto feeds = feeds_of(record);
   for (std::size_t i = 0; feeds && i < record.images.size(); ++i) {
@@ -189,27 +198,27 @@ void ImageFiles::tell_unfed(LayerRecord& record) const {
   }
 }
 
-Status ImageFiles::program(const LayerImages& images, Work& work, LayerRecord& record) const {
+Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecord& record) const {
   if (!program_) return {};
   const auto feeds = feeds_of(record);
   if (!feeds) {
     return Error{feeds.error().fault, fmt::format("layer {} (z {:.3f} mm): {}", record.layer.index, mm(record.layer.plane()),
                                                   feeds.error().message)};
   }
-  tell_unfed(record);
+  report_unfed(record);
   std::vector<RunsView> planes{images.whole};
-  if (head_.most_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
+  if (head_.max_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
   return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }
 
 std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
   const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
-  const std::uint32_t planes = std::max(1u, head_.most_drops);
-  const auto most_bytes = levels_ == nullptr ? format_->most_bytes : levels_->most_bytes;
+  const std::uint32_t planes = std::max(1u, head_.max_drops);
+  const auto max_bytes = levels_ == nullptr ? format_->max_bytes : levels_->max_bytes;
   // Planes of drops share their changes, images of materials each have all.
   const std::uint64_t of_plane = drops.changes_of_all / planes + 1;
   const std::uint64_t of_file = head_.materials.empty() && levels_ == nullptr ? of_plane : drops.changes;
-  return files * most_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
+  return files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
          (program_ ? program_->bytes_bound(of_plane, planes) : 0);
 }
 
@@ -235,7 +244,7 @@ Status ImageFiles::finish() {
 Status ImageFiles::keep() { return manifest_->flush(); }
 
 void ImageFiles::discard() {
-  manifest_->discard();
+  if (manifest_) manifest_->discard();
   if (!remove_layers(plan_.job.output)) return;
   for (const char* folder : {"layers", "program"}) {
     const std::filesystem::path path = std::filesystem::path(plan_.job.output) / folder;

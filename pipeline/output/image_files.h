@@ -9,22 +9,22 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/output/plan_head.h"
+#include "pipeline/manifest/manifest.h"
+#include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/sync.h"
+#include "stages/formats/image_format.h"
+#include "stages/support/io/sync.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 
 /// The manifest head for a plan of images, and what the files of a layer say of it.
 ManifestHead image_head(const Plan& plan);
-write::LayerTags tags_of(const Plan& plan, const Layer& layer);
+formats::LayerTags tags_of(const Plan& plan, const Layer& layer);
 
 /// The images of a layer that is to be written.
 struct LayerImages {
@@ -43,9 +43,12 @@ class ImageFiles {
   void pause_before(const std::vector<std::uint32_t>& layers) {
     if (program_) program_->refills = layers;
   }
-  /// Prepares the directory and starts its manifest.
+  /// Prepares the directory and starts its manifest, if the number of layers is known: see start().
   /// errors  kUsage: the directory holds another job; kOutput
   Status open();
+  /// Starts the manifest of a plan whose layers are decided since open(). errors  kOutput
+  Status start();
+  bool started() const { return manifest_.has_value(); }
   /// Layers still to be made, in increasing order; valid after opening.
   std::vector<std::uint32_t> take_todo() { return std::move(todo_); }
   /// Layers kept from an interrupted run.
@@ -53,21 +56,21 @@ class ImageFiles {
   const ManifestHead& head() const { return head_; }
 
   /// Scratch of a layer in flight; reused by later layers.
-  struct Work {
-    std::unique_ptr<write::ImageEncoder> encoder;
-    std::unique_ptr<write::LevelEncoder> level_encoder;
-    write::Bytes file;
-    std::vector<write::Bytes> files;  // those that have names
+  struct FileWork {
+    std::unique_ptr<formats::ImageEncoder> encoder;
+    std::unique_ptr<formats::LevelEncoder> level_encoder;
+    formats::Bytes file;
+    std::vector<formats::Bytes> files;  // those that have names
     ProgramWork program;
     std::uint64_t bytes() const;
   };
 
   // --- from many threads at once, each with its own work
-  Status encode(const LayerImages& images, Work& work, LayerRecord& record) const;
+  Status encode(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// errors  kOutput; kUsage: the machine cannot feed the layer
-  Status store(const LayerImages& images, Work& work, LayerRecord& record) const;
+  Status store(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
-  Status program(const LayerImages& images, Work& work, LayerRecord& record) const;
+  Status program(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// Upper bound of the bytes for a layer whose images have that many changes.
   std::uint64_t bytes_bound(const dose::DropBound& drops) const;
 
@@ -83,20 +86,22 @@ class ImageFiles {
  private:
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
-  void tell_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, const Levels* levels, Work& work, const LayerRecord& record, write::Bytes& file) const;
+  void report_unfed(LayerRecord& record) const;
+  Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
+                    formats::Bytes& file) const;
 
   const Plan& plan_;
   ManifestHead head_;
-  const write::ImageFormat* format_;  // null if levels_ is there
-  const write::LevelFormat* levels_;
+  const formats::ImageFormat* format_;  // null if levels_ is there
+  const formats::LevelFormat* levels_;
   std::optional<PrintProgram> program_;
+  std::optional<Claim> claim_;  // until the manifest is started
   std::optional<ManifestWriter> manifest_;
-  std::optional<write::FolderSync> sync_;
+  std::optional<FolderSync> sync_;
   std::vector<std::uint32_t> todo_;
   std::vector<LayerRecord> kept_;
   std::size_t next_kept_ = 0;
-  write::MadeFolders made_;
+  MadeFolders made_;
 };
 
 }  // namespace lamina::pipeline

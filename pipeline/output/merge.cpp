@@ -8,13 +8,12 @@
 #include <span>
 
 #include "pipeline/job/file.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "stages/sanity/records.h"
-#include "stages/write/bring.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/sync.h"
+#include "stages/checks/records.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -33,21 +32,21 @@ bool covers_all(const ManifestHead& head) { return head.first_layer == 0 && head
 
 Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directories, const std::string& output) {
   std::vector<Shard> shards;
-  std::vector<fs::path> seen;
+  std::vector<fs::path> detected;
   for (const std::string& directory : directories) {
     std::error_code error;
     if (!fs::is_directory(directory, error)) {
       return Error{Fault::kUsage, fmt::format("{}: no such directory; name those that the shards were written to", directory)};
     }
     const fs::path canonical = fs::canonical(directory, error);
-    if (std::ranges::find(seen, canonical) != seen.end()) continue;
-    seen.push_back(canonical);
+    if (std::ranges::find(detected, canonical) != detected.end()) continue;
+    detected.push_back(canonical);
     const std::vector<ManifestFile> files = find_manifests(directory);
     if (files.empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directory));
     for (const ManifestFile& file : files) {
       const std::string path = (fs::path(directory) / file.name).string();
       // An earlier merge into this directory was interrupted, or failed to remove the shards' manifests.
-      const bool of_merge = !file.shard && files.back().shard && write::same_file(directory, output);
+      const bool of_merge = !file.shard && files.back().shard && same_file(directory, output);
       if (of_merge && file.partial) continue;
       if (file.partial) return unmatched(fmt::format("{}: this shard is not finished; run it again with --resume", path));
       Result<Manifest> manifest = read_manifest(path);
@@ -89,7 +88,7 @@ Status check_coverage(std::vector<Shard>& shards) {
 }
 
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
-  const auto linked = write::bring_file(from.string(), to.string());
+  const auto linked = lamina::bring_file(from.string(), to.string());
   if (!linked) return linked.error();
   ++(*linked ? report.linked : report.copied);
   return {};
@@ -97,12 +96,12 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
 
 // Links every file of a shard into `output`.
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
-  const bool in_place = write::same_file(shard.directory, output);
+  const bool in_place = same_file(shard.directory, output);
   const ManifestHead& head = shard.manifest.head;
   const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
-    if (Status status = write::check_plain(from.string(), bytes); !status) return status;
+    if (Status status = check_plain(from.string(), bytes); !status) return status;
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
   for (const LayerRecord& record : shard.manifest.layers) {
@@ -117,7 +116,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   for (const std::string& name :
        {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
     const fs::path from = fs::path(shard.directory) / "program" / name;
-    if (Status status = write::check_plain(from.string()); !status) return status;
+    if (Status status = check_plain(from.string()); !status) return status;
     if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
   }
   return {};
@@ -125,7 +124,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
 
 /// Never replaces files of another job, nor of none: a merge that was killed left its begun manifest.
 /// returns  whether a finished manifest says so, of a shard or of all
-Result<bool> check_place(const std::string& output, const ManifestHead& head, const write::Claim& claim) {
+Result<bool> check_output(const std::string& output, const ManifestHead& head, const Claim& claim) {
   bool known = false, finished = false;
   for (const ManifestFile& file : find_manifests(output)) {
     const std::string path = (fs::path(output) / file.name).string();
@@ -156,7 +155,7 @@ Status remove_shard_manifests(const std::string& output) {
 /// Of a whole job, whose directory may be one to read only.
 Status end_earlier_merge(const std::string& output) {
   if (std::ranges::none_of(find_manifests(output), [](const ManifestFile& file) { return file.shard.has_value(); })) return {};
-  auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
+  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
   return claim ? remove_shard_manifests(output) : Status(claim.error());
 }
 
@@ -164,7 +163,7 @@ Status end_earlier_merge(const std::string& output) {
 /// have been interrupted while it removed the shards' manifests.
 std::optional<Shard> whole_job(const std::vector<std::string>& directories, const std::vector<Shard>& shards,
                                const std::string& output) {
-  const auto is_output = [&](const std::string& directory) { return write::same_file(directory, output); };
+  const auto is_output = [&](const std::string& directory) { return same_file(directory, output); };
   if (!std::ranges::all_of(directories, is_output)) return std::nullopt;
   const std::string path = (fs::path(output) / "manifest.json").string();
   auto manifest = read_manifest(path);
@@ -175,26 +174,23 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
 }
 
 /// shards  that cover all layers, in their order
-Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, MergeReport& report) {
+Status check(std::span<const Shard> shards, bool strict, bool allow_empty, MergeReport& report) {
   const ManifestHead& head = shards.front().manifest.head;
   Job job;
   if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
-  sanity::LayerRecords records;
+  checks::LayerRecords records;
   std::vector<UnfedPowder> unfed;
   for (const JobMaterial& material : head.materials) unfed.push_back({material.name});
-  bool timed = true;  // layers that an earlier build left are not
   for (const Shard& shard : shards) {
     for (const LayerRecord& record : shard.manifest.layers) {
       records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
       for (std::size_t m = 0; m < unfed.size(); ++m) unfed[m].add(record.layer, record.image_of(m, unfed.size()).unfed_pixels);
       report.microseconds += record.program.microseconds;
-      timed = timed && (record.program.bytes == 0 || record.program.microseconds > 0);
     }
   }
-  if (!timed) report.microseconds = 0;
-  for (const UnfedPowder& powder : unfed) sanity::warn_of_unfed(powder, report.warnings);
-  const Status status = records.judge(head.parts, thins(job), allow_empty, report.warnings);
-  return status && strict ? sanity::refuse_warnings(report.warnings) : status;
+  for (const UnfedPowder& powder : unfed) checks::warn_of_unfed(powder, report.warnings);
+  const Status status = records.check(head.parts, thins(job), allow_empty, report.warnings);
+  return status && strict ? checks::refuse_warnings(report.warnings) : status;
 }
 
 }  // namespace
@@ -206,7 +202,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   MergeReport report;
   report.output = output;
   if (const auto whole = whole_job(request.directories, *shards, output)) {
-    if (Status status = judge({&*whole, 1}, request.strict, true, report); !status) return status.error();
+    if (Status status = check({&*whole, 1}, request.strict, true, report); !status) return status.error();
     if (Status status = bring_files(*whole, output, report); !status) return status.error();
     if (Status status = end_earlier_merge(output); !status) return status.error();
     report.layers = whole->manifest.layers.size();
@@ -214,16 +210,16 @@ Result<MergeReport> merge(const MergeRequest& request) {
   }
   if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
-  const Status sane = judge(*shards, request.strict, request.allow_empty, report);
+  const Status sane = check(*shards, request.strict, request.allow_empty, report);
   if (!sane) return sane.error();
 
   std::error_code error;
   fs::create_directories(output, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", output, error.message())};
-  auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
+  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
   if (!claim) return claim.error();
   ManifestHead head = shards->front().manifest.head;
-  const auto is_known = check_place(output, head, *claim);
+  const auto is_known = check_output(output, head, *claim);
   if (!is_known) return is_known.error();
   sweep_partial_files(output);
   if (Status status = check_stays_inside(output); !status) return status.error();
@@ -232,7 +228,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   if (!head.machine.empty()) fs::create_directories(fs::path(output) / "program", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/program: {}", output, error.message())};
 
-  const auto sync = write::FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
+  const auto sync = FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
   report.shards = static_cast<std::uint32_t>(shards->size());
   head.first_layer = 0;
   head.last_layer = head.layer_count;

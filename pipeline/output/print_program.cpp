@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "pipeline/machine/profiles.h"
-#include "stages/write/file.h"
-#include "stages/write/program/binary_program.h"
+#include "stages/program/binary_program.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 
@@ -16,16 +16,16 @@ std::string program_file_name(std::uint32_t index, std::string_view extension) {
 
 ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers) {
   ProgramFrame frame;
-  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
   writer->start(layers, frame.start);
   writer->end(frame.end);
   return frame;
 }
 
 PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers,
-                           const write::FileOptions& files)
+                           const FileOptions& files)
     : resolved_(resolved),
-      dialect_(*write::find_dialect(resolved.machine.dialect)),
+      dialect_(*program::find_dialect(resolved.machine.dialect)),
       directory_(std::move(directory)),
       layers_(layers),
       files_(files),
@@ -34,13 +34,13 @@ PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string director
 std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
 
 Status PrintProgram::begin() const {
-  const std::string profile = read::kept_machine_text(resolved_.machine);
-  if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile)), files_); !status) {
+  const std::string profile = pipeline::kept_machine_text(resolved_.machine);
+  if (Status status = write_file(path("machine.toml"), std::as_bytes(std::span(profile)), files_); !status) {
     return status;
   }
   const ProgramFrame frame = program_frame(resolved_, layers_);
-  const Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), frame.start, files_);
-  return status ? write::write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
+  const Status status = write_file(path(fmt::format("start{}", dialect_.extension)), frame.start, files_);
+  return status ? write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
 }
 
 Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
@@ -48,11 +48,11 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   if (!work.timer) work.timer.emplace(*machine_);
-  std::optional<write::File> file;  // none: the layer is only timed
+  std::optional<File> file;  // none: the layer is only timed
   if (!directory_.empty()) {
-    write::FileOptions how = files_;
+    FileOptions how = files_;
     how.hash = true;
-    auto opened = write::File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
+    auto opened = File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
     if (!opened) return opened.error();
     file.emplace(std::move(*opened));
   }
@@ -67,20 +67,20 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   work.text.clear();
   work.timer->begin(layer);
   work.writer->begin_layer(cycle, work.text);
-  const auto care = [&](const auto& write) {  // of the head alone
+  const auto maintenance = [&](const auto& write) {  // of the head alone
     const std::size_t from = work.text.size();
     write();
-    if (!dialect_.has_motion) work.timer->care(std::span(work.text).subspan(from));
+    if (!dialect_.has_motion) work.timer->maintenance(std::span(work.text).subspan(from));
   };
-  care([&] { work.writer->care_of_layer(cycle, work.text); });
+  maintenance([&] { work.writer->maintenance_of_layer(cycle, work.text); });
   constexpr std::size_t kPiece = 256 << 10;
   const auto count = program::compile(
       resolved_.grid, planes, work.compile,
       [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        care([&] { work.writer->care_before(sweep, vectors, work.text); });
+        maintenance([&] { work.writer->maintenance_before(sweep, vectors, work.text); });
         if (!dialect_.has_motion) {
           const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
-          work.timer->sweep(static_cast<double>(write::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
+          work.timer->sweep(static_cast<double>(program::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
                             sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
         }
         if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
@@ -88,7 +88,7 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
       },
       layer.index);
   if (!count) return count.error();
-  care([&] { work.writer->care_behind(work.text); });
+  maintenance([&] { work.writer->maintenance_after(work.text); });
   work.writer->end_layer(cycle, work.text);
   if (Status status = flush(); !status) return status;
   const auto taken = work.timer->end();
@@ -113,16 +113,17 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
   const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.most_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
+  const std::uint64_t sweeps = std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   // Lines of the base, and of shots off the bed: of one nozzle after the other (m578), of a dot a drop (brundlefab).
   const Machine& machine = resolved_.machine;
-  const std::uint64_t shots = machine.care.spits() ? 1 + (machine.care.spit_seconds > 0 ? sweeps : 0) : 0;
-  const std::uint64_t care = 512 * machine.powder.base_layers + shots * (256 + 16 * std::uint64_t{machine.care.spit_drops});
+  const std::uint64_t shots = machine.maintenance.spits() ? 1 + (machine.maintenance.spit_seconds > 0 ? sweeps : 0) : 0;
+  const std::uint64_t maintenance =
+      512 * machine.powder.base_layers + shots * (256 + 16 * std::uint64_t{machine.maintenance.spit_drops});
   // Lines of the bits of drops, at most twice those of the drops, and their changes sorted.
   const std::uint64_t bits = grid.drop_bits > 1 ? 16 * changes * grid.sweep_drops + 40 * grid.nozzles : 0;
-  return bits + 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
+  return bits + 4 * maintenance + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
          (512 << 10);
 }
 

@@ -15,23 +15,23 @@
 #include <string_view>
 
 #include "pipeline/job/job.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/replay/time/timer.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/program/dialect.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 
 /// Scratch for a layer's program; reused by later layers.
 struct ProgramWork {
   program::CompileScratch compile;
-  std::unique_ptr<write::ProgramWriter> writer;
-  write::ProgramBytes text;
+  std::unique_ptr<program::ProgramWriter> writer;
+  program::ProgramBytes text;
   std::optional<replay::Timer> timer;
 
   std::uint64_t bytes() const { return compile.bytes() + bytes_held(text) + (timer ? timer->bytes() : 0); }
@@ -42,14 +42,14 @@ std::string program_file_name(std::uint32_t index, std::string_view extension);
 
 /// The commands before the first layer and after the last one.
 struct ProgramFrame {
-  write::ProgramBytes start, end;
+  program::ProgramBytes start, end;
 };
 ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers);
 
 class PrintProgram {
  public:
   /// directory  of the job, empty to time layers without writing them; the machine must outlive this object
-  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const write::FileOptions& files);
+  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const FileOptions& files);
 
   /// Writes machine.toml, start and end. errors  kOutput
   Status begin() const;
@@ -73,10 +73,10 @@ class PrintProgram {
  private:
   std::string path(std::string_view name) const;
   const ResolvedMachine& resolved_;
-  const write::Dialect& dialect_;
+  const program::Dialect& dialect_;
   std::string directory_;
   std::uint32_t layers_;
-  write::FileOptions files_;
+  FileOptions files_;
   Result<replay::VirtualMachine> machine_;  // tells the time
 };
 

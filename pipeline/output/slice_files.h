@@ -3,20 +3,24 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include "pipeline/job/job.h"
+#include "pipeline/manifest/kept.h"
+#include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/kept.h"
-#include "stages/write/manifest/layered_file.h"
-#include "stages/write/slice3mf/slice3mf.h"
-#include "stages/write/slice_format.h"
-#include "stages/write/sync.h"
+#include "stages/formats/slice_format.h"
+#include "stages/formats/threemf/slice3mf.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/sync.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 
@@ -34,16 +38,16 @@ class SliceFiles {
   /// The output path for the summary.
   std::string output() const;
   /// Bytes of text for points and paths.
-  Sections::TextBytes text_bytes() const { return {format_.point_bytes, format_.stretch_bytes, 0}; }
+  Sections::TextBytes text_bytes() const { return {format_.point_bytes, format_.interval_bytes, 0}; }
 
   // --- from many threads at once, each with its own text
   /// errors  kUsage: the format cannot hold the layer
-  Status encode(const write::SliceLayer& layer, Buffer<char>& text) const;
+  Status encode(const formats::SliceLayer& layer, Buffer<char>& text) const;
   /// Stores size and hash of the text in the record; writes the file if layers have their own. errors  kOutput
   Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
 
   // --- from one thread at a time, in layer order
-  Status record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
+  Status record(const formats::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
   /// returns  the bytes of all files
   Result<std::uint64_t> finish();
   Status keep();
@@ -52,22 +56,49 @@ class SliceFiles {
   bool keeps() const { return file_.has_value() || (file_a_layer_ && encoder_); }
 
  private:
-  Status open_single(const ManifestHead& head, write::Claim claim);
-  Result<write::File> write_package();
+  Status open_single(const ManifestHead& head, Claim claim);
+  Result<File> write_package();
 
   const Plan& plan_;
-  const write::SliceFormat& format_;
+  const formats::SliceFormat& format_;
   const bool file_a_layer_;
-  write::SliceHead head_;
-  std::unique_ptr<write::SliceEncoder> encoder_;  // of text formats
-  std::optional<write::Slice3mfWriter> package_;  // 3MF
-  std::optional<LayeredFile> file_;               // of one text file
-  std::optional<ManifestWriter> manifest_;        // of all others
-  std::optional<write::FolderSync> sync_;         // of files a layer
-  KeptJob kept_;                                  // of all others
-  write::MadeFolders made_;
+  formats::SliceHead head_;
+  std::unique_ptr<formats::SliceEncoder> encoder_;  // of text formats
+  std::optional<formats::Slice3mfWriter> package_;  // 3MF
+  std::optional<LayeredFile> file_;                 // of one text file
+  std::optional<ManifestWriter> manifest_;          // of all others
+  std::optional<FolderSync> sync_;                  // of files a layer
+  KeptJob kept_;                                    // of all others
+  MadeFolders made_;
   std::uint64_t bytes_ = 0;
   bool finished_ = false, waits_ = false;  // waits: files a layer stay where --resume finds them
 };
+
+// --- the files of a sliced job, and the removal of an earlier job's.
+
+/// ".svg", ".cli" or ".3mf"
+std::string_view slice_extension(const Job& job);
+
+/// Name of the single file: the first part's name with the format's extension.
+std::string slice_file_name(const Job& job);
+
+/// Refuses a directory with another job, or files that no record tells of, unless job.overwrite is set. errors  kUsage, kOutput
+Status check_slice_output(const Job& job);
+
+/// Temporary directory of per-layer files until all are written.
+std::filesystem::path waiting_layers(const Job& job);
+
+/// Makes the folder of waiting layers for a job that has them; of an earlier run it stays only if `keeps`. errors  kOutput
+Status prepare_waiting_layers(const Job& job, bool keeps);
+
+/// The files that an earlier job leaves to this one, its manifest last: what is left of a killed removal is on record. Without
+/// job.overwrite, no layers that no record tells of.
+std::vector<std::filesystem::path> earlier_slices(const Job& job);
+
+/// Call when the job is complete: removes earlier files in their order, and renames the waiting layers. errors  kOutput
+Status replace_slices(const Job& job, const std::vector<std::filesystem::path>& earlier);
+
+/// Of a job that has failed; what cannot be removed is noted (stages/support/io/temporary.h).
+void remove_waiting_layers(const Job& job);
 
 }  // namespace lamina::pipeline

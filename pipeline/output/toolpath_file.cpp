@@ -8,17 +8,17 @@
 #include <filesystem>
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/heights.h"
-#include "pipeline/output/plan_head.h"
+#include "pipeline/job/job.h"
+#include "pipeline/job/profiles/extruder.h"
+#include "pipeline/output/directory.h"
 #include "pipeline/plan/heights.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
+#include "stages/formats/rp3/rp3.h"
 #include "stages/heights/evaluate.h"
-#include "stages/read/profiles/extruder.h"
-#include "stages/write/file.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/rp3/rp3.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -48,23 +48,23 @@ Result<std::string> layer_table(const Plan& plan) {
   if (!own) return own.error();
   const heights::Plan& of = job.heights.per_part ? *own : plan.heights;
   heights::Evaluation evaluation;
-  if (of.looked_at.empty()) {
+  if (of.inspected.empty()) {
     evaluation = heights::evaluate(index_scene(job, *plan.scene, *options), heights::boundaries_of(of.table), *options);
   }
-  std::vector<write::rp3::Layer> layers;
+  std::vector<formats::rp3::LayerSetting> layers;
   for (std::uint32_t i = plan.range[0]; i < std::min(plan.range[1], of.table.size()); ++i) {
-    const auto& slope = of.looked_at.empty() ? evaluation.layers[i].flattest : of.looked_at[i];
+    const auto& slope = of.inspected.empty() ? evaluation.layers[i].flattest : of.inspected[i];
     layers.push_back({mm(of.table[i].thickness), heights::angle_of(slope)});
   }
   const FillSettings& fill = job.fill.all;
-  write::rp3::Settings settings;
+  formats::rp3::Settings settings;
   settings.raster_width_mm = fill.width_mm;
   settings.contour_offset_mm = fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm;
   settings.angle_step_deg = fill.angle_step_deg;
   settings.first_angle_deg = std::fmod(fill.angle_deg + settings.angle_step_deg * plan.range[0], 360);
   settings.shrink = job.parts.front().shrink;
   settings.rotation_deg = job.parts.front().rotate_deg;
-  return write::rp3::text_of(layers, settings);
+  return formats::rp3::text_of(layers, settings);
 }
 
 /// The layer of the file before which every part on the bed has laid its first `count` layers; the file's first one if it
@@ -72,11 +72,11 @@ Result<std::string> layer_table(const Plan& plan) {
 std::uint32_t after_first(const Plan& plan, std::uint32_t count) {
   if (!plan.job.heights.per_part) return std::max(count, plan.range[0]);
   const std::vector<ScheduledLayer>& layers = plan.sections->layers();
-  std::vector<bool> stands(plan.scene->parts.size());  // parts in the air have no first layer that has to stick
+  std::vector<bool> on_bed(plan.scene->parts.size());  // parts in the air have no first layer that has to stick
   std::uint32_t after = plan.range[0];
   for (std::uint32_t i = 0; i < layers.size(); ++i) {
-    if (layers[i].number == 0) stands[layers[i].part] = layers[i].layer.bottom == 0;
-    if (layers[i].number < count && stands[layers[i].part]) after = std::max(after, i + 1);
+    if (layers[i].number == 0) on_bed[layers[i].part] = layers[i].layer.bottom == 0;
+    if (layers[i].number < count && on_bed[layers[i].part]) after = std::max(after, i + 1);
   }
   return after;
 }
@@ -94,12 +94,12 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
     return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
                                             (fs::path(job.output) / "part.gcode").string())};
   }
-  if (write::is_stream(job.output)) {
+  if (is_stream(job.output)) {
     if (!job.resume && !sml) return {};
     return Error{Fault::kUsage, fmt::format("-o {}: is no file, which {} needs; name one", job.output,
                                             sml ? "the layer table beside an SML file" : "--resume")};
   }
-  if (Status status = write::check_not_being_written(job.output); !status) return status;
+  if (Status status = check_not_being_written(job.output); !status) return status;
   if (Status status = LayeredFile::check_part(job.output, manifest_path(job)); !status) return status;
   if (job.overwrite || (job.resume && has_record(manifest_path(job)))) return {};
   std::vector<std::string> names{job.output, manifest_path(job)};
@@ -116,7 +116,7 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
 
 ToolpathFile::ToolpathFile(const Plan& plan)
     : plan_(plan),
-      format_(write::make_extrusion_format(
+      format_(formats::make_extrusion_format(
           plan.moves->profile.machine, {after_first(plan, 1), after_first(plan, plan.moves->profile.machine.fan.from_layer)})) {
 }
 
@@ -127,11 +127,11 @@ Status ToolpathFile::open() {
   head.format = machine.format;
   head.file = fs::path(job.output).filename().string();
   head.machine = machine.name;
-  const std::string profile = read::extruder_text(plan_.moves->profile);
+  const std::string profile = pipeline::extruder_text(plan_.moves->profile);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   Buffer<char> start;
   format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);
-  const bool streams = job.dry_run || write::is_stream(job.output);
+  const bool streams = job.dry_run || is_stream(job.output);
   auto file = LayeredFile::open({job.dry_run ? "/dev/null" : job.output, manifest_path(job), job.resume && !job.dry_run,
                                  job.overwrite, job.sync, streams},
                                 head, {start.data(), start.size()});
@@ -140,31 +140,31 @@ Status ToolpathFile::open() {
   return {};
 }
 
-std::unique_ptr<write::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text) const {
+std::unique_ptr<formats::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text) const {
   return format_->layer(layer, layers(), text);
 }
 
-Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
+Result<std::uint64_t> ToolpathFile::finish(const formats::MoveTotals& totals) {
   if (file_->finished()) return file_->size();
-  std::optional<write::File> beside;
+  std::optional<File> neighbour;
   if (plan_.moves->profile.machine.format == "sml" && !plan_.job.dry_run) {
     const auto table = layer_table(plan_);
     if (!table) return table.error();
-    write::FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
-    if (plan_.job.sync == Sync::kOff) how.durable = write::Durable::kNo;
-    auto file = write::File::open(table_path(plan_.job), how);
+    FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
+    if (plan_.job.sync == Sync::kOff) how.durable = Durable::kNo;
+    auto file = File::open(table_path(plan_.job), how);
     Status status = file ? file->append(std::string_view(*table)) : Status(file.error());
     if (status) status = file->flush();
     if (!status) return status.error();
-    beside.emplace(std::move(*file));
+    neighbour.emplace(std::move(*file));
   }
   Buffer<char> end;
   format_->tail(totals, layers(), end);
   return file_->finish({end.data(), end.size()}, [&]() -> Status {
     std::error_code error;  // the older manifest goes before anything that it speaks of
-    if (!plan_.job.dry_run && !write::is_stream(plan_.job.output)) fs::remove(manifest_path(plan_.job), error);
+    if (!plan_.job.dry_run && !is_stream(plan_.job.output)) fs::remove(manifest_path(plan_.job), error);
     if (error) return Error{Fault::kOutput, fmt::format("{}: {}", manifest_path(plan_.job), error.message())};
-    const auto named = beside ? beside->finish() : FileDigest();
+    const auto named = neighbour ? neighbour->finish() : FileDigest();
     return named ? Status() : Status(named.error());
   });
 }

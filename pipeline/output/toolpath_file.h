@@ -7,11 +7,11 @@
 #include <optional>
 #include <string_view>
 
+#include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/write/extrusion_format.h"
-#include "stages/write/manifest/layered_file.h"
+#include "stages/formats/extrusion_format.h"
 
 namespace lamina::pipeline {
 
@@ -29,11 +29,11 @@ class ToolpathFile {
   const LayeredFile& file() const { return *file_; }
 
   /// Encodes the moves of a layer as text; from many threads at once, each with its own text.
-  std::unique_ptr<write::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
+  std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
 
   // --- from one thread at a time, in layer order
   /// totals  of all layers. returns  the file's size
-  Result<std::uint64_t> finish(const write::MoveTotals& totals);
+  Result<std::uint64_t> finish(const formats::MoveTotals& totals);
   Status keep() { return file_ ? file_->keep() : Status(); }
   void discard();
 
@@ -41,7 +41,7 @@ class ToolpathFile {
   std::uint32_t layers() const { return plan_.range[1] - plan_.range[0]; }
 
   const Plan& plan_;
-  std::unique_ptr<write::ExtrusionFormat> format_;
+  std::unique_ptr<formats::ExtrusionFormat> format_;
   std::optional<LayeredFile> file_;
 };
 

@@ -40,7 +40,7 @@ Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::v
   if (!segments) return segments.error();
   const auto warn = [&](const SegmentRange& range) {
     if (!range.settings.on) return;
-    for (std::string& warning : segment::warnings(range.plan, exact)) warnings.push_back({"pores", std::move(warning)});
+    for (Warning& warning : segment::warnings(range.plan, exact)) warnings.push_back(std::move(warning));
   };
   std::ranges::for_each(segments->ranges, warn);
   warn(segments->base);
@@ -53,7 +53,7 @@ Beads::Beads(const Job& job, const PixelGrid& grid, const Sections& sections, co
   if (shell > 0) shell_ = dose::reach_of(grid, shell, shell);
 }
 
-Status Beads::lay(const Layer& layer, BeadWork& work) const {
+Status Beads::deposit(const Layer& layer, BeadWork& work) const {
   work.beads.clear();
   const ToolpathsView all = work.sections.paths;
   const std::span<const std::uint32_t> path_area = work.sections.path_area;
@@ -64,12 +64,12 @@ Status Beads::lay(const Layer& layer, BeadWork& work) const {
     if (!cut) return cut.error();
     ToolpathsView paths = all;
     paths.offset = all.offset.subspan(path_area[a], path_area[a + 1] - path_area[a] + 1);
-    if (Status status = segment::check_stretch_count(range.plan, *cut, paths, layer.index); !status) return status;
+    if (Status status = segment::check_interval_count(range.plan, *cut, paths, layer.index); !status) return status;
     const auto width = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
     const segment::Segmentation& of = range.plan;
     const raster::BeadWidths widths{cut->on, width(of.thick_width_mm), width(of.thin_width_mm), width(of.continuous_width_mm)};
     raster::BeadPen pen(work.beads, widths, ends_);
-    segment::for_each_stretch(paths, *cut, [&](const Stretch& s) { pen.lay(s); });
+    segment::for_each_interval(paths, *cut, [&](const PathInterval& s) { pen.deposit(s); });
   }
   return {};
 }
@@ -101,15 +101,15 @@ Beads::Expected Beads::expected(std::uint32_t index) const {
     beads += loops * corners;
     if (fill.pattern == infill::Pattern::kNone) continue;
     const double length = mm(box.width()) * mm(box.depth()) / distance;
-    double stretch = range.settings.on ? std::min(range.plan.thick_mm, range.plan.thin_mm) : INFINITY;
+    double interval = range.settings.on ? std::min(range.plan.thick_mm, range.plan.thin_mm) : INFINITY;
     if (fill.pattern == infill::Pattern::kContour) {
-      spans += length / stretch * of_bead;  // closed curves are divided where they have no corner
-      beads += length / stretch;
+      spans += length / interval * of_bead;  // closed curves are divided where they have no corner
+      beads += length / interval;
       continue;
     }
     if (fill.pattern != infill::Pattern::kRaster && fill.pattern != infill::Pattern::kContourRaster)
-      stretch = std::min(stretch, width);
-    const double ends = length / stretch + 2 * mm(box.width() + box.depth()) / distance;
+      interval = std::min(interval, width);
+    const double ends = length / interval + 2 * mm(box.width() + box.depth()) / distance;
     spans += length * rows_per_mm + ends * of_bead;
     beads += ends;
   }

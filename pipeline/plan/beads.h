@@ -45,7 +45,7 @@ class Beads {
 
   /// Collects the walls and the filling of a layer in work.beads. work.sections holds the filled layer.
   /// errors  of layer_cut
-  Status lay(const Layer& layer, BeadWork& work) const;
+  Status deposit(const Layer& layer, BeadWork& work) const;
   /// Clears all pixels of the part outside the beads and the shell; sets none.
   /// image    the part's, row 0 at the back (before any mirror)
   /// scratch  of the image's kind

@@ -6,12 +6,65 @@
 #include <cmath>
 #include <utility>
 
+#include "pipeline/plan/sections.h"
+#include "stages/data/mesh.h"
 #include "stages/dose/saturate.h"
+#include "stages/formats/image_format.h"
 #include "stages/program/head_grid.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/program/care_check.h"
+#include "stages/program/maintenance/maintenance_check.h"
 
 namespace lamina::pipeline {
+
+DoseZones::DoseZones(const Job& job, const PixelGrid& grid) : bleeds_(job.dose.first_bleed_um ? job.dose.first_layers : 0) {
+  const DoseRequest& dose = job.dose;
+  const auto zone_of = [&](const PartRequest* part) {
+    const bool own = part != nullptr && part->bleed_um;
+    const dose::BleedUm outside = own ? *part->bleed_um : dose.bleed_um;
+    dose::BleedUm holes = own ? outside : dose.hole_bleed_um.value_or(outside);
+    if (part != nullptr && part->hole_bleed_um) holes = *part->hole_bleed_um;
+    Zone zone;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double first = dose.first_bleed_um ? (*dose.first_bleed_um)[axis] : 0;
+      zone.grows_nm[axis] = std::max<std::int64_t>(0, std::llround(-1000 * std::min(outside[axis], first)));
+    }
+    zone.bleed.above = dose::bleed_of(grid, outside, holes);
+    zone.bleed.first =
+        dose.first_bleed_um ? dose::bleed_of(grid, *dose.first_bleed_um, *dose.first_bleed_um) : zone.bleed.above;
+    if (part != nullptr && part->saturation_percent)
+      zone.target = dose::DoseTarget{*part->saturation_percent, part->core_saturation_percent};
+    return zone;
+  };
+  zones_.push_back(zone_of(nullptr));
+  for (const PartRequest& part : job.parts) {
+    Zone zone = zone_of(&part);
+    const auto found = std::ranges::find(zones_, zone);
+    of_part_.push_back(static_cast<std::uint32_t>(found - zones_.begin()));
+    if (found == zones_.end()) zones_.push_back(std::move(zone));
+  }
+  for (const Zone& zone : zones_) bleeds_.add_zone(zone.bleed);
+}
+
+std::vector<std::optional<dose::DoseTarget>> DoseZones::targets() const {
+  std::vector<std::optional<dose::DoseTarget>> targets;
+  for (std::size_t zone = 1; zone < zones_.size(); ++zone) targets.push_back(zones_[zone].target);
+  return targets;
+}
+
+std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones, const PixelGrid& grid) {
+  std::vector<dose::ZoneBox> boxes;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const std::uint32_t zone = zones.of_part(scene.part_of_instance[i]);
+    const auto [x, y] = zones.grows_nm(zone);
+    const Box box = box_of(scene, scene.instances[i]);
+    boxes.push_back(
+        {zone, {box.lo.x - x, box.lo.y - y, box.lo.z}, {box.hi.x + x, box.hi.y + y, box.hi.z}, {box.lo.x, box.lo.y, box.lo.z}});
+  }
+  for (const PlacedImages& of : scene.images) {  // anywhere on the bed
+    const std::int64_t top = of.bottom + std::int64_t{of.thickness} * of.images->layers();
+    boxes.push_back({zones.of_part(of.part), {0, 0, of.bottom}, {grid.x.length, grid.y.length, top}});
+  }
+  return boxes;
+}
 
 DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
     : zones_(job, grid),
@@ -21,13 +74,13 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
       mirror_(job.mirror) {
   const std::int64_t shell = nm_of(job.dose.shell_mm);
   if (job.dose.saturation_percent) {
-    wishes_.emplace().all = wish_of(*job.dose.saturation_percent, job.dose.core_saturation_percent);
+    targets_.emplace().all = {*job.dose.saturation_percent, job.dose.core_saturation_percent};
     for (const SaturationRange& range : job.dose.saturation_ranges) {
-      wishes_->ranges.push_back({range.from_mm, range.to_mm, wish_of(range.percent, range.core_percent)});
+      targets_->ranges.push_back({range.from_mm, range.to_mm, {range.percent, range.core_percent}});
     }
-    wishes_->own = zones_.wishes();
+    targets_->own = zones_.targets();
   }
-  if (core_ < 1 || (wishes_ && wishes_->has_core())) rules_.shell = dose::reach_of(grid, shell, shell);
+  if (core_ < 1 || (targets_ && targets_->has_core())) rules_.shell = dose::reach_of(grid, shell, shell);
 }
 
 void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const {
@@ -46,17 +99,17 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
                         "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add "
                         "--shell or give a share above 0"});
   }
-  const bool asked = wishes_.has_value();
+  const bool requested = targets_.has_value();
   // Without a machine, formats that carry levels have those of the voxels.
-  if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
-    rules_.most_drops = 1;
+  if (requested || (job.levels > 0 && (machine != nullptr || formats::find_level_format(job.format) == nullptr)))
+    rules_.max_drops = 1;
   // Levels that are not dithered are drops to a head that fires several.
-  if (machine != nullptr && machine->head.most_drops > 1 && rules_.full > 0 && !rules_.dithered && !asked)
+  if (machine != nullptr && machine->head.max_drops > 1 && rules_.full > 0 && !rules_.dithered && !requested)
     full_drops_ = rules_.full;
-  rules_.most_drops *= full_drops_;
-  limit_ = dose::kMostDrops;
-  if (machine != nullptr && machine->head.most_drop_sweeps > 0)
-    limit_ = std::min(limit_, machine->head.most_drop_sweeps * sweep_drops);
+  rules_.max_drops *= full_drops_;
+  limit_ = dose::kMaxDrops;
+  if (machine != nullptr && machine->head.max_drop_sweeps > 0)
+    limit_ = std::min(limit_, machine->head.max_drop_sweeps * sweep_drops);
   if (full_drops_ > limit_) {
     return Error{Fault::kUsage,
                  fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.most_drop_sweeps of {} in "
@@ -64,96 +117,95 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
                              rules_.full + 1, full_drops_, limit_, sweep_drops)};
   }
   if (machine == nullptr || machine->head.drop_pl == 0) {
-    if (!asked) return {};
+    if (!requested) return {};
     return Error{Fault::kUsage, fmt::format("--saturation: {}",
                                             machine == nullptr ? "is of drops, and no machine tells how large; add --machine"
                                                                : "head.drop_pl of the machine is 0; state its drop")};
   }
   const auto& powder = machine->powder;
   binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
-  if (!job.allow_unbound) least_percent_ = powder.least_saturation_percent;
+  if (!job.allow_unbound) min_percent_ = powder.min_saturation_percent;
   const auto pitch = static_cast<std::int64_t>(std::ceil(1 / std::min(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm())));
   std::vector<dose::ZoneBox> boxes = zone_boxes(scene, zones_, grid_);
-  budget_.emplace(binder_, grid_, wishes_, limit_, powder.least_saturation_percent,
+  budget_.emplace(binder_, grid_, targets_, limit_, powder.min_saturation_percent,
                   dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_, full_drops_},
-                  dose::Stretches(boxes, zones_.count(), nm_of(job.dose.shell_mm), pitch));
-  if (wishes_ && wishes_->has_formula()) {
-    copies_.resize(wishes_->zones());
+                  dose::CoveredSpans(boxes, zones_.count(), nm_of(job.dose.shell_mm), pitch));
+  if (targets_ && targets_->has_formula()) {
+    copies_.resize(targets_->zones());
     for (const dose::ZoneBox& box : boxes) {
-      if (wishes_->is_own(box.zone) && wishes_->own[box.zone - 1]->has_formula()) copies_[box.zone].push_back(box);
+      if (targets_->is_own(box.zone) && targets_->own[box.zone - 1]->has_formula()) copies_[box.zone].push_back(box);
     }
     budget_->survey(std::move(boxes), layers);
   }
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i), i >= range[0] && i < range[1]);
-  if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
-  return budget_->judge(job.allow_unbound, warnings);
+  if (requested) rules_.max_drops = std::max(1u, budget_->max_drops());
+  return budget_->check(job.allow_unbound, warnings);
 }
 
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
-  if (std::string idle = write::idle_care(machine); !idle.empty()) warnings.push_back({"care", std::move(idle)});
-  if (std::string joints = program::idle_joints(machine, grid); !joints.empty())
-    warnings.push_back({"joints", std::move(joints)});
+  program::warn_of_idle_maintenance(machine, warnings);
+  program::warn_of_fixed_stitching(machine, grid, warnings);
 }
 
 Status DosePlan::check_images(std::string_view format) const {
-  if (format != "tiff-4" || most_drops() <= 15) return {};
+  if (format != "tiff-4" || max_drops() <= 15) return {};
   return Error{Fault::kUsage,
-               fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops())};
+               fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", max_drops())};
 }
 
 bool DosePlan::has_formula(const Layer& layer) const {
-  for (std::uint32_t zone = 0; wishes_ && !copies_.empty() && zone < wishes_->zones(); ++zone) {
-    if (wishes_->of(layer, zone).has_formula()) return true;
+  for (std::uint32_t zone = 0; targets_ && !copies_.empty() && zone < targets_->zones(); ++zone) {
+    if (targets_->of(layer, zone).has_formula()) return true;
   }
   return false;
 }
 
-Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
-                                               dose::DropWork& work) const {
+Result<dose::ZoneSums> DosePlan::saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+                                                    dose::DropWork& work) const {
   dose::Sheet sheet{grid_, mirror_ == Mirror::kX || mirror_ == Mirror::kXY, mirror_ == Mirror::kY || mirror_ == Mirror::kXY,
                     layer};
   sheet.limit = dose::Drops24{limit_ > 0 ? limit_ : 1} << dose::kDropBits;
   sheet.dithered = rules_.dithered;
-  if (wishes_) {
-    sheet.limit = std::min(sheet.limit, dose::Drops24{rules_.most_drops} << dose::kDropBits);
+  if (targets_) {
+    sheet.limit = std::min(sheet.limit, dose::Drops24{rules_.max_drops} << dose::kDropBits);
     sheet.scale = dose::DropScale(binder_, grid_, layer.thickness);
-    sheet.least = sheet.scale.drops(least_percent_ * (1 - 1e-6));
-    sheet.least_percent = least_percent_;
+    sheet.minimum = sheet.scale.drops(min_percent_ * (1 - 1e-6));
+    sheet.min_percent = min_percent_;
   }
   work.fields.resize(std::size_t{2} * zones_.count());
-  const dose::Ask one{dose::Drops24{full_drops_} << dose::kDropBits};
-  std::vector<std::array<dose::Ask, 2>> asks(zones_.count(), {one, one});
-  for (std::uint32_t zone = 0; wishes_ && zone < zones_.count(); ++zone) {
-    const dose::Wish& wish = wishes_->of(layer, zone);
+  const dose::DropRequest one{dose::Drops24{full_drops_} << dose::kDropBits};
+  std::vector<std::array<dose::DropRequest, 2>> requests(zones_.count(), {one, one});
+  for (std::uint32_t zone = 0; targets_ && zone < zones_.count(); ++zone) {
+    const dose::DoseTarget& target = targets_->of(layer, zone);
     for (std::size_t inside = 0; inside < 2; ++inside) {
-      const dose::Percent& percent = inside == 0 ? wish.percent : wish.of_core();
-      if (percent.formula.empty()) {
+      const Saturation& wanted = inside == 0 ? target.percent : target.of_core();
+      if (wanted.formula.empty()) {
         constexpr std::uint32_t kAny = 1u << 20;
-        asks[zone][inside].drops = dose::drops_for(percent.value, binder_, grid_, layer.thickness, kAny);
+        requests[zone][inside].drops = dose::drops_for(wanted.percent, binder_, grid_, layer.thickness, kAny);
         continue;
       }
       dose::Field& field = work.fields[2 * zone + inside];
-      const bool own = wishes_->is_own(zone);
-      const bool core = inside == 1 && wish.core_percent;
+      const bool own = targets_->is_own(zone);
+      const bool core = inside == 1 && target.core_percent;
       const std::string_view key = own    ? core ? "part.core_saturation_percent" : "part.saturation_percent"
                                    : core ? "--core-saturation"
                                           : "--saturation";
-      Status status = field.start(percent.formula, key, sheet,
+      Status status = field.start(wanted.formula, key, sheet,
                                   own ? std::span<const dose::ZoneBox>(copies_[zone]) : std::span<const dose::ZoneBox>());
       if (!status) return status.error();
-      asks[zone][inside].field = &field;
+      requests[zone][inside].field = &field;
     }
   }
-  return dose::drops_of_laid(rules_, sheet, asks, materials, image, second, work);
+  return dose::drops_of_deposited(rules_, sheet, requests, materials, image, second, work);
 }
 
-Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
+Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool deposited, std::uint32_t materials, Runs& image,
                                           std::span<const Runs> zone, Runs& second, dose::DropWork& work) const {
-  if (laid) return saturate_laid(layer, materials, image, second, work);
+  if (deposited) return saturate_deposited(layer, materials, image, second, work);
   if (has_formula(layer)) {
-    work.laid.resize(zones_.count());
+    work.deposited.resize(zones_.count());
     for (std::uint32_t z = 0; z < zones_.count(); ++z) {
-      dose::LaidPart& part = work.laid[z];
+      dose::DepositedPart& part = work.deposited[z];
       part.zone = z;
       part.material = 0;
       if (rules_.full > 0) {
@@ -162,12 +214,12 @@ Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool laid, std::ui
         levels_of(zones_.several() ? zone[z].view() : image.view(), 1, part.shares);
       }
     }
-    return saturate_laid(layer, 1, image, second, work);
+    return saturate_deposited(layer, 1, image, second, work);
   }
   const auto dose_of = [&](std::uint32_t z) {
-    dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop(full_drops_);
+    dose::LayerDose dose = targets_ ? dose::dose_of(layer, *targets_, binder_, grid_, limit_, z) : dose::one_drop(full_drops_);
     // Of shares of voxels the drops of each are rounded, not those of full ones.
-    if (wishes_ && !rules_.dithered && zones_.several()) dose::round_drops(dose, binder_, grid_, layer.thickness);
+    if (targets_ && !rules_.dithered && zones_.several()) dose::round_drops(dose, binder_, grid_, layer.thickness);
     return dose;
   };
   if (!zones_.several()) return dose::drops_of_layer(rules_, dose_of(0), layer.index, image, second, work);
@@ -180,7 +232,7 @@ std::uint64_t DosePlan::parted_pixels(const Runs& image, const dose::DropWork& w
   if (!parts_pixels()) return 0;
   if (rules_.full > 0) {
     const std::uint64_t full = pixels_at(work.shares, rules_.full);
-    return pixels_at(work.shares) - (wishes_ ? 0 : full);
+    return pixels_at(work.shares) - (targets_ ? 0 : full);
   }
   const std::uint64_t pixels = edges_bound(set_pixels(image));  // at most, where edges grow
   return core_ >= 1 ? pixels : static_cast<std::uint64_t>(2 * std::min(core_, 1 - core_) * static_cast<double>(pixels)) + 2;

@@ -1,6 +1,8 @@
 // pipeline/plan/dose.h: the distribution of binder in a job's layers (stages/dose/).
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -8,7 +10,6 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/plan/dose_zones.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -16,12 +17,45 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/dose/budget.h"
+#include "stages/dose/covered_spans.h"
+#include "stages/dose/dose_target.h"
+#include "stages/dose/edges/bleed.h"
 #include "stages/dose/edges/erode.h"
 #include "stages/dose/layer_drops.h"
-#include "stages/dose/wish.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::pipeline {
+
+/// Parts of one bleed and one saturation are a zone. Zone 0 is that of the job's own values.
+class DoseZones {
+ public:
+  DoseZones(const Job& job, const PixelGrid& grid);
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(zones_.size()); }
+  bool several() const { return zones_.size() > 1; }
+  std::uint32_t of_part(std::size_t part) const { return of_part_[part]; }
+
+  /// The moves of their edges.
+  const dose::Bleeds& bleeds() const { return bleeds_; }
+  /// How far a zone grows along x and y at most.
+  std::array<std::int64_t, 2> grows_nm(std::uint32_t zone) const { return zones_[zone].grows_nm; }
+  /// The wishes of zones 1, 2, ...
+  std::vector<std::optional<dose::DoseTarget>> targets() const;
+
+ private:
+  struct Zone {
+    dose::ZoneBleed bleed;
+    std::optional<dose::DoseTarget> target;
+    std::array<std::int64_t, 2> grows_nm{};  // its outside
+    bool operator==(const Zone&) const = default;
+  };
+  std::vector<Zone> zones_;
+  std::vector<std::uint32_t> of_part_;
+  dose::Bleeds bleeds_;
+};
+
+/// What parts cover at most, after their edges moved.
+std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones, const PixelGrid& grid);
 
 /// What a machine's profile has that does nothing: care, joints.
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings);
@@ -45,8 +79,8 @@ class DosePlan {
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }
   /// Whether a saturation or shares of voxels decide the drops, and how many a pixel can get; 0 if none does.
-  bool saturates() const { return most_drops() > 0; }
-  std::uint32_t most_drops() const { return rules_.most_drops; }
+  bool saturates() const { return max_drops() > 0; }
+  std::uint32_t max_drops() const { return rules_.max_drops; }
   /// Level of a full voxel; 0: the job asks for no shares of voxels.
   std::uint8_t full() const { return rules_.full; }
   /// What binder gives and was asked to give, for the summary; absent without a machine that says how large its drops are.
@@ -64,16 +98,16 @@ class DosePlan {
   /// materials  of the job, whose drops are told apart if solids share voxels
   /// zone       the image of each zone, where there are several
   /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
-  Result<dose::ZoneSums> saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
+  Result<dose::ZoneSums> saturate(const Layer& layer, bool deposited, std::uint32_t materials, Runs& image,
                                   std::span<const Runs> zone, Runs& second, dose::DropWork& work) const;
 
   /// Upper bound of the changes of edges that moved.
   std::uint64_t edges_bound(std::uint64_t changes) const {
-    return zones_.bleeds().grows() ? changes * (2 * std::uint64_t{zones_.bleeds().most_rows()} + 1) : changes;
+    return zones_.bleeds().grows() ? changes * (2 * std::uint64_t{zones_.bleeds().max_rows()} + 1) : changes;
   }
   /// Of pixels or voxels of a layer those that blue noise may part from the one before them, at most; none of many jobs.
   bool parts_pixels() const {
-    return core_ < 1 || (saturates() && (rules_.dithered ? wishes_ || rules_.full > 0 : has_copies()));
+    return core_ < 1 || (saturates() && (rules_.dithered ? targets_ || rules_.full > 0 : has_copies()));
   }
   std::uint64_t parted_pixels(const Runs& image, const dose::DropWork& work) const;
   /// What drops make of it. sizes  its edges moved
@@ -83,17 +117,17 @@ class DosePlan {
 
  private:
   bool has_formula(const Layer& layer) const;
-  Result<dose::ZoneSums> saturate_laid(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
-                                       dose::DropWork& work) const;
+  Result<dose::ZoneSums> saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+                                            dose::DropWork& work) const;
 
   DoseZones zones_;
   dose::DropRules rules_;
   double core_;
   PixelGrid grid_;
-  std::optional<dose::Wishes> wishes_;
+  std::optional<dose::DoseTargets> targets_;
   dose::Binder binder_;
   std::uint32_t limit_ = 0, full_drops_ = 1;  // full_drops: of a full pixel without a wish
-  double least_percent_ = 0;                  // that binds, of a job that has to; 0: it has not
+  double min_percent_ = 0;                    // that binds, of a job that has to; 0: it has not
   Mirror mirror_;
   std::vector<std::vector<dose::ZoneBox>> copies_;  // of each zone with formulas of its own
   std::optional<dose::Budget> budget_;

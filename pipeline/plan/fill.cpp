@@ -6,8 +6,8 @@
 #include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "stages/data/text/ranges.h"
 #include "stages/infill/fill.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -38,7 +38,7 @@ std::string contradiction(const FillSettings& settings) {
 }  // namespace
 
 const infill::FillParameters& FillPlan::at(std::int64_t height) const {
-  for (const Range& range : ranges) {
+  for (const FillInterval& range : ranges) {
     if (range.from <= height && height < range.to) return range.parameters;
   }
   return base;
@@ -46,7 +46,7 @@ const infill::FillParameters& FillPlan::at(std::int64_t height) const {
 
 bool FillPlan::fills() const {
   const auto does = [](const infill::FillParameters& p) { return p.walls > 0 || p.pattern != infill::Pattern::kNone; };
-  return does(base) || std::ranges::any_of(ranges, [&](const Range& range) { return does(range.parameters); });
+  return does(base) || std::ranges::any_of(ranges, [&](const FillInterval& range) { return does(range.parameters); });
 }
 
 Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& part_changes) {
@@ -71,7 +71,7 @@ Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& par
     plan.ranges.push_back({nm_of(range.from_mm), nm_of(range.to_mm), infill::parameters_of(own)});
     if (Status status = infill::check(plan.ranges.back().parameters); !status) return wrong(name, status.error().message);
   }
-  std::ranges::sort(plan.ranges, {}, &FillPlan::Range::from);
+  std::ranges::sort(plan.ranges, {}, &FillPlan::FillInterval::from);
   return plan;
 }
 

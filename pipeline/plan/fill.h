@@ -12,12 +12,12 @@ namespace lamina::pipeline {
 
 /// The filling of a part at each height.
 struct FillPlan {
-  struct Range {
+  struct FillInterval {
     std::int64_t from, to;  // nm above the part's bottom: layers whose middle is in [from, to)
     infill::FillParameters parameters;
   };
   infill::FillParameters base;
-  std::vector<Range> ranges;  // in order, disjoint
+  std::vector<FillInterval> ranges;  // in order, disjoint
 
   const infill::FillParameters& at(std::int64_t height) const;
   /// Whether any layer has walls or a filling.

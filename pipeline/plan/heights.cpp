@@ -1,7 +1,7 @@
 #include "pipeline/plan/heights.h"
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 
 namespace lamina::pipeline {
 
@@ -15,12 +15,12 @@ Nm plane_of(const Job& job, const Layer& layer, std::int64_t top) {
 }
 
 heights::SurfaceIndex index_scene(const Job& job, const Scene& scene, const heights::Options& options) {
-  std::vector<heights::Stretch> stretch(scene.meshes.size(), {1, 1, 1});
+  std::vector<heights::ScaleFactors> scale(scene.meshes.size(), {1, 1, 1});
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    stretch[scene.instances[i].mesh] = job.parts[scene.part_of_instance[i]].shrink;
+    scale[scene.instances[i].mesh] = job.parts[scene.part_of_instance[i]].shrink;
   }
   return heights::index_surface(scene.meshes, scene.instances, scene.part_of_instance,
-                                static_cast<std::uint32_t>(scene.parts.size()), options.surface, stretch);
+                                static_cast<std::uint32_t>(scene.parts.size()), options.surface, scale);
 }
 
 Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
@@ -29,8 +29,19 @@ Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
   if (!options) return options.error();
   if (options->mode != heights::Mode::kUniform) return heights::plan_heights(index_scene(job, scene, *options), *options);
   heights::Plan plan;
-  plan.table = heights::LayerTable::uniform(scene.height, options->set.least());
+  plan.table = heights::LayerTable::uniform(scene.height, options->set.minimum());
   return plan;
+}
+
+bool decides_in_order(const Job& job) {
+  return job.heights.mode != heights::Mode::kUniform && job.heights.mode != heights::Mode::kOptimal && !job.heights.per_part;
+}
+
+Result<std::unique_ptr<heights::GreedyLayers>> begin_heights(const Job& job, const Scene& scene, heights::Plan& plan) {
+  count(Decision::kHeights);
+  const Result<heights::Options> options = heights_options(job);
+  if (!options) return options.error();
+  return heights::begin_heights(index_scene(job, scene, *options), *options, plan);
 }
 
 }  // namespace lamina::pipeline

@@ -1,9 +1,12 @@
 // pipeline/plan/heights.h: decides the layers of a job.
 #pragma once
 
+#include <memory>
+
 #include "pipeline/job/job.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/status.h"
+#include "stages/heights/greedy.h"
 #include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
@@ -21,5 +24,11 @@ Nm plane_of(const Job& job, const Layer& layer, std::int64_t top);
 /// facet once.
 /// errors  of heights_options and heights::plan_heights
 Result<heights::Plan> decide_heights(const Job& job, const Scene& scene);
+
+/// Whether the modes of a job decide one layer after the other.
+bool decides_in_order(const Job& job);
+
+/// Begins to decide the layer table shared by all parts, for a job that decides_in_order(). errors  as above
+Result<std::unique_ptr<heights::GreedyLayers>> begin_heights(const Job& job, const Scene& scene, heights::Plan& plan);
 
 }  // namespace lamina::pipeline

@@ -10,17 +10,17 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Where a filling turned by 90 degrees has its first line, nm across it. errors  of infill::first_place
+/// Where a filling turned by 90 degrees has its first line, nm across it. errors  of infill::first_position
 Result<double> first_line_across(const infill::FillParameters& filling, MicroDegrees angle, const Layer& layer,
                                  const Box& part) {
   infill::FillParameters turned = filling;
   turned.angle_base = (angle + kTurn / 4) % (kTurn / 2);
   turned.angle_step = 0;
   const auto [low, high] = segment::reach(part, segment::across(turned.angle_base));
-  const auto place = infill::first_place(turned, {layer, part},
-                                         {std::llround(low), std::llround(high - low), std::llround(low), std::llround(high)});
-  if (!place) return place.error();
-  return low + static_cast<double>(*place);
+  const auto position = infill::first_position(
+      turned, {layer, part}, {std::llround(low), std::llround(high - low), std::llround(low), std::llround(high)});
+  if (!position) return position.error();
+  return low + static_cast<double>(*position);
 }
 
 }  // namespace
@@ -28,22 +28,22 @@ Result<double> first_line_across(const infill::FillParameters& filling, MicroDeg
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
                                     const Box& part) {
   const SegmentSettings& settings = range.settings;
-  segment::CutPlace place;
-  place.on = settings.on;
-  if (!place.on) return segment::LayerCut();
-  place.first = settings.first;
-  place.one_direction = settings.one_direction;
-  place.angle = infill::layer_angle(filling, layer.index) % (kTurn / 2);
+  segment::CutPosition position;
+  position.on = settings.on;
+  if (!position.on) return segment::LayerCut();
+  position.first = settings.first;
+  position.one_direction = settings.one_direction;
+  position.angle = infill::layer_angle(filling, layer.index) % (kTurn / 2);
   if (settings.across) {
-    const auto first_line = first_line_across(filling, place.angle, layer, part);
+    const auto first_line = first_line_across(filling, position.angle, layer, part);
     if (!first_line) return first_line.error();
-    place.first_line = *first_line;
+    position.first_line = *first_line;
   }
-  if (!settings.shift_mm.empty()) place.shift_mm = settings.shift_mm[layer.index % settings.shift_mm.size()];
-  return segment::layer_cut(range.plan, place, part);
+  if (!settings.shift_mm.empty()) position.shift_mm = settings.shift_mm[layer.index % settings.shift_mm.size()];
+  return segment::layer_cut(range.plan, position, part);
 }
 
-Status check_thin_stretches(const SegmentPlan& segments, const Sections& plan) {
+Status check_thin_intervals(const SegmentPlan& segments, const Sections& plan) {
   // No straight line is longer than the parts are across; closed curves are.
   const double across =
       mm(std::llround(std::hypot(static_cast<double>(plan.bounds().width()), static_cast<double>(plan.bounds().depth()))));

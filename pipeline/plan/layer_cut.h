@@ -9,11 +9,11 @@
 namespace lamina::pipeline {
 
 /// The cut of a part's lines in a layer.
-/// errors  of infill::first_place
+/// errors  of infill::first_position
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
                                     const Box& part);
 
 /// Checks that thin stretches fit into the parts. errors  kUsage: longer than any possible line
-Status check_thin_stretches(const SegmentPlan& segments, const Sections& plan);
+Status check_thin_intervals(const SegmentPlan& segments, const Sections& plan);
 
 }  // namespace lamina::pipeline

@@ -4,7 +4,7 @@
 #include <tuple>
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/plan/heights.h"
 #include "stages/heights/per_part.h"
 
@@ -71,12 +71,12 @@ Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const 
   }
   std::ranges::sort(planes);
   planes.erase(std::unique(planes.begin(), planes.end()), planes.end());
-  const auto place = [&](Nm plane) {
+  const auto position = [&](Nm plane) {
     return static_cast<std::uint32_t>(std::ranges::lower_bound(planes, plane) - planes.begin());
   };
   for (ScheduledLayer& scheduled : schedule.layers) {
-    scheduled.low = place(lowest(scheduled));
-    scheduled.high = place(highest(scheduled));
+    scheduled.low = position(lowest(scheduled));
+    scheduled.high = position(highest(scheduled));
   }
   return schedule;
 }

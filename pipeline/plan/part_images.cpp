@@ -6,16 +6,16 @@
 #include <cmath>
 #include <filesystem>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/manifest/images_on_record.h"
+#include "pipeline/manifest/images_on_record.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint32_t kLooks = 5;  // into a stack, for how crowded its images are
+constexpr std::uint32_t kSampledImages = 5;  // into a stack, for how crowded its images are
 
 Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
 
@@ -30,7 +30,8 @@ Status check_apart(const Job& job, const std::string& path) {
 }
 
 /// Dots an inch of the images by key or tags. errors  kInput, kUsage
-Result<std::array<std::int64_t, 2>> dots_of(const PartRequest& part, const read::LayerImages& images, const PixelGrid& grid) {
+Result<std::array<std::int64_t, 2>> dots_of(const PartRequest& part, const formats::LayerImages& images,
+                                            const PixelGrid& grid) {
   std::array<double, 2> dpi{images.dpi_x(), images.dpi_y()};
   if (part.images.dpi) dpi = {static_cast<double>((*part.images.dpi)[0]), static_cast<double>((*part.images.dpi)[1])};
   if (!(dpi[0] > 0) || !(dpi[1] > 0))
@@ -77,22 +78,22 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
     return usage(fmt::format("{}: is layer images; lamina jet and lamina convert take them", one_line(part.path)));
   if (Status status = check_no_transform(part); !status) return status.error();
   if (Status status = check_apart(job, part.path); !status) return status.error();
-  const auto told = images_on_record(part.path);
-  if (!told) return told.error();
+  const auto reported = images_on_record(part.path);
+  if (!reported) return reported.error();
   if (job.levels > 0 && part.images.threshold != PartImages().threshold)
     return usage(
         fmt::format("{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
                     "one of them",
                     one_line(part.path)));
-  auto images = read::LayerImages::open(
-      told->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty, kLooks});
+  auto images = formats::LayerImages::open(
+      reported->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty, kSampledImages});
   if (!images) return images.error();
   OpenImages open;
   const auto dots = dots_of(part, *images, *grid);
   if (!dots) return dots.error();
   open.dots = *dots;
-  open.bottom = part.bottom_mm ? static_cast<Nm>(nm_of(*part.bottom_mm)) : told->bottom;
-  open.thickness = told->thickness;
+  open.bottom = part.bottom_mm ? static_cast<Nm>(nm_of(*part.bottom_mm)) : reported->bottom;
+  open.thickness = reported->thickness;
   const bool layer_named = std::ranges::find(job.named, "layers.thickness_mm") != job.named.end();
   if (part.images.layer_mm) {
     open.thickness = static_cast<Nm>(nm_of(*part.images.layer_mm));
@@ -111,15 +112,15 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
       {false, fmt::format("images: {} layers of {} mm, {} x {} pixels{}", images->layers(), number_text(mm(open.thickness)),
                           images->columns(), images->rows(),
                           images->missing() > 0 ? fmt::format(", {} of them missing and empty", images->missing()) : "")});
-  if (!told->mirror.empty() && told->mirror != "none")
+  if (!reported->mirror.empty() && reported->mirror != "none")
     open.notes.push_back(
-        {false, fmt::format("its manifest says that the images are mirrored; --mirror {} turns them back", told->mirror)});
-  if (told->levels > 0 && told->levels != job.levels)
+        {false, fmt::format("its manifest says that the images are mirrored; --mirror {} turns them back", reported->mirror)});
+  if (reported->levels > 0 && reported->levels != job.levels)
     open.notes.push_back(
-        {false,
-         fmt::format("its manifest says that the images are shares of voxels in {} levels, which --levels {} keeps; {}",
-                     told->levels, told->levels, job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
-  open.images = std::make_shared<const read::LayerImages>(std::move(*images));
+        {false, fmt::format("its manifest says that the images are shares of voxels in {} levels, which --levels {} keeps; {}",
+                            reported->levels, reported->levels,
+                            job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
+  open.images = std::make_shared<const formats::LayerImages>(std::move(*images));
   return open;
 }
 
@@ -139,7 +140,8 @@ PlacedImages placed_images(const OpenImages& open, const PartRequest& part, cons
   const bool cut_y = part.images.crop && y_nm + open.depth > grid.y.length;
   const std::int64_t column = snapped(x_nm, cut_x ? 0 : open.width, grid.x),
                      row = snapped(y_nm, cut_y ? 0 : open.depth, grid.y);
-  placed.place = read::placement_of(open.images->columns(), open.images->rows(), open.dots[0], open.dots[1], grid, column, row);
+  placed.position =
+      formats::placement_of(open.images->columns(), open.images->rows(), open.dots[0], open.dots[1], grid, column, row);
   const auto at_nm = [](std::int64_t pixel, const PixelAxis& axis) { return pixel * axis.span / axis.dots; };
   if (part.at_mm && (std::abs(at_nm(column, grid.x) - x_nm) > 1 || std::abs(at_nm(row, grid.y) - y_nm) > 1))
     notes.push_back(

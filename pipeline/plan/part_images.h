@@ -8,13 +8,13 @@
 #include "pipeline/plan/scene.h"
 #include "stages/arrange/placement.h"
 #include "stages/data/status.h"
-#include "stages/read/layer_images.h"
+#include "stages/formats/images/layer_images.h"
 
 namespace lamina::pipeline {
 
 /// A part's images, opened, and what a manifest of lamina beside them and the job's keys say of them.
 struct OpenImages {
-  std::shared_ptr<const read::LayerImages> images;
+  std::shared_ptr<const formats::LayerImages> images;
   std::array<std::int64_t, 2> dots{};  // an inch, or the bed's where they are the same
   Nm bottom = 0, thickness = 0;
   std::int64_t width = 0, depth = 0;  // nm on the bed

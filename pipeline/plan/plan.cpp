@@ -7,25 +7,24 @@
 #include <future>
 #include <set>
 
-#include "pipeline/job/heights.h"
-#include "pipeline/machine/extruder.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/job/job.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/plan/fill.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/part_images.h"
-#include "pipeline/plan/reach.h"
-#include "stages/data/handles/clocks.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/plan/scene.h"
+#include "stages/checks/records.h"
+#include "stages/formats/extrusion_format.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/slice_format.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
-#include "stages/heights/build_steps.h"
+#include "stages/heights/table.h"
 #include "stages/raster/beams.h"
-#include "stages/sanity/records.h"
-#include "stages/write/extrusion_format.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/slice_format.h"
+#include "stages/support/clocks.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -39,6 +38,7 @@ class Planner {
     plan_.job = std::move(resolved.job);
     plan_.product = resolved.product;
     plan_.bed = resolved.bed;
+    streams_layers_ = resolved.streams_layers;
     if (resolved.printer) printer_ = std::move(*resolved.printer);
     if (resolved.extruder) plan_.moves.emplace(MovePlan{std::move(*resolved.extruder)});
   }
@@ -65,7 +65,7 @@ class Planner {
       auto materials = materials_of(job(), machine());
       if (!materials) return materials.error();
       materials_ = std::move(*materials);
-      // Of one powder no layer mixes: the kept profile says what it said before `refuse` was the rule, so that its jobs go on.
+      // No layer of one powder mixes: the rule has no effect, and the kept profile names one value.
       if (printer_.machine && !materials_.several()) printer_.machine->machine.powder.vat_rule = VatRule::kMajority;
       beads_ = job().segment.any();
     }
@@ -109,8 +109,8 @@ class Planner {
   Status read_parts_as(bool blocks) {
     const Stopwatch loading;
     progress_({ProgressEvent::Stage::kLoading});
-    std::future<void> beside;  // without a thread to spare it is never run, and the index does it
-    if (images() && job().engine != Engine::kContours) beside = std::async(raster::BeamIndex::prepare);
+    std::future<void> neighbour;  // without a thread to spare it is never run, and the index does it
+    if (images() && job().engine != Engine::kContours) neighbour = std::async(raster::BeamIndex::prepare);
     auto scene = load_scene(job(), plan_.bed, blocks, images() ? &printer_.grid : nullptr);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
@@ -119,7 +119,7 @@ class Planner {
       const std::int64_t by = images.bottom - nm_of(job().parts[images.part].bottom_mm.value_or(0));
       if (materials_.part.empty() || raised_.contains(images.part)) continue;
       raised_.insert(images.part);
-      for (PartMaterial::Range& range : materials_.part[images.part].ranges) range.from += by, range.to += by;
+      for (PartMaterial::MaterialInterval& range : materials_.part[images.part].ranges) range.from += by, range.to += by;
     }
     plan_.triangles = 0;
     for (const Instance& instance : plan_.scene->instances) {
@@ -144,6 +144,12 @@ class Planner {
       if (!status) return status;
     }
     if (Status status = check_layer_count(); !status) return status;
+    if (streams_layers()) {
+      auto begun = begin_heights(job(), *plan_.scene, plan_.heights);
+      if (!begun) return begun.error();
+      plan_.undecided = std::move(*begun);
+      return {};
+    }
     if (!job().heights.per_part) {
       auto heights = decide_heights(job(), *plan_.scene);
       if (!heights) return heights.error();
@@ -161,12 +167,21 @@ class Planner {
     return {};
   }
 
+  bool streams_layers() const {
+    const Job& job = plan_.job;
+    const bool counts_first = beads_ || machine() != nullptr || job.inspect || job.resume || job.dry_run || !job.title.empty();
+    const bool whole = !job.layers && !job.shard;
+    const bool warns_of_top = covers_top(job) && job.heights.containment == Containment::kInside;
+    return streams_layers_ && images() && whole && !counts_first && !warns_of_top && plan_.scene->images.empty() &&
+           decides_in_order(job);
+  }
+
   /// Steps inside of a part and a layer that ends above it exclude each other.
   void warn_of_open_top() {
     if (!covers_top(job()) || job().heights.containment != Containment::kInside) return;
     const heights::LayerTable& table = plan_.heights.table;
     const Layer last = job().heights.per_part ? schedule_.layers.back().layer : table[table.size() - 1];
-    sanity::warn_of_open_top(last, plan_.scene->height, plan_.warnings);
+    checks::warn_of_open_top(last, plan_.scene->height, plan_.warnings);
   }
 
   /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory
@@ -174,13 +189,13 @@ class Planner {
     const auto options = heights_options(job());
     if (!options) return options.error();
     const double bytes_of_layer = images() && !beads_ ? 32 : 96;  // in the table, the schedule, the planes and their index
-    const double count = static_cast<double>(plan_.scene->height) / static_cast<double>(options->set.least());
+    const double count = static_cast<double>(plan_.scene->height) / static_cast<double>(options->set.minimum());
     if (options->mode != heights::Mode::kUniform || count * bytes_of_layer <= static_cast<double>(job().memory_bytes))
       return {};
     return usage(
         fmt::format("{:.0f} layers of {} mm take {} for their table alone, --memory is {}; give thicker layers or more "
                     "memory",
-                    std::ceil(count), number_text(mm(options->set.least())),
+                    std::ceil(count), number_text(mm(options->set.minimum())),
                     readable_bytes(static_cast<std::uint64_t>(count * bytes_of_layer)), readable_bytes(job().memory_bytes)));
   }
 
@@ -200,7 +215,7 @@ class Planner {
       return usage(fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
                                mm(plan_.scene->height), machine.name, machine.bed.build_height_mm));
     }
-    const auto format = write::make_extrusion_format(machine);
+    const auto format = formats::make_extrusion_format(machine);
     for (std::uint32_t i = plan_.range[0]; i < plan_.range[1]; ++i) {
       if (Status status = format->check(schedule_.layers[i].layer); !status) return status;
     }
@@ -222,7 +237,7 @@ class Planner {
     if (!sections) return sections.error();
     plan_.sections = std::make_unique<Sections>(std::move(*sections));
     if (plan_.segments) {
-      if (Status status = check_thin_stretches(*plan_.segments, *plan_.sections); !status) return status;
+      if (Status status = check_thin_intervals(*plan_.segments, *plan_.sections); !status) return status;
     }
     end_indexing();
     return {};
@@ -230,12 +245,12 @@ class Planner {
 
   /// errors  kUsage: what doses of parts exclude, and edges that grow beyond the bed
   Status check_zones(const DoseZones& zones) {
-    constexpr std::uint32_t kMostZones = 100;
-    if (zones.count() > kMostZones) {
+    constexpr std::uint32_t kMaxZones = 100;
+    if (zones.count() > kMaxZones) {
       return usage(
           fmt::format("part.bleed_um, part.saturation_percent: the parts have {} different doses, at most {} are "
                       "planned together; plan them as several jobs",
-                      zones.count(), kMostZones));
+                      zones.count(), kMaxZones));
     }
     if (zones.several() && job().fill_rule == FillRule::kEvenOdd && (materials_.several() || job().levels > 0)) {
       return usage(
@@ -304,6 +319,7 @@ class Planner {
   std::vector<FillPlan> fillings_;
   LayerSchedule schedule_;
   bool beads_ = false;  // fill the parts of an image
+  bool streams_layers_ = false;
   Stopwatch indexing_;
 };
 
@@ -319,9 +335,9 @@ Result<Resolved> resolve(const Job& job, Product product) {
     if (!printer) return printer.error();
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
-    if (!write::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
+    if (!formats::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
     const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
-    if (write::find_level_format(job.format) != nullptr && !dosed) {
+    if (formats::find_level_format(job.format) != nullptr && !dosed) {
       return usage(
           fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
                       "--levels 2, 4 or 16, or --machine and --saturation",
@@ -331,7 +347,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
   }
   if (job.shard) return usage(fmt::format("run.shard: {}", kNoShards));
   if (product == Product::kContours) {
-    const auto* format = write::find_slice_format(job.slice.format);
+    const auto* format = formats::find_slice_format(job.slice.format);
     if (format == nullptr) return usage(fmt::format("unknown format '{}'", job.slice.format));
     if (!format->paths && fills(job)) {
       return usage(fmt::format("--format {}: holds contours only; leave out the filling, or choose svg", format->id));

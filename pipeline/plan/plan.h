@@ -13,9 +13,8 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/plan/beads.h"
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/progress.h"
@@ -27,6 +26,7 @@
 #include "stages/data/extruder.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
+#include "stages/heights/greedy.h"
 #include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
@@ -53,7 +53,10 @@ struct Plan {
   Product product = Product::kImages;
   Bed bed;
   std::unique_ptr<Scene> scene;
-  heights::Plan heights;                  // layer table of all parts; empty if each part has its own layers
+  heights::Plan heights;  // layer table of all parts; empty if each part has its own layers
+  /// Decides the layers while others are made (Resolved::streams_layers); null if all are decided. Until then, layer_count and
+  /// range are 0, and the table has the layers decided so far.
+  std::unique_ptr<heights::GreedyLayers> undecided;
   std::uint32_t layer_count = 0;          // of the whole job
   std::array<std::uint32_t, 2> range{};   // [first, last) made by this job
   std::unique_ptr<Sections> sections;     // null for images of solid parts
@@ -76,6 +79,10 @@ struct Resolved {
   Bed bed;
   std::optional<PowderPrinter> printer;     // of images
   std::optional<ExtruderProfile> extruder;  // of toolpaths
+  /// Whether the caller takes layers while they are decided, where the job allows it: images without a program, of all layers,
+  /// by a mode that decides one layer after the other. Files with a title state the number of layers first, and so do programs,
+  /// slices and toolpaths; an inspection, a resumed run and a dry run need it first, too.
+  bool streams_layers = false;
 };
 
 /// Loads no part and writes nothing. errors  kUsage: no such machine, keys that do not apply to the product

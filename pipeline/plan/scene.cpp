@@ -12,6 +12,7 @@
 #include "stages/arrange/placement.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/load.h"
+#include "stages/program/reach.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -178,7 +179,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
         part.material_ranges.empty()
             ? part.material
             : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm.value_or(0));
-    const bool images = read::names_images(part.path);
+    const bool images = formats::names_images(part.path);
     const LoadKey key{images         ? fmt::format("images {}", loaded.size())
                       : file.empty() ? part.path
                                      : file.string(),
@@ -216,10 +217,10 @@ arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded, c
     request.at_y = nm_of((*part.at_mm)[1]);
   }
   if (loaded.images && part.images.crop) {
-    const std::int64_t room_x = nm_of(bed.size_mm[0]) - request.at_x.value_or(0);
-    const std::int64_t room_y = nm_of(bed.size_mm[1]) - request.at_y.value_or(0);
-    if (room_x > 0) request.width = std::min(request.width, room_x);
-    if (room_y > 0) request.depth = std::min(request.depth, room_y);
+    const std::int64_t free_x = nm_of(bed.size_mm[0]) - request.at_x.value_or(0);
+    const std::int64_t free_y = nm_of(bed.size_mm[1]) - request.at_y.value_or(0);
+    if (free_x > 0) request.width = std::min(request.width, free_x);
+    if (free_y > 0) request.depth = std::min(request.depth, free_y);
   }
   return request;
 }
@@ -235,9 +236,9 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
   std::vector<arrange::BoxRequest> requests;
   for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p], bed));
 
-  const Result<std::vector<arrange::Place>> places =
-      arrange::place_boxes(requests, nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(job.gap_mm), bed.of_machine);
-  if (!places) return places.error();
+  const Result<std::vector<arrange::BoxPosition>> positions =
+      arrange::arrange_boxes(requests, nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(job.gap_mm), bed.of_machine);
+  if (!positions) return positions.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     scene.parts.push_back(
@@ -246,21 +247,21 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
   // Meshes far from their file's origin, whose offset to the bed exceeds 32 bits of nanometres.
   std::map<std::uint32_t, Point3> rebased;
   std::vector<std::pair<std::uint32_t, Box>> boxes;
-  bool positions_asked = false;
-  for (const arrange::Place& place : *places) {
-    const Loaded& part = *loaded[place.request];
-    const std::int64_t bottom = bottom_of(job.parts[place.request], part);
+  bool positions_requested = false;
+  for (const arrange::BoxPosition& position : *positions) {
+    const Loaded& part = *loaded[position.request];
+    const std::int64_t bottom = bottom_of(job.parts[position.request], part);
     if (part.images) {
-      scene.images.push_back(
-          placed_images(*part.images, job.parts[place.request], *grid, place.x, place.y, scene.parts[place.request].notes));
-      scene.images.back().part = place.request;
+      scene.images.push_back(placed_images(*part.images, job.parts[position.request], *grid, position.x, position.y,
+                                           scene.parts[position.request].notes));
+      scene.images.back().part = position.request;
     }
-    positions_asked = positions_asked || job.parts[place.request].at_mm.has_value();
+    positions_requested = positions_requested || job.parts[position.request].at_mm.has_value();
     for (const Instance& instance : part.instances) {
       const std::uint32_t mesh = part.first_mesh + instance.mesh;
       const auto way = [&](Nm own, std::int64_t target, Nm lo) { return std::int64_t{own} + target - lo; };
-      std::int64_t x = way(instance.offset.x, place.x, part.bounds.lo.x);
-      std::int64_t y = way(instance.offset.y, place.y, part.bounds.lo.y);
+      std::int64_t x = way(instance.offset.x, position.x, part.bounds.lo.x);
+      std::int64_t y = way(instance.offset.y, position.y, part.bounds.lo.y);
       std::int64_t z = way(instance.offset.z, bottom, part.bounds.lo.z);
       auto base = rebased.find(mesh);
       if (base == rebased.end() && !(fits(x) && fits(y) && fits(z))) {
@@ -279,17 +280,46 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
         z += base->second.z;
       }
       scene.instances.push_back({mesh, {static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)}});
-      scene.part_of_instance.push_back(place.request);
+      scene.part_of_instance.push_back(position.request);
     }
-    const Box box{{static_cast<Nm>(place.x), static_cast<Nm>(place.y), static_cast<Nm>(bottom)},
-                  {static_cast<Nm>(place.x + part.bounds.width()), static_cast<Nm>(place.y + part.bounds.depth()),
+    const Box box{{static_cast<Nm>(position.x), static_cast<Nm>(position.y), static_cast<Nm>(bottom)},
+                  {static_cast<Nm>(position.x + part.bounds.width()), static_cast<Nm>(position.y + part.bounds.depth()),
                    static_cast<Nm>(bottom + part.bounds.height())}};
-    if (scene.parts[place.request].bounds.empty()) scene.parts[place.request].bounds = box;
+    if (scene.parts[position.request].bounds.empty()) scene.parts[position.request].bounds = box;
     scene.height = std::max<std::int64_t>(scene.height, box.hi.z);
-    boxes.emplace_back(place.request, box);
+    boxes.emplace_back(position.request, box);
   }
-  if (positions_asked) note_overlaps(job, scene, boxes);
+  if (positions_requested) note_overlaps(job, scene, boxes);
   return scene;
+}
+
+Status check_reach(const Machine& machine, const Scene& scene) {
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    const Mesh& mesh = scene.meshes[instance.mesh];
+    const auto outside = program::first_outside(machine, mesh, instance.offset);
+    if (!outside) continue;
+    const std::string& part = scene.parts[scene.part_of_instance[i]].path;
+    if (outside->above) {
+      return Error{Fault::kUsage, fmt::format("{}: reaches z {:.3f} mm at x {:.3f}, y {:.3f}, above the build height of {}, "
+                                              "{:g} mm; turn or scale the part",
+                                              part, mm(outside->position.z), mm(outside->position.x), mm(outside->position.y),
+                                              machine.name, machine.bed.build_height_mm)};
+    }
+    return Error{Fault::kUsage,
+                 fmt::format("{}: reaches x {:.3f}, y {:.3f} mm at z {:.3f}, {:.3f} mm outside of the bed of {}; "
+                             "move, turn or scale the part",
+                             part, mm(outside->position.x), mm(outside->position.y), mm(outside->position.z),
+                             outside->beyond_mm, machine.name)};
+  }
+  for (const PlacedImages& images : scene.images) {
+    const double top = mm(images.bottom + std::int64_t{images.thickness} * images.images->layers());
+    if (top <= machine.bed.build_height_mm) continue;
+    return Error{Fault::kUsage,
+                 fmt::format("{}: its images reach z {:.3f} mm, above the build height of {}, {:g} mm; leave some out",
+                             scene.parts[images.part].path, top, machine.name, machine.bed.build_height_mm)};
+  }
+  return {};
 }
 
 }  // namespace lamina::pipeline

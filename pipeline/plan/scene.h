@@ -8,20 +8,21 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/data/machine.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/formats/images/layer_images.h"
+#include "stages/formats/images/placed.h"
 #include "stages/load/load.h"
-#include "stages/read/layer_images.h"
-#include "stages/read/placed.h"
 
 namespace lamina::pipeline {
 
 /// A copy of a part that is images, in whole pixels of the bed.
 struct PlacedImages {
   std::uint32_t part = 0;  // index into Scene::parts
-  std::shared_ptr<const read::LayerImages> images;
-  read::Placement place;
+  std::shared_ptr<const formats::LayerImages> images;
+  formats::Placement position;
   Nm bottom = 0, thickness = 0;  // of the first layer; of each
 
   /// The image whose heights hold the plane, if any.
@@ -55,5 +56,11 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request);
 /// grid    of the bed's pixels: parts may be images then
 /// errors  kUsage if a part does not fit the bed (with the excess and a remedy); kInput from load
 Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false, const PixelGrid* grid = nullptr);
+
+// --- checks that a powder printer can reach the parts of a job.
+
+/// Checks that all parts lie on the bed and below the build height.
+/// errors  kUsage with the part and its first point outside
+Status check_reach(const Machine& machine, const Scene& scene);
 
 }  // namespace lamina::pipeline

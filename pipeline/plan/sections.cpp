@@ -7,7 +7,7 @@
 
 #include "pipeline/plan/sections.h"
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/order.h"
+#include "stages/geometry/contours/nest.h"
 #include "stages/infill/fill.h"
 #include "stages/slice/bodies.h"
 
@@ -128,14 +128,14 @@ double Sections::area_mm2(const Area& area, const Work& work) const {
   return sum;
 }
 
-Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                             slice::LayerContours& out) const {
+Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
+                                               slice::LayerContours& out) const {
   auto report = slicer.layer(scheduled.low, work.scratch, out);
   if (!report || containment_ == Containment::kAcross) return report;
   const auto high = slicer.layer(scheduled.high, work.scratch, work.highest);
   if (!high) return high.error();
   report->cuts += high->cuts;
-  report->united += high->united;
+  report->merged += high->merged;
   report->gaps.add(high->gaps);
   slice::LayerContours both;
   for (std::uint32_t b = 0; b < slicer.bodies(); ++b) {
@@ -147,7 +147,7 @@ Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const 
       Contours all;
       all.append(low_view);
       all.append(high_view);
-      region = unite_contours(all, FillRule::kNonzero);
+      region = contour_union(all, FillRule::kNonzero);
     }
     if (!region) return region.error();
     order_by_outer(*region);
@@ -249,7 +249,7 @@ Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work
     const auto bound =
         infill::bound_fill(contours_of(area, work), work.outlines[a].region, {own, area.box}, filling(area, own));
     if (!bound) return failed(area, bound.error());
-    bytes += bound->points * (kOfPoint + text.point) + bound->stretches * text.stretch + bound->paths * (kOfPath + text.path);
+    bytes += bound->points * (kOfPoint + text.point) + bound->intervals * text.interval + bound->paths * (kOfPath + text.path);
     scratch = std::max(scratch, bound->scratch_bytes);
   }
   // Buffers grow by half or double, so their capacity is at most twice their content.

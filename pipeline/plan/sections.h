@@ -31,7 +31,7 @@ class Sections {
 
   /// Scratch of a layer in flight.
   struct Work {
-    slice::LayerScratch scratch;
+    slice::SectionScratch scratch;
     slice::LayerContours contours;
     slice::LayerContours highest;            // section at the layer's top, if steps must stay on one side
     slice::LayerContours parts;              // of areas in bodies with several parts, united part by part
@@ -41,7 +41,7 @@ class Sections {
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
     Buffer<std::uint32_t> rebased, rebased_highest;
-    slice::LayerReport report;
+    slice::SectionReport report;
     Buffer<char> text;
 
     std::uint64_t bytes() const;  // capacity of its buffers
@@ -79,7 +79,7 @@ class Sections {
   std::uint64_t bytes_bound(std::uint32_t index) const;
   /// Upper bounds of the text, in bytes: per point, and in addition per stretch of one kind and per path.
   struct TextBytes {
-    std::uint64_t point = 0, stretch = 0, path = 0;
+    std::uint64_t point = 0, interval = 0, path = 0;
   };
   /// Upper bound of the additional bytes for fill() and its text. errors  of infill::bound_fill
   Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const;
@@ -99,8 +99,8 @@ class Sections {
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
-  Result<slice::LayerReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                     slice::LayerContours& out) const;
+  Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
+                                       slice::LayerContours& out) const;
   ContoursView contours_of(const Area& area, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;

@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/plan/segment.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/ranges.h"
 #include "stages/segment/resolve.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -85,20 +85,20 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
   if (Status status = check_spacings(request.all, fill.all, ""); !status) return status.error();
   if (plan.base.settings.on && spaced) fill.all.distance_mm = segment::line_distances(*base, request.all.first);
 
-  for (const auto& asked : request.ranges) {
-    const std::string name = range_name(asked.from_mm, asked.to_mm);
+  for (const auto& requested : request.ranges) {
+    const std::string name = range_name(requested.from_mm, requested.to_mm);
     SegmentSettings settings = request.all;
-    apply(segment_settings_keys(), asked.changes, settings);
+    apply(segment_settings_keys(), requested.changes, settings);
     if (Status status = spaced ? Status() : check_spacings(settings, fill.all, name + ": "); !status) return status.error();
     const auto resolved = segment::resolve(settings, calibration, fill.all.width_mm);
     if (!resolved) return Error{Fault::kUsage, fmt::format("segment.range: {}: {}", name, resolved.error().message)};
-    const auto filling = filling_of(asked, fill);
+    const auto filling = filling_of(requested, fill);
     if (!filling) return filling.error();
     if (spaced && distance_keys((*filling)->changes).empty()) {
       set_distances(settings.on ? segment::line_distances(*resolved, settings.first) : std::vector{fill.all.width_mm},
                     (*filling)->changes);
     }
-    plan.ranges.push_back({nm_of(asked.from_mm), nm_of(asked.to_mm), settings, *resolved});
+    plan.ranges.push_back({nm_of(requested.from_mm), nm_of(requested.to_mm), settings, *resolved});
   }
   std::ranges::sort(plan.ranges, {}, &SegmentRange::from);
   return plan;
@@ -109,8 +109,9 @@ void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profil
     warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
   }
   for (const auto& [heights, range] : segments.segmented()) {
-    for (const std::string& warning : segment::warnings(range->plan, profile.calibration)) {
-      warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
+    for (Warning& warning : segment::warnings(range->plan, profile.calibration)) {
+      if (!heights.empty()) warning.text.insert(0, heights + ": ");
+      warnings.push_back(std::move(warning));
     }
   }
   if (!segments.any()) return;

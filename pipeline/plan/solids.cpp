@@ -6,8 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "stages/formats/image_format.h"
 #include "stages/geometry/blocks/block_maker.h"
-#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -40,7 +40,7 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 
 /// What keeps a job from levels, and what to do; empty if nothing does.
 std::string_view against_shares(const Job& job, const Materials& materials, const DoseZones& zones) {
-  if (materials.several() && job.machine.profile.empty() && write::find_level_format(job.format) != nullptr)
+  if (materials.several() && job.machine.profile.empty() && formats::find_level_format(job.format) != nullptr)
     return "one material as grey, for several would lie in one voxel; choose a 1-bit format or name a machine";
   if (zones.bleeds().grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
@@ -49,7 +49,7 @@ std::string_view against_shares(const Job& job, const Materials& materials, cons
   return {};
 }
 
-struct Group {
+struct SolidGroup {
   std::uint32_t level;
   PartMaterial material;
   std::uint32_t zone;
@@ -60,13 +60,13 @@ struct Group {
 };
 
 /// Moves meshes into the groups; two that use the same share its blocks.
-std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
+std::vector<SolidGroup> groups_of(Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
   const std::vector<std::uint32_t> level = levels_of(scene, job, materials, zones);
-  std::vector<Group> groups;
+  std::vector<SolidGroup> groups;
   std::vector<std::uint32_t> home(scene.meshes.size(), UINT32_MAX);
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     const std::uint32_t part = scene.part_of_instance[i], mesh = scene.instances[i].mesh;
-    const auto found = std::ranges::find_if(groups, [&](const Group& group) {
+    const auto found = std::ranges::find_if(groups, [&](const SolidGroup& group) {
       return group.level == level[part] && group.material == materials.part[part] && group.zone == zones.of_part(part);
     });
     const auto number = static_cast<std::uint32_t>(found - groups.begin());
@@ -74,7 +74,7 @@ std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& mate
       groups.push_back({level[part], materials.part[part], zones.of_part(part), {}, {}, {}, {}});
       groups.back().own_mesh.assign(scene.meshes.size(), UINT32_MAX);
     }
-    Group& group = groups[number];
+    SolidGroup& group = groups[number];
     if (group.own_mesh[mesh] == UINT32_MAX) {
       group.own_mesh[mesh] = static_cast<std::uint32_t>(group.meshes.size());
       if (home[mesh] == UINT32_MAX) {
@@ -87,7 +87,7 @@ std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& mate
     group.instances.push_back({group.own_mesh[mesh], scene.instances[i].offset});
     group.instance.push_back(i);
   }
-  std::ranges::stable_sort(groups, {}, &Group::level);
+  std::ranges::stable_sort(groups, {}, &SolidGroup::level);
   return groups;
 }
 
@@ -104,9 +104,9 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   }
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material, std::uint32_t zone,
                        std::vector<std::uint32_t> instance) -> Status {
-    std::optional<cover::Coverage> coverage;
+    std::optional<coverage::Coverage> coverage;
     if (job.levels > 0 && !instances.empty()) {
-      auto covered = cover::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels, job.isa);
+      auto covered = coverage::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels, job.isa);
       if (!covered) return covered.error();
       coverage = std::move(*covered);
     }
@@ -125,7 +125,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
     if (Status status = add(scene.meshes, scene.instances, {}, 0, {}); !status) return status.error();
     return result;
   }
-  for (Group& group : groups_of(scene, job, materials, zones)) {
+  for (SolidGroup& group : groups_of(scene, job, materials, zones)) {
     if (Status status = add(group.meshes, group.instances, std::move(group.material), group.zone, std::move(group.instance));
         !status) {
       return status.error();

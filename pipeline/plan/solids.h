@@ -8,7 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/plan/dose_zones.h"
+#include "pipeline/plan/dose.h"
 #include "pipeline/plan/scene.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/grid.h"
@@ -22,8 +22,8 @@ struct Solid {
   PartMaterial material;
   std::uint32_t zone = 0;  // of DoseZones
   raster::Rasterizer rasterizer;
-  std::vector<std::uint32_t> instance;      // scene index of each of its instances; empty: all in order
-  std::optional<cover::Coverage> coverage;  // if the job asks for shares of voxels
+  std::vector<std::uint32_t> instance;         // scene index of each of its instances; empty: all in order
+  std::optional<coverage::Coverage> coverage;  // if the job asks for shares of voxels
 };
 
 /// All solids of a scene. A scene of one material and one dose is one solid. Otherwise parts with the same materials at all

@@ -4,11 +4,11 @@
 #include <memory>
 
 #include "pipeline/plan/plan.h"
+#include "pipeline/run/job_checks.h"
 #include "pipeline/run/maker.h"
-#include "pipeline/run/sanity.h"
 
 namespace lamina::pipeline {
 
-std::unique_ptr<Maker> make_contour_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
+std::unique_ptr<Maker> make_contour_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

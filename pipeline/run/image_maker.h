@@ -2,116 +2,13 @@
 #pragma once
 
 #include <memory>
-#include <string>
-#include <vector>
 
-#include "pipeline/output/image_files.h"
-#include "pipeline/plan/heights.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/run/job_checks.h"
 #include "pipeline/run/maker.h"
-#include "pipeline/run/sanity.h"
-#include "stages/coverage/coverage.h"
-#include "stages/data/runs.h"
-#include "stages/inspect/vanished.h"
-#include "stages/raster/materials.h"
-#include "stages/raster/raster.h"
 
 namespace lamina::pipeline {
 
-/// Scratch for the images of a layer; reused by later layers.
-struct ImageWork {
-  raster::LayerScratch scratch;
-  Runs runs;             // the image of all materials
-  Runs second;           // of the other engine, mirrored, or before the dose
-  Runs third;            // the core of a layer with a shell
-  Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
-  Runs section;          // of one solid of a layer with several materials
-  dose::DropWork drops;  // if a saturation or shares of voxels are asked for
-  cover::LayerScratch coverage;
-  raster::MaterialImages materials;
-  raster::MaterialImages zones;  // of parts with doses of their own
-  dose::BleedWork bleed;
-  inspect::VanishScratch vanish;    // if edges move inwards
-  std::unique_ptr<BeadWork> beads;  // if beads fill parts
-
-  /// Capacity of its buffers.
-  std::uint64_t bytes() const;
-};
-
-/// Observations about a layer, for the summary.
-struct ImageNotes {
-  raster::LayerReport report;
-  inspect::VanishedPieces vanished;                 // by the bleed
-  std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
-  std::vector<std::uint64_t> part_pixels;           // of each part before its dose, or shares of voxels; empty: nobody asks
-};
-
-/// The steps of a layer's images; const, usable from any thread with separate work objects.
-class LayerImager {
- public:
-  /// The plan must outlive this object.
-  explicit LayerImager(const Plan& plan) : plan_(plan) {}
-
-  // --- in this order; contours, fill and beads only if beads fill the parts
-  /// errors  kVerification: engines disagree
-  Status raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
-  /// Of a job of shares of voxels: the image becomes that of voxels half full or more.
-  void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
-  /// Unites the layer with those of the parts that are images, whose pixels it adds to notes.part_pixels, if those are wanted.
-  /// errors  kInput: an image cannot be read; kUsage: it sets pixels outside of the bed
-  Status images(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  Status contours(const Layer& layer, ImageWork& work) const;
-  Status fill(const Layer& layer, ImageWork& work) const;
-  Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
-  Status bleed(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Thins the core, or gives pixels their drops, and counts what remains. errors  kUsage: of DosePlan::saturate
-  Status dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
-  /// Runs all steps.
-  Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
-
-  /// The images of a layer that have names, and its levels, of each material if there are several; from then on.
-  std::span<const Runs> several(const ImageWork& work) const;
-  std::span<const Levels> levels(const ImageWork& work) const;
-
-  /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
-  /// The plan's job asks for levels.
-  cover::LayerReport levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const;
-
-  static constexpr std::uint64_t kUnknown = UINT64_MAX;
-  /// Upper bound of the bytes for scratch and runs of a layer.
-  /// pixels  that blue noise may part (DosePlan::parted_pixels), 0 before the dose, or kUnknown
-  std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const;
-  /// Upper bound of the changes in the layer's images with their drops.
-  dose::DropBound drops_bound(const Layer& layer, std::uint64_t pixels) const {
-    return plan_.images->dose.bound(sizes_of(layer, pixels));
-  }
-
- private:
-  Nm plane(const Layer& layer) const { return plane_of(plan_.job, layer, plan_.scene->height); }
-  Status section_of(const Solid& solid, const Layer& layer, ImageWork& work, Runs& image, LayerRecord& record,
-                    ImageNotes& notes) const;
-  raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
-                              Runs& image) const;
-  Status place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const;
-  void mirror(Runs& image, Runs& scratch) const;
-  Status check_grown(const Layer& layer, const ImageWork& work) const;
-  std::uint64_t least_vanished() const;
-  bool shares_voxels() const;  // of several materials or doses
-  void cover(const Layer& layer, ImageWork& work) const;
-  void lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const;
-  void own_voxels(ImageWork& work) const;
-  static void empty_removed(const Runs& before, bool laid, ImageWork& work);
-  std::array<Nm, 2> planes(const Layer& layer) const;
-  dose::DropSizes sizes_of(const Layer& layer, std::uint64_t pixels) const;
-  std::uint64_t changes_of_images(Nm plane) const;
-
-  const Plan& plan_;
-};
-
-/// The head of the summary for a plan of images.
-void tell_images(const Plan& plan, Summary& summary);
-
-std::unique_ptr<Maker> make_image_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
+std::unique_ptr<Maker> make_image_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

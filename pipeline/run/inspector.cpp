@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "stages/data/text/readable.h"
-#include "stages/write/manifest/inspection_file.h"
+#include "pipeline/manifest/inspection_file.h"
+#include "pipeline/report/inspection_json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -22,25 +22,25 @@ double narrowest_mm(const ImagePlan& images) {
 
 Inspector::Inspector(const Plan& plan) : plan_(plan) {
   if (!plan.job.inspect) return;
-  std::vector<inspect::Stand> stands;
+  std::vector<checks::Solid> placed_parts;
   for (std::size_t i = 0; i < plan.scene->instances.size(); ++i) {
-    stands.push_back({box_of(*plan.scene, plan.scene->instances[i]), plan.scene->part_of_instance[i]});
+    placed_parts.push_back({box_of(*plan.scene, plan.scene->instances[i]), plan.scene->part_of_instance[i]});
   }
   for (const PlacedImages& images : plan.scene->images) {
-    stands.push_back({plan.scene->parts[images.part].bounds, images.part});
-    Box& box = stands.back().box;
+    placed_parts.push_back({plan.scene->parts[images.part].bounds, images.part});
+    Box& box = placed_parts.back().box;
     const PixelGrid& grid = plan.images->grid;
     const auto nm = [](std::int64_t pixel, const PixelAxis& axis) { return static_cast<Nm>(pixel * axis.span / axis.dots); };
-    const std::int64_t back = std::int64_t{grid.rows()} - images.place.first_row;
-    box.lo = {nm(images.place.column.front(), grid.x), nm(back - std::ssize(images.place.row), grid.y), images.bottom};
-    box.hi = {nm(images.place.column.back(), grid.x), nm(back, grid.y),
+    const std::int64_t back = std::int64_t{grid.rows()} - images.position.first_row;
+    box.lo = {nm(images.position.column.front(), grid.x), nm(back - std::ssize(images.position.row), grid.y), images.bottom};
+    box.hi = {nm(images.position.column.back(), grid.x), nm(back, grid.y),
               static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
   }
-  least_mm_ = plan.job.least_wall_mm.value_or(narrowest_mm(*plan.images));
-  inspection_.emplace(plan.images->grid, std::move(stands), nm_of(least_mm_), plan.job.memory_bytes / 2);
+  min_mm_ = plan.job.min_wall_mm.value_or(narrowest_mm(*plan.images));
+  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), plan.job.memory_bytes / 2);
 }
 
-void Inspector::warn(std::vector<Warning>& warnings) {
+void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   if (!on()) return;
   if (kept_) {
     warnings.push_back({"not-inspected",
@@ -50,12 +50,12 @@ void Inspector::warn(std::vector<Warning>& warnings) {
   }
   std::vector<std::string> names;
   for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  inspect::tell(inspection_->finish(), names, least_mm_, told_);
-  warnings.insert(warnings.end(), told_.begin(), told_.end());
+  checks::report(inspection_->finish(), names, min_mm_, reports_);
+  warnings.insert(warnings.end(), reports_.begin(), reports_.end());
 }
 
-void Inspector::tell(Summary& summary) const {
-  if (on() && !kept_) (*summary.facts)["inspection"] = json_of(inspection_->findings(), least_mm_);
+void Inspector::report(Summary& summary) const {
+  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_);
 }
 
 Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
@@ -63,7 +63,7 @@ Status Inspector::check_file() const { return on() && whole() ? check_inspection
 Status Inspector::write(const ManifestHead& head) const {
   if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
   return write_inspection(plan_.job.output, head,
-                          {{"inspection", json_of(inspection_->findings(), least_mm_)}, {"warnings", warnings_json(told_)}});
+                          {{"inspection", json_of(inspection_->findings(), min_mm_)}, {"warnings", warnings_json(reports_)}});
 }
 
 bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }

@@ -1,13 +1,16 @@
-// The steps of a layer's images; those that give binder are in layer_dose.cpp.
+#include "pipeline/run/layer_imager.h"
+
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <numbers>
 
-#include "pipeline/run/image_maker.h"
+#include "stages/dose/edges/dilate.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
 #include "stages/raster/mirror.h"
-#include "stages/read/placed.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -46,25 +49,25 @@ Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& rec
   for (const Solid& solid : images.solids.all()) {
     Runs& image = several || zones ? work.section : work.runs;
     if (Status status = section_of(solid, layer, work, image, record, notes); !status) return status;
-    if (several) work.materials.lay(solid.material.at(plane(layer)), image, work.runs);
-    if (zones) work.zones.lay(solid.zone, image, work.runs, plan_.job.fill_rule == FillRule::kEvenOdd);
+    if (several) work.materials.deposit(solid.material.at(plane(layer)), image, work.runs);
+    if (zones) work.zones.deposit(solid.zone, image, work.runs, plan_.job.fill_rule == FillRule::kEvenOdd);
   }
   return {};
 }
 
-Status LayerImager::place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const {
+Status LayerImager::position(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const {
   const ImagePlan& images = *plan_.images;
   const std::uint32_t number = *part.image_at(plane(layer));
   if (const std::uint8_t full = images.dose.full(); full > 0) {
     const auto levels = part.images->levels(number, full);
     if (!levels) return levels.error();
-    read::place(*levels, part.place, work.drops.zones);
-    at_least(work.drops.zones, 1, work.section);
+    formats::position(*levels, part.position, work.drops.zones);
+    threshold_levels(work.drops.zones, 1, work.section);
     filled = sum_of_levels(work.drops.zones);
   } else {
     const auto read = part.images->read(number);
     if (!read) return read.error();
-    read::place(*read, part.place, work.section);
+    formats::position(*read, part.position, work.section);
     filled = set_pixels(work.section);
   }
   const auto outside =
@@ -73,7 +76,7 @@ Status LayerImager::place(const Layer& layer, const PlacedImages& part, ImageWor
   return Error{Fault::kUsage,
                fmt::format("{}: layer {} sets a pixel at x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed of {}; "
                            "move the images",
-                           plan_.scene->parts[part.part].path, layer.index, mm(outside->place.x), mm(outside->place.y),
+                           plan_.scene->parts[part.part].path, layer.index, mm(outside->position.x), mm(outside->position.y),
                            outside->beyond_mm, images.machine->machine.name)};
 }
 
@@ -82,21 +85,21 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   for (const PlacedImages& part : plan_.scene->images) {
     if (!part.image_at(plane(layer))) continue;
     std::uint64_t filled = 0;
-    if (Status status = place(layer, part, work, filled); !status) return status;
+    if (Status status = position(layer, part, work, filled); !status) return status;
     if (!notes.part_pixels.empty()) notes.part_pixels[part.part] += filled;
     if (shares_voxels()) {
-      lay_shares(layer, part.part, work);
+      add_shares(layer, part.part, work);
       continue;
     }
     if (const std::uint8_t full = images.dose.full(); full > 0) {
       larger(work.drops.shares, work.drops.zones, work.drops.levels);
       std::swap(work.drops.shares, work.drops.levels);
-      at_least(work.drops.zones, dose::half_of(full), work.section);
+      threshold_levels(work.drops.zones, dose::half_of(full), work.section);
     }
     const DoseZones& zones = images.dose.zones();
-    if (zones.several()) work.zones.lay(zones.of_part(part.part), work.section, work.runs);
+    if (zones.several()) work.zones.deposit(zones.of_part(part.part), work.section, work.runs);
     if (images.materials.several()) {
-      work.materials.lay(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
+      work.materials.deposit(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
     } else if (zones.several()) {
       continue;
     } else if (work.runs.change.empty()) {
@@ -108,7 +111,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   }
   if (!shares_voxels() || plan_.scene->images.empty()) return {};
   dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
-  at_least(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
+  threshold_levels(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
   own_voxels(work);
   return {};
 }
@@ -131,7 +134,7 @@ Status LayerImager::fill(const Layer& layer, ImageWork& work) const {
 }
 
 Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const {
-  if (Status status = plan_.images->beads->lay(layer, *work.beads); !status) return status;
+  if (Status status = plan_.images->beads->deposit(layer, *work.beads); !status) return status;
   notes.solid_pixels = set_pixels(work.runs);
   plan_.images->beads->apply(work.runs, work.second, *work.beads);
   notes.bead_pixels = set_pixels(work.runs);
@@ -211,7 +214,7 @@ dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) 
   sizes.runs = of_images;
   for (const Solid& solid : images.solids.all()) {
     if (!solid.coverage) continue;
-    const cover::LayerBound bound = solid.coverage->bound(layer);
+    const coverage::LayerBound bound = solid.coverage->bound(layer);
     sizes.runs += bound.runs, sizes.edges += bound.edges;
     voxels += bound.voxels;
   }
@@ -246,6 +249,197 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer, std::uint64_t pixels) co
     if (solid.coverage) scratch = std::max(scratch, solid.coverage->bound(layer).scratch_bytes);
   }
   return total + scratch + (images.beads ? images.beads->bytes_expected(layer.index) : 0);
+}
+
+// --- binder: shares of voxels, bleed, drops
+
+bool LayerImager::shares_voxels() const {
+  return plan_.job.levels > 0 && (plan_.images->materials.several() || plan_.images->dose.zones().several());
+}
+
+coverage::CoverageReport LayerImager::levels(const Layer& layer, coverage::CoverageScratch& scratch, Levels& image) const {
+  const Solid& solid = plan_.images->solids.all().front();
+  if (solid.coverage) return solid.coverage->layer(layer, scratch, image);
+  image.start(plan_.images->grid.columns());  // no mesh
+  image.row_offset.assign(std::size_t{plan_.images->grid.rows()} + 1, 0);
+  return {};
+}
+
+Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes) const {
+  const ImagePlan& images = *plan_.images;
+  const DoseZones& zones = images.dose.zones();
+  const bool shares = plan_.job.levels > 0;
+  if (const Mirror axes = plan_.job.mirror; axes != Mirror::kNone) {
+    mirror(work.runs, work.second);
+    for (Runs& image : work.materials.image) mirror(image, work.second);
+    for (Runs& image : work.zones.image) mirror(image, work.second);
+    if (shares) dose::mirror(work.drops.shares, axes != Mirror::kY, axes != Mirror::kX, work.drops.zones);
+    if (shares) std::swap(work.drops.shares, work.drops.zones);
+    if (shares_voxels()) {
+      for (dose::DepositedPart& part : work.drops.deposited) {
+        dose::mirror(part.shares, axes != Mirror::kY, axes != Mirror::kX, part.zones);
+        std::swap(part.shares, part.zones);
+      }
+    }
+  }
+  if (!images.dose.bleeds()) return {};
+  if (zones.several() && images.beads) work.zones.keep(work.runs);
+  for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
+    const RunsView own = zones.several() ? work.zones.image[zone].view() : work.runs.view();
+    const dose::Bleed& bleed = zones.bleeds().of(zone, layer);
+    if (!bleed.outside.grows || !dose::grows_beyond(own, bleed.outside.reach)) continue;
+    return Error{Fault::kUsage,
+                 fmt::format("dose.bleed_um: in layer {} (z {:.3f} mm) edges would grow beyond the bed; move the "
+                             "parts away from its edge",
+                             layer.index, mm(layer.plane()))};
+  }
+  const std::uint64_t minimum = min_vanished();
+  if (shares || minimum > 0) work.third = work.runs;
+  zones.bleeds().remove(layer, work.runs, work.zones.image, work.bleed);
+  if (minimum > 0) notes.vanished = checks::vanished_pieces(work.third, work.runs, minimum, work.vanish);
+  if (shares) empty_removed(work.third, shares_voxels(), work);
+  return check_grown(layer, work);
+}
+
+/// Pixels of four discs of the widest bleed inwards; 0: there is none, or beads fill the parts.
+std::uint64_t LayerImager::min_vanished() const {
+  if (plan_.images->beads) return 0;
+  double widest = 0;
+  for (const auto& [x, y] : bleeds_of(plan_.job)) widest = std::max(widest, std::max(x, 0.0) * std::max(y, 0.0));
+  const PixelGrid& grid = plan_.images->grid;
+  const double pixels = 4 * std::numbers::pi * widest * 1e6 * grid.x.pixels_per_nm() * grid.y.pixels_per_nm();
+  return widest > 0 ? std::max<std::uint64_t>(1, static_cast<std::uint64_t>(pixels)) : 0;
+}
+
+/// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
+void LayerImager::empty_removed(const Runs& before, bool deposited, ImageWork& work) {
+  combine(before, work.runs, SetOperation::kDifference, work.second);
+  const dose::Reach neighbour{{1, 1}};
+  dose::dilate(work.second, neighbour, work.section);
+  combine(work.section, work.runs, SetOperation::kDifference, work.second);
+  dose::without(work.drops.shares, work.second, work.drops.zones);
+  std::swap(work.drops.shares, work.drops.zones);
+  if (!deposited) return;
+  for (dose::DepositedPart& part : work.drops.deposited) {
+    dose::without(part.shares, work.second, part.zones);
+    std::swap(part.shares, part.zones);
+  }
+}
+
+/// Parts stay on a bed that is not a rectangle as far as they were checked; what grew does too.
+Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
+  if (!images.machine || !images.dose.zones().bleeds().grows()) return {};
+  const auto outside = program::first_outside(images.machine->machine, images.grid, work.runs);
+  if (!outside) return {};
+  return Error{Fault::kUsage,
+               fmt::format("dose.bleed_um: layer {} grows to x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed "
+                           "of {}; move the parts away from its edge",
+                           layer.index, mm(outside->position.x), mm(outside->position.y), outside->beyond_mm,
+                           images.machine->machine.name)};
+}
+
+void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+  const ImagePlan& images = *plan_.images;
+  if (shares_voxels()) {
+    cover(layer, work);
+    dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
+  } else {
+    // What was dosed in the layer before took its buffer with it.
+    if (work.drops.zones.bytes() > work.drops.shares.bytes()) std::swap(work.drops.shares, work.drops.zones);
+    levels(layer, work.coverage, work.drops.shares);
+  }
+  const auto differs = dose::take_half(images.dose.full(), work.runs, work.second, work.drops);
+  record.half_differs = differs.pixels;
+  record.half_far = differs.far;
+  if (shares_voxels()) own_voxels(work);
+}
+
+/// Voxels half full or more are those of the part that has most of them.
+void LayerImager::own_voxels(ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
+  const std::uint32_t columns = images.grid.columns(), rows = images.grid.rows();
+  const bool several = images.materials.several(), zones = images.dose.zones().several();
+  if (several) work.materials.start(images.materials.used.size(), columns, rows);
+  if (zones) work.zones.start(images.dose.zones().count(), columns, rows);
+  for (std::size_t i = 0; i < work.drops.deposited.size(); ++i) {
+    const dose::DepositedPart& part = work.drops.deposited[i];
+    const auto merge = [&](Runs& image) {
+      combine(image, work.drops.shared.owner[i], SetOperation::kUnion, work.section);
+      std::swap(image, work.section);
+    };
+    if (several) merge(work.materials.image[part.material]);
+    if (zones) merge(work.zones.image[part.zone]);
+  }
+}
+
+/// How full each solid makes the voxels.
+void LayerImager::cover(const Layer& layer, ImageWork& work) const {
+  const std::span<const Solid> solids = plan_.images->solids.all();
+  work.drops.deposited.resize(solids.size());
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    dose::DepositedPart& part = work.drops.deposited[i];
+    solids[i].coverage->layer(layer, work.coverage, part.shares);
+    part.zone = solids[i].zone;
+    part.material = plan_.images->materials.several() ? solids[i].material.at(plane(layer)) : 0;
+  }
+}
+
+/// Those of an image, as placed in work.drops.zones, lie over the parts before: of the same kind as the last one, the larger
+/// share counts.
+void LayerImager::add_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const {
+  std::vector<dose::DepositedPart>& deposited = work.drops.deposited;
+  const std::uint32_t zone = plan_.images->dose.zones().of_part(part);
+  const std::uint32_t material = plan_.images->materials.several() ? plan_.images->materials.part[part].at(plane(layer)) : 0;
+  if (deposited.empty() || deposited.back().zone != zone || deposited.back().material != material) {
+    deposited.push_back({work.drops.zones, {}, zone, material});
+  } else {
+    larger(deposited.back().shares, work.drops.zones, work.drops.levels);
+    std::swap(deposited.back().shares, work.drops.levels);
+  }
+}
+
+Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+  const ImagePlan& images = *plan_.images;
+  if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
+  images.dose.thin(layer.index, work.runs, work.second, work.third);
+  if (images.dose.saturates()) {
+    const auto materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
+    const auto sums =
+        images.dose.saturate(layer, shares_voxels(), materials, work.runs, work.zones.image, work.second, work.drops);
+    if (!sums) return sums.error();
+    record.dosed_pixels = sums->full_voxels;
+    record.requested_drops = sums->requested_drops;
+    record.drops = images.dose.max_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
+    record.max_drops = images.dose.max_drops() > 1 ? highest(work.drops.levels) : record.drops > 0 ? 1 : 0;
+    // Of one drop a pixel the image alone was made.
+    const bool levels = formats::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
+    if (levels && images.dose.max_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
+  } else if (plan_.job.levels > 0) {
+    threshold_levels(work.drops.shares, 1, work.runs);
+    record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
+  }
+  if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
+  const bool grey = formats::find_level_format(plan_.job.format) != nullptr, drops = images.dose.max_drops() > 1;
+  if (images.materials.several() && (shares_voxels() || drops || grey))
+    dose::drops_of_materials(images.dose.max_drops(), shares_voxels(), work.materials.image, work.drops);
+  const bool counted = images.dose.saturates() && images.dose.max_drops() <= 1;
+  record.set_pixels = counted ? record.drops : set_pixels(work.runs);
+  for (const Runs& image : several(work)) record.images.emplace_back().set_pixels = set_pixels(image);
+  for (std::size_t m = 0; grey && m < record.images.size(); ++m)
+    record.images[m].drops = sum_of_levels(work.drops.of_material[m]);
+  return {};
+}
+
+std::span<const Runs> LayerImager::several(const ImageWork& work) const {
+  const bool drops = plan_.images->dose.max_drops() > 1 && formats::find_level_format(plan_.job.format) == nullptr;
+  if (!drops) return work.materials.image;
+  return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
+}
+
+std::span<const Levels> LayerImager::levels(const ImageWork& work) const {
+  if (plan_.images->materials.several()) return work.drops.of_material;
+  return {plan_.images->dose.saturates() ? &work.drops.levels : &work.drops.shares, 1};
 }
 
 }  // namespace lamina::pipeline

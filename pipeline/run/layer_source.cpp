@@ -8,9 +8,9 @@
 
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layers.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 #include "stages/load/load.h"
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -62,8 +62,8 @@ LayerSource::LayerSource(LayerSource&&) noexcept = default;
 LayerSource& LayerSource::operator=(LayerSource&&) noexcept = default;
 LayerSource::~LayerSource() = default;
 
-Result<LayerSource> LayerSource::make(const Job& asked) {
-  Job job = asked;
+Result<LayerSource> LayerSource::make(const Job& requested) {
+  Job job = requested;
   job.dry_run = true;  // nothing is written
   if (Status status = check_job(job); !status) return status.error();
   auto plan = plan_of(job, Product::kImages);
@@ -101,7 +101,7 @@ Result<PlannedImages> LayerSource::images(std::uint32_t index) const {
   return images;
 }
 
-write::LayerTags LayerSource::tags(std::uint32_t index) const { return tags_of(state_->plan, layer(index)); }
+formats::LayerTags LayerSource::tags(std::uint32_t index) const { return tags_of(state_->plan, layer(index)); }
 
 Result<Contours> LayerSource::contours(std::uint32_t index) const {
   const auto sections = state_->sections();
@@ -131,13 +131,13 @@ Result<std::vector<Layer>> layers_of(const Job& job) {
 
 Result<Part> load_part(const Job& job, const PartRequest& part) { return load::load(part.path, load_options(job, part)); }
 
-Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y, const write::ImageFormat& format,
-                  const write::LayerTags& tags) {
-  write::Bytes file;
+Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y,
+                  const formats::ImageFormat& format, const formats::LayerTags& tags) {
+  formats::Bytes file;
   const auto encoder = format.make_encoder();
   encoder->tag(tags);
   if (Status status = encoder->encode(image, dpi_x, dpi_y, file); !status) return status;
-  return write::write_file(path, file);
+  return write_file(path, file);
 }
 
 }  // namespace lamina::pipeline

@@ -16,7 +16,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/image_format.h"
+#include "stages/formats/image_format.h"
 
 namespace lamina::pipeline {
 
@@ -50,7 +50,7 @@ class LayerSource {
   /// memory  the runs; scratch is kept for later layers, one set per concurrent call
   Result<PlannedImages> images(std::uint32_t index) const;
   /// What run() has the files of a layer say, but for their material.
-  write::LayerTags tags(std::uint32_t index) const;
+  formats::LayerTags tags(std::uint32_t index) const;
   /// Closed contours of a layer, nm on the bed, outer ones counter-clockwise, as run() writes them for kContours.
   /// cost  the first call loads the parts again
   Result<Contours> contours(std::uint32_t index) const;
@@ -69,7 +69,7 @@ Result<std::vector<Layer>> layers_of(const Job& job);
 Result<Part> load_part(const Job& job, const PartRequest& part);
 
 /// Writes an image in the same way as run(), atomically. errors  kOutput
-Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y, const write::ImageFormat& format,
-                  const write::LayerTags& tags = {});
+Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y,
+                  const formats::ImageFormat& format, const formats::LayerTags& tags = {});
 
 }  // namespace lamina::pipeline

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "pipeline/flow/layers.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/manifest/record.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/status.h"
-#include "stages/write/manifest/record.h"
 
 namespace lamina::pipeline {
 
@@ -34,6 +34,8 @@ class Maker {
   /// Starts the files. returns  the layers still to be made, in increasing order
   /// errors  kUsage: existing output of another job; kOutput
   virtual Result<std::vector<std::uint32_t>> open() = 0;
+  /// Starts what states the number of layers, of a plan whose layers are decided since open(). errors  kOutput
+  virtual Status start() { return {}; }
   /// Whether a dry run makes the layers too, for what they take; then open() and all below write nothing.
   virtual bool times_dry_runs() const { return false; }
   /// Records of the layers kept from an interrupted run.
@@ -49,7 +51,7 @@ class Maker {
   virtual std::uint64_t bytes_held(std::uint32_t work) const = 0;
   virtual void let_go(std::uint32_t work) = 0;
   /// Of what record() keeps from layer to layer.
-  virtual std::uint64_t bytes_beside() const { return 0; }
+  virtual std::uint64_t extra_bytes() const { return 0; }
 
   // --- the end
   /// Adds the product's own warnings; before finish().
@@ -65,7 +67,7 @@ class Maker {
   /// Crossings of rows with surfaces in all layers made; 0 where there are no rows.
   virtual std::uint64_t crossings() const { return 0; }
   /// Adds the product's own lines to the summary.
-  virtual void tell(Summary& summary) const = 0;
+  virtual void report(Summary& summary) const = 0;
 };
 
 }  // namespace lamina::pipeline

@@ -4,14 +4,11 @@
 #include <memory>
 
 #include "pipeline/plan/plan.h"
+#include "pipeline/run/job_checks.h"
 #include "pipeline/run/maker.h"
-#include "pipeline/run/sanity.h"
 
 namespace lamina::pipeline {
 
-/// Adds what is known before the first move: the printer, its bead and the tolerance.
-void tell_moves(const Plan& plan, Summary& summary);
-
-std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

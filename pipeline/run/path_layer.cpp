@@ -1,4 +1,5 @@
 #include "pipeline/run/path_layer.h"
+#include "pipeline/plan/heights.h"
 
 #include <fmt/format.h>
 
@@ -8,18 +9,18 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
+#include "pipeline/report/move_observers.h"
 #include "stages/bead/even_starts.h"
 #include "stages/infill/skirt.h"
-#include "stages/segment/laid/crossing.h"
+#include "stages/segment/deposited/pores.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {
 namespace {
 
 /// Lays the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one, with beads or not.
-void lay_skirt(const Plan& plan, const Layer& layer, write::LayerMoves& out) {
+void deposit_skirt(const Plan& plan, const Layer& layer, formats::LayerMoves& out) {
   const Extruder& machine = plan.moves->profile.machine;
   const FillSettings& fill = plan.job.fill.all;
   const auto width = static_cast<Nm>(nm_of(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm));
@@ -29,14 +30,14 @@ void lay_skirt(const Plan& plan, const Layer& layer, write::LayerMoves& out) {
   segment::MoveTable table(plan.segments->base.plan, uncut, machine, layer);
   for (std::uint32_t c = 0; c < skirt.size(); ++c) {
     for (std::size_t i = 0; i + 1 < skirt[c].size(); ++i) {
-      Stretch stretch{};
-      stretch.from = skirt[c][i];
-      stretch.to = skirt[c][i + 1];
-      stretch.kind = PathKind::kOuter;
-      stretch.width = width;
-      stretch.line = kNoLine;
-      const segment::MoveTable::Entry& entry = table.of(stretch);
-      out.lay({stretch.from, stretch.to, PathKind::kSkirt, i == 0, entry.width, entry.area, entry.speed});
+      PathInterval interval{};
+      interval.from = skirt[c][i];
+      interval.to = skirt[c][i + 1];
+      interval.kind = PathKind::kOuter;
+      interval.width = width;
+      interval.line = kNoLine;
+      const segment::MoveTable::MoveEntry& entry = table.of(interval);
+      out.deposit({interval.from, interval.to, PathKind::kSkirt, i == 0, entry.width, entry.area, entry.speed});
     }
   }
 }
@@ -62,12 +63,12 @@ AreaCut cut_of(const Plan& plan, std::uint32_t area_number, const Layer& layer) 
 class PoresByRange {
  public:
   explicit PoresByRange(const Plan& plan) {
-    if (tells_ranges(plan)) segmented_ = plan.segments->segmented();
+    if (has_ranges_by_layer(plan)) segmented_ = plan.segments->segmented();
     ranges.resize(segmented_.size());
   }
   /// What `count` adds to `all` is added to the range too. returns  what it returns
-  template <class Count>
-  auto take(const SegmentRange& range, PoreCounts& all, Count count) {
+  template <class SampleCount>
+  auto take(const SegmentRange& range, PoreCounts& all, SampleCount count) {
     if (ranges.empty()) return count();
     const PoreCounts before = std::exchange(all, {});
     const auto result = count();
@@ -113,35 +114,27 @@ Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work
 
 }  // namespace
 
-bool tells_ranges(const Plan& plan) {
-  if (plan.segments->ranges.empty() || !plan.segments->any()) return false;
-  // A layer that goes on above a part is in that part's topmost range, whatever range others are in.
-  if (covers_top(plan.job) || plan.job.heights.containment == Containment::kOutside) return true;
-  const auto& areas = plan.sections->areas();
-  return std::ranges::any_of(areas, [&](const Sections::Area& area) { return area.box.lo.z != areas.front().box.lo.z; });
-}
-
 PathFacts facts_of(const Sections::Work& work) {
   PathFacts facts;
   const Contours& contours = work.contours.contours;
   facts.contours = contours.size();
   facts.points = contours.point.size();
   facts.paths = work.paths.size();
-  facts.united = work.report.united;
+  facts.merged = work.report.merged;
   facts.open = work.report.gaps.open;
   facts.stored_points = work.paths.point.size();
   return facts;
 }
 
-Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Work& work, const TextRoom& room,
-                       write::LayerMoves& out, PathFacts& facts) {
+Result<bool> deposit_moves(const Plan& plan, std::uint32_t index, const Sections::Work& work, const TextBuffer& buffer,
+                           formats::LayerMoves& out, PathFacts& facts) {
   const Layer layer = plan.sections->layers()[index].own();
-  LaidSums laid;
-  laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
+  DepositedSums deposited;
+  deposited.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
   PoresByRange by_range(plan);
   const Extruder& machine = plan.moves->profile.machine;
   bead::EvenStarts starts(machine, mm(layer.thickness));
-  if (index == 0 && plan.sections->fills()) lay_skirt(plan, layer, out);
+  if (index == 0 && plan.sections->fills()) deposit_skirt(plan, layer, out);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const AreaCut of = cut_of(plan, a, layer);
     const SegmentRange& range = of.range;
@@ -149,23 +142,25 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
     if (!cut) return cut.error();
     segment::MoveTable table(range.plan, *cut, machine, layer);
     const ToolpathsView paths = paths_of(work, a);
-    if (Status status = segment::check_stretch_count(range.plan, *cut, paths, layer.index); !status) return status.error();
-    const auto write = [&](const BeadMove& move) -> std::optional<LaidMove> {
-      const double length = out.lay(move);
-      if (room.text.size() > room.most && !room.grown()) return std::nullopt;
-      return LaidMove{length, length * move.area_mm2};
+    if (Status status = segment::check_interval_count(range.plan, *cut, paths, layer.index); !status) return status.error();
+    const auto write = [&](const BeadMove& move) -> std::optional<DepositedMove> {
+      const double length = out.deposit(move);
+      if (buffer.text.size() > buffer.maximum && !buffer.grown()) return std::nullopt;
+      return DepositedMove{length, length * move.area_mm2};
     };
     const bool even = range.settings.on && range.settings.even_starts && machine.material.lag_s > 0;
     if (!even) starts.forget();
-    const auto lay = [&](const BeadMove& move) { return even ? starts.lay(move, write) : write(move); };
-    if (!by_range.take(range, laid.pores, [&] { return segment::for_each_move(paths, *cut, table, laid, lay); })) return false;
-    if (RangePores* told = by_range.find(range)) told->area_mm2 += plan.sections->area_mm2(plan.sections->areas()[a], work);
+    const auto deposit = [&](const BeadMove& move) { return even ? starts.deposit(move, write) : write(move); };
+    if (!by_range.take(range, deposited.pores, [&] { return segment::for_each_move(paths, *cut, table, deposited, deposit); }))
+      return false;
+    if (RangePores* reported = by_range.find(range))
+      reported->area_mm2 += plan.sections->area_mm2(plan.sections->areas()[a], work);
   }
   facts.totals = out.finish();
   if (plan.segments->crosses()) {
-    if (Status status = count_crossed(plan, index, work, laid.pores, by_range); !status) return status.error();
+    if (Status status = count_crossed(plan, index, work, deposited.pores, by_range); !status) return status.error();
   }
-  facts.laid = laid;
+  facts.deposited = deposited;
   facts.by_range = std::move(by_range.ranges);
   return true;
 }

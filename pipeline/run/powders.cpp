@@ -8,24 +8,25 @@
 #include <atomic>
 
 #include "pipeline/plan/heights.h"
+#include "pipeline/report/image_text.h"
+#include "stages/checks/mixed.h"
 #include "stages/program/vats.h"
-#include "stages/sanity/mixed.h"
 
 namespace lamina::pipeline {
 namespace {
 
 /// The heights of a part by material, one after the other.
-void add_stretches(const PartMaterial& part, std::int64_t bottom, std::int64_t top,
-                   std::vector<sanity::PowderStretch>& stretches) {
+void add_intervals(const PartMaterial& part, std::int64_t bottom, std::int64_t top,
+                   std::vector<checks::PowderInterval>& intervals) {
   std::vector<std::int64_t> ends{bottom, top};
-  for (const PartMaterial::Range& range : part.ranges) {
+  for (const PartMaterial::MaterialInterval& range : part.ranges) {
     for (const std::int64_t end : {range.from, range.to}) {
       if (end > bottom && end < top) ends.push_back(end);
     }
   }
   std::ranges::sort(ends);
   for (std::size_t i = 0; i + 1 < ends.size(); ++i) {
-    stretches.push_back({ends[i], ends[i + 1], part.at(static_cast<Nm>(ends[i]))});
+    intervals.push_back({ends[i], ends[i + 1], part.at(static_cast<Nm>(ends[i]))});
   }
 }
 
@@ -33,31 +34,32 @@ void add_stretches(const PartMaterial& part, std::int64_t bottom, std::int64_t t
 /// so they do of shares of voxels.
 std::int64_t reach_of_layers(const Plan& plan) {
   if (plan.job.heights.containment == Containment::kAcross && plan.job.levels == 0) return 0;
-  std::int64_t most = 0;
-  for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i) most = std::max<std::int64_t>(most, plan.layer(i).thickness);
-  return most;
+  std::int64_t maximum = 0;
+  for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i)
+    maximum = std::max<std::int64_t>(maximum, plan.layer(i).thickness);
+  return maximum;
 }
 
 /// Layers of the job that can hold several materials.
-std::vector<sanity::LayerRange> layers_in_question(const Plan& plan) {
+std::vector<checks::LayerRange> layers_in_question(const Plan& plan) {
   const Scene& scene = *plan.scene;
   const std::int64_t beyond = reach_of_layers(plan);
-  std::vector<sanity::PowderStretch> stretches;
+  std::vector<checks::PowderInterval> intervals;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const PartMaterial& part = plan.images->materials.part[scene.part_of_instance[i]];
     const Box box = box_of(scene, scene.instances[i]);
-    add_stretches(part, box.lo.z - beyond, box.hi.z + beyond, stretches);
+    add_intervals(part, box.lo.z - beyond, box.hi.z + beyond, intervals);
   }
   for (const PlacedImages& images : scene.images) {
-    add_stretches(plan.images->materials.part[images.part], images.bottom,
-                  images.bottom + std::int64_t{images.thickness} * images.images->layers(), stretches);
+    add_intervals(plan.images->materials.part[images.part], images.bottom,
+                  images.bottom + std::int64_t{images.thickness} * images.images->layers(), intervals);
   }
   std::vector<Nm> planes;
   for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i)
     planes.push_back(plane_of(plan.job, plan.layer(i), scene.height));
   const auto materials = static_cast<std::uint32_t>(plan.images->materials.used.size());
-  std::vector<sanity::LayerRange> ranges = sanity::mixed_layers(std::move(stretches), materials, planes);
-  for (sanity::LayerRange& range : ranges) range = {range[0] + plan.range[0], range[1] + plan.range[0]};
+  std::vector<checks::LayerRange> ranges = checks::mixed_layers(std::move(intervals), materials, planes);
+  for (checks::LayerRange& range : ranges) range = {range[0] + plan.range[0], range[1] + plan.range[0]};
   return ranges;
 }
 
@@ -87,7 +89,7 @@ Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
       if (feeds) continue;
       if (feeds.error().fault != Fault::kUsage) return feeds.error();
       return Error{Fault::kUsage, fmt::format("{} mix powders, by the heights of their parts; layer {} (z {:.3f} mm) has {}",
-                                              sanity::ranges_text(ranges), i, mm(layer.plane()), feeds.error().message)};
+                                              ranges_text(ranges), i, mm(layer.plane()), feeds.error().message)};
     }
   }
   return {};
@@ -95,20 +97,20 @@ Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
 
 Status refuse_faulty_formulas(const Plan& plan, const LayerImager& imager) {
   const auto& budget = plan.images->dose.budget();
-  if (!budget || !budget->in_doubt(plan.job.allow_unbound)) return {};
+  if (!budget || !budget->is_uncertain(plan.job.allow_unbound)) return {};
   tbb::enumerable_thread_specific<ImageWork> works;
   std::atomic<std::uint32_t> lowest{UINT32_MAX};
-  const auto look = [&](std::uint32_t i, ImageWork& work) {
+  const auto prepare = [&](std::uint32_t i, ImageWork& work) {
     LayerRecord record;
     ImageNotes notes;
     return imager.make(plan.layer(i), work, record, notes);
   };
   tbb::parallel_for(plan.range[0], plan.range[1], [&](std::uint32_t i) {
-    if (i > lowest || look(i, works.local())) return;
+    if (i > lowest || prepare(i, works.local())) return;
     for (std::uint32_t known = lowest; i < known && !lowest.compare_exchange_weak(known, i);) {
     }
   });
-  return lowest == UINT32_MAX ? Status() : look(lowest, works.local());
+  return lowest == UINT32_MAX ? Status() : prepare(lowest, works.local());
 }
 
 Result<std::vector<std::uint32_t>> plan_refills(const Plan& plan, const LayerImager& imager) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 
 namespace lamina::pipeline {
 

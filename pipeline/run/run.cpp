@@ -5,21 +5,24 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 
 #include "pipeline/flow/layers.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/slice_directory.h"
+#include "pipeline/output/slice_files.h"
 #include "pipeline/output/toolpath_file.h"
+#include "pipeline/report/heights_study.h"
+#include "pipeline/report/image_observers.h"
+#include "pipeline/report/move_observers.h"
+#include "pipeline/report/timing.h"
 #include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"
+#include "pipeline/run/job_checks.h"
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
-#include "pipeline/run/sanity.h"
-#include "pipeline/run/timing.h"
-#include "stages/sanity/records.h"
+#include "stages/checks/records.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -34,13 +37,20 @@ Status check_output_of(const Resolved& resolved) {
   return {};
 }
 
-std::unique_ptr<Maker> make_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
+std::unique_ptr<Maker> make_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits) {
   switch (plan.product) {
-    case Product::kImages: return make_image_maker(plan, sanity, limits);
-    case Product::kContours: return make_contour_maker(plan, sanity, limits);
+    case Product::kImages: return make_image_maker(plan, checks, limits);
+    case Product::kContours: return make_contour_maker(plan, checks, limits);
     case Product::kMoves: break;
   }
-  return make_move_maker(plan, sanity, limits);
+  return make_move_maker(plan, checks, limits);
+}
+
+void count_layers(const Plan& plan, Summary& summary) {
+  summary.layers_total = plan.layer_count;
+  if (plan.layer_count == 0) return;
+  const Layer highest = plan.layer(plan.layer_count - 1);
+  summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
 }
 
 Summary summary_of(const Plan& plan) {
@@ -49,43 +59,41 @@ Summary summary_of(const Plan& plan) {
   summary.dry_run = plan.job.dry_run;
   summary.output = plan.job.output;
   summary.layer_text = text_of(plan.job.heights, plan.job.layer_mm);
-  const std::string small = small_peaks_text(plan.heights, plan.job.heights.least_flat_mm2);
+  const std::string small = small_peaks_text(plan.heights, plan.job.heights.min_flat_mm2);
   if (!small.empty()) summary.layer_text += "; " + small;
-  summary.layers_total = plan.layer_count;
   summary.triangles = plan.triangles;
   summary.load_seconds = plan.load_seconds;
   summary.index_seconds = plan.index_seconds;
   summary.memory_budget_bytes = plan.job.memory_bytes;
   summary.parts = plan.scene->parts;
   summary.warnings = plan.warnings;
-  summary.facts = std::make_shared<nlohmann::ordered_json>(nlohmann::ordered_json::object());
-  if (plan.layer_count > 0) {
-    const Layer highest = plan.layer(plan.layer_count - 1);
-    summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
-  }
-  if (plan.product == Product::kImages) tell_images(plan, summary);
-  if (plan.product == Product::kMoves) tell_moves(plan, summary);
+  count_layers(plan, summary);
+  if (plan.product == Product::kImages) report_image_plan(plan, summary);
+  if (plan.product == Product::kMoves) report_move_plan(plan, summary);
   return summary;
 }
 
-/// The maker's steps as those of the flow. todo  layers by position; outlives them
-LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const std::function<void()>& recorded) {
+/// The maker's steps as those of the flow. layer_at  by position; outlives them
+LayerSteps steps_of(Maker& maker, const std::function<std::uint32_t(std::uint32_t)>& layer_at,
+                    const std::function<void()>& recorded) {
   LayerSteps steps;
-  steps.bytes_of = [&](std::uint32_t position) { return maker.bytes_of(todo[position]); };
+  steps.bytes_of = [&](std::uint32_t position) { return maker.bytes_of(layer_at(position)); };
   for (MakerStep& step : maker.steps()) {
     Step& made = steps.steps.emplace_back();
     made.name = step.name;
-    made.run = [&todo, run = std::move(step.run)](const Ticket& ticket) { return run(todo[ticket.position], ticket); };
+    made.run = [&layer_at, run = std::move(step.run)](const Ticket& ticket) { return run(layer_at(ticket.position), ticket); };
     if (!step.needs) continue;
-    made.needs = [&todo, needs = std::move(step.needs)](const Ticket& ticket) { return needs(todo[ticket.position], ticket); };
+    made.needs = [&layer_at, needs = std::move(step.needs)](const Ticket& ticket) {
+      return needs(layer_at(ticket.position), ticket);
+    };
   }
   steps.record = [&](const Ticket& ticket) {
-    const Status status = maker.record(todo[ticket.position], ticket);
+    const Status status = maker.record(layer_at(ticket.position), ticket);
     if (status) recorded();
     return status;
   };
   steps.bytes_held = [&](std::uint32_t work) { return maker.bytes_held(work); };
-  steps.bytes_beside = [&] { return maker.bytes_beside(); };
+  steps.extra_bytes = [&] { return maker.extra_bytes(); };
   steps.let_go = [&](std::uint32_t work) { maker.let_go(work); };
   steps.records_from_work = maker.records_from_work();
   return steps;
@@ -106,12 +114,9 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer, bool shared)
   return {error.fault, error.message + "; finished layers are kept, go on with --resume"};
 }
 
-void tell_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
+void report_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
   timing.phases.push_back({"layers", layers});
-  timing.lock_seconds = report.lock_seconds;
-  for (std::size_t s = 0; s < report.step_seconds.size(); ++s) {
-    timing.steps.push_back({report.step_seconds[s].first, report.step_seconds[s].second, report.step_processor_seconds[s]});
-  }
+  timing.nodes = report.nodes;
 }
 
 bool cut_short(const Status& status) {
@@ -120,10 +125,10 @@ bool cut_short(const Status& status) {
 
 /// Collects the warnings while the files are unfinished still, and refuses what is empty or, if strict, doubtful. Then
 /// nothing stays, unless an earlier run had made a part of it.
-Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool shared, Summary& summary) {
+Status check_job(const Plan& plan, Maker& maker, const JobChecks& checks, bool shared, Summary& summary) {
   maker.warn(summary, summary.warnings);
-  Status status = sanity.end(summary.warnings);
-  if (status && plan.job.strict) status = sanity::refuse_warnings(summary.warnings);
+  Status status = checks.end(summary.warnings);
+  if (status && plan.job.strict) status = checks::refuse_warnings(summary.warnings);
   if (status) return {};
   if (cut_short(status)) return status;
   if (shared) {
@@ -134,15 +139,25 @@ Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool shared, 
   return status;
 }
 
+/// Lets the flow decide the layers of a plan whose layers are undecided. decided  called once they are all in the plan
+void stream_layers(Plan& plan, LayerSteps& steps, const std::function<Status()>& decided) {
+  steps.decide = [&plan](std::uint32_t position) { return plan.undecided->decide(position, plan.heights); };
+  steps.decided = [&plan, decided] {
+    plan.layer_count = plan.heights.table.size();
+    plan.range = {0, plan.layer_count};
+    return decided();
+  };
+}
+
 /// Makes the remaining layers. errors  of the lowest failing layer
-Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const FlowLimits& limits, Summary& summary,
+Status make_layers(Plan& plan, Maker& maker, JobChecks& checks, const FlowLimits& limits, Summary& summary,
                    const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   auto todo = maker.open();
   if (!todo) return todo.error();
   const std::vector<LayerRecord> kept = maker.kept();
   for (const LayerRecord& record : kept) maker.add_kept(record);
   summary.layers_kept = static_cast<std::uint32_t>(kept.size());
-  const std::uint32_t layers = plan.range[1] - plan.range[0];
+  std::uint32_t layers = plan.range[1] - plan.range[0];
   std::uint32_t done = layers - static_cast<std::uint32_t>(todo->size());
   progress({ProgressEvent::Stage::kLayers, done, layers});
   const Stopwatch moving;
@@ -150,22 +165,35 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
     ++summary.layers_planned;
     progress({ProgressEvent::Stage::kLayers, ++done, layers});
   };
-  const LayerSteps steps = steps_of(maker, *todo, recorded);
+  const std::function<std::uint32_t(std::uint32_t)> layer_at = [&](std::uint32_t position) {
+    return plan.undecided ? position : (*todo)[position];
+  };
+  LayerSteps steps = steps_of(maker, layer_at, recorded);
+  if (plan.undecided) {
+    stream_layers(plan, steps, [&] {
+      layers = plan.layer_count;
+      count_layers(plan, summary);
+      checks.count_layers();
+      return maker.start();
+    });
+  }
   const bool shared = !kept.empty() || plan.job.shard;
   FlowReport report;
-  const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
+  const std::uint32_t count = plan.undecided ? plan.undecided->max_layers() : static_cast<std::uint32_t>(todo->size());
+  const Status moved = flow_layers(count, steps, limits, cancel, report);
   if (!moved) return ended_early(maker, moved.error(), done > 0, shared);
-  if (Status status = judge(plan, maker, sanity, shared, summary); !status) {
+  if (Status status = check_job(plan, maker, checks, shared, summary); !status) {
     return cut_short(status) ? ended_early(maker, status.error(), done > 0, shared) : status;
   }
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0, shared);
   const Elapsed moved_in = moving.elapsed();
   summary.layer_seconds = moved_in.wall;
-  summary.step_seconds = report.step_seconds;
-  summary.most_layers_in_flight = report.most_in_flight;
-  summary.peak_layer_bytes = report.most_bytes;
+  for (const NodeTime& step : std::span(report.nodes).last(steps.steps.size() + 1))
+    summary.step_seconds.emplace_back(step.name, step.busy.wall);
+  summary.max_layers_in_flight = report.max_in_flight;
+  summary.peak_layer_bytes = report.max_bytes;
   summary.oversized_layers = report.oversized;
-  if (summary.timing) tell_flow(report, moved_in, *summary.timing);
+  if (summary.timing) report_flow(report, moved_in, *summary.timing);
   return {};
 }
 
@@ -180,7 +208,8 @@ std::shared_ptr<Timing> timing_of(const Plan& plan, const Elapsed& before) {
 }
 
 /// Measures the least that any program would need for the same.
-void tell_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary, Timing& timing) {
+void report_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary,
+                  Timing& timing) {
   std::vector<std::string> parts;
   for (const PartSummary& part : plan.scene->parts) parts.push_back(part.path);
   timing.floor.bytes_written = summary.bytes_written;
@@ -188,8 +217,8 @@ void tell_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& c
   timing.floor.crossings = maker.crossings();
   std::error_code error;
   const bool is_folder = std::filesystem::is_directory(plan.job.output, error);
-  const std::string beside = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
-  if (Status status = write::measure_floor(parts, beside, cancel, timing.floor); !status)
+  const std::string neighbour = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
+  if (Status status = formats::measure_floor(parts, neighbour, cancel, timing.floor); !status)
     timing.not_measured = status.error().message;
 }
 
@@ -208,32 +237,33 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (!resolved.job.dry_run) {
     if (Status status = check_output_of(resolved); !status) return status.error();
   }
-  const auto plan = make_plan(std::move(resolved), progress);
+  resolved.streams_layers = true;
+  auto plan = make_plan(std::move(resolved), progress);
   if (!plan) return plan.error();
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
 
   const Job& job = plan->job;
-  if (Status status = sanity::refuse_warnings(plan->warnings); job.strict && !status) return status.error();
+  if (Status status = checks::refuse_warnings(plan->warnings); job.strict && !status) return status.error();
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
-  limits.most_in_flight = layers_in_flight();
+  limits.max_in_flight = layers_in_flight();
   limits.processor_times = job.timing;
-  limits.record_slots = 2 * limits.most_in_flight;  // some layers wait for an older one, in a single file with their scratch
-  if (product != Product::kImages) limits.most_in_flight = limits.record_slots;
+  limits.record_slots = 2 * limits.max_in_flight;  // some layers wait for an older one, in a single file with their scratch
+  if (product != Product::kImages) limits.max_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
   if (job.timing) summary.timing = timing_of(*plan, {before, before});
-  Sanity sanity(*plan, cancel);
-  const std::unique_ptr<Maker> maker = make_maker(*plan, sanity, limits);
+  JobChecks checks(*plan, cancel);
+  const std::unique_ptr<Maker> maker = make_maker(*plan, checks, limits);
   if (job.dry_run && !maker->times_dry_runs()) {
     for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, maker->bytes_of(i));
     }
-  } else if (Status status = make_layers(*plan, *maker, sanity, limits, summary, progress, cancel); !status) {
+  } else if (Status status = make_layers(*plan, *maker, checks, limits, summary, progress, cancel); !status) {
     return status.error();
   }
-  maker->tell(summary);
+  maker->report(summary);
   summary.peak_resident_bytes = peak_resident_bytes();
-  if (summary.timing) tell_floor(*plan, *maker, cancel, summary, *summary.timing);
+  if (summary.timing) report_floor(*plan, *maker, cancel, summary, *summary.timing);
   return summary;
 }
 

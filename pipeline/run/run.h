@@ -7,7 +7,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/plan/progress.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/report/summary.h"
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 

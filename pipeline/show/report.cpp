@@ -10,26 +10,24 @@
 #include <span>
 
 #include "pipeline/job/file.h"
-#include "pipeline/run/job_cost.h"
+#include "pipeline/report/job_cost.h"
 #include "pipeline/show/report_cast.h"
-#include "pipeline/show/report_doubts.h"
+#include "pipeline/show/report_head.h"
+#include "pipeline/show/report_locations.h"
 #include "pipeline/show/report_source.h"
-#include "stages/data/input/hash.h"
+#include "pipeline/show/report_warnings.h"
 #include "stages/geometry/coverage.h"
+#include "stages/support/hash/hash.h"
 #include "stages/view/depth.h"
-#include "stages/write/report/head.h"
-#include "stages/write/report/page.h"
-#include "stages/write/report/places.h"
-#include "stages/write/report/run_code.h"
+#include "stages/view/report/page.h"
+#include "stages/view/report/run_code.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using write::report::HeldLayers;
-using write::report::LayersSeen;
-using write::report::PageData;
-using write::report::ShownView;
+using view::report::HeldLayers;
+using view::report::PageData;
 
 constexpr std::uint32_t kChunk = 64;  // layers read in parallel
 
@@ -42,17 +40,17 @@ Status each_layer(const ReportSource& source, bool timed, Work work, Gather gath
     const std::uint32_t end = std::min(first + kChunk, count);
     std::vector<Slot> slots(end - first);
     std::vector<Status> states(end - first);
-    tbb::parallel_for(first, end, [&](std::uint32_t place) {
-      const Result<LayerSeen> layer = source.layer(place, timed);
+    tbb::parallel_for(first, end, [&](std::uint32_t position) {
+      const Result<ReportLayer> layer = source.layer(position, timed);
       if (layer) {
-        work(place, *layer, slots[place - first]);
+        work(position, *layer, slots[position - first]);
       } else {
-        states[place - first] = layer.error();
+        states[position - first] = layer.error();
       }
     });
-    for (std::uint32_t place = first; place < end; ++place) {
-      if (!states[place - first]) return states[place - first];
-      gather(place, slots[place - first]);
+    for (std::uint32_t position = first; position < end; ++position) {
+      if (!states[position - first]) return states[position - first];
+      gather(position, slots[position - first]);
     }
   }
   return {};
@@ -72,7 +70,7 @@ Result<std::vector<ShownView>> views_of_parts(const Scene& scene) {
   for (const auto& [name, picture] :
        {std::pair{"top", &(*pictures)[0]}, {"front", &(*pictures)[1]}, {"side", &(*pictures)[2]}}) {
     views.push_back({name, picture->width, picture->height, 0, picture->width_mm, picture->height_mm,
-                     write::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
+                     view::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
   }
   return views;
 }
@@ -80,41 +78,41 @@ Result<std::vector<ShownView>> views_of_parts(const Scene& scene) {
 std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
   std::vector<ShownView> shown;
   for (const view::DepthView& view : views.views()) {
-    shown.push_back({view.name, view.width, view.height, view.most, view.width_mm, view.height_mm,
-                     write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
+    shown.push_back({view.name, view.width, view.height, view.maximum, view.width_mm, view.height_mm,
+                     view::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
   }
   return shown;
 }
 
 /// Reads every layer; codes that fit the page go to `held`.
-Result<LayersSeen> see_layers(const ReportSource& source, ReportDoubts& doubts, HeldLayers& held) {
+Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& report_warnings, view::report::HeldLayers& held) {
   struct First {
     PixelWindow window;
     Buffer<std::byte> code;
     std::uint64_t set = 0;
     double seconds = 0;
   };
-  LayersSeen seen;
+  ReportLayers detected;
   const Status status = each_layer<First>(
       source, true,
-      [&](std::uint32_t place, const LayerSeen& layer, First& first) {
+      [&](std::uint32_t position, const ReportLayer& layer, First& first) {
         const RunsView runs = layer.runs.view();
-        doubts.look(source.manifest.layers[place].layer, runs);
+        report_warnings.inspect(source.manifest.layers[position].layer, runs);
         first.window = window_of(runs);
-        if (held.wants(place)) first.code = write::report::pack_runs(runs);
+        if (held.wants(position)) first.code = view::report::pack_runs(runs);
         for (std::size_t i = 0; i < runs.change.size(); i += 2) first.set += runs.change[i + 1] - runs.change[i];
         first.seconds = layer.seconds;
       },
-      [&](std::uint32_t place, First& first) {
-        seen.window = joined(seen.window, first.window);
-        held.add(place, std::move(first.code));
-        seen.set.push_back(first.set);
-        seen.seconds.push_back(first.seconds);
+      [&](std::uint32_t position, First& first) {
+        detected.window = joined(detected.window, first.window);
+        held.add(position, std::move(first.code));
+        detected.set.push_back(first.set);
+        detected.seconds.push_back(first.seconds);
       });
   if (!status) return status.error();
-  seen.warnings = doubts.tell(seen.set);
-  if (seen.window.empty()) seen.window = {0, source.grid.columns(), 0, source.grid.rows()};
-  return seen;
+  detected.warnings = report_warnings.report(detected.set);
+  if (detected.window.empty()) detected.window = {0, source.grid.columns(), 0, source.grid.rows()};
+  return detected;
 }
 
 /// Views of the parts from their layers, for missing part files: a second pass over all layers.
@@ -124,8 +122,10 @@ Result<std::vector<ShownView>> build_up(const ReportSource& source, const PixelW
   view::ThreeViews built(source.grid, window, lowest.bottom, highest.bottom + highest.thickness);
   const Status status = each_layer<std::vector<std::uint8_t>>(
       source, false,
-      [&](std::uint32_t, const LayerSeen& layer, std::vector<std::uint8_t>& cells) { built.look(layer.runs.view(), cells); },
-      [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { built.add(layers[place].layer, cells); });
+      [&](std::uint32_t, const ReportLayer& layer, std::vector<std::uint8_t>& cells) {
+        built.inspect(layer.runs.view(), cells);
+      },
+      [&](std::uint32_t position, const std::vector<std::uint8_t>& cells) { built.add(layers[position].layer, cells); });
   if (!status) return status.error();
   return views_of_layers(built);
 }
@@ -153,40 +153,40 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   } else {
     report.without_parts = shown.error().message;
   }
-  ReportDoubts doubts(manifest, job, source->machine ? &*source->machine : nullptr, parts ? &*parts : nullptr);
+  ReportWarnings report_warnings(manifest, job, source->machine ? &*source->machine : nullptr, parts ? &*parts : nullptr);
 
   // Reserves room for the layers' lines and the rest of the page.
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();
-  taken += options.laid_svg.size() / 3 * 4;
+  taken += options.deposited_svg.size() / 3 * 4;
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
-  auto seen = see_layers(*source, doubts, held);
-  if (!seen) return seen.error();
-  write::report::add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *seen);
-  seen->laid = options.laid;
-  seen->laid_svg = options.laid_svg;
+  auto detected = see_layers(*source, report_warnings, held);
+  if (!detected) return detected.error();
+  add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
+  detected->deposited = options.deposited;
+  detected->deposited_svg = options.deposited_svg;
   if (source->machine) {
     JobCost cost(*source->machine, manifest);
     for (std::size_t i = 0; i < manifest.layers.size(); ++i)
       cost.add(manifest.layers[i], manifest.layers[i].program.drops + manifest.layers[i].program.spat,
-               std::llround(1e6 * seen->seconds[i]));
-    seen->quote = cost.account().rows();
-    seen->sweeps = sweeps_of_job(folder.string(), manifest);
+               std::llround(1e6 * detected->seconds[i]));
+    detected->quote = cost.rows();
+    detected->sweeps = sweeps_of_job(folder.string(), manifest);
   }
   if (views.empty()) {
-    auto built = build_up(*source, seen->window);
+    auto built = build_up(*source, detected->window);
     if (!built) return built.error();
     views = std::move(*built);
   }
-  const std::string head = write::report::head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file},
-                                                    source->grid, *seen, held, views);
+  const std::string head =
+      head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file}, source->grid, *detected, held, views);
   std::vector<PageData> data;
   for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
-  for (auto& [place, code] : held.layers()) data.push_back({fmt::format("r{}", place), std::move(code)});
+  for (auto& [position, code] : held.layers()) data.push_back({fmt::format("r{}", position), std::move(code)});
   report.layers = static_cast<std::uint32_t>(manifest.layers.size());
   report.held = static_cast<std::uint32_t>(held.layers().size());
   report.stride = held.stride();
-  report.page = write::report::make_page("lamina: " + write::report::page_title(manifest.head), head, data);
+  report.page = view::report::make_page("lamina: " + page_title(manifest.head), head, data);
   return report;
 }
 

@@ -12,8 +12,8 @@ namespace lamina::pipeline {
 struct ReportOptions {
   std::uint64_t size_limit = 19'000'000;  // bytes of the page; layers are omitted evenly to stay below it
   std::vector<std::string> parts;         // folders or files to search first for the parts
-  std::string laid;                       // lines on what toolpaths leave open, a section of the page; "" for none
-  std::string laid_svg;                   // a picture of it; "" for none
+  std::string deposited;                  // lines on what toolpaths leave open, a section of the page; "" for none
+  std::string deposited_svg;              // a picture of it; "" for none
 };
 
 struct Report {

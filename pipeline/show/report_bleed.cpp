@@ -26,7 +26,7 @@ std::unique_ptr<ReportBleed> ReportBleed::make(const Manifest& manifest, const J
 }
 
 // What cannot be made again is not told.
-void ReportBleed::look(const Layer& layer) {
+void ReportBleed::inspect(const Layer& layer) {
   const LayerImager imager(plan_);
   ImageWork& work = work_.local();
   LayerRecord record;
@@ -37,10 +37,10 @@ void ReportBleed::look(const Layer& layer) {
     vanished_[layer.index - layers_.front().index] = notes.vanished;
 }
 
-void ReportBleed::tell(std::vector<Warning>& warnings) const {
-  inspect::VanishCount count;
+void ReportBleed::report(std::vector<Warning>& warnings) const {
+  checks::VanishCount count;
   for (std::size_t i = 0; i < layers_.size(); ++i) count.add(layers_[i], vanished_[i]);
-  count.tell(plan_.images->grid, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror), warnings);
+  count.report(plan_.images->grid, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror), warnings);
 }
 
 }  // namespace lamina::pipeline

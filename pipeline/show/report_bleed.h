@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/image_maker.h"
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/run/layer_imager.h"
 
 namespace lamina::pipeline {
 
@@ -19,15 +19,15 @@ class ReportBleed {
                                            const Scene& scene);
 
   /// Makes a layer as it was before the bleed, and moves its edges; from many threads at once.
-  void look(const Layer& layer);
-  void tell(std::vector<Warning>& warnings) const;
+  void inspect(const Layer& layer);
+  void report(std::vector<Warning>& warnings) const;
 
  private:
   ReportBleed() = default;
 
   Plan plan_;
   std::vector<Layer> layers_;
-  std::vector<inspect::VanishedPieces> vanished_;  // by layer
+  std::vector<checks::VanishedPieces> vanished_;  // by layer
   tbb::enumerable_thread_specific<ImageWork> work_;
 };
 

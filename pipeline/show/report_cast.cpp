@@ -51,11 +51,11 @@ Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const st
   return scene;
 }
 
-Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t most) {
+Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t maximum) {
   const Result<view::Caster> caster = view::Caster::build(scene.meshes, scene.instances);
   if (!caster) return caster.error();
-  return std::array{caster->look(view::Side::kTop, most), caster->look(view::Side::kFront, most),
-                    caster->look(view::Side::kRight, most)};
+  return std::array{caster->render(view::ViewSide::kTop, maximum), caster->render(view::ViewSide::kFront, maximum),
+                    caster->render(view::ViewSide::kRight, maximum)};
 }
 
 }  // namespace lamina::pipeline

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/status.h"
 #include "stages/view/cast.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
@@ -21,6 +21,6 @@ namespace lamina::pipeline {
 Result<Scene> find_parts(const ManifestHead& head, const Job& job, const std::vector<std::string>& folders);
 
 /// Parts from above, from the front and from the right, `most` pixels along the longest side of all.
-Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t most);
+Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t maximum);
 
 }  // namespace lamina::pipeline

@@ -8,9 +8,9 @@
 #include <span>
 
 #include "pipeline/check/job_files.h"
-#include "stages/data/input/hash.h"
+#include "stages/formats/gcode/read_gcode.h"
 #include "stages/raster/beads.h"
-#include "stages/read/gcode.h"
+#include "stages/support/hash/hash.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,20 +23,20 @@ Error wrong(const std::string& path, std::string_view what) {
 
 Error changed(const std::string& path) { return wrong(path, "is not the file of the manifest; lamina verify tells more"); }
 
-Result<Manifest> finished_manifest(const std::string& place, const std::string& path) {
+Result<Manifest> finished_manifest(const std::string& position, const std::string& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     if (fs::exists(path + ".part", ignored)) {
-      return wrong(place, "the job is not finished; end it with --resume, then ask for the report");
+      return wrong(position, "the job is not finished; end it with --resume, then ask for the report");
     }
-    return wrong(place,
+    return wrong(position,
                  fmt::format("no {}; name a finished directory of lamina jet (shards: run lamina merge first) or a G-code "
                              "file of lamina extrude",
                              fs::path(path).filename().string()));
   }
   Result<Manifest> manifest = read_manifest(path);
   if (!manifest) return manifest;
-  if (manifest->layers.empty()) return wrong(place, "the job has no layers");
+  if (manifest->layers.empty()) return wrong(position, "the job has no layers");
   return manifest;
 }
 
@@ -81,14 +81,14 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
     source.machine = machine->profile();
   }
   const auto manifest = std::make_shared<const Manifest>(source.manifest);
-  source.layer = [directory, manifest, machine](std::uint32_t place, bool timed) -> Result<LayerSeen> {
-    const LayerRecord& record = manifest->layers[place];
+  source.layer = [directory, manifest, machine](std::uint32_t position, bool timed) -> Result<ReportLayer> {
+    const LayerRecord& record = manifest->layers[position];
     auto runs = read_layer(directory, manifest->head, record);
     if (!runs) return runs.error();
-    if (!machine || !timed) return LayerSeen{std::move(runs->front())};
+    if (!machine || !timed) return ReportLayer{std::move(runs->front())};
     const auto seconds = seconds_of_layer(directory, manifest->head, *machine, record, *runs);
     if (!seconds) return seconds.error();
-    return LayerSeen{std::move(runs->front()), *seconds};
+    return ReportLayer{std::move(runs->front()), *seconds};
   };
   return source;
 }
@@ -100,23 +100,23 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
   if (digest->bytes != manifest.file.bytes || digest->hash != manifest.file.hash) {
     return wrong(path, "is not the file of its manifest; lamina verify tells more");
   }
-  auto opened = read::GcodeFile::open(path);
+  auto opened = formats::GcodeFile::open(path);
   if (!opened) return opened.error();
   if (opened->count() != manifest.layers.size()) {
     return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), manifest.layers.size()));
   }
-  const auto file = std::make_shared<const read::GcodeFile>(std::move(*opened));
+  const auto file = std::make_shared<const formats::GcodeFile>(std::move(*opened));
   source.grid = raster::bead_grid(file->box());
   std::vector<double> seconds;
   for (const LayerRecord& record : manifest.layers) seconds.push_back(record.paths ? record.paths->totals.seconds : 0);
-  source.layer = [file, grid = source.grid, seconds](std::uint32_t place, bool) -> Result<LayerSeen> {
-    const auto layer = file->layer(place);
+  source.layer = [file, grid = source.grid, seconds](std::uint32_t position, bool) -> Result<ReportLayer> {
+    const auto layer = file->layer(position);
     if (!layer) return layer.error();
     raster::BeadRaster beads(grid);
     beads.add(layer->beads, {file->box().lo.x, file->box().lo.y});
-    LayerSeen seen{{}, seconds[place]};
-    beads.runs(seen.runs);
-    return seen;
+    ReportLayer detected{{}, seconds[position]};
+    beads.runs(detected.runs);
+    return detected;
   };
   return source;
 }

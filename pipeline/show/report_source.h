@@ -6,15 +6,15 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
-struct LayerSeen {
+struct ReportLayer {
   Runs runs;           // all materials as one image; toolpaths as the area of their beads
   double seconds = 0;  // estimated machine time; 0 without a machine
 };
@@ -26,7 +26,7 @@ struct ReportSource {
   std::optional<Machine> machine;  // that the job's programs are for
   /// A layer, by its place in the manifest; for any thread. timed: with the machine's seconds
   /// errors  kVerification: a file that is missing or differs from the manifest, a program that prints a different image
-  std::function<Result<LayerSeen>(std::uint32_t place, bool timed)> layer;
+  std::function<Result<ReportLayer>(std::uint32_t position, bool timed)> layer;
 };
 
 /// path  a directory of lamina jet, or a G-code file of lamina extrude with its manifest beside it

@@ -6,16 +6,16 @@
 #include <memory>
 
 #include "pipeline/job/file.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
 #include "stages/view/bead_shapes.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 namespace {
 
-Result<LayerShapes> gcode_shapes(const read::GcodeFile& file, const std::string& name, std::uint32_t index) {
-  const Result<read::GcodeLayer> layer = file.layer(index);
+Result<LayerShapes> gcode_shapes(const formats::GcodeFile& file, const std::string& name, std::uint32_t index) {
+  const Result<formats::GcodeLayer> layer = file.layer(index);
   if (!layer) return layer.error();
   LayerShapes shapes;
   shapes.index = index;
@@ -24,7 +24,7 @@ Result<LayerShapes> gcode_shapes(const read::GcodeFile& file, const std::string&
   if (Status status = view::add_beads(layer->beads, file.types(), shapes); !status) return status.error();
   shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", name, index, file.count(), mm(shapes.z));
   shapes.caption = fmt::format("{} moves, {:.1f} mm{}", layer->beads.size(), view::length_mm(layer->beads),
-                               file.tells_widths() ? "" : fmt::format(", widths by {:g} mm filament", file.filament_mm()));
+                               file.states_widths() ? "" : fmt::format(", widths by {:g} mm filament", file.filament_mm()));
   return shapes;
 }
 
@@ -39,7 +39,7 @@ struct SlicedJob {
 };
 
 Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
-  const std::uint32_t count = job.plan.layer_count, place = index - job.manifest.head.first_layer;
+  const std::uint32_t count = job.plan.layer_count, position = index - job.manifest.head.first_layer;
   if (index >= count) {
     return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count - 1)};
   }
@@ -51,7 +51,7 @@ Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
   shapes.contours = std::move(work.contours.contours);
   const double area = square_mm(doubled_area(shapes.contours));
   const std::vector<LayerRecord>& recorded = job.manifest.layers;
-  const PathFacts* written = place < recorded.size() ? recorded[place].paths.get() : nullptr;
+  const PathFacts* written = position < recorded.size() ? recorded[position].paths.get() : nullptr;
   if (written != nullptr &&
       (written->points != shapes.contours.point.size() || written->area_mm2 != area || written->paths != work.paths.size())) {
     return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
@@ -68,16 +68,15 @@ Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
 
 }  // namespace
 
-Result<view::LayerSeries> gcode_series(const std::string& path, const read::GcodeOptions& options) {
-  auto file = read::GcodeFile::open(path, options);
+Result<view::LayerSeries> gcode_series(const std::string& path, const formats::GcodeOptions& options) {
+  auto file = formats::GcodeFile::open(path, options);
   if (!file) return file.error();
   view::LayerSeries series;
   series.name = std::filesystem::path(path).filename().string();
   series.last = series.count = file->count();
   for (const std::string& note : file->notes()) series.notes.push_back(path + ": " + note);
-  series.layer = [file = std::make_shared<const read::GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
-    return gcode_shapes(*file, name, index);
-  };
+  series.layer = [file = std::make_shared<const formats::GcodeFile>(std::move(*file)),
+                  name = series.name](std::uint32_t index) { return gcode_shapes(*file, name, index); };
   return series;
 }
 

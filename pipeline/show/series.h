@@ -4,14 +4,14 @@
 #include <string>
 
 #include "stages/data/status.h"
-#include "stages/read/gcode.h"
-#include "stages/view/shapes.h"
+#include "stages/formats/gcode/read_gcode.h"
+#include "stages/view/bead_shapes.h"
 
 namespace lamina::pipeline {
 
 /// Layers of a file from lamina extrude or another slicer: beads by type, at true width, with a shade per width.
-/// errors  of read::GcodeFile
-Result<view::LayerSeries> gcode_series(const std::string& path, const read::GcodeOptions& options = {});
+/// errors  of formats::GcodeFile
+Result<view::LayerSeries> gcode_series(const std::string& path, const formats::GcodeOptions& options = {});
 
 /// The job of lamina slice in a directory (job.toml), planned again from its parts.
 /// errors  kUsage; kInput: an unreadable part. Of a layer: kUsage: no layer of that number; kVerification: a changed part

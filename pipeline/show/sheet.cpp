@@ -6,15 +6,15 @@
 #include <filesystem>
 #include <numeric>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/show/series.h"
 #include "pipeline/show/swath.h"
-#include "stages/data/text/readable.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/picture/canvas.h"  // have_font
-#include "stages/write/picture/contact_sheet.h"
-#include "stages/write/picture/plan_view.h"
-#include "stages/write/svg/drawing.h"
+#include "stages/formats/images/image.h"
+#include "stages/formats/svg/drawing.h"
+#include "stages/support/text/readable.h"
+#include "stages/view/picture/canvas.h"  // have_font
+#include "stages/view/picture/contact_sheet.h"
+#include "stages/view/picture/plan_view.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -42,8 +42,9 @@ std::string title_of(const ManifestHead& head) {
   std::string title = parts.empty() ? "" : parts + "   |   ";
   title += fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm", head.layer_count, head.grid.x.dpi(),
                        head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
-  if (const int most = head.most_of_pixel(); most > 1)
-    title += head.most_drops > 0 ? fmt::format("   |   darkest {} drops", most) : fmt::format("   |   darkest level {}", most);
+  if (const int maximum = head.max_of_pixel(); maximum > 1)
+    title +=
+        head.max_drops > 0 ? fmt::format("   |   darkest {} drops", maximum) : fmt::format("   |   darkest level {}", maximum);
   return title;
 }
 
@@ -66,7 +67,7 @@ Result<Preview> draw_series_sheet(const view::LayerSeries& series, const Preview
     layer->caption = fmt::format("z {:.3f} mm", mm(layer->z));
     return layer;
   };
-  auto picture = write::picture::plan_sheet(title, chosen->size(), box, request.width.value_or(kSheetWidth), captioned);
+  auto picture = view::picture::plan_sheet(title, chosen->size(), box, request.width.value_or(kSheetWidth), captioned);
   if (!picture) return picture.error();
   const std::string said =
       fmt::format("{}: {} of {} layers, {}", request.output, chosen->size(), series.count, readable_bytes(picture->size()));
@@ -93,11 +94,11 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
   if (!shapes) return shapes.error();
   const std::string said = fmt::format("{}: {}", request.output, shapes->title);
   if (svg) {
-    const std::string text = write::svg::drawing(*shapes);
+    const std::string text = formats::svg::drawing(*shapes);
     const auto bytes = std::as_bytes(std::span(text));
     return Preview{{bytes.begin(), bytes.end()}, said};
   }
-  auto picture = write::picture::plan_view(*shapes, request.width.value_or(kSheetWidth));
+  auto picture = view::picture::plan_view(*shapes, request.width.value_or(kSheetWidth));
   if (!picture) return picture.error();
   return Preview{std::move(*picture), said};
 }
@@ -120,17 +121,17 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   if (!chosen) return chosen.error();
   const ManifestHead& head = manifest.head;
   const std::filesystem::path folder = request.source;
-  write::picture::SheetRequest sheet;
+  view::picture::SheetRequest sheet;
   sheet.title = title_of(head);
   sheet.grid = head.grid;
-  sheet.most = head.most_of_pixel();
+  sheet.maximum = head.max_of_pixel();
   sheet.whole_bed = request.whole_bed;
   sheet.width = request.width.value_or(kSheetWidth);
   for (const std::size_t index : *chosen) {
     const LayerRecord& record = manifest.layers[index];
     const auto images = layer_images(head, record);
     for (std::size_t first = 0; first < images.size(); first += head.drop_images()) {  // of each material
-      write::picture::SheetLayer cell;
+      view::picture::SheetLayer cell;
       for (std::size_t drop = 0; drop < head.drop_images(); ++drop)
         cell.paths.push_back((folder / images[first + drop].name).string());
       cell.warns = images[first].record.unfed_pixels > 0;
@@ -141,14 +142,14 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
       sheet.layers.push_back(std::move(cell));
     }
   }
-  const auto read_levels = [&](const std::string& path) { return read::image_levels(path, head.full_level()); };
-  auto picture = write::picture::contact_sheet(sheet, read_levels);
+  const auto read_levels = [&](const std::string& path) { return formats::image_levels(path, head.full_level()); };
+  auto picture = view::picture::contact_sheet(sheet, read_levels);
   if (!picture) return picture.error();
   const std::size_t made = manifest.layers.size(), all = head.layer_count;
   Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,
                                                    made == all ? "" : fmt::format(" that are there, of {}", all))};
   preview.said += readable_bytes(preview.bytes.size());
-  if (!write::picture::have_font()) preview.doubts.push_back("lamina: no captions: no font; install fonts-dejavu-core");
+  if (!view::picture::have_font()) preview.warnings.push_back("lamina: no captions: no font; install fonts-dejavu-core");
   return preview;
 }
 
@@ -166,7 +167,7 @@ Result<Preview> draw_preview(const PreviewRequest& request) {
     const auto series = toolpaths ? gcode_series(request.source, request.gcode) : slice_series(request.source);
     if (!series) return series.error();
     auto preview = draw_series(*series, request, ending == ".svg");
-    if (preview) preview->doubts.insert(preview->doubts.end(), series->notes.begin(), series->notes.end());
+    if (preview) preview->warnings.insert(preview->warnings.end(), series->notes.begin(), series->notes.end());
     return preview;
   }
   if (ending != ".png") {

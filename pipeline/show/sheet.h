@@ -8,7 +8,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/read/gcode.h"
+#include "stages/formats/gcode/read_gcode.h"
 #include "stages/view/choice.h"
 
 namespace lamina::pipeline {
@@ -21,13 +21,13 @@ struct PreviewRequest {
   bool whole_bed = false;              // images: the whole bed instead of the set pixels' window
   bool swath = false;                  // images: the layer during its print program
   std::optional<std::uint32_t> swath_number, step;
-  read::GcodeOptions gcode;  // for G-code alone
+  formats::GcodeOptions gcode;  // for G-code alone
 };
 
 struct Preview {
-  Buffer<std::byte> bytes;               // of the file
-  std::string said;                      // what is drawn, one line
-  std::vector<std::string> doubts = {};  // what it lacks, or may have wrong, and why; a line each
+  Buffer<std::byte> bytes;                 // of the file
+  std::string said;                        // what is drawn, one line
+  std::vector<std::string> warnings = {};  // what it lacks, or may have wrong, and why; a line each
 };
 
 /// errors  kUsage: options that do not fit the source; kVerification: missing or changed files of the job; of the readers

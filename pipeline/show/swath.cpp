@@ -7,7 +7,7 @@
 
 #include "pipeline/check/job_files.h"
 #include "stages/geometry/combine.h"
-#include "stages/write/picture/swath_view.h"
+#include "stages/view/picture/swath_view.h"
 
 namespace lamina::pipeline {
 
@@ -28,24 +28,24 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   const auto image = picture_of_layer(directory, head, *record);
   if (!image) return image.error();
   replay::StepChoice step = choice;
-  step.planes = std::max(1u, head.most_drops);
+  step.planes = std::max(1u, head.max_drops);
   const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), step, head.grid);
   if (!jetting) return jetting.error();
-  write::picture::SwathView view;
+  view::picture::SwathView view;
   view.grid = head.grid;
   view.width = width;
-  const Levels asked = times_set(*image);
-  view.image = asked;
+  const Levels requested = times_set(*image);
+  view.image = requested;
   view.fired = jetting->printed;
-  view.most = head.most_of_pixel();
+  view.maximum = head.max_of_pixel();
   view.bands = jetting->bands;
   view.nozzles = jetting->nozzles;
   view.title = fmt::format("{}, layer {}, swath {} ({} of {} that fire), step {}", head.machine, choice.layer, jetting->swath,
-                           jetting->place, jetting->sweeps, jetting->step);
+                           jetting->position, jetting->sweeps, jetting->step);
   view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", jetting->fired, jetting->drops,
                              jetting->firing, jetting->nozzles.size());
-  if (view.most > 1) view.caption += fmt::format("; darkest {} drops", view.most);
-  return write::picture::swath_picture(view);
+  if (view.maximum > 1) view.caption += fmt::format("; darkest {} drops", view.maximum);
+  return view::picture::swath_picture(view);
 }
 
 }  // namespace lamina::pipeline

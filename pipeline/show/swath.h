@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <string>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/replay/jetting.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

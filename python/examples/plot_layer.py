@@ -40,20 +40,20 @@ def main():
     words.add_argument("--dpi", type=int, default=300)
     words.add_argument("-o", "--output", default="layer.png")
     words.add_argument("--library", action="store_true", help="without matplotlib")
-    asked = words.parse_args()
+    requested = words.parse_args()
 
-    plan = lamina.plan(asked.part, {"bed.dpi": asked.dpi, "layers.thickness_mm": 0.1})
+    plan = lamina.plan(requested.part, {"bed.dpi": requested.dpi, "layers.thickness_mm": 0.1})
     bottoms = plan.heights["bottom"]
-    layer = plan[int(np.searchsorted(bottoms, round(asked.height * 1e6), side="right")) - 1]
+    layer = plan[int(np.searchsorted(bottoms, round(requested.height * 1e6), side="right")) - 1]
     print(layer)
     print(f"contours enclose {plan.contours(layer.index).area_mm2:.3f} mm2, "
           f"pixels cover {layer.set_pixels * 25.4 ** 2 / (layer.dpi[0] * layer.dpi[1]):.3f} mm2")
     try:
-        if asked.library:
+        if requested.library:
             raise ImportError
-        draw(plan, layer, asked.output)
+        draw(plan, layer, requested.output)
     except ImportError:
-        layer.save(asked.output, "png")
+        layer.save(requested.output, "png")
 
 
 if __name__ == "__main__":

@@ -21,9 +21,9 @@ std::optional<Error> too_large(const BoxRequest& box, std::int64_t bed_width, st
 
 }  // namespace
 
-Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
-                                       std::int64_t gap, bool bed_of_machine) {
-  std::vector<Place> places;
+Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
+                                               std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine) {
+  std::vector<BoxPosition> positions;
   std::int64_t x = 0, y = 0, row_depth = 0, block_width = 0;
   bool begun = false;
   for (std::uint32_t r = 0; r < requests.size(); ++r) {
@@ -40,7 +40,7 @@ Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std
                                    box.name, copy + 1, mm(from), mm(*box.at_y),
                                    mm(std::max({over_x, over_y, -from, -*box.at_y})), mm(bed_width), mm(bed_depth))};
         }
-        places.push_back({r, from, *box.at_y});
+        positions.push_back({r, from, *box.at_y});
         continue;
       }
       if (begun && x + gap + box.width > bed_width) {
@@ -57,7 +57,7 @@ Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std
                                  box.name, copy + 1, box.copies, mm(bed_width), mm(bed_depth), mm(y + box.depth - bed_depth),
                                  bed_of_machine ? "another machine" : "a larger --bed")};
       }
-      places.push_back({r, x, y});
+      positions.push_back({r, x, y});
       begun = true;
       x += box.width;
       row_depth = std::max(row_depth, box.depth);
@@ -65,12 +65,12 @@ Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std
     }
   }
   const std::int64_t right = (bed_width - block_width) / 2, back = (bed_depth - (y + row_depth)) / 2;
-  for (Place& place : places) {
-    if (requests[place.request].at_x) continue;
-    place.x += right;
-    place.y += back;
+  for (BoxPosition& position : positions) {
+    if (requests[position.request].at_x) continue;
+    position.x += right;
+    position.y += back;
   }
-  return places;
+  return positions;
 }
 
 }  // namespace lamina::arrange

@@ -20,7 +20,7 @@ struct BoxRequest {
 };
 
 /// The front left corner of one copy.
-struct Place {
+struct BoxPosition {
   std::uint32_t request;  // index of its BoxRequest
   std::int64_t x, y;      // nm
 };
@@ -35,7 +35,7 @@ struct Place {
 ///
 /// errors  kUsage if a copy does not lie within the bed: which, by how much, and what would help
 /// cost    O(copies)
-Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
-                                       std::int64_t gap, bool bed_of_machine = false);
+Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
+                                               std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine = false);
 
 }  // namespace lamina::arrange

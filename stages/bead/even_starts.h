@@ -1,10 +1,9 @@
-// stages/bead/even_starts.h: lines that begin with the flow they keep, whatever the line before left behind.
+// stages/bead/even_starts.h: lines begin with the flow they keep, regardless of the previous line.
 //
-// The melt lags (stages/bead/lag.h): behind a line that was laid faster a line begins too thick, behind a slower one too thin,
-// until the melt has forgotten, some tenths of a millimetre on. The first 0.2 mm of a line, or as much as keeps the feed
-// between a twentieth and thrice its own, are fed as much more or less as makes the flow at their end that of the line. Nothing
-// is fed standing or drawn back for it. Within a line nothing is changed: segmented lines live from the lag.
-//
+// The melt lags (stages/bead/lag.h): after a faster line a line begins too thick, after a slower one too thin, until the
+// transient has decayed after some tenths of a millimetre. The first 0.2 mm of a line, or as much as keeps the feed between a
+// twentieth and three times its own, are fed more or less such that the flow at their end is that of the line. Nothing is fed
+// or retracted for it while the head stands still. Within a line nothing is changed: segmented lines depend on the lag.
 // Assumed: travels and retractions keep what the melt holds; lines begin and end with their own speeds. Braking at ends is the
 // same for all lines, and what it leaves behind is left alone.
 #pragma once
@@ -17,7 +16,7 @@
 
 namespace lamina::bead {
 
-/// Takes the moves of a layer in the order in which they are laid. The first line of a layer is left as it is.
+/// Takes the moves of a layer in the order in which they are deposited. The first line of a layer is left as it is.
 /// cost  some ten exponentials a move
 class EvenStarts {
  public:
@@ -25,39 +24,39 @@ class EvenStarts {
   /// height   of the layer, mm
   EvenStarts(const Extruder& machine, double height_mm);
 
-  /// What is laid without this object is not known: the next line is left as it is.
+  /// Moves deposited without this object are unknown: the next line is left as it is.
   void forget() { known_ = false; }
 
-  /// Gives lay(const BeadMove&) the move, or two pieces of it.
-  /// returns  what both have laid; nothing if `lay` stops
-  template <class Lay>
-  std::optional<LaidMove> lay(const BeadMove& move, Lay&& lay) {
-    const Pieces pieces = take(move);
-    LaidMove sum{};
+  /// Calls deposit(const BeadMove&) with the move, or with two pieces of it.
+  /// returns  the sum of both; nothing if `deposit` stops
+  template <class Deposit>
+  std::optional<DepositedMove> deposit(const BeadMove& move, Deposit&& deposit) {
+    const MovePieces pieces = take(move);
+    DepositedMove sum{};
     for (int i = 0; i < pieces.count; ++i) {
-      const std::optional<LaidMove> laid = lay(pieces.move[i]);
-      if (!laid) return std::nullopt;
-      sum.length_mm += laid->length_mm;
-      sum.volume_mm3 += laid->volume_mm3;
+      const std::optional<DepositedMove> deposited = deposit(pieces.move[i]);
+      if (!deposited) return std::nullopt;
+      sum.length_mm += deposited->length_mm;
+      sum.volume_mm3 += deposited->volume_mm3;
     }
     return sum;
   }
 
  private:
-  struct Pieces {
+  struct MovePieces {
     BeadMove move[2];
     int count = 1;
   };
-  Pieces take(const BeadMove& move);
+  MovePieces take(const BeadMove& move);
   /// A move of a line that is not even yet.
-  Pieces made_even(const BeadMove& move);
+  MovePieces made_even(const BeadMove& move);
 
   double lag_;
   BeadLine line_;              // since the line is even
   double speed_ = 0;           // of the last move
   double left_ = 0, own_ = 0;  // mm3/s: the flow that runs, and that of the line, until it is even
   bool even_ = true;
-  bool known_ = false;  // whether a line was laid
+  bool known_ = false;  // whether a line was deposited
 };
 
 }  // namespace lamina::bead

@@ -11,7 +11,7 @@
 namespace lamina::bead {
 
 /// A part of a stretch on which the head accelerates evenly, with the flow at its beginning.
-struct Phase {
+struct FlowPhase {
   double length_mm, area_mm2;
   double speed_mm_s, acceleration_mm_s2;  // at the beginning; below 0 where it slows down
   double tau_s, flow_mm3_s;
@@ -26,8 +26,8 @@ struct Phase {
     if (tau_s <= 0) return followed;
     return followed + excess() * std::exp(-t / tau_s);
   }
-  /// mm3 that were laid by then: the integral of the flow, not what was fed less what is held.
-  double laid_after(double t) const {
+  /// mm3 that were deposited by then: the integral of the flow, not what was fed less what is held.
+  double deposited_after(double t) const {
     const double followed = area_mm2 * t * (speed_mm_s + acceleration_mm_s2 * (t / 2 - tau_s));
     if (tau_s <= 0) return followed;
     return followed - excess() * tau_s * std::expm1(-t / tau_s);
@@ -38,11 +38,6 @@ struct Phase {
  private:
   double excess() const { return flow_mm3_s - area_mm2 * (speed_mm_s - acceleration_mm_s2 * tau_s); }
 };
-
-/// Flow after a feed of constant flow, or none (0: a travel without retraction), for a time.
-inline double flow_after_rest(double flow_mm3_s, double fed_mm3_s, double seconds, double tau_s) {
-  return tau_s <= 0 ? fed_mm3_s : fed_mm3_s + (flow_mm3_s - fed_mm3_s) * std::exp(-seconds / tau_s);
-}
 
 /// mm3 by which a line that is fed so much comes short (below 0: has too much) because it begins with another flow. Fed in
 /// addition before the line begins, it makes a start that is right at once: the same line then begins with the flow that it

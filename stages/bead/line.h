@@ -1,17 +1,63 @@
 // stages/bead/line.h: the bead along a line, predicted while its stretches come, without keeping the line.
 //
 // What it assumes: extrusion follows motion (what is fed is the commanded cross-section x the speed of the head), the head
-// accelerates evenly (speeds.h), the melt lags (lag.h), and volume is conserved: cross-section = flow / speed. The width is
+// accelerates evenly, the melt lags (lag.h), and volume is conserved: cross-section = flow / speed. The width is
 // that of the cross-section (section.h). That material spreads along the line as well is left to spread.h.
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <span>
 
 #include "stages/bead/lag.h"
 #include "stages/bead/machine.h"
-#include "stages/bead/speeds.h"
+#include "stages/data/buffer.h"
 
 namespace lamina::bead {
+
+// --- the speed of the head along a line, decided as far ahead as it has to be and no further.
+//
+// A planner joins two segments at the slower of their two speeds: a change takes place within the faster one. Where a segment
+// is too short for that, the speed at its beginning is lower. A junction speed is final as soon as it is the same whether the
+// head stops after the last known segment or continues, so that the queue is as long as a braking distance.
+
+/// A stretch and the speeds at its two ends.
+struct Planned {
+  LineSegment segment;
+  double begin_mm_s, end_mm_s;
+  /// The highest speed within it: that of the stretch, or less where it is short.
+  double peak(double acceleration_mm_s2) const;
+};
+
+/// Takes the stretches of a line one after another.
+class SpeedPlan {
+ public:
+  explicit SpeedPlan(double acceleration_mm_s2) : acceleration_(acceleration_mm_s2) {}
+
+  /// A new line; nothing may wait. speed  that the line before joins with; faster than the first stretch: it is left at once
+  void begin(double speed_mm_s) { speed_ = speed_mm_s; }
+  void add(const LineSegment& segment) { waiting_.push_back(segment); }
+  /// The line ends with this speed. The caller then takes all queued segments.
+  bool take_last(double speed_mm_s, Planned& out);
+  /// The next stretch whose speeds are final. cost  O(stretches that wait)
+  bool take(Planned& out);
+
+  std::size_t waiting() const { return waiting_.size() - first_; }
+
+ private:
+  double end_of_first(double last_mm_s) const;
+  bool give(double end_mm_s, Planned& out);
+
+  double acceleration_, speed_ = 0;
+  Buffer<LineSegment> waiting_;
+  std::size_t first_ = 0;  // those before it were taken
+};
+
+/// The speed with which a pattern that is repeated without end begins each time.
+/// errors  none; an empty pattern has 0
+double cyclic_speed(std::span<const LineSegment> period, double acceleration_mm_s2);
+
+// ---
 
 /// A short piece of a bead, mm from where the line begins. Between its ends area and width are in proportion, within the
 /// tolerance; the volume is exact.
@@ -19,7 +65,7 @@ struct BeadPiece {
   double begin_mm, end_mm;
   double begin_area_mm2, end_area_mm2;
   double begin_width_mm, end_width_mm;
-  double volume_mm3;  // that is laid
+  double volume_mm3;  // deposited
   bool pressed;       // between nozzle and layer
 };
 
@@ -40,34 +86,32 @@ class BeadLine {
   void begin(const Joint& from);
   /// Gives the pieces of all stretches whose speeds are final, in order.
   /// stretch  an empty one is left out
-  void add(const Stretch& stretch, const TakePiece& take);
+  void add(const LineSegment& segment, const TakePiece& take);
   /// Gives the rest. speed  that the line after joins with
   /// returns  how the line ends
   Joint end(double speed_mm_s, const TakePiece& take);
 
-  double place_mm() const { return place_; }
+  double position_mm() const { return position_; }
   double seconds() const { return seconds_; }
-  double laid_mm3() const { return laid_; }
+  double deposited_mm3() const { return deposited_; }
   double fed_mm3() const { return fed_; }
-  /// What the lag holds: fed - laid = held now - held at the beginning.
-  double held_mm3() const { return machine_.tau_s * flow_; }
 
  private:
-  void lay(const Planned& planned, const TakePiece& take);
-  void lay(const Phase& phase, const TakePiece& take);
-  double step_within(const Phase& phase, double from, double step) const;
-  double width(const Phase& phase, double s) const;
+  void deposit(const Planned& planned, const TakePiece& take);
+  void deposit(const FlowPhase& phase, const TakePiece& take);
+  double step_within(const FlowPhase& phase, double from, double step) const;
+  double width(const FlowPhase& phase, double s) const;
 
   BeadMachine machine_;
   double height_, tolerance_;
   SpeedPlan plan_;
-  double place_ = 0, seconds_ = 0, laid_ = 0, fed_ = 0;
+  double position_ = 0, seconds_ = 0, deposited_ = 0, fed_ = 0;
   double flow_ = 0, speed_ = 0;
   bool pressed_ = true;
 };
 
 /// How a pattern that is repeated without end begins each time: a line that begins like this is in its steady state at once.
 /// cost  O(stretches) and three periods: the lag is linear, so that the flow after a period is a line of the flow before
-Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const Stretch> period);
+Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const LineSegment> period);
 
 }  // namespace lamina::bead

@@ -8,9 +8,9 @@ namespace lamina::cost {
 namespace {
 
 constexpr double kNlPerLitre = 1e9, kMicrosecondsPerHour = 3.6e9;
-constexpr double kMost = 9e17;  // of amounts in units; sums of a job stay within int64
+constexpr double kMax = 9e17;  // of amounts in units; sums of a job stay within int64
 
-std::int64_t whole(double amount) { return std::llround(std::clamp(amount, 0.0, kMost)); }
+std::int64_t whole(double amount) { return std::llround(std::clamp(amount, 0.0, kMax)); }
 
 }  // namespace
 
@@ -96,7 +96,7 @@ Quote Tally::quote() const {
   job.powder_cents = whole(100 * powder_price_l(cost) * spent_nl / kNlPerLitre);
 
   std::vector<std::uint64_t> pixels, drops, pixel_nm, time, fed;
-  for (const Part& part : parts_) {
+  for (const PartTotals& part : parts_) {
     pixels.push_back(part.pixels), drops.push_back(part.drops), pixel_nm.push_back(part.pixel_nm);
   }
   const auto further_time = shares(unshared_microseconds_, pixels), further_fed = shares(unshared_nl_, pixels);

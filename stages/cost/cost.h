@@ -1,7 +1,7 @@
 // stages/cost/cost.h: what a powder job uses up and costs, and what each of its parts has of that.
 //
 //      binder   (drops + spat drops x layers) x volume of a drop
-//      fed      sum over layers: dose x thickness x area of the vats, that of the bed unless told, as the powder cycle feeds
+//      fed      sum over layers: dose x thickness x area of the vats, that of the bed by default, as the powder cycle feeds
 //      it; volumes of powder are those of
 //               the bed, gaps between grains included
 //      bound    sum over layers: set pixels x area of a pixel x thickness
@@ -63,13 +63,13 @@ class Tally {
   Quote quote() const;
 
  private:
-  struct Part {
+  struct PartTotals {
     std::uint64_t pixels = 0, drops = 0, pixel_nm = 0;
     std::int64_t microseconds = 0, fed_nl = 0;
   };
   const Machine& machine_;
   double pixel_mm2_, fed_mm2_;
-  std::vector<Part> parts_;
+  std::vector<PartTotals> parts_;
   std::uint64_t drops_ = 0, pixels_ = 0, pixel_nm_ = 0;
   std::int64_t microseconds_ = 0, fed_nl_ = 0;
   std::int64_t unshared_microseconds_ = 0, unshared_nl_ = 0;

@@ -52,8 +52,8 @@ PartPixels::PartPixels(std::span<const Body> bodies, std::size_t parts, const Pi
     if (mirror_x) left = columns - std::exchange(right, columns - left);
     if (!mirror_y) front = rows - std::exchange(back, rows - front);  // the image's first row is the last of the bed
     if (groups_.size() <= body.group) groups_.resize(body.group + 1);
-    Group& group = groups_[body.group];
-    const Window window{left, right, front, back, body.box.lo.z, body.box.hi.z, body.part};
+    BodyGroup& group = groups_[body.group];
+    const BodyWindow window{left, right, front, back, body.box.lo.z, body.box.hi.z, body.part};
     if (group.bodies.empty()) group.around = window;
     group.one_part = group.one_part && body.part == group.around.part;
     group.around.left = std::min(group.around.left, left);
@@ -67,7 +67,7 @@ PartPixels::PartPixels(std::span<const Body> bodies, std::size_t parts, const Pi
 }
 
 template <class Row>
-std::uint64_t PartPixels::sum_in(const Window& window, std::uint32_t rows, const Row& row_of) {
+std::uint64_t PartPixels::sum_in(const BodyWindow& window, std::uint32_t rows, const Row& row_of) {
   std::uint64_t sum = 0;
   for (std::uint32_t r = window.top; r < std::min(window.bottom, rows); ++r) {
     const auto [row, level_of] = row_of(r);
@@ -84,10 +84,10 @@ std::uint64_t PartPixels::sum_in(const Window& window, std::uint32_t rows, const
 template <class Row>
 std::vector<std::uint64_t> PartPixels::sums(const Layer& layer, std::uint32_t rows, const Row& row_of) const {
   std::vector<std::uint64_t> sums(parts_), weights;
-  const auto reaches = [&](const Window& window) {
+  const auto reaches = [&](const BodyWindow& window) {
     return window.low <= layer.highest_plane() && window.high >= layer.lowest_plane();
   };
-  for (const Group& group : groups_) {
+  for (const BodyGroup& group : groups_) {
     if (group.bodies.empty() || !reaches(group.around)) continue;
     const std::uint64_t together = sum_in(group.around, rows, row_of);
     if (group.one_part || together == 0) {

@@ -10,17 +10,17 @@
 #include "stages/coverage/edges.h"
 #include "stages/coverage/held_bound.h"
 #include "stages/coverage/meet/meetings.h"
-#include "stages/coverage/slab_index.h"
 #include "stages/geometry/blocks/block_maker.h"
+#include "stages/geometry/interval_table.h"
 #include "stages/geometry/isa.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// A mesh, and what was found out about it once.
 struct CoveredMesh {
   std::shared_ptr<const MeshBlocks> blocks;
-  SlabIndex index;
+  IntervalTable<Nm> index;
   Suspects suspects;
   HeldBound held;
 };
@@ -28,12 +28,12 @@ struct CoveredMesh {
 struct Copy {
   std::uint32_t mesh;
   Point3 offset;
-  bool crowded;             // its box meets too many others to look at each
+  bool crowded;             // its box meets too many others to inspect each
   std::vector<Box> others;  // boxes of other copies that its own meets, nm, on the bed
 };
 
 /// Boxes that each facet of a copy is compared with.
-constexpr std::size_t kMostOthers = 64;
+constexpr std::size_t kMaxOthers = 64;
 
 bool boxes_meet(const Box& a, const Box& b) {
   return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y && a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
@@ -46,7 +46,7 @@ Box moved(const Box& box, const Point3& by) {
 }
 
 void note_other(Copy& copy, const Box& other) {
-  copy.crowded |= copy.others.size() == kMostOthers;
+  copy.crowded |= copy.others.size() == kMaxOthers;
   if (!copy.crowded) copy.others.push_back(other);
 }
 
@@ -75,7 +75,7 @@ bool is_near_others(const Copy& copy, const Triangle& facet) {
   return std::ranges::any_of(copy.others, [&](const Box& other) { return boxes_meet(box, other); });
 }
 
-/// Facets lie in the order of the mesh, and each is looked at once.
+/// Facets are in the order of the mesh, and each is read once.
 void fetch(const SlabFacet& facet) {
   const auto* bytes = reinterpret_cast<const char*>(&facet);
   for (std::size_t at = 0; at < sizeof facet; at += 64) __builtin_prefetch(bytes + at);
@@ -92,12 +92,12 @@ struct Coverage::State {
   std::vector<Copy> copies;
 
   State(const PixelGrid& pixel_grid, Rule of_rows, Isa widest)
-      : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(isa_at_most(widest)) {}
+      : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(limited_isa(widest)) {}
 
   std::uint32_t bands() const { return (grid.rows() + kBandRows - 1) / kBandRows; }
-  HeldBound::Count held_in(const Layer& layer) const;
-  void gather(const Layer& layer, LayerScratch& scratch) const;
-  void order_by_band(LayerScratch& scratch) const;
+  HeldBound::HeldCount held_in(const Layer& layer) const;
+  void gather(const Layer& layer, CoverageScratch& scratch) const;
+  void order_by_band(CoverageScratch& scratch) const;
 };
 
 Coverage::Coverage(Coverage&&) noexcept = default;
@@ -123,7 +123,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     meshes[i].blocks = blocks[i];
-    SlabIndex index(blocks[i]->bounds());
+    IntervalTable<Nm> index = heights_of(blocks[i]->bounds());
     Suspects suspects = find_suspects(*blocks[i], index, isa);
     HeldBound held(*blocks[i], suspects, grid, levels - 1);
     state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
@@ -131,20 +131,20 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   return coverage;
 }
 
-void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
+void Coverage::State::gather(const Layer& layer, CoverageScratch& scratch) const {
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
   scratch.facets.clear();
-  make_room(scratch.facets, held_in(layer).facets);
+  ensure_capacity(scratch.facets, held_in(layer).facets);
   SlabFacet taken;
-  Cluster room;
+  Cluster slack;
   for (const Copy& copy : copies) {
     const CoveredMesh& mesh = meshes[copy.mesh];
     const Point3 by = copy.offset;
     const auto moved = [&](const Point3& p) {
       return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
     };
-    mesh.index.each(bottom - by.z, top - by.z, [&](std::uint32_t c) {
-      const Cluster& cluster = mesh.blocks->cluster(c, room);
+    mesh.index.find(bottom - by.z, top - by.z - 1, [&](std::uint32_t c) {
+      const Cluster& cluster = mesh.blocks->cluster(c, slack);
       const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
       for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
         const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
@@ -158,32 +158,32 @@ void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
   }
 }
 
-void Coverage::State::order_by_band(LayerScratch& scratch) const {
+void Coverage::State::order_by_band(CoverageScratch& scratch) const {
   scratch.begins.assign(std::size_t{bands()} + 2, 0);
   for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row / kBandRows + 2];
   for (std::size_t r = 1; r < scratch.begins.size(); ++r) scratch.begins[r] += scratch.begins[r - 1];
-  make_room(scratch.order, scratch.facets.size());
+  ensure_capacity(scratch.order, scratch.facets.size());
   scratch.order.resize(scratch.facets.size());
   for (std::uint32_t i = 0; i < scratch.facets.size(); ++i)
     scratch.order[scratch.begins[scratch.facets[i].last_row / kBandRows + 1]++] = i;
 }
 
-LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& out) const {
+CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Levels& out) const {
   const State& state = *state_;
-  LayerReport report;
+  CoverageReport report;
   state.gather(layer, scratch);
   state.order_by_band(scratch);
   report.facets = static_cast<std::uint32_t>(scratch.facets.size());
   out.start(state.grid.columns());
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
-  const Slab slab{state.grid.x,
-                  state.grid.y,
-                  state.x,
-                  state.rule,
-                  {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
-                  bottom,
-                  top,
-                  scratch.facets};
+  const BandSlab slab{state.grid.x,
+                      state.grid.y,
+                      state.x,
+                      state.rule,
+                      {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
+                      bottom,
+                      top,
+                      scratch.facets};
   scratch.maker.start(slab, state.isa);
   for (std::uint32_t band = state.bands(); band-- > 0;) {
     for (std::uint32_t k = scratch.begins[band]; k < scratch.begins[band + 1]; ++k) {
@@ -204,11 +204,11 @@ LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& o
   return report;
 }
 
-HeldBound::Count Coverage::State::held_in(const Layer& layer) const {
-  HeldBound::Count held;
+HeldBound::HeldCount Coverage::State::held_in(const Layer& layer) const {
+  HeldBound::HeldCount held;
   for (const Copy& copy : copies) {
     const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
-    HeldBound::Count own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
+    HeldBound::HeldCount own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
     if (copy.crowded || !copy.others.empty()) own.runs = own.voxels, own.edges = 2 * own.voxels;  // facets may meet others
     held.facets += own.facets, held.voxels += own.voxels, held.runs += own.runs, held.edges += own.edges;
   }
@@ -217,7 +217,7 @@ HeldBound::Count Coverage::State::held_in(const Layer& layer) const {
 
 LayerBound Coverage::bound(const Layer& layer) const {
   const State& state = *state_;
-  const HeldBound::Count held = state.held_in(layer);
+  const HeldBound::HeldCount held = state.held_in(layer);
   // Samples of a row come on top where facets meet.
   const std::uint64_t columns = state.grid.columns(), rows = state.grid.rows(), facets = held.facets + held.facets / 8;
   const std::uint64_t bytes = facets * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
@@ -243,4 +243,4 @@ std::uint64_t Coverage::index_bytes() const {
 
 const PixelGrid& Coverage::grid() const { return state_->grid; }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

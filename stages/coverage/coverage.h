@@ -19,7 +19,9 @@
 #include <memory>
 #include <span>
 
-#include "stages/coverage/scratch.h"
+#include "stages/coverage/band/maker.h"
+#include "stages/coverage/slab_facet.h"
+#include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -27,15 +29,28 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
-/// What a layer told besides its levels.
-struct LayerReport {
+// --- memory of one layer in flight.
+
+/// Any layer may follow any other in it.
+struct CoverageScratch {
+  Buffer<SlabFacet> facets;             // that reach into the layer
+  Buffer<std::uint32_t> begins, order;  // facets by the band of the last row they reach: where a band's begin; indices
+  BandMaker maker;
+
+  std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + maker.bytes(); }
+};
+
+// ---
+
+/// The report of a layer in addition to its levels.
+struct CoverageReport {
   double volume_mm3 = 0;             // sum of share x voxel, before shares become levels
   std::uint32_t facets = 0;          // that reach into the layer
   std::uint64_t held_voxels = 0;     // that hold facets
   std::uint64_t sampled_voxels = 0;  // whose share is that of samples
-  std::uint64_t looked_at = 0;       // voxels whose samples were counted, for a facet in them meets another one
+  std::uint64_t inspected = 0;       // voxels whose samples were counted, for a facet in them meets another one
   std::uint64_t exact_voxels = 0;    // that rationals decided; a stretch of one share counts once
   std::uint64_t scratch_bytes = 0;
 };
@@ -49,10 +64,10 @@ struct LayerBound {
   std::uint64_t scratch_bytes = 0;  // its levels left out
 };
 
-/// Immutable once built; layers may be asked for from any number of threads.
+/// Immutable once built; any number of threads may request layers.
 class Coverage {
  public:
-  /// meshes     triangles are moved into Mesh::blocks, unless they are there: whoever indexes the meshes next shares these
+  /// meshes     triangles are moved into Mesh::blocks, unless they are there: later users of the meshes share these
   /// instances  where copies stand; every corner within the grid's bed and below kNmReach
   /// levels     2 .. 256 of them; 2, 4 and 16 are what drops come in
   /// isa        the widest instructions to use; levels are the same with any
@@ -66,7 +81,7 @@ class Coverage {
 
   /// The levels of the layer's voxels, into `out` (its capacity is reused).
   /// cost  O(facets near the layer + voxels that hold facets), no matter how large the bed is; the same bytes on any thread
-  LayerReport layer(const Layer& layer, LayerScratch& scratch, Levels& out) const;
+  CoverageReport layer(const Layer& layer, CoverageScratch& scratch, Levels& out) const;
 
   /// What the layer has at most. cost  O(copies)
   LayerBound bound(const Layer& layer) const;
@@ -81,4 +96,4 @@ class Coverage {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

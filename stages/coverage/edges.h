@@ -7,7 +7,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// nm of the edge before pixel i; that of pixel `count` ends the last one.
 constexpr std::int64_t edge(const PixelAxis& axis, std::int64_t i) { return i * axis.span / axis.dots; }
@@ -57,4 +57,4 @@ class Edges {
   Buffer<double> edge_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

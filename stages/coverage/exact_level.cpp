@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "stages/coverage/volume.h"
+#include "stages/coverage/slab_facet.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 mpq_class rational(std::int64_t whole) { return mpq_class(static_cast<long>(whole)); }
@@ -39,10 +39,10 @@ mpq_class volume_behind(const Triangle& facet, const Voxel& voxel) {
 }  // namespace
 
 std::uint32_t exact_level(const Voxel& voxel, std::int64_t winding, std::span<const SlabFacet> facets,
-                          std::span<const RowFacet> stretch, std::uint32_t column, std::uint32_t top_level) {
+                          std::span<const RowFacet> span, std::uint32_t column, std::uint32_t top_level) {
   const mpq_class whole = rational(voxel.x1 - voxel.x0) * rational(voxel.y1 - voxel.y0) * rational(voxel.z1 - voxel.z0);
   mpq_class volume = rational(winding) * whole;
-  for (const RowFacet& of_row : stretch) {
+  for (const RowFacet& of_row : span) {
     const SlabFacet& facet = facets[of_row.index];
     if (facet.edgewise || of_row.first > column) continue;
     volume += volume_behind(facet.facet, voxel);
@@ -54,4 +54,4 @@ std::uint32_t exact_level(const Voxel& voxel, std::int64_t winding, std::span<co
   return below > top_level ? top_level : static_cast<std::uint32_t>(below.get_ui());
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -7,11 +7,11 @@
 #include "stages/coverage/slab_facet.h"
 #include "stages/coverage/voxel.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// floor(share n + 1/2) within 0 .. n of a voxel of a stretch of columns with facets; before it the winding number is
 /// `winding`. stretch  facets of it; those that begin at or before the column count cost     some ten microseconds a facet
 std::uint32_t exact_level(const Voxel& voxel, std::int64_t winding, std::span<const SlabFacet> facets,
-                          std::span<const RowFacet> stretch, std::uint32_t column, std::uint32_t top_level);
+                          std::span<const RowFacet> span, std::uint32_t column, std::uint32_t top_level);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

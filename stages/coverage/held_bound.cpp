@@ -6,12 +6,12 @@
 
 #include "stages/geometry/blocks/cluster.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 constexpr double kUnit = 1024;
-constexpr std::int64_t kMostParts = 8;  // of a facet along z, each of one number a slab
-constexpr double kUsualPixels = 4;      // that layers are thick: decides alone which of two bounds a facet goes to
+constexpr std::int64_t kMaxParts = 8;  // of a facet along z, each of one number a slab
+constexpr double kUsualPixels = 4;     // that layers are thick: decides alone which of two bounds a facet goes to
 
 double along_z(const Triangle& t) {
   return std::abs((static_cast<double>(t.b.x) - t.a.x) * (static_cast<double>(t.c.y) - t.a.y) -
@@ -32,7 +32,7 @@ struct HeldBound::Facet {
   Triangle t;           // corners by height
   bool suspect;         // meets others: samples may say anything
   bool flat;            // shares that pass levels are fewer than its voxels
-  double area, levels;  // seen from above, voxels; along x, levels x nm
+  double area, levels;  // in plan view, voxels; along x, levels x nm
   double low, middle, high;
   double rise() const { return high - low; }
   /// Voxels that a way along x and one along y pass.
@@ -52,14 +52,14 @@ HeldBound::HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const Pix
     lowest = std::min<std::int64_t>(lowest, box.lo.z);
     highest = std::max<std::int64_t>(highest, box.hi.z);
   }
-  const std::size_t most = std::min(kMostSlabs, 64 + 4 * bounds.size());
+  const std::size_t maximum = std::min(kMaxSlabs, 64 + 4 * bounds.size());
   const auto slabs = [&] { return static_cast<std::size_t>((highest >> shift_) - (lowest >> shift_) + 1); };
-  while (slabs() > most) ++shift_;
+  while (slabs() > maximum) ++shift_;
   first_ = lowest >> shift_;
   slab_.resize(slabs() + 2);
-  Cluster room;
+  Cluster slack;
   for (std::uint32_t c = 0; c < bounds.size(); ++c) {
-    const Cluster& cluster = mesh.cluster(c, room);
+    const Cluster& cluster = mesh.cluster(c, slack);
     for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) add(cluster.triangle(lane), (suspects[c] >> lane & 1) != 0);
   }
   // Differences become what each slab has, and that what all below have.
@@ -138,18 +138,18 @@ void HeldBound::add_parts(const Facet& f) {
     return z < high ? 1 - (high - z) * (high - z) / (rise * (high - middle)) : 1;
   };
   const double height = std::ldexp(1.0, static_cast<int>(shift_));
-  const std::int64_t slabs = slab_of(std::int64_t{f.t.c.z} - 1) + 1 - first, parts = std::min(slabs, kMostParts);
+  const std::int64_t slabs = slab_of(std::int64_t{f.t.c.z} - 1) + 1 - first, parts = std::min(slabs, kMaxParts);
   for (std::int64_t p = 0; p < parts; ++p) {
     const std::int64_t from = first + slabs * p / parts, end = first + slabs * (p + 1) / parts;
     const double bottom = std::max(low, static_cast<double>((from + first_) << shift_));
     const double top = std::min(high, static_cast<double>((end + first_) << shift_));
-    const double most = bottom <= middle && middle <= top ? 1 : std::max(tent(bottom), tent(top));
-    const double share = end - from == 1 ? below(top) - below(bottom) : 2 * most * height / rise;
-    spread(from, end, within(std::min(1.0, share)), f.way(x, y, most));
+    const double maximum = bottom <= middle && middle <= top ? 1 : std::max(tent(bottom), tent(top));
+    const double share = end - from == 1 ? below(top) - below(bottom) : 2 * maximum * height / rise;
+    spread(from, end, within(std::min(1.0, share)), f.way(x, y, maximum));
   }
 }
 
-HeldBound::Count HeldBound::at(std::int64_t bottom, std::int64_t top) const {
+HeldBound::HeldCount HeldBound::at(std::int64_t bottom, std::int64_t top) const {
   if (slab_.empty() || top <= bottom) return {};
   const auto last_slab = static_cast<std::int64_t>(slab_.size()) - 3;
   if (slab_of(top - 1) < 0 || slab_of(bottom) > last_slab) return {};
@@ -169,4 +169,4 @@ HeldBound::Count HeldBound::at(std::int64_t bottom, std::int64_t top) const {
   return {facets, voxels, runs, std::min(2 * runs, whole(static_cast<double>(sum.rows)) + kCorners * facets)};
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -9,21 +9,21 @@
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
-/// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMostSlabs; 112 bytes a slab.
+/// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMaxSlabs; 112 bytes a slab.
 ///
-/// Seen from above, what lies of a facet in a layer is convex: of area A, width w and depth d in voxels it touches at most
-/// A + 2 w + 2 d + 4 voxels, in d + 2 rows. Twice its width is how far its border runs along x: along the facet's edges, of
+/// In plan view, the piece of a facet in a layer is convex: of area A, width w and depth d in voxels it touches at most A + 2 w
+/// + 2 d + 4 voxels, in d + 2 rows. Twice its width is how far its border runs along x: along the facet's edges, of
 /// which each slab has its share, and along the cuts with the layer's two planes, which grow evenly up to the middle corner and
 /// shrink again, as areas for each nm of height do.
 ///
-/// Of a steep facet, and of one that meets others, each voxel may be a run of levels. Along a row of a flat one shares only
-/// rise or only fall, by its area seen along x over that of the row: of levels 0 .. n they pass n times that many, and what
-/// other facets add begins or ends with them.
+/// Of a steep facet, and of one that meets others, each voxel may be a run of levels. Along a row of a flat one coverage only
+/// rises or only falls, by its area projected along x over that of the row: of levels 0 .. n it passes n times that many, and
+/// the contributions of other facets begin or end with them.
 class HeldBound {
  public:
-  struct Count {
+  struct HeldCount {
     std::uint64_t facets = 0;  // that reach into the layer
     std::uint64_t voxels = 0;  // that hold them, and as many more as there can be rows of voxels without a gap
     std::uint64_t runs = 0;    // of levels, full ones between facets too
@@ -33,11 +33,11 @@ class HeldBound {
   /// top_level  n. cost  some ten nanoseconds a facet
   HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level);
   /// Between two heights, nm in the frame of the mesh. cost  O(1)
-  Count at(std::int64_t bottom, std::int64_t top) const;
+  HeldCount at(std::int64_t bottom, std::int64_t top) const;
   std::uint64_t bytes() const { return slab_.capacity() * sizeof(Slab); }
 
  private:
-  static constexpr std::size_t kMostSlabs = 8192;
+  static constexpr std::size_t kMaxSlabs = 8192;
   static constexpr std::uint32_t kFinest = 12;  // 4 micrometres
 
   /// Voxels, or levels x nm of height, in 1024ths, so that sums do not depend on their order.
@@ -70,4 +70,4 @@ class HeldBound {
   std::vector<Slab> slab_;  // one more before the lowest, and one behind the highest
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

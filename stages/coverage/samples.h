@@ -9,12 +9,12 @@
 #include "stages/coverage/voxel.h"
 #include "stages/data/buffer.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// Counts a stretch of columns at once; keeps its buffers.
 class Samples {
  public:
-  struct Count {
+  struct SampleCount {
     std::uint16_t solid = 0;   // samples that the fill rule calls solid
     std::uint16_t others = 0;  // samples whose winding number is neither 0 nor 1
   };
@@ -23,9 +23,9 @@ class Samples {
   /// stretch  facets that reach the columns; none reaches columns outside
   /// cost     64 lines a facet, one step a column and line
   void count(const Strip& strip, const PixelAxis& columns, const Edges& edges, std::int64_t winding, FillRule fill,
-             std::span<const SlabFacet> facets, std::span<const RowFacet> stretch, std::uint32_t first, std::uint32_t end);
+             std::span<const SlabFacet> facets, std::span<const RowFacet> span, std::uint32_t first, std::uint32_t end);
 
-  const Count& at(std::uint32_t column) const { return count_[column - first_]; }
+  const SampleCount& at(std::uint32_t column) const { return count_[column - first_]; }
   bool knows(std::uint32_t column) const { return column >= first_ && column < end_; }
   void forget() { first_ = end_ = 0; }
   std::uint64_t bytes() const { return bytes_held(crossing_) + bytes_held(count_); }
@@ -44,7 +44,7 @@ class Samples {
 
   std::uint32_t first_ = 0, end_ = 0;
   Buffer<Crossing> crossing_;
-  Buffer<Count> count_;
+  Buffer<SampleCount> count_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::int64_t top, const Edges& rows,
                 SlabFacet& out) {
@@ -47,8 +47,8 @@ bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::
     last = std::max(last, out.y[i]);
   }
   if (out.corners == 0) return false;
-  out.first_row = rows.at(front + first - kRoom);
-  out.last_row = rows.at(front + last + kRoom);
+  out.first_row = rows.at(front + first - kSlack);
+  out.last_row = rows.at(front + last + kSlack);
   return true;
 }
 
@@ -62,4 +62,4 @@ double volume_behind(const SlabFacet& facet, double end) {
   return sum;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -6,7 +6,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// Samples along a side of a voxel.
 inline constexpr std::int64_t kSamples = 8;
@@ -39,4 +39,4 @@ constexpr std::uint32_t level_of_samples(std::uint32_t solid, std::uint32_t top_
   return (2 * solid * top_level + kAllSamples) / (2 * kAllSamples);
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

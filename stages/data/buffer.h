@@ -1,4 +1,4 @@
-// stages/data/buffer.h: a growable flat array that does not touch memory it is not told to write.
+// stages/data/buffer.h: a growable flat array that touches only memory that it is to write.
 #pragma once
 
 #include <cstddef>
@@ -19,12 +19,12 @@ struct UnsetAllocator : std::allocator<T> {
     using other = UnsetAllocator<U>;
   };
   template <class U>
-  void construct(U* place) noexcept(std::is_nothrow_default_constructible_v<U>) {
-    ::new (static_cast<void*>(place)) U;
+  void construct(U* position) noexcept(std::is_nothrow_default_constructible_v<U>) {
+    ::new (static_cast<void*>(position)) U;
   }
   template <class U, class... Arguments>
-  void construct(U* place, Arguments&&... arguments) {
-    ::new (static_cast<void*>(place)) U(std::forward<Arguments>(arguments)...);
+  void construct(U* position, Arguments&&... arguments) {
+    ::new (static_cast<void*>(position)) U(std::forward<Arguments>(arguments)...);
   }
 };
 

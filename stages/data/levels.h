@@ -80,9 +80,9 @@ inline std::uint64_t pixels_at(const LevelsView& image, std::uint8_t level = 0) 
 
 /// The highest level of any pixel; 0 of an empty image.
 inline std::uint8_t highest(const LevelsView& image) {
-  std::uint8_t most = 0;
-  for (const std::uint8_t level : image.level) most = most < level ? level : most;
-  return most;
+  std::uint8_t maximum = 0;
+  for (const std::uint8_t level : image.level) maximum = maximum < level ? level : maximum;
+  return maximum;
 }
 
 /// The same of the pixels that the mask sets. mask  of the same size
@@ -102,7 +102,7 @@ inline std::uint64_t sum_of_levels(const LevelsView& image, const RunsView& mask
 }
 
 /// The pixels whose level is at least `least` (> 0): the plane of the drop of that number. No branch waits for a level.
-inline void at_least(const LevelsView& image, std::uint8_t least, Runs& plane) {
+inline void threshold_levels(const LevelsView& image, std::uint8_t minimum, Runs& plane) {
   const std::uint32_t rows = image.rows();
   plane.columns = image.columns;
   plane.row_offset.resize(std::size_t{rows} + 1);
@@ -110,13 +110,14 @@ inline void at_least(const LevelsView& image, std::uint8_t least, Runs& plane) {
   std::size_t used = 0;
   for (std::uint32_t r = 0; r < rows; ++r) {
     const std::uint32_t first = image.row_offset[r], last = image.row_offset[r + 1];
-    const std::size_t most = used + 2 * std::size_t{last - first} + 1;
-    if (plane.change.size() < most) plane.change.resize(most < plane.change.capacity() ? plane.change.capacity() : 2 * most);
+    const std::size_t maximum = used + 2 * std::size_t{last - first} + 1;
+    if (plane.change.size() < maximum)
+      plane.change.resize(maximum < plane.change.capacity() ? plane.change.capacity() : 2 * maximum);
     std::uint32_t* change = plane.change.data() + used;
     std::uint32_t set = 0, end = 0;  // 1: the run before is taken; where it ends
     for (std::uint32_t i = first; i < last; ++i) {
       const std::uint32_t begin = image.change[2 * i];
-      const std::uint32_t takes = image.level[i] >= least ? 1 : 0, joined = begin == end ? takes & set : 0;
+      const std::uint32_t takes = image.level[i] >= minimum ? 1 : 0, joined = begin == end ? takes & set : 0;
       *change = end;
       change += set ^ joined;
       *change = begin;

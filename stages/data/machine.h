@@ -11,7 +11,7 @@ namespace lamina {
 
 enum class BedShape : std::uint8_t { kRectangle, kRound };
 enum class ScanAxis : std::uint8_t { kX, kY };
-/// A side of the bed as seen from above: x grows to the right, y to the back.
+/// A side of the bed in plan view: x grows to the right, y to the back.
 enum class Side : std::uint8_t { kLeft, kRight, kFront, kBack };
 /// What becomes of the pixels of a nozzle that does not fire.
 enum class BlockedRule : std::uint8_t {
@@ -49,8 +49,8 @@ struct Machine {
     std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
     double highest_frequency_hz = 5000;    // of one nozzle
     double drop_pl = 50;
-    std::uint32_t most_drops = 1;        // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
-    std::uint32_t most_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
+    std::uint32_t max_drops = 1;         // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
+    std::uint32_t max_drop_sweeps = 0;   // over one place, for several drops a pixel; 0: not stated
     std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;
     std::array<double, 2> dot_gain_um{0, 0};  // how far edges of full ink stand out of their pixels along x, y; as measured
@@ -86,7 +86,7 @@ struct Machine {
 
   struct Powder {
     std::uint32_t vats = 1;
-    std::vector<std::string> materials;  // what each vat holds; empty: whatever a job names, in that order
+    std::vector<std::string> materials;  // content of each vat; empty: those that a job names, in that order
     VatRule vat_rule = VatRule::kRefuse;
     std::string build_axis = "Z";
     std::vector<std::string> feed_axes{"A", "B"};
@@ -97,7 +97,7 @@ struct Machine {
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
     double base_mm() const { return base_layers * base_layer_mm; }
     double spread_s = 0;  // a layer's powder cycle that the program does not spell; 0: by the movements above
-    double pause_s = 0;   // a layer, beside all movements: drying, wiping
+    double pause_s = 0;   // a layer, in addition to all movements: drying, wiping
     std::array<double, 2> vat_depth_mm{0, 0};  // that each vat can feed when it is full; 0: not stated
     double vat_area_mm2 = 0;                   // of each; 0: that of the bed
     VatRefill refill = VatRefill::kRefuse;
@@ -105,14 +105,14 @@ struct Machine {
     double base_layer_mm = 0.1;                            // thickness of each
     double dry_s = 0;                                      // pause of the program behind the last sweep of each layer
     std::vector<std::string> dry_on_lines, dry_off_lines;  // the machine's own around it: a lamp
-    double roller_rpm = 0;                // of a roller that turns against its way while it spreads; 0: not told
-    double packing = 0.6;                 // share of the powder bed that is solid
-    double evaporates_percent = 0;        // of the jetted binder, before the next layer is spread
-    double least_saturation_percent = 0;  // of the voids, that binds; 0: not stated
+    double roller_rpm = 0;              // of a roller that turns against its way while it spreads; 0: not stated
+    double packing = 0.6;               // share of the powder bed that is solid
+    double evaporates_percent = 0;      // of the jetted binder, before the next layer is spread
+    double min_saturation_percent = 0;  // of the voids, that binds; 0: not stated
   } powder;
 
   /// Keeps the nozzles from drying: firing off the bed, and wiping. Positions are those of the carriage.
-  struct Care {
+  struct Maintenance {
     std::uint32_t spit_layers = 0, wipe_layers = 0;  // before the sweeps of every so many layers, from the first; 0: never
     double spit_seconds = 0, wipe_seconds = 0;       // and at most so long before the end of any sweep; 0: no limit
     std::uint32_t spit_drops = 100;                  // of each nozzle that is not blocked
@@ -124,7 +124,7 @@ struct Machine {
 
     bool spits() const { return spit_layers > 0 || spit_seconds > 0; }
     bool wipes() const { return wipe_layers > 0 || wipe_seconds > 0; }
-  } care;
+  } maintenance;
 
   /// Prices, in units of the currency; 0: none. Powder by volume is that of the bed, as fed.
   struct Cost {

@@ -19,12 +19,12 @@ namespace lamina {
 struct HeadGrid {
   PixelGrid image;
   ScanAxis scan_axis = ScanAxis::kX;
-  bool lines_from_end = false;   // line 0 is the last image row (x) or column (y)
-  bool places_from_end = false;  // place 0 is at the right (x) or at the back (y), else at the left or at the front
-  std::uint32_t lines = 0, places = 0;
+  bool lines_from_end = false;      // line 0 is the last image row (x) or column (y)
+  bool positions_from_end = false;  // place 0 is at the right (x) or at the back (y), else at the left or at the front
+  std::uint32_t lines = 0, positions = 0;
   std::uint32_t nozzles = 0, passes = 1, overlap = 0, joint_shift = 0, steps_per_pixel = 1;
   std::vector<std::uint32_t> lag;  // steps, the least is 0
-  std::uint32_t most_lag = 0;
+  std::uint32_t max_lag = 0;
   std::uint32_t head_drops = 1;   // most drops that a nozzle can fire on a pixel in one sweep
   std::uint32_t sweep_drops = 1;  // that it does at the scan's speed, within its frequency
   std::uint32_t drop_bits = 1;    // of their number in vectors: 1, 2 or 4, by head_drops
@@ -35,17 +35,17 @@ struct HeadGrid {
   BlockedRule blocked_rule = BlockedRule::kReport;
 
   // --- for reports and positions
-  double line_nm = 0, place_nm = 0;              // pitch of pixels across and along the scan
-  double angle_deg = 90;                         // between the row of nozzles and the scan
-  double lag_pixels = 0;                         // from one nozzle to the next, exactly
-  double worst_place_nm = 0, worst_line_nm = 0;  // how far a drop lands from the centre of its pixel, at most
+  double line_nm = 0, position_nm = 0;              // pitch of pixels across and along the scan
+  double angle_deg = 90;                            // between the row of nozzles and the scan
+  double lag_pixels = 0;                            // from one nozzle to the next, exactly
+  double worst_position_nm = 0, worst_line_nm = 0;  // how far a drop lands from the centre of its pixel, at most
 
-  double step_nm() const { return place_nm / steps_per_pixel; }
+  double step_nm() const { return position_nm / steps_per_pixel; }
   std::uint32_t swath_lines() const { return nozzles * passes; }
   /// Of 64 bits a vector, for one bit of the drops.
   std::uint32_t words() const { return bit_order < 64 ? (nozzles + 63) / 64 : (nozzles + 127) / 128 * 2; }
   /// Steps of a sweep over a whole line, the first one 0.
-  std::uint64_t steps() const { return (std::uint64_t{places} - 1) * steps_per_pixel + 1 + most_lag; }
+  std::uint64_t steps() const { return (std::uint64_t{positions} - 1) * steps_per_pixel + 1 + max_lag; }
   /// Swaths of a layer whose first one begins at the line `first`, before the bed's if joints are shifted.
   std::uint32_t swaths(std::int64_t first) const {
     const std::int64_t left = lines - first, all = swath_lines();
@@ -54,7 +54,7 @@ struct HeadGrid {
   /// Sweeps over a place that its drops take.
   std::uint32_t sweeps_for(std::uint32_t drops) const { return (drops + sweep_drops - 1) / sweep_drops; }
   /// The most that a layer can have.
-  std::uint32_t most_swaths() const { return swaths(0) + (joint_shift > 0 ? 1 : 0); }
+  std::uint32_t max_swaths() const { return swaths(0) + (joint_shift > 0 ? 1 : 0); }
   /// Bed coordinates in nm (x or y) of a line and of the lag-free nozzle at a step. Lines may lie outside of the bed.
   double line_position_nm(std::int64_t line) const {
     const PixelAxis& axis = scan_axis == ScanAxis::kX ? image.y : image.x;
@@ -65,8 +65,8 @@ struct HeadGrid {
   }
   double step_position_nm(double step) const {
     const PixelAxis& axis = scan_axis == ScanAxis::kX ? image.x : image.y;
-    const double near = 0.5 * place_nm + step * step_nm();
-    return places_from_end ? static_cast<double>(axis.count) * place_nm - near : near;
+    const double near = 0.5 * position_nm + step * step_nm();
+    return positions_from_end ? static_cast<double>(axis.count) * position_nm - near : near;
   }
 };
 
@@ -103,7 +103,7 @@ struct ProgramCount {
   std::uint64_t moved = 0, lost = 0;      // pixels of blocked nozzles: fired by a neighbour instead, or not at all
 };
 
-/// What the machine has to know of a layer beside its vectors.
+/// The data of a layer for the machine in addition to its vectors.
 struct LayerCycle {
   std::uint32_t layer = 0, layers = 0;
   std::int64_t bottom_nm = 0, thickness_nm = 0;

@@ -51,24 +51,24 @@ class FarField {
   }
   /// The set pixel of most energy; the first one of equals.
   LAMINA_BODY std::uint32_t tightest_cluster() const {
-    return first_of_most([](std::uint32_t energy, std::uint32_t set) { return set != 0 ? energy + 1 : 0; });
+    return first_of_largest([](std::uint32_t energy, std::uint32_t set) { return set != 0 ? energy + 1 : 0; });
   }
   /// The pixel of least energy that is not set; the first one of equals.
   LAMINA_BODY std::uint32_t largest_void() const {
-    return first_of_most([](std::uint32_t energy, std::uint32_t set) { return set != 0 ? 0 : ~energy; });
+    return first_of_largest([](std::uint32_t energy, std::uint32_t set) { return set != 0 ? 0 : ~energy; });
   }
 
  private:
   /// Row by row, so that the first of equals is looked for in one.
   template <class Value>
-  LAMINA_BODY std::uint32_t first_of_most(Value value) const {
-    std::uint32_t best = 0, most = 0;
+  LAMINA_BODY std::uint32_t first_of_largest(Value value) const {
+    std::uint32_t best = 0, maximum = 0;
     for (std::uint32_t row = 0; row < kTilePixels; row += kTileSide) {
       std::uint32_t of_row = 0;
       for (std::uint32_t i = row; i < row + kTileSide; ++i) of_row = std::max(of_row, value(energy_[i], set_[i]));
-      if (of_row > most) best = row, most = of_row;
+      if (of_row > maximum) best = row, maximum = of_row;
     }
-    while (value(energy_[best], set_[best]) != most) ++best;
+    while (value(energy_[best], set_[best]) != maximum) ++best;
     return best;
   }
 
@@ -79,7 +79,7 @@ class FarField {
 /// The same by the Gaussian, which is short: pixels are only added.
 class NearField {
  public:
-  NearField() : energy_(kTilePixels, 0), least_(kBlocks * kBlocks, 0), at_(kBlocks * kBlocks, 0) {}
+  NearField() : energy_(kTilePixels, 0), min_(kBlocks * kBlocks, 0), at_(kBlocks * kBlocks, 0) {}
 
   void add(std::uint32_t pixel) {
     const std::uint32_t column = pixel % kTileSide, row = pixel / kTileSide;
@@ -96,30 +96,29 @@ class NearField {
     constexpr std::uint32_t kReach = static_cast<std::uint32_t>(kGaussReach);
     const std::uint32_t first_x = (column - kReach) & kMask, first_y = (row - kReach) & kMask;
     for (std::uint32_t y = first_y / kBlock * kBlock; y <= first_y + 2 * kReach; y += kBlock) {
-      for (std::uint32_t x = first_x / kBlock * kBlock; x <= first_x + 2 * kReach; x += kBlock) look(x & kMask, y & kMask);
+      for (std::uint32_t x = first_x / kBlock * kBlock; x <= first_x + 2 * kReach; x += kBlock)
+        inspection(x & kMask, y & kMask);
     }
   }
   /// The pixel of least energy that is not set; the first one of equals within the first block of equals.
-  std::uint32_t largest_void() const {
-    return at_[static_cast<std::size_t>(std::ranges::min_element(least_) - least_.begin())];
-  }
+  std::uint32_t largest_void() const { return at_[static_cast<std::size_t>(std::ranges::min_element(min_) - min_.begin())]; }
 
  private:
   static constexpr std::uint32_t kSet = ~0u;
 
   /// Looks for the least energy of a block again.
-  void look(std::uint32_t left, std::uint32_t top) {
+  void inspection(std::uint32_t left, std::uint32_t top) {
     const std::uint32_t block = top / kBlock * kBlocks + left / kBlock;
-    least_[block] = kSet;
+    min_[block] = kSet;
     for (std::uint32_t y = top; y < top + kBlock; ++y) {
       for (std::uint32_t x = left; x < left + kBlock; ++x) {
-        if (energy_[y * kTileSide + x] >= least_[block]) continue;
-        least_[block] = energy_[y * kTileSide + x];
+        if (energy_[y * kTileSide + x] >= min_[block]) continue;
+        min_[block] = energy_[y * kTileSide + x];
         at_[block] = y * kTileSide + x;
       }
     }
   }
-  Energies energy_, least_;
+  Energies energy_, min_;
   std::vector<std::uint32_t> at_;
 };
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::dose {
 namespace {
@@ -23,18 +23,18 @@ std::string where(const std::vector<LayerSpan>& spans) {
 }
 
 /// As the job names it.
-std::string_view key_of(std::size_t place, const Wishes& wishes, bool core) {
-  if (place == 0) return core ? "--core-saturation" : "--saturation";
-  if (place <= wishes.ranges.size()) return "dose.saturation_range";
+std::string_view key_of(std::size_t position, const DoseTargets& targets, bool core) {
+  if (position == 0) return core ? "--core-saturation" : "--saturation";
+  if (position <= targets.ranges.size()) return "dose.saturation_range";
   return core ? "part.core_saturation_percent" : "part.saturation_percent";
 }
 
 }  // namespace
 
-void DoseFault::add(const Layer& layer, double asked_percent, double gets_percent, double asked_drops, bool worse) {
+void DoseFault::add(const Layer& layer, double requested_percent, double gets_percent, double requested_drops, bool worse) {
   const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
   if (!where.empty() && gets_percent != gets) alike = false;
-  if (where.empty() || worse) asked = asked_percent, gets = gets_percent, drops = asked_drops;
+  if (where.empty() || worse) requested = requested_percent, gets = gets_percent, drops = requested_drops;
   if (!where.empty() && (where.back().last == layer.index || where.back().last == layer.index + 1)) {
     where.back().last = layer.index + 1;
     where.back().to_nm = top;
@@ -43,27 +43,27 @@ void DoseFault::add(const Layer& layer, double asked_percent, double gets_percen
   }
 }
 
-Budget::Budget(const Binder& binder, const PixelGrid& grid, std::optional<Wishes> wishes, std::uint32_t most_drops,
-               double least_percent, const Jetting& jetting, Stretches stretches)
+Budget::Budget(const Binder& binder, const PixelGrid& grid, std::optional<DoseTargets> targets, std::uint32_t max_drops,
+               double min_percent, const Jetting& jetting, CoveredSpans covered)
     : binder_(binder),
       grid_(grid),
-      wishes_(std::move(wishes)),
-      limit_(most_drops),
-      least_percent_(least_percent),
+      targets_(std::move(targets)),
+      limit_(max_drops),
+      min_percent_(min_percent),
       jetting_(jetting),
-      stretches_(std::move(stretches)) {}
+      spans_(std::move(covered)) {}
 
 const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
-  const auto [found, fresh] = known_.try_emplace({wishes_ ? wishes_->place_of(layer, zone) : 0, layer.thickness});
+  const auto [found, fresh] = known_.try_emplace({targets_ ? targets_->target_index(layer, zone) : 0, layer.thickness});
   if (!fresh) return found->second;
   LayerDose& dose = found->second;
-  if (wishes_) {
-    dose = dose_of(layer, *wishes_, binder_, grid_, limit_, zone);
+  if (targets_) {
+    dose = dose_of(layer, *targets_, binder_, grid_, limit_, zone);
     if (!jetting_.dithered) round_drops(dose, binder_, grid_, layer.thickness);
   } else {
     dose = one_drop(jetting_.full_drops);
-    dose.gets = dose.asked = saturation_of(jetting_.full_drops, binder_, grid_, layer.thickness);
-    dose.gets_core = dose.asked_core = dose.gets * jetting_.core;
+    dose.gets = dose.requested = saturation_of(jetting_.full_drops, binder_, grid_, layer.thickness);
+    dose.gets_core = dose.requested_core = dose.gets * jetting_.core;
   }
   return dose;
 }
@@ -75,101 +75,102 @@ void Budget::survey(std::vector<ZoneBox> boxes, std::uint32_t layers) {
 
 void Budget::foresee(const Layer& layer, bool made) {
   made_ = made;
-  for (std::uint32_t zone = 0; zone < (wishes_ ? wishes_->zones() : 1); ++zone) {
-    if (!stretches_.any(zone, layer)) continue;
-    if (wishes_ && wishes_->of(layer, zone).has_formula()) {
-      const Wish& wish = wishes_->of(layer, zone);
-      const bool differ = !(wish.percent == wish.of_core());
-      if (jetting_.shell || !differ) look_at_field(layer, zone, false);
-      if (differ && (!jetting_.shell || stretches_.core(zone, layer))) look_at_field(layer, zone, true);
+  for (std::uint32_t zone = 0; zone < (targets_ ? targets_->zones() : 1); ++zone) {
+    if (!spans_.any(zone, layer)) continue;
+    if (targets_ && targets_->of(layer, zone).has_formula()) {
+      const DoseTarget& target = targets_->of(layer, zone);
+      const bool differ = !(target.percent == target.of_core());
+      if (jetting_.shell || !differ) inspect_field(layer, zone, false);
+      if (differ && (!jetting_.shell || spans_.core(zone, layer))) inspect_field(layer, zone, true);
       continue;
     }
     const LayerDose& of = dose(layer, zone);
-    const bool differ = of.asked != of.asked_core;
-    if (jetting_.shell || !differ) look_at(layer, zone, of, false, cut_);
-    if (differ && (!jetting_.shell || stretches_.core(zone, layer))) look_at(layer, zone, of, true, cut_);
+    const bool differ = of.requested != of.requested_core;
+    if (jetting_.shell || !differ) check_dose(layer, zone, of, false, cut_);
+    if (differ && (!jetting_.shell || spans_.core(zone, layer))) check_dose(layer, zone, of, true, cut_);
   }
 }
 
-void Budget::look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core, DoseFault& cut) {
-  const double asked = core ? dose.asked_core : dose.asked, gets = core ? dose.gets_core : dose.gets;
-  const Drops24 drops = core ? dose.core : dose.shell, asked_drops = core ? dose.asked_inside : dose.asked_shell;
-  const double wish = static_cast<double>(asked_drops) / static_cast<double>(kOneDrop);
-  most_drops_ = std::max(most_drops_, static_cast<std::uint32_t>((drops + kOneDrop - 1) >> kDropBits));
-  const bool unbound = gets < least_percent_ * (1 - 1e-6);
-  if (unbound) unbound_anywhere_.add(layer, asked, gets, wish, gets < unbound_anywhere_.gets);
+void Budget::check_dose(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core, DoseFault& cut) {
+  const double requested = core ? dose.requested_core : dose.requested, gets = core ? dose.gets_core : dose.gets;
+  const Drops24 drops = core ? dose.core : dose.shell, requested_drops = core ? dose.requested_inside : dose.requested_shell;
+  const double target = static_cast<double>(requested_drops) / static_cast<double>(kOneDrop);
+  max_drops_ = std::max(max_drops_, static_cast<std::uint32_t>((drops + kOneDrop - 1) >> kDropBits));
+  const bool unbound = gets < min_percent_ * (1 - 1e-6);
+  if (unbound) unbound_anywhere_.add(layer, requested, gets, target, gets < unbound_anywhere_.gets);
   if (!made_) return;
-  gets_ = seen_ ? std::pair(std::min(gets_.first, gets), std::max(gets_.second, gets)) : std::pair(gets, gets);
-  seen_ = true;
-  if (asked_drops > Drops24{limit_} << kDropBits) cut.add(layer, asked, gets, wish, asked > cut.asked);
-  if (unbound) unbound_.add(layer, asked, gets, wish, gets < unbound_.gets);
-  if (!wishes_) return;
-  const std::size_t place = wishes_->place_of(layer, zone);
-  if (drops == 0 && asked > 0) none_[{place, core}].add(layer, asked, gets, wish, false);
-  if (place > wishes_->ranges.size()) jetted_[zone] |= drops > 0 || asked > 0;
+  gets_ = any_ ? std::pair(std::min(gets_.first, gets), std::max(gets_.second, gets)) : std::pair(gets, gets);
+  any_ = true;
+  if (requested_drops > Drops24{limit_} << kDropBits) cut.add(layer, requested, gets, target, requested > cut.requested);
+  if (unbound) unbound_.add(layer, requested, gets, target, gets < unbound_.gets);
+  if (!targets_) return;
+  const std::size_t position = targets_->target_index(layer, zone);
+  if (drops == 0 && requested > 0) none_[{position, core}].add(layer, requested, gets, target, false);
+  if (position > targets_->ranges.size()) jetted_[zone] |= drops > 0 || requested > 0;
 }
 
-FieldSurvey* Budget::survey_of(const std::string& formula, std::size_t place, std::uint32_t zone) {
+FieldSurvey* Budget::survey_of(const std::string& formula, std::size_t position, std::uint32_t zone) {
   const auto found = surveys_.find({formula, zone});
   if (found != surveys_.end()) return &found->second;
   std::vector<ZoneBox> boxes;
   std::ranges::copy_if(boxes_, std::back_inserter(boxes), [&](const ZoneBox& box) { return box.zone == zone; });
-  auto made = FieldSurvey::make(formula, grid_, std::move(boxes), place > wishes_->ranges.size(), layers_);
+  auto made = FieldSurvey::make(formula, grid_, std::move(boxes), position > targets_->ranges.size(), layers_);
   if (made) return &surveys_.emplace(std::pair(formula, zone), std::move(*made)).first->second;
   if (!no_formula_) no_formula_ = Error{Fault::kUsage, made.error().message};
   return nullptr;
 }
 
-void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
-  const Wish& wish = wishes_->of(layer, zone);
-  const std::size_t place = wishes_->place_of(layer, zone);
-  const Percent& percent = core ? wish.of_core() : wish.percent;
-  FieldRange range{percent.value, percent.value, true};
-  if (!percent.formula.empty()) {
-    FieldSurvey* survey = survey_of(percent.formula, place, zone);
+void Budget::inspect_field(const Layer& layer, std::uint32_t zone, bool core) {
+  const DoseTarget& target = targets_->of(layer, zone);
+  const std::size_t position = targets_->target_index(layer, zone);
+  const Saturation& wanted = core ? target.of_core() : target.percent;
+  FieldRange range{wanted.percent, wanted.percent, true};
+  if (!wanted.formula.empty()) {
+    FieldSurvey* survey = survey_of(wanted.formula, position, zone);
     if (survey != nullptr) range = survey->in(layer);
   }
   no_number_ |= made_ && !range.each;
   if (!range.any) return;  // where it meets a part it is told
   const DropScale scale(binder_, grid_, layer.thickness);
-  const auto of = [&](double asked) {
+  const auto of = [&](double requested) {
     LayerDose dose;
-    dose.asked = dose.asked_core = asked;
-    dose.asked_shell = dose.asked_inside = scale.drops(asked);
-    dose.shell = dose.core = std::min(dose.asked_shell, Drops24{limit_} << kDropBits);
+    dose.requested = dose.requested_core = requested;
+    dose.requested_shell = dose.requested_inside = scale.drops(requested);
+    dose.shell = dose.core = std::min(dose.requested_shell, Drops24{limit_} << kDropBits);
     dose.gets = dose.gets_core = saturation_of(static_cast<double>(dose.shell) / kOneDrop, binder_, grid_, layer.thickness);
     if (!jetting_.dithered) round_drops(dose, binder_, grid_, layer.thickness);
     return dose;
   };
-  const LayerDose least = of(range.least);
-  if (made_ && least.gets < least_percent_ * (1 - 1e-6)) thin_.add(layer, least.asked, least.gets, 0, least.gets < thin_.gets);
-  look_at(layer, zone, of(range.most), core, percent.formula.empty() ? cut_ : peaks_);
+  const LayerDose minimum = of(range.minimum);
+  if (made_ && minimum.gets < min_percent_ * (1 - 1e-6))
+    thin_.add(layer, minimum.requested, minimum.gets, 0, minimum.gets < thin_.gets);
+  check_dose(layer, zone, of(range.maximum), core, wanted.formula.empty() ? cut_ : peaks_);
 }
 
 void Budget::warn_of_none(std::vector<Warning>& warnings) const {
   for (const auto& [of, fault] : none_) {
     warnings.push_back({"no-drop", fmt::format("{}: {} % is {:.2f} drops a pixel, which rounds to none in {}; leave out "
                                                "--no-dither, or ask for more",
-                                               key_of(of.first, *wishes_, of.second), number_text(fault.asked), fault.drops,
-                                               where(fault.where))});
+                                               key_of(of.first, *targets_, of.second), number_text(fault.requested),
+                                               fault.drops, where(fault.where))});
   }
   for (const auto& [zone, jetted] : jetted_) {
     if (!jetted) warnings.push_back({"no-drop", "part.saturation_percent: 0: that part stays loose powder"});
   }
 }
 
-Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
+Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
   if (!cut_.where.empty()) {
     warnings.push_back({"saturation", fmt::format("--saturation: {:.1f} % needs more than the {} drops a pixel that may be "
                                                   "jetted, {} get {:.1f} %; thinner layers or larger drops reach it",
-                                                  cut_.asked, limit_, where(cut_.where), cut_.gets)});
+                                                  cut_.requested, limit_, where(cut_.where), cut_.gets)});
   }
   if (!peaks_.where.empty()) {
     warnings.push_back(
         {"saturation", fmt::format("--saturation: the formula comes to {:.1f} % somewhere in the boxes of the parts, "
                                    "which needs more than the {} drops a pixel that may be jetted; what lies "
                                    "there gets {:.1f} %, in {}",
-                                   peaks_.asked, limit_, peaks_.gets, where(peaks_.where))});
+                                   peaks_.requested, limit_, peaks_.gets, where(peaks_.where))});
   }
   warn_of_none(warnings);
   if (no_formula_) return *no_formula_;
@@ -177,28 +178,28 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
     warnings.push_back(
         {"saturation", fmt::format("{} may get as little as {:.1f} % of their voids filled by their formula, and the "
                                    "powder binds from {} % on (powder.least_saturation_percent)",
-                                   where(thin_.where), thin_.gets, number_text(least_percent_))});
+                                   where(thin_.where), thin_.gets, number_text(min_percent_))});
   }
   const DoseFault& unbound = allow_unbound ? unbound_ : unbound_anywhere_;
   if (unbound.where.empty()) return {};
-  const std::string asked = has_wish() ? fmt::format(" where {} % is asked", number_text(unbound.asked)) : "";
+  const std::string requested = has_target() ? fmt::format(" where {} % is asked", number_text(unbound.requested)) : "";
   const std::string text = fmt::format(
       "{} get {}{:.1f} % of their voids filled{}, and the powder binds from {} % on "
       "(powder.least_saturation_percent)",
-      where(unbound.where), unbound.alike ? "" : "as little as ", unbound.gets, asked, number_text(least_percent_));
+      where(unbound.where), unbound.alike ? "" : "as little as ", unbound.gets, requested, number_text(min_percent_));
   if (!allow_unbound) {
     return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound",
-                                            has_wish() ? "--saturation" : "dose", text, has_wish() ? "a higher" : "a")};
+                                            has_target() ? "--saturation" : "dose", text, has_target() ? "a higher" : "a")};
   }
   warnings.push_back({"saturation", fmt::format("{}, parts may fall apart there", text)});
   return {};
 }
 
 void BinderCount::add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops,
-                      std::uint64_t asked_drops, std::uint64_t lost, std::uint32_t most_drops) {
-  most_drops_ = std::max(most_drops_, most_drops);
+                      std::uint64_t requested_drops, std::uint64_t lost, std::uint32_t max_drops) {
+  max_drops_ = std::max(max_drops_, max_drops);
   drops_ += drops - std::min(lost, drops);
-  asked_drops_ += asked_drops;
+  requested_drops_ += requested_drops;
   voids_pl_ += static_cast<double>(dosed_pixels) * dose::voids_pl(budget.binder(), budget.grid(), layer.thickness);
 }
 
@@ -206,30 +207,14 @@ double BinderCount::binder_ml(const Budget& budget) const {
   return static_cast<double>(drops_) * budget.binder().drop_pl * 1e-9;
 }
 
-double BinderCount::asked_percent(const Budget& budget) const {
+double BinderCount::requested_percent(const Budget& budget) const {
   const double stays = budget.binder().drop_pl * (1 - budget.binder().evaporates);
-  return voids_pl_ > 0 ? 100 * static_cast<double>(asked_drops_) * stays / voids_pl_ : 0;
+  return voids_pl_ > 0 ? 100 * static_cast<double>(requested_drops_) * stays / voids_pl_ : 0;
 }
 
 double BinderCount::reached_percent(const Budget& budget) const {
   const double stays = budget.binder().drop_pl * (1 - budget.binder().evaporates);
   return voids_pl_ > 0 ? 100 * static_cast<double>(drops_) * stays / voids_pl_ : 0;
-}
-
-std::string told(const Budget& budget, const BinderCount& count) {
-  if (!budget.has_wish()) {
-    const auto [least, most] = budget.gets();
-    const std::string share = least == most ? fmt::format("{:.1f}", most) : fmt::format("{:.1f} to {:.1f}", least, most);
-    const double core = budget.jetting().core;
-    const std::string thinned = core < 1 ? fmt::format(", of the core's {} %,", number_text(100 * core)) : "";
-    const std::string pl = number_text(budget.binder().drop_pl);
-    if (const std::uint32_t full = budget.jetting().full_drops; full > 1)
-      return fmt::format("{} drops of {} pl a full voxel fill {} % of the voids", full, pl, share);
-    return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", pl, thinned, share);
-  }
-  return fmt::format("{:.2f} % of the voids reached, {:.2f} % asked; {} drops, {:.3f} ml of binder, up to {} a pixel",
-                     count.reached_percent(budget), count.asked_percent(budget), readable_count(count.drops()),
-                     count.binder_ml(budget), count.most_drops() > 0 ? count.most_drops() : budget.most_drops());
 }
 
 }  // namespace lamina::dose

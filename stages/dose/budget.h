@@ -10,9 +10,9 @@
 
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
+#include "stages/dose/covered_spans.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/field.h"
-#include "stages/dose/stretches.h"
-#include "stages/dose/wish.h"
 
 namespace lamina::dose {
 
@@ -25,10 +25,10 @@ struct LayerSpan {
 /// Layers that have a fault in common, and the worst of them.
 struct DoseFault {
   std::vector<LayerSpan> where;
-  double asked = 0, gets = 0, drops = 0;  // per cent and drops a pixel, of the worst
-  bool alike = true;                      // all get the same
+  double requested = 0, gets = 0, drops = 0;  // per cent and drops a pixel, of the worst
+  bool alike = true;                          // all get the same
   /// worse  whether this is worse than what was found so far
-  void add(const Layer& layer, double asked_percent, double gets_percent, double asked_drops, bool worse);
+  void add(const Layer& layer, double requested_percent, double gets_percent, double requested_drops, bool worse);
 };
 
 /// How drops are jetted.
@@ -43,11 +43,11 @@ struct Jetting {
 class Budget {
  public:
   /// wishes         none: one drop a pixel
-  /// most_drops     that may be jetted on a pixel
-  /// least_percent  of the voids, that binds; 0: nobody knows
+  /// max_drops     that may be jetted on a pixel
+  /// min_percent  of the voids, that binds; 0: nobody knows
   /// stretches      where doses are needed: those of nothing are not judged
-  Budget(const Binder& binder, const PixelGrid& grid, std::optional<Wishes> wishes, std::uint32_t most_drops,
-         double least_percent, const Jetting& jetting = {true, true, 1}, Stretches stretches = {});
+  Budget(const Binder& binder, const PixelGrid& grid, std::optional<DoseTargets> targets, std::uint32_t max_drops,
+         double min_percent, const Jetting& jetting = {true, true, 1}, CoveredSpans covered = {});
 
   /// Before foresee(), of wishes that are formulas: where parts lie, and how many layers there are.
   void survey(std::vector<ZoneBox> boxes, std::uint32_t layers);
@@ -57,37 +57,37 @@ class Budget {
   void foresee(const Layer& layer, bool made = true);
 
   /// The most drops of any pixel in the layers so far.
-  std::uint32_t most_drops() const { return most_drops_; }
+  std::uint32_t max_drops() const { return max_drops_; }
 
   /// Warns of wishes that cannot be met, and of those that come to no drop.
   /// errors  kUsage: layers get less than binds, whoever makes them, and that is not allowed; a formula is none
-  Status judge(bool allow_unbound, std::vector<Warning>& warnings) const;
+  Status check(bool allow_unbound, std::vector<Warning>& warnings) const;
 
   const Binder& binder() const { return binder_; }
   const PixelGrid& grid() const { return grid_; }
   const Jetting& jetting() const { return jetting_; }
-  bool has_wish() const { return wishes_.has_value(); }
+  bool has_target() const { return targets_.has_value(); }
   /// Whether somewhere in the boxes of parts a formula is no number of per cent, or gives less than binds.
-  bool in_doubt(bool allow_unbound) const { return no_number_ || (!allow_unbound && !thin_.where.empty()); }
+  bool is_uncertain(bool allow_unbound) const { return no_number_ || (!allow_unbound && !thin_.where.empty()); }
   /// Least and most per cent that the layers get that are made.
   std::pair<double, double> gets() const { return gets_; }
 
  private:
   const LayerDose& dose(const Layer& layer, std::uint32_t zone);
-  void look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core, DoseFault& cut);
-  void look_at_field(const Layer& layer, std::uint32_t zone, bool core);
-  FieldSurvey* survey_of(const std::string& formula, std::size_t place, std::uint32_t zone);
+  void check_dose(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core, DoseFault& cut);
+  void inspect_field(const Layer& layer, std::uint32_t zone, bool core);
+  FieldSurvey* survey_of(const std::string& formula, std::size_t position, std::uint32_t zone);
   void warn_of_none(std::vector<Warning>& warnings) const;
 
   Binder binder_;
   PixelGrid grid_;
-  std::optional<Wishes> wishes_;
-  std::uint32_t limit_, most_drops_ = 0;
-  double least_percent_;
+  std::optional<DoseTargets> targets_;
+  std::uint32_t limit_, max_drops_ = 0;
+  double min_percent_;
   Jetting jetting_;
-  Stretches stretches_;
+  CoveredSpans spans_;
   std::pair<double, double> gets_{0, 0};
-  bool seen_ = false, made_ = true;                         // made: the layer that is looked at
+  bool any_ = false, made_ = true;                          // made: the layer that is looked at
   std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by place of the wish and thickness
   DoseFault peaks_;                                         // as cut_, of formulas in boxes of parts
   DoseFault cut_, unbound_, thin_;                          // thin: by places of a formula, of which none need be in a part
@@ -104,25 +104,22 @@ class Budget {
 /// Counts what layers got.
 class BinderCount {
  public:
-  /// dosed_pixels, drops, asked_drops, most_drops  of the layer's record; lost  drops that no nozzle fires
-  void add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops, std::uint64_t asked_drops,
-           std::uint64_t lost, std::uint32_t most_drops = 0);
+  /// dosed_pixels, drops, requested_drops, max_drops  of the layer's record; lost  drops that no nozzle fires
+  void add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops,
+           std::uint64_t requested_drops, std::uint64_t lost, std::uint32_t max_drops = 0);
 
   std::uint64_t drops() const { return drops_; }
   /// Of any pixel; a dithered wish plans for one more than a small part may get.
-  std::uint32_t most_drops() const { return most_drops_; }
+  std::uint32_t max_drops() const { return max_drops_; }
   double binder_ml(const Budget& budget) const;
   /// Per cent of the voids of all dosed pixels, by the wish and by the drops.
-  double asked_percent(const Budget& budget) const;
+  double requested_percent(const Budget& budget) const;
   double reached_percent(const Budget& budget) const;
 
  private:
-  std::uint64_t drops_ = 0, asked_drops_ = 0;
-  std::uint32_t most_drops_ = 0;
+  std::uint64_t drops_ = 0, requested_drops_ = 0;
+  std::uint32_t max_drops_ = 0;
   double voids_pl_ = 0;
 };
-
-/// The summary's line.
-std::string told(const Budget& budget, const BinderCount& count);
 
 }  // namespace lamina::dose

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint32_t kWords = kTileSide / 64, kStride = kWords + 1;
 static_assert(kWords == 2);
-constexpr std::size_t kRoom = 16;  // changes behind the last one of a row that are written too
+constexpr std::size_t kPadding = 16;  // changes behind the last one of a row that are written too
 constexpr unsigned kRankBits = 14, kBelowRank = kDropBits - kRankBits;
 static_assert(1u << kRankBits == kTilePixels);
 
@@ -89,19 +89,20 @@ struct RowTask {
 
 /// The places of the bits that are set in a byte, from the lowest on.
 struct SetBits {
-  std::array<std::array<std::uint8_t, 8>, 256> place{};
+  std::array<std::array<std::uint8_t, 8>, 256> position{};
   std::array<std::uint8_t, 256> count{};
 };
 constexpr SetBits kSetBits = [] {
   SetBits table;
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
     for (std::uint8_t bit = 0; bit < 8; ++bit) {
-      if ((byte >> bit & 1) != 0) table.place[byte][table.count[byte]++] = bit;
+      if ((byte >> bit & 1) != 0) table.position[byte][table.count[byte]++] = bit;
     }
   }
   return table;
 }();
-/// Write the columns `begin` + i of all bits i that are set, and up to kRoom more that do not count. return  one past the last
+/// Write the columns `begin` + i of all bits i that are set, and up to kPadding more that do not count. return  one past the
+/// last
 std::uint32_t* put_columns(std::uint32_t* change, std::uint32_t begin, std::uint64_t bits) {
   for (; bits != 0; bits &= bits - 1) *change++ = begin + static_cast<std::uint32_t>(std::countr_zero(bits));
   return change;
@@ -109,8 +110,8 @@ std::uint32_t* put_columns(std::uint32_t* change, std::uint32_t begin, std::uint
 
 #if defined(LAMINA_WIDE_KERNELS)
 LAMINA_AVX2 std::uint32_t* put_byte(std::uint32_t* change, std::uint32_t begin, std::uint64_t byte) {
-  const __m128i place = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.place[byte].data()));
-  const __m256i column = _mm256_add_epi32(_mm256_cvtepu8_epi32(place), _mm256_set1_epi32(static_cast<int>(begin)));
+  const __m128i position = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.position[byte].data()));
+  const __m256i column = _mm256_add_epi32(_mm256_cvtepu8_epi32(position), _mm256_set1_epi32(static_cast<int>(begin)));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(change), column);
   return change + kSetBits.count[byte];
 }
@@ -152,7 +153,7 @@ LAMINA_BODY std::uint32_t* row_body(const RowTask& task, std::uint32_t* change, 
     change += ends;
     set ^= ends;
     end = task.change[2 * i + 1];
-    for (std::uint32_t left = std::min(end - at, of.most);; at += 64, left -= 64) {
+    for (std::uint32_t left = std::min(end - at, of.maximum);; at += 64, left -= 64) {
       const std::uint32_t pixels = std::min(left, 64u);
       const std::uint64_t* const word = words + at / 64 % kWords;
       const std::uint64_t bits = word[0] >> (at % 64) | word[1] << 1 << (63 - at % 64);
@@ -257,8 +258,8 @@ void dither_one(const LevelsView& image, std::span<const Drops24> drops, std::ui
   std::size_t used = 0;
   for (std::uint32_t row = 0; row < rows; ++row) {
     if (image.row_offset[row] != image.row_offset[row + 1]) {
-      const std::size_t most = used + image.columns + kRoom;
-      if (result.change.size() < most) result.change.resize(std::max(most, result.change.capacity()));
+      const std::size_t maximum = used + image.columns + kPadding;
+      if (result.change.size() < maximum) result.change.resize(std::max(maximum, result.change.capacity()));
       const std::uint32_t first = image.row_offset[row];
       const RowTask task{image.change.data() + 2 * std::size_t{first}, image.level.data() + first,
                          image.row_offset[row + 1] - first, row, scratch.bits_of.data()};

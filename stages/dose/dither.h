@@ -21,8 +21,8 @@ struct DitherScratch {
   /// The pixels of a level that get a drop: in all rows the same word, or those of the tile.
   struct Bits {
     const std::uint64_t* words;
-    std::uint32_t stride;  // 0: the word is of all rows
-    std::uint32_t most;    // pixels of a run that matter: one where all are equal
+    std::uint32_t stride;   // 0: the word is of all rows
+    std::uint32_t maximum;  // pixels of a run that matter: one where all are equal
   };
   std::vector<Extra> of_level;
   std::vector<Bits> bits_of;  // a level, of dither_one()
@@ -33,7 +33,7 @@ struct DitherScratch {
 /// offset that goes through 1024 places from layer to layer, so that fractions finer than a tile can show come out right
 /// over the layers.
 /// image   levels: zones of different doses, or shares of a voxel that a part fills
-/// drops   a pixel of each level, [0] for level 0 is not looked at; each at most kMostDrops
+/// drops   a pixel of each level, [0] for level 0 is not looked at; each at most kMaxDrops
 /// layer   its number: the same for the same job
 /// cost    O(runs + changes of the result), and once a level and layer O(tile)
 void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
@@ -51,7 +51,7 @@ class Thresholds {
  public:
   /// cost  O(tile)
   void start(std::uint32_t layer);
-  /// Appends [begin, end) of a row. drops  a pixel, at most kMostDrops; cost  O(pixels) where they are not whole
+  /// Appends [begin, end) of a row. drops  a pixel, at most kMaxDrops; cost  O(pixels) where they are not whole
   void append(std::uint32_t begin, std::uint32_t end, std::uint32_t row, Drops24 drops, Levels& result) const;
   std::uint64_t bytes() const { return of_tile_.capacity() * sizeof(std::uint32_t); }
 

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/data/text/number_text.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::dose {
 namespace {
 
-constexpr std::uint64_t kMostSamples = 8'000'000;  // of a job: about a second
+constexpr std::uint64_t kMaxSamples = 8'000'000;  // of a job: about a second
 
 std::int64_t middle(const PixelAxis& axis, std::uint32_t block) {
   const std::uint32_t first = block * kBlockSide, last = std::min(axis.count - 1, first + kBlockSide - 1);
@@ -21,7 +21,7 @@ std::int64_t beyond(std::int64_t low, std::int64_t high, std::int64_t at) {
   return std::max({std::int64_t{0}, low - at, at - high});
 }
 
-bool is_percent(double value) { return value >= 0 && value <= kMostPercent; }  // no number is neither
+bool is_percent(double value) { return value >= 0 && value <= kMaxPercent; }  // no number is neither
 
 }  // namespace
 
@@ -61,11 +61,11 @@ void Field::begin_band(std::uint32_t row) {
   if (flat_) return;
   if (++stamp_ == 0) std::ranges::fill(known_, 0), stamp_ = 1;
   const std::int64_t y = middle(sheet_->grid.y, row);
-  place_[1] = mm(y);
+  position_[1] = mm(y);
   near_.clear();
-  const std::int64_t room = 2 * kBlockSide * sheet_->grid.y.span / sheet_->grid.y.dots;
+  const std::int64_t margin = 2 * kBlockSide * sheet_->grid.y.span / sheet_->grid.y.dots;
   for (const ZoneBox* box : here_) {
-    if (beyond(box->low[1], box->high[1], y) <= room) near_.push_back(box);
+    if (beyond(box->low[1], box->high[1], y) <= margin) near_.push_back(box);
   }
   if (near_.empty()) near_ = here_;
 }
@@ -74,8 +74,8 @@ Drops24 Field::evaluate(std::uint32_t column) {
   const std::size_t slot = flat_ ? 0 : column;
   if (flat_ && known_[0] == stamp_) return drops_[0];
   const std::int64_t x = middle(sheet_->grid.x, column), y = middle(sheet_->grid.y, band_);
-  place_ = {mm(x), mm(y), mm(sheet_->layer.plane())};
-  std::array<double, 3> at = place_;
+  position_ = {mm(x), mm(y), mm(sheet_->layer.plane())};
+  std::array<double, 3> at = position_;
   if (copies_) {
     const ZoneBox* own = nullptr;
     std::int64_t nearest = INT64_MAX;
@@ -90,7 +90,7 @@ Drops24 Field::evaluate(std::uint32_t column) {
   if (value && !is_percent(*value)) blame(*value, true);
   const Drops24 drops = value && is_percent(*value) ? sheet_->scale.drops(*value) : 0;
   const Drops24 gets = std::min(drops, sheet_->limit);
-  if (!fault_ && (sheet_->dithered ? gets : rounded(gets)) < sheet_->least) blame(*value, false);
+  if (!fault_ && (sheet_->dithered ? gets : rounded(gets)) < sheet_->minimum) blame(*value, false);
   known_[slot] = stamp_;
   return drops_[slot] = drops;
 }
@@ -99,15 +99,15 @@ void Field::blame(double value, bool binds) {
   if (fault_) return;
   if (std::isnan(value)) value = std::abs(value);  // written without a sign
   const std::string where = fmt::format("{} '{}': is {:.6g} % in layer {} at x {:.3f}, y {:.3f}, z {:.3f} mm", key_,
-                                        formula_->text(), value, sheet_->layer.index, place_[0], place_[1], place_[2]);
+                                        formula_->text(), value, sheet_->layer.index, position_[0], position_[1], position_[2]);
   if (binds) {
     fault_ = Error{Fault::kUsage,
-                   fmt::format("{}; it has to be a number from 0 to {:g}: put it into max(0, ...)", where, kMostPercent)};
+                   fmt::format("{}; it has to be a number from 0 to {:g}: put it into max(0, ...)", where, kMaxPercent)};
   } else {
     fault_ = Error{Fault::kUsage,
                    fmt::format("{}, and the powder binds from {} % on (powder.least_saturation_percent); give a higher "
                                "saturation, or --allow-unbound",
-                               where, number_text(sheet_->least_percent))};
+                               where, number_text(sheet_->min_percent))};
   }
 }
 
@@ -129,16 +129,16 @@ FieldRange FieldSurvey::in(const Layer& layer) {
     return !by_height || (box.low[2] < std::int64_t{layer.bottom} + layer.thickness && box.high[2] > layer.bottom);
   };
   const auto boxes = static_cast<std::uint64_t>(std::max<std::ptrdiff_t>(1, std::ranges::count_if(boxes_, met)));
-  const std::uint64_t most = std::max<std::uint64_t>(16, kMostSamples / boxes / (by_height ? layers_ : 1));
+  const std::uint64_t maximum = std::max<std::uint64_t>(16, kMaxSamples / boxes / (by_height ? layers_ : 1));
   FieldRange found;
   for (const ZoneBox& box : boxes_) {
-    if (met(box)) look(box, layer.plane(), most, found);
+    if (met(box)) inspection(box, layer.plane(), maximum, found);
   }
   if (!by_height) always_ = found;
   return found;
 }
 
-void FieldSurvey::look(const ZoneBox& box, Nm plane, std::uint64_t most, FieldRange& found) {
+void FieldSurvey::inspection(const ZoneBox& box, Nm plane, std::uint64_t maximum, FieldRange& found) {
   std::array<std::uint64_t, 2> first{}, blocks{}, samples{};
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const PixelAxis& along = axis == 0 ? grid_.x : grid_.y;
@@ -150,11 +150,11 @@ void FieldSurvey::look(const ZoneBox& box, Nm plane, std::uint64_t most, FieldRa
     blocks[axis] = block(box.high[axis]) - first[axis] + 1;
     samples[axis] = formula_.uses(axis == 0 ? "x" : "y") ? blocks[axis] : 1;
   }
-  if (samples[0] * samples[1] > most) {
-    const double side = std::sqrt(static_cast<double>(most));
+  if (samples[0] * samples[1] > maximum) {
+    const double side = std::sqrt(static_cast<double>(maximum));
     const std::size_t small = samples[0] < samples[1] ? 0 : 1, large = 1 - small;
     samples[small] = std::min(samples[small], std::max<std::uint64_t>(2, static_cast<std::uint64_t>(side)));
-    samples[large] = std::min(samples[large], std::max<std::uint64_t>(2, most / samples[small]));
+    samples[large] = std::min(samples[large], std::max<std::uint64_t>(2, maximum / samples[small]));
   }
   const auto nth = [&](std::size_t axis, std::uint64_t i) {
     const std::uint64_t at = samples[axis] == 1 ? blocks[axis] / 2 : i * (blocks[axis] - 1) / (samples[axis] - 1);
@@ -170,8 +170,8 @@ void FieldSurvey::look(const ZoneBox& box, Nm plane, std::uint64_t most, FieldRa
         found.each = false;
         continue;
       }
-      found.least = found.any ? std::min(found.least, *value) : *value;
-      found.most = found.any ? std::max(found.most, *value) : *value;
+      found.minimum = found.any ? std::min(found.minimum, *value) : *value;
+      found.maximum = found.any ? std::max(found.maximum, *value) : *value;
       found.any = true;
     }
   }

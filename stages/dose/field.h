@@ -15,16 +15,16 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/data/text/formula.h"
+#include "stages/dose/covered_spans.h"
 #include "stages/dose/saturation.h"
-#include "stages/dose/stretches.h"
+#include "stages/support/text/formula.h"
 
 namespace lamina::dose {
 
 inline constexpr std::uint32_t kBlockSide = 4;
 
 /// Most per cent that a formula may give.
-inline constexpr double kMostPercent = 10'000;
+inline constexpr double kMaxPercent = 10'000;
 
 /// A formula of x, y and z.
 Result<Formula> parse_saturation(const std::string& text);
@@ -35,9 +35,9 @@ struct Sheet {
   bool mirror_x = false, mirror_y = false;  // columns, rows run the other way
   Layer layer{};
   DropScale scale{};
-  Drops24 limit = 0;  // of a pixel
-  Drops24 least = 0;  // full pixels that get less are a fault
-  double least_percent = 0;
+  Drops24 limit = 0;    // of a pixel
+  Drops24 minimum = 0;  // full pixels that get less are a fault
+  double min_percent = 0;
   bool dithered = true;  // else what a pixel gets is rounded to whole drops
 
   /// Of an image's column, and of its row.
@@ -85,7 +85,7 @@ class Field {
   std::vector<const ZoneBox*> here_, near_;  // copies in the layer, and of them those that the band meets
   bool copies_ = false, flat_ = false;       // flat: one value in the layer
   std::uint32_t band_ = UINT32_MAX, stamp_ = 0;
-  std::array<double, 3> place_{};
+  std::array<double, 3> position_{};
   std::vector<Drops24> drops_;        // by block of the band
   std::vector<std::uint32_t> known_;  // the stamp of the band that drops_ is of
   std::optional<Error> fault_;
@@ -93,8 +93,8 @@ class Field {
 
 /// Least and most per cent that a formula gives within boxes, by samples: all blocks, or a grid of them.
 struct FieldRange {
-  double least = 0, most = 0;
-  bool any = false;  // else no sample has a number of 0 to kMostPercent
+  double minimum = 0, maximum = 0;
+  bool any = false;  // else no sample has a number of 0 to kMaxPercent
   bool each = true;  // all of them have
 };
 class FieldSurvey {
@@ -109,7 +109,7 @@ class FieldSurvey {
 
  private:
   FieldSurvey(Formula formula, const PixelGrid& grid) : formula_(std::move(formula)), grid_(grid) {}
-  void look(const ZoneBox& box, Nm plane, std::uint64_t most, FieldRange& found);
+  void inspection(const ZoneBox& box, Nm plane, std::uint64_t maximum, FieldRange& found);
 
   Formula formula_;
   PixelGrid grid_;

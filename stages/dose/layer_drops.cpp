@@ -9,7 +9,7 @@ namespace lamina::dose {
 
 std::uint64_t DropWork::bytes() const {
   std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pour.bytes() + pieces.capacity() * sizeof(ZonePiece);
-  for (const LaidPart& part : laid) total += part.bytes();
+  for (const DepositedPart& part : deposited) total += part.bytes();
   total += shared.bytes();
   for (const Field& field : fields) total += field.bytes();
   const auto add = [&](const Runs& plane) { total += bytes_held(plane.row_offset) + bytes_held(plane.change); };
@@ -21,22 +21,22 @@ std::uint64_t DropWork::bytes() const {
 }
 
 void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work) {
-  if (work.laid.empty()) {
+  if (work.deposited.empty()) {
     work.shares.start(columns);
     work.shares.row_offset.assign(std::size_t{rows} + 1, 0);
     return;
   }
   std::vector<Levels*> parts;
-  for (LaidPart& part : work.laid) parts.push_back(&part.shares);
+  for (DepositedPart& part : work.deposited) parts.push_back(&part.shares);
   share_out(parts, full, work.shared, work.shares);
 }
 
 DropBound bound_of(const DropRules& rules, const DropSizes& sizes) {
-  const std::uint64_t most = std::max(1u, rules.most_drops), rows = sizes.rows;
+  const std::uint64_t maximum = std::max(1u, rules.max_drops), rows = sizes.rows;
   // Of blue noise each pixel may differ from the one before it, by one drop: in one plane. Where it ends there is an edge.
   const std::uint64_t parted = sizes.pixels == 0 ? 0 : sizes.edges + sizes.pixels;
-  DropBound bound{sizes.edges + parted + 2, most * sizes.edges + parted + 2, 0};
-  if (rules.full == 0 && rules.most_drops == 0) return bound;
+  DropBound bound{sizes.edges + parted + 2, maximum * sizes.edges + parted + 2, 0};
+  if (rules.full == 0 && rules.max_drops == 0) return bound;
   const auto image = [&](std::uint64_t changes) { return 8 * changes + 4 * (rows + 1); };
   const auto levels = [&](std::uint64_t runs) { return 18 * runs + 8 * (rows + 1); };
   const std::uint64_t core = rules.shell.half_width.empty() ? 0 : sizes.edges;
@@ -48,16 +48,16 @@ DropBound bound_of(const DropRules& rules, const DropSizes& sizes) {
     bound.bytes += 70 * runs + 18 * core * parts + 32 * parts * (rows + 1);
     bound.bytes += 112 * std::min(sizes.columns, runs) + 36 * sizes.columns + sizeof(std::uint32_t) * kTilePixels;
   }
-  if (most == 1 && sizes.parts == 0) return bound;
+  if (maximum == 1 && sizes.parts == 0) return bound;
   // A plane is made with room for all runs of a row.
-  const std::uint64_t planes = 8 * bound.changes_of_all + most * (4 * (rows + 1) + 16 * sizes.columns);
+  const std::uint64_t planes = 8 * bound.changes_of_all + maximum * (4 * (rows + 1) + 16 * sizes.columns);
   // Drops and planes of each material, and of those up to it.
   bound.bytes += (levels(bound.changes) + planes) * (sizes.materials > 1 ? 2 + sizes.materials : 1);
   return bound;
 }
 
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work) {
-  at_least(work.shares, half_of(full), second);
+  threshold_levels(work.shares, half_of(full), second);
   const Difference found = difference(image, second);
   std::swap(image, second);
   return found;
@@ -68,7 +68,7 @@ namespace {
 /// Shell and core in work.zones, by the levels in work.shares.
 void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Runs& second, DropWork& work) {
   if (rules.shell.half_width.empty()) {
-    at_least(work.shares, 1, second);
+    threshold_levels(work.shares, 1, second);
   } else {
     erode(image, rules.shell, second);
   }
@@ -77,9 +77,9 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
 
 /// The planes of work.levels.
 void make_planes(const DropRules& rules, Runs& image, DropWork& work) {
-  work.planes.resize(rules.most_drops);
-  for (std::uint32_t drop = 0; drop < rules.most_drops; ++drop) {
-    at_least(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
+  work.planes.resize(rules.max_drops);
+  for (std::uint32_t drop = 0; drop < rules.max_drops; ++drop) {
+    threshold_levels(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
   }
   image.row_offset = work.planes[0].row_offset;
   image.change = work.planes[0].change;
@@ -87,7 +87,7 @@ void make_planes(const DropRules& rules, Runs& image, DropWork& work) {
 
 /// The planes of work.zones; of one drop a pixel the image alone.
 void dither_zones(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
-  if (rules.most_drops == 1) return dither_one(work.zones, drops, layer, work.dither, image);
+  if (rules.max_drops == 1) return dither_one(work.zones, drops, layer, work.dither, image);
   dither(work.zones, drops, layer, work.dither, work.levels);
   make_planes(rules, image, work);
 }
@@ -97,7 +97,7 @@ void dither_zones(const DropRules& rules, std::span<const Drops24> drops, std::u
 ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, Runs& image, Runs& second,
                         DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
-  const bool core = dose.asked_shell != dose.asked_inside;
+  const bool core = dose.requested_shell != dose.requested_inside;
   if (rules.full == 0) levels_of(image, 1, core ? work.shares : work.zones);
   if (core) {
     mark_shell(rules, image, full, second, work);
@@ -115,9 +115,9 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   const auto count = static_cast<std::uint8_t>(zone.size());
   join_zones(zone, work.pieces, work.shares);
   mark_shell(rules, image, count, second, work);
-  std::vector<Drops24> drops{0}, asked{0};
-  for (const LayerDose& dose : doses) drops.push_back(dose.shell), asked.push_back(dose.asked_shell);
-  for (const LayerDose& dose : doses) drops.push_back(dose.core), asked.push_back(dose.asked_inside);
+  std::vector<Drops24> drops{0}, requested{0};
+  for (const LayerDose& dose : doses) drops.push_back(dose.shell), requested.push_back(dose.requested_shell);
+  for (const LayerDose& dose : doses) drops.push_back(dose.core), requested.push_back(dose.requested_inside);
   if (!rules.dithered) std::ranges::for_each(drops, [](Drops24& of) { of = rounded(of); });
   dither_zones(rules, drops, layer, image, work);
   unsigned __int128 sum = 0;
@@ -125,17 +125,18 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   for (std::size_t i = 0; i < work.zones.level.size(); ++i) {
     const std::uint64_t length = work.zones.change[2 * i + 1] - work.zones.change[2 * i];
     pixels += length;
-    sum += static_cast<unsigned __int128>(asked[work.zones.level[i]]) * length;
+    sum += static_cast<unsigned __int128>(requested[work.zones.level[i]]) * length;
   }
   return {pixels, static_cast<std::uint64_t>((sum + kOneDrop / 2) >> kDropBits)};
 }
 
-Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
-                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work) {
+Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
+                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials, Runs& image,
+                                    Runs& second, DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
   const bool shell = !rules.shell.half_width.empty();
   if (shell) erode(image, rules.shell, second);
-  for (LaidPart& part : work.laid) {
+  for (DepositedPart& part : work.deposited) {
     if (shell) mark_core(part.shares, second, full, part.zones);
   }
   work.of_material.resize(materials);
@@ -143,8 +144,8 @@ Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::
   for (std::uint32_t material = 0;; ++material) {
     const bool last = material + 1 >= materials;
     parts.clear();
-    for (const LaidPart& part : work.laid) {
-      const auto& [of_shell, of_core] = asks[part.zone];
+    for (const DepositedPart& part : work.deposited) {
+      const auto& [of_shell, of_core] = requests[part.zone];
       if (last || part.material <= material)
         parts.push_back({shell ? part.zones.view() : part.shares.view(), shell ? of_shell : of_core, of_core});
     }
@@ -160,15 +161,15 @@ Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::
   }
 }
 
-void drops_of_materials(std::uint32_t most_drops, bool shared, std::span<Runs> image, DropWork& work) {
+void drops_of_materials(std::uint32_t max_drops, bool shared, std::span<Runs> image, DropWork& work) {
   work.of_material.resize(image.size());
-  work.material_planes.resize(image.size() * most_drops);
+  work.material_planes.resize(image.size() * max_drops);
   for (std::size_t m = 0; m < image.size(); ++m) {
     Levels& drops = work.of_material[m];
-    if (!shared && most_drops == 1) levels_of(image[m], 1, drops);
-    if (!shared && most_drops > 1) within(work.levels, image[m], drops);
-    Runs* const planes = &work.material_planes[m * most_drops];
-    for (std::uint32_t drop = 0; drop < most_drops; ++drop) at_least(drops, static_cast<std::uint8_t>(drop + 1), planes[drop]);
+    if (!shared && max_drops == 1) levels_of(image[m], 1, drops);
+    if (!shared && max_drops > 1) within(work.levels, image[m], drops);
+    Runs* const planes = &work.material_planes[m * max_drops];
+    for (std::uint32_t drop = 0; drop < max_drops; ++drop) threshold_levels(drops, static_cast<std::uint8_t>(drop + 1), planes[drop]);
     image[m] = planes[0];
   }
 }

@@ -9,17 +9,17 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/dose/dither.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/edges/erode.h"
 #include "stages/dose/field.h"
 #include "stages/dose/pour.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/wish.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::dose {
 
 /// A part of a layer that has a dose, or shares of voxels, of its own.
-struct LaidPart {
+struct DepositedPart {
   Levels shares;  // how full its voxels are
   Levels zones;   // the same, with its core marked
   std::uint32_t zone = 0, material = 0;
@@ -34,7 +34,7 @@ struct DropWork {
   DitherScratch dither;
   std::vector<ZonePiece> pieces;
   std::vector<Runs> planes;  // then: the pixels with at least one drop, two, ...: as many as the job has
-  std::vector<LaidPart> laid;
+  std::vector<DepositedPart> deposited;
   ShareOut shared;                    // of the parts' shares
   std::vector<Levels> of_material;    // drops of each material, where they are told apart
   std::vector<Runs> material_planes;  // of them: the planes of the first material, of the next, ...
@@ -46,10 +46,10 @@ struct DropWork {
 
 /// Common to the layers of a job.
 struct DropRules {
-  std::uint8_t full = 0;         // level of a full voxel in DropWork::shares; 0: pixels of the image are full
-  bool dithered = true;          // else drops are rounded to whole ones
-  Reach shell;                   // empty: all is core
-  std::uint32_t most_drops = 0;  // of any pixel of the job
+  std::uint8_t full = 0;        // level of a full voxel in DropWork::shares; 0: pixels of the image are full
+  bool dithered = true;         // else drops are rounded to whole ones
+  Reach shell;                  // empty: all is core
+  std::uint32_t max_drops = 0;  // of any pixel of the job
 };
 
 /// What the parts in work.laid, of which each lies over those before, make of the voxels together: shares.h. Laid more parts
@@ -95,13 +95,14 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
 /// materials  whose drops are told apart in work.of_material: of a voxel's drops the first are those of the first material, so
 ///            that each gets them in proportion to its share over many voxels
 /// errors     of pour()
-Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
-                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work);
+Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
+                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials, Runs& image,
+                                    Runs& second, DropWork& work);
 
 /// The planes of each material's drops, work.material_planes, after any of the functions above.
-/// shared  drops_of_laid() has told the drops apart; else all drops of a pixel are of the material that it is of
+/// shared  drops_of_deposited() has told the drops apart; else all drops of a pixel are of the material that it is of
 /// image   of each material, its pixels; becomes that of those which get any drop of it
-/// cost    O((runs + rows) x materials x most_drops)
-void drops_of_materials(std::uint32_t most_drops, bool shared, std::span<Runs> image, DropWork& work);
+/// cost    O((runs + rows) x materials x max_drops)
+void drops_of_materials(std::uint32_t max_drops, bool shared, std::span<Runs> image, DropWork& work);
 
 }  // namespace lamina::dose

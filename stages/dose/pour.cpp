@@ -6,50 +6,50 @@ namespace lamina::dose {
 namespace {
 
 using Wide = unsigned __int128;
-using Piece = PourScratch::Piece;
+using DosePiece = PourScratch::DosePiece;
 
 /// Takes the runs of a row apart into pieces of one number of drops.
-class Cutter {
+class RunCutter {
  public:
-  Cutter(std::uint8_t full, const Sheet& sheet) : full_(full), sheet_(sheet) {}
+  RunCutter(std::uint8_t full, const Sheet& sheet) : full_(full), sheet_(sheet) {}
 
-  void cut(const Dosed& part, std::uint32_t row, std::vector<Piece>& pieces) {
+  void cut(const Dosed& part, std::uint32_t row, std::vector<DosePiece>& pieces) {
     const LevelsView& zones = part.zones;
     for (std::uint32_t i = zones.row_offset[row]; i < zones.row_offset[row + 1]; ++i) {
       const bool core = zones.level[i] > full_;
-      const Ask& ask = core ? part.core : part.shell;
+      const DropRequest& request = core ? part.core : part.shell;
       const std::uint32_t level = zones.level[i] - (core ? full_ : 0u);
       const std::uint32_t begin = zones.change[2 * i], end = zones.change[2 * i + 1];
-      if (ask.field == nullptr) {
-        add({begin, end, level, 0}, ask.drops, pieces);
+      if (request.field == nullptr) {
+        add({begin, end, level, 0}, request.drops, pieces);
       } else {
-        cut_blocks(*ask.field, {begin, end, level, 0}, row, pieces);
+        cut_blocks(*request.field, {begin, end, level, 0}, row, pieces);
       }
     }
   }
 
   ZoneSums sums() const {
     const Wide one = Wide{kOneDrop} * full_;
-    return {(2 * levels_ + full_) / (2 * full_), static_cast<std::uint64_t>((2 * asked_ + one) / (2 * one))};
+    return {(2 * levels_ + full_) / (2 * full_), static_cast<std::uint64_t>((2 * requested_ + one) / (2 * one))};
   }
 
  private:
-  void add(Piece piece, Drops24 asked, std::vector<Piece>& pieces) {
+  void add(DosePiece piece, Drops24 requested, std::vector<DosePiece>& pieces) {
     const std::uint64_t length = piece.end - piece.begin;
     levels_ += length * piece.level;
-    asked_ += Wide{asked} * (length * piece.level);
-    piece.drops = std::min(asked, sheet_.limit) * piece.level / full_;
+    requested_ += Wide{requested} * (length * piece.level);
+    piece.drops = std::min(requested, sheet_.limit) * piece.level / full_;
     pieces.push_back(piece);
   }
 
-  void cut_blocks(Field& field, const Piece& run, std::uint32_t row, std::vector<Piece>& pieces) {
+  void cut_blocks(Field& field, const DosePiece& run, std::uint32_t row, std::vector<DosePiece>& pieces) {
     const std::uint32_t block_row = sheet_.block_row(row);
     for (std::uint32_t at = run.begin; at < run.end;) {
-      const Drops24 asked = field.drops_of(sheet_.block_column(at), block_row);
+      const Drops24 requested = field.drops_of(sheet_.block_column(at), block_row);
       std::uint32_t stop = std::min(run.end, sheet_.block_end(at));
-      while (stop < run.end && field.drops_of(sheet_.block_column(stop), block_row) == asked)
+      while (stop < run.end && field.drops_of(sheet_.block_column(stop), block_row) == requested)
         stop = std::min(run.end, sheet_.block_end(stop));
-      add({at, stop, run.level, 0}, asked, pieces);
+      add({at, stop, run.level, 0}, requested, pieces);
       at = stop;
     }
   }
@@ -57,13 +57,13 @@ class Cutter {
   std::uint8_t full_;
   const Sheet& sheet_;
   std::uint64_t levels_ = 0;
-  Wide asked_ = 0;
+  Wide requested_ = 0;
 };
 
 /// Pieces of several parts, in any order, become those of all: where they overlap their drops add up.
-void unite(PourScratch& scratch) {
+void merge(PourScratch& scratch) {
   scratch.changes.clear();
-  for (const Piece& piece : scratch.pieces) {
+  for (const DosePiece& piece : scratch.pieces) {
     const auto drops = static_cast<std::int64_t>(piece.drops);
     const auto level = static_cast<std::int32_t>(piece.level);
     scratch.changes.push_back({piece.begin, level, drops});
@@ -87,12 +87,12 @@ void unite(PourScratch& scratch) {
 }  // namespace
 
 std::uint64_t PourScratch::bytes() const {
-  return pieces.capacity() * sizeof(Piece) + changes.capacity() * sizeof(Change) + thresholds.bytes();
+  return pieces.capacity() * sizeof(DosePiece) + changes.capacity() * sizeof(Change) + thresholds.bytes();
 }
 
 Result<ZoneSums> pour(std::span<const Dosed> parts, std::uint8_t full, const Sheet& sheet, PourScratch& scratch, Levels& result,
                       Levels& levels) {
-  Cutter cutter(full, sheet);
+  RunCutter cutter(full, sheet);
   if (sheet.dithered) scratch.thresholds.start(sheet.layer.index);
   result.start(sheet.grid.columns());
   levels.start(sheet.grid.columns());
@@ -104,8 +104,8 @@ Result<ZoneSums> pour(std::span<const Dosed> parts, std::uint8_t full, const She
       cutter.cut(part, row, scratch.pieces);
       here += scratch.pieces.size() > before ? 1 : 0;
     }
-    if (here > 1) unite(scratch);
-    for (const Piece& piece : scratch.pieces) {
+    if (here > 1) merge(scratch);
+    for (const DosePiece& piece : scratch.pieces) {
       levels.append(piece.begin, piece.end, static_cast<std::uint8_t>(piece.level));
       if (sheet.dithered) {
         scratch.thresholds.append(piece.begin, piece.end, row, piece.drops, result);

@@ -15,7 +15,7 @@
 namespace lamina::dose {
 
 /// What a full pixel asks for, however many drops may be jetted: a number of them, or a formula's.
-struct Ask {
+struct DropRequest {
   Drops24 drops = 0;
   Field* field = nullptr;
 };
@@ -23,12 +23,12 @@ struct Ask {
 /// A part of a layer: levels 1 .. full in its shell, full more in its core.
 struct Dosed {
   LevelsView zones;
-  Ask shell, core;
+  DropRequest shell, core;
 };
 
 /// Scratch; keeps its capacity.
 struct PourScratch {
-  struct Piece {
+  struct DosePiece {
     std::uint32_t begin = 0, end = 0;
     std::uint32_t level = 0;
     Drops24 drops = 0;  // at most as many as may be jetted
@@ -38,7 +38,7 @@ struct PourScratch {
     std::int32_t level = 0;
     std::int64_t drops = 0;
   };
-  std::vector<Piece> pieces;
+  std::vector<DosePiece> pieces;
   std::vector<Change> changes;
   Thresholds thresholds;
   std::uint64_t bytes() const;

@@ -32,7 +32,7 @@ std::int64_t voids_of(const Binder& binder) {
 std::int64_t stays_of(const Binder& binder) {
   return std::clamp<std::int64_t>(kMillion - millionths(binder.evaporates), 0, kMillion);
 }
-std::int64_t wish_of(double percent) { return std::clamp<std::int64_t>(millionths(percent / 100), 0, 10'000 * kMillion); }
+std::int64_t target_of(double percent) { return std::clamp<std::int64_t>(millionths(percent / 100), 0, 10'000 * kMillion); }
 std::int64_t drop_of(const Binder& binder) { return std::max<std::int64_t>(0, millionths(binder.drop_pl)); }  // 10^6 nm3
 
 /// In thousandths of a nm3, at most 10^9 x 10^9 x 10^9 x 10^3 before it is divided.
@@ -49,39 +49,40 @@ Wide one_of(const Binder& binder) {
 
 }  // namespace
 
-Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm, std::uint32_t most) {
-  const Drops24 limit = Drops24{most} << kDropBits;
-  const std::int64_t wish = wish_of(percent), voids = voids_of(binder);
-  if (wish == 0 || voids == 0) return 0;
+Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm,
+                  std::uint32_t maximum) {
+  const Drops24 limit = Drops24{maximum} << kDropBits;
+  const std::int64_t target = target_of(percent), voids = voids_of(binder);
+  if (target == 0 || voids == 0) return 0;
   const Wide one = one_of(binder);
   if (one == 0) return limit;
-  const Wide asked = voxel_of(grid, thickness_nm) * static_cast<Wide>(wish) * static_cast<Wide>(voids);
-  const Wide whole = asked / one;
-  if (whole >= most) return limit;
-  return std::min(limit, (static_cast<Drops24>(whole) << kDropBits) + fraction_of(asked % one, one, kDropBits));
+  const Wide requested = voxel_of(grid, thickness_nm) * static_cast<Wide>(target) * static_cast<Wide>(voids);
+  const Wide whole = requested / one;
+  if (whole >= maximum) return limit;
+  return std::min(limit, (static_cast<Drops24>(whole) << kDropBits) + fraction_of(requested % one, one, kDropBits));
 }
 
 DropScale::DropScale(const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
   constexpr unsigned kBits = 88;
-  constexpr Wide kMost = Wide{1} << (kBits - 2);  // more than any nozzle fires, for ten millionths
-  Wide asked = voxel_of(grid, thickness_nm) * static_cast<Wide>(voids_of(binder));
+  constexpr Wide kMax = Wide{1} << (kBits - 2);  // more than any nozzle fires, for ten millionths
+  Wide requested = voxel_of(grid, thickness_nm) * static_cast<Wide>(voids_of(binder));
   const Wide one = one_of(binder);
-  if (asked == 0) return;
-  of_millionth_ = kMost;
-  if (asked >= one / 4) return;
+  if (requested == 0) return;
+  of_millionth_ = kMax;
+  if (requested >= one / 4) return;
   of_millionth_ = 0;
   for (unsigned bit = 0; bit < kBits; ++bit) {
-    asked *= 2;
+    requested *= 2;
     of_millionth_ *= 2;
-    if (asked < one) continue;
-    asked -= one;
+    if (requested < one) continue;
+    requested -= one;
     ++of_millionth_;
   }
 }
 
 Drops24 DropScale::drops(double percent) const {
   constexpr Wide kAny = Wide{1} << (20 + kDropBits);
-  const Wide drops = (static_cast<Wide>(wish_of(percent)) * of_millionth_ + (Wide{1} << 63)) >> 64;
+  const Wide drops = (static_cast<Wide>(target_of(percent)) * of_millionth_ + (Wide{1} << 63)) >> 64;
   return static_cast<Drops24>(std::min(drops, kAny));
 }
 

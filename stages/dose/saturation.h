@@ -14,7 +14,7 @@ inline constexpr Drops24 kOneDrop = Drops24{1} << kDropBits;
 /// To whole drops, half a drop up.
 constexpr Drops24 rounded(Drops24 drops) { return (drops + kOneDrop / 2) >> kDropBits << kDropBits; }
 /// Of a pixel, in all planes of a layer.
-inline constexpr std::uint32_t kMostDrops = 64;
+inline constexpr std::uint32_t kMaxDrops = 64;
 
 /// What binder meets in a layer.
 ///
@@ -36,7 +36,7 @@ struct Binder {
 /// thickness_nm  of the layer
 /// cost          some hundred instructions
 Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm,
-                  std::uint32_t most = kMostDrops);
+                  std::uint32_t maximum = kMaxDrops);
 
 /// drops_for() of many saturations in one layer: the same, but where it is within 2^-30 of a tie. At most 2^20 drops.
 class DropScale {

@@ -1,27 +1,20 @@
-// stages/dose/share_count.h: what a job of shares of voxels came to, layer by layer, for people and for programs.
+// stages/dose/share_count.h: what a job of shares of voxels came to, summed over layers.
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
-#include <string>
-#include <string_view>
 
 namespace lamina::dose {
 
-class ShareCount {
- public:
-  /// full_voxels  that the layer's levels come to
-  /// differs, far  of take_half(): voxels half full or more against pixels whose centre is set
-  void add(std::uint64_t full_voxels, std::uint64_t differs, std::uint64_t far);
-
-  /// The summary's line. levels  of a voxel; as  what they are written as
-  std::string told(std::uint32_t levels, std::string_view as) const;
-  nlohmann::ordered_json json(std::uint32_t levels, std::string_view as) const;
-
- private:
-  double differing_share() const;
-
-  std::uint64_t full_voxels_ = 0, differs_ = 0, far_ = 0;
+struct ShareCount {
+  std::uint64_t full_voxels = 0;   // that the levels come to
+  std::uint64_t half_differs = 0;  // of take_half(): voxels half full or more against pixels whose centre is set
+  std::uint64_t half_far = 0;      // of these, those away from any boundary
+  double differing_share() const {
+    return full_voxels > 0 ? static_cast<double>(half_differs) / static_cast<double>(full_voxels) : 0;
+  }
+  void add(std::uint64_t more_full, std::uint64_t more_differs, std::uint64_t more_far) {
+    full_voxels += more_full, half_differs += more_differs, half_far += more_far;
+  }
 };
 
 }  // namespace lamina::dose

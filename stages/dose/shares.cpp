@@ -45,14 +45,14 @@ void append_masked(const LevelsView& image, std::uint32_t row, std::span<const s
 
 /// How many changes two rows have in common at their beginning; eight are looked at at once.
 std::size_t same_changes(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
-  const std::size_t most = std::min(a.size(), b.size());
+  const std::size_t maximum = std::min(a.size(), b.size());
   std::size_t same = 0;
-  for (; same + 8 <= most; same += 8) {
+  for (; same + 8 <= maximum; same += 8) {
     std::uint32_t differs = 0;
     for (std::size_t i = same; i < same + 8; ++i) differs |= a[i] ^ b[i];
     if (differs != 0) break;
   }
-  while (same < most && a[same] == b[same]) ++same;
+  while (same < maximum && a[same] == b[same]) ++same;
   return same;
 }
 
@@ -126,13 +126,13 @@ void share_out(std::span<Levels* const> parts, std::uint8_t full, ShareOut& out,
     row.start(r);
     for (std::uint32_t at = row.next(0); at != UINT32_MAX; at = row.next(at)) {
       const std::uint32_t stop = row.end(at);
-      std::uint8_t used = 0, most = 0;
+      std::uint8_t used = 0, maximum = 0;
       std::size_t owner = 0;
       for (std::size_t i = parts.size(); i-- > 0;) {
         const std::uint8_t level = std::min<std::uint8_t>(row.level(i, at), static_cast<std::uint8_t>(full - used));
         out.part[i].append(at, stop, level);
         used = static_cast<std::uint8_t>(used + level);
-        if (level > most) most = level, owner = i;
+        if (level > maximum) maximum = level, owner = i;
       }
       total.append(at, stop, used);
       if (used >= half_of(full)) append_run(out.owner[owner].row_offset.back(), at, stop, out.owner[owner]);
@@ -223,9 +223,9 @@ ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& do
     }
   }
   using Wide = unsigned __int128;
-  const Wide asked = Wide{dose.asked_shell} * shell + Wide{dose.asked_inside} * core;
+  const Wide requested = Wide{dose.requested_shell} * shell + Wide{dose.requested_inside} * core;
   const Wide one = Wide{kOneDrop} * full;
-  return {(2 * (shell + core) + full) / (2 * full), static_cast<std::uint64_t>((2 * asked + one) / (2 * one))};
+  return {(2 * (shell + core) + full) / (2 * full), static_cast<std::uint64_t>((2 * requested + one) / (2 * one))};
 }
 
 Difference difference(const RunsView& a, const RunsView& b) {

@@ -9,8 +9,8 @@
 
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/saturation.h"
-#include "stages/dose/wish.h"
 
 namespace lamina::dose {
 
@@ -35,8 +35,8 @@ void drops_of_zones(const LayerDose& dose, std::uint8_t full, bool dithered, std
 
 /// What a layer's zones come to.
 struct ZoneSums {
-  std::uint64_t full_voxels = 0;  // sum of levels / full, rounded
-  std::uint64_t asked_drops = 0;  // for them, rounded, however many may be jetted
+  std::uint64_t full_voxels = 0;      // sum of levels / full, rounded
+  std::uint64_t requested_drops = 0;  // for them, rounded, however many may be jetted
 };
 ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose);
 

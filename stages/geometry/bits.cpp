@@ -56,9 +56,9 @@ bool RunsBuilder::add_row(std::span<const std::byte> row, bool invert) {
     std::uint64_t changes = word ^ (word >> 1 | before);
     before = word << 63;
     while (changes != 0) {
-      const int place = std::countl_zero(changes);
-      *next++ = column + static_cast<std::uint32_t>(place);
-      changes ^= std::uint64_t{1} << 63 >> place;
+      const int position = std::countl_zero(changes);
+      *next++ = column + static_cast<std::uint32_t>(position);
+      changes ^= std::uint64_t{1} << 63 >> position;
     }
   }
   if (before != 0) *next++ = columns;

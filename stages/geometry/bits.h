@@ -12,7 +12,7 @@ namespace lamina {
 
 /// A side of the largest bed at the finest dpi (data/units.h, data/grid.h): no writer makes, and no reader believes,
 /// more columns or rows. A row of bits is then at most 268,436 bytes.
-inline constexpr std::uint32_t kMostPixelsASide =
+inline constexpr std::uint32_t kMaxPixelsASide =
     static_cast<std::uint32_t>(ceil_div(kNmReach * std::int64_t{25'400}, kNmPerInch));
 
 constexpr std::size_t row_bytes(std::uint32_t columns) { return (std::size_t{columns} + 7) / 8; }

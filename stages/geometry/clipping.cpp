@@ -100,7 +100,7 @@ Result<Contours> combine(const ContoursView& contours, const ContoursView& with,
 
 }  // namespace
 
-Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
+Result<Contours> contour_union(const ContoursView& contours, FillRule rule) {
   if (contours.size() == 0) return Contours();
   return guarded([&](Contours& out) -> Status {
     const Moved moved = to_clipper(contours, middle_of(contours));
@@ -116,7 +116,7 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
   });
 }
 
-Result<Contours> unite_curves(const ContoursView& curves) {
+Result<Contours> curve_union(const ContoursView& curves) {
   return guarded([&](Contours& out) -> Status {
     const Moved moved = to_clipper(curves, middle_of(curves));
     clip::Clipper clipper;

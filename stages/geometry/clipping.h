@@ -20,14 +20,14 @@ enum class OffsetJoin : std::uint8_t {
 /// followed by its holes.
 /// errors  kInternal if Clipper refuses the contours
 /// cost    O((P + X) log P) for P points and X crossings
-Result<Contours> unite_contours(const ContoursView& contours, FillRule rule);
+Result<Contours> contour_union(const ContoursView& contours, FillRule rule);
 
-/// The region that curves, which may cross themselves, go round counter-clockwise more often than clockwise. As unite_contours
+/// The region that curves, which may cross themselves, go round counter-clockwise more often than clockwise. As contour_union
 /// in less time, but contours of the result may touch at corners.
-Result<Contours> unite_curves(const ContoursView& curves);
+Result<Contours> curve_union(const ContoursView& curves);
 
 /// The region of clean contours less that of others, which may overlap each other: where they share an edge nothing is
-/// left of it. In the order of unite_contours.
+/// left of it. In the order of contour_union.
 /// errors  kInternal if Clipper refuses them
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less);
 

@@ -41,8 +41,10 @@ std::array<std::uint32_t, 2> first_difference(const RunsView& a, const RunsView&
   std::uint32_t r = 0;
   while (r + 1 < a.rows() && std::ranges::equal(a.row(r), b.row(r))) ++r;
   const auto first = a.row(r), second = b.row(r);
-  const auto place = static_cast<std::size_t>(std::ranges::mismatch(first, second).in1 - first.begin());
-  return {std::min(place < first.size() ? first[place] : a.columns, place < second.size() ? second[place] : a.columns), r};
+  const auto position = static_cast<std::size_t>(std::ranges::mismatch(first, second).in1 - first.begin());
+  return {
+      std::min(position < first.size() ? first[position] : a.columns, position < second.size() ? second[position] : a.columns),
+      r};
 }
 
 namespace {

@@ -123,13 +123,13 @@ void fill_parts(const PixelWindow& window, std::uint32_t columns, std::uint64_t 
 
 }  // namespace
 
-void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
+void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
   fill_parts(window, columns, 1, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
     part_row.add(runs.row(r), weight, [](std::size_t) { return std::uint64_t{1}; });
   });
 }
 
-void coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
+void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
               std::span<std::uint8_t> result) {
   fill_parts(window, columns, full, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
     const std::uint8_t* level = levels.level.data() + levels.row_offset[r];

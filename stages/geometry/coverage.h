@@ -31,11 +31,11 @@ PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
 /// window   not empty, within the image
 /// columns  1 .. 65535; result  columns x rows values, the top row first
 /// cost     a few operations a run and result row that it touches, and one a result value
-void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
+void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
 
 /// The same of levels, each pixel set by its share: 255 where all have the level `full` (no pixel has more), and the mean of
 /// shares where they differ. Of one level it is what the runs are.
-void coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
+void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
               std::span<std::uint8_t> result);
 
 }  // namespace lamina

@@ -46,7 +46,7 @@ Isa widest_isa() {
   return isa;
 }
 
-Isa isa_at_most(Isa wanted) { return wanted == Isa::kAuto ? widest_isa() : std::min(wanted, widest_isa()); }
+Isa limited_isa(Isa wanted) { return wanted == Isa::kAuto ? widest_isa() : std::min(wanted, widest_isa()); }
 
 Result<Isa> usable_isa(Isa wanted, Isa of_processor, const char* cap) {
   const Isa widest = capped_isa(of_processor, cap);

@@ -21,7 +21,7 @@ Isa widest_isa();
 Isa capped_isa(Isa isa, const char* cap);
 
 /// `wanted`, or the widest where that is kAuto or more than the processor has.
-Isa isa_at_most(Isa wanted);
+Isa limited_isa(Isa wanted);
 
 /// The set to use where `wanted` is wished for; kAuto is the widest.
 /// errors  kUsage if the processor does not have it, or LAMINA_ISA does not allow it

@@ -41,8 +41,8 @@ inline constexpr std::array<Code, 4096> kFourVertical = [] {
   std::array<Code, 4096> table{};
   for (std::uint32_t index = 0; index < table.size(); ++index) {
     std::uint32_t bits = 0, length = 0;
-    for (std::uint32_t place = 0; place < 4; ++place) {
-      const std::uint32_t mode = index >> (3 * place) & 7;
+    for (std::uint32_t position = 0; position < 4; ++position) {
+      const std::uint32_t mode = index >> (3 * position) & 7;
       if (mode == 7) continue;
       bits = bits << kVertical[mode].length() | kVertical[mode].bits();
       length += kVertical[mode].length();

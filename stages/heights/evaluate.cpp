@@ -17,15 +17,16 @@ std::vector<std::int64_t> boundaries_of(const LayerTable& table) {
 Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> boundaries, const Options& options) {
   Evaluation result;
   const std::size_t count = boundaries.size() - 1;
-  const Ladder ladder = Ladder::listed({boundaries.begin(), boundaries.end()});
+  const CandidateHeights candidate_heights = CandidateHeights::listed({boundaries.begin(), boundaries.end()});
   const Nm tolerance = options.surface.flat_tolerance;
   result.layers.resize(count);
   const bool nominal = index.has_nominal();
   Buffer<Steepness> of_steps(count, 0);
   for (std::uint32_t part = 0; part < index.parts.size(); ++part) {
     const auto own = std::span(index.parts).subspan(part, 1);
-    const Buffer<Steepness> cells = steepest_in_cells(index, own, ladder);
-    const Buffer<Steepness> angles = nominal ? steepest_in_cells(index, own, ladder, Slope::kAngles) : Buffer<Steepness>();
+    const Buffer<Steepness> cells = steepest_in_cells(index, own, candidate_heights);
+    const Buffer<Steepness> angles =
+        nominal ? steepest_in_cells(index, own, candidate_heights, Slope::kAngles) : Buffer<Steepness>();
     for (std::size_t i = 0; i < count; ++i) {
       of_steps[i] = std::max(of_steps[i], cells[i]);
       const Steepness slope = nominal ? angles[i] : cells[i];
@@ -34,10 +35,10 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
       result.layers[i].part = part;
     }
   }
-  const Buffer<double> below = projected_below(index, index.parts, ladder, Sign::kBoth);
-  const bool timed = options.time.on() || options.tells_time;
+  const Buffer<double> below = projected_below(index, index.parts, candidate_heights, Sign::kBoth);
+  const bool timed = options.time.on() || options.estimates_time;
   const TimeModel& time = options.time.on() ? options.time : kPlainTime;
-  const Buffer<double> section = timed ? section_at_rungs(index, ladder, tolerance) : Buffer<double>();
+  const Buffer<double> section = timed ? section_at_candidates(index, candidate_heights, tolerance) : Buffer<double>();
   double steps = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
     LayerFacts& layer = result.layers[i];
@@ -53,7 +54,7 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
   }
   if (index.area_mm2 > 0) result.mean_cusp = steps / index.area_mm2;
 
-  for (const Flat& flat : find_flats(index, tolerance, options.least_flat_mm2)) {
+  for (const Flat& flat : find_flats(index, tolerance, options.min_flat_mm2)) {
     const std::int64_t miss = distance_to_nearest(boundaries, flat.height);
     result.flats.push_back({flat, miss});
     if (miss > tolerance) {

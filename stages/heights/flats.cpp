@@ -15,7 +15,7 @@ struct Face {
 
 Flat flat_of(std::span<const Face> faces) {
   Flat flat{};
-  double all = 0, below = 0, part_mm2 = 0, most_mm2 = -1;
+  double all = 0, below = 0, part_mm2 = 0, max_mm2 = -1;
   for (const Face& face : faces) {
     all += face.mm2;
     (face.up ? flat.up_mm2 : flat.down_mm2) += face.mm2;
@@ -37,8 +37,8 @@ Flat flat_of(std::span<const Face> faces) {
   std::ranges::stable_sort(by_part, {}, &Face::part);
   for (std::size_t i = 0; i < by_part.size(); ++i) {
     part_mm2 = i > 0 && by_part[i - 1].part == by_part[i].part ? part_mm2 + by_part[i].mm2 : by_part[i].mm2;
-    if (part_mm2 > most_mm2) {
-      most_mm2 = part_mm2;
+    if (part_mm2 > max_mm2) {
+      max_mm2 = part_mm2;
       flat.part = by_part[i].part;
     }
   }
@@ -47,13 +47,13 @@ Flat flat_of(std::span<const Face> faces) {
 
 }  // namespace
 
-std::vector<Flat> find_flats(const SurfaceIndex& index, Nm tolerance, double least_mm2) {
+std::vector<Flat> find_flats(const SurfaceIndex& index, Nm tolerance, double min_mm2) {
   std::vector<Face> faces;
   for (std::uint32_t part = 0; part < index.parts.size(); ++part) {
     const PartSurface& surface = index.parts[part];
-    for (const Standing& standing : surface.standing) {
-      for (const FlatFacet& flat : index.meshes[standing.mesh].flats) {
-        faces.push_back({flat.height + standing.raise, part, flat.up, false, flat.mm2});
+    for (const PlacedSurface& placed : surface.placed) {
+      for (const FlatFacet& flat : index.meshes[placed.mesh].flats) {
+        faces.push_back({flat.height + placed.raise, part, flat.up, false, flat.mm2});
       }
     }
     faces.push_back({surface.bottom, part, false, true, 0});
@@ -64,7 +64,7 @@ std::vector<Flat> find_flats(const SurfaceIndex& index, Nm tolerance, double lea
   for (std::size_t first = 0, last = 0; first < faces.size(); first = last) {
     while (last < faces.size() && faces[last].height - faces[first].height <= tolerance) ++last;
     const Flat flat = flat_of(std::span(faces).subspan(first, last - first));
-    if (flat.height > tolerance && (flat.end || flat.up_mm2 + flat.down_mm2 >= least_mm2)) flats.push_back(flat);
+    if (flat.height > tolerance && (flat.end || flat.up_mm2 + flat.down_mm2 >= min_mm2)) flats.push_back(flat);
   }
   return flats;
 }

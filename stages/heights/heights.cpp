@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "stages/data/text/number_text.h"
+#include <utility>
+
+#include "stages/heights/candidate_heights.h"
 #include "stages/heights/greedy.h"
-#include "stages/heights/ladder.h"
 #include "stages/heights/optimal.h"
 
 namespace lamina::heights {
@@ -17,18 +18,18 @@ Result<Options> options_of(const Settings& settings, double layer_mm) {
   options.surface.peak_angle_deg = settings.peak_angle_deg;
   options.surface.normal_tolerance = settings.normal_tolerance;
   options.surface.flat_tolerance = static_cast<Nm>(nm_of(settings.flat_tolerance_um / 1000));
-  options.surface.least_facet_mm2 = settings.least_facet_mm2;
+  options.surface.min_facet_mm2 = settings.min_facet_mm2;
   options.surface.nominal_cusps = settings.cusp_of == CuspOf::kNominal;
   options.peaks = settings.peaks;
   options.cover_top = settings.cover_top;
   options.facets = settings.facets;
   options.flats = settings.flats;
-  options.least_flat_mm2 = settings.least_flat_mm2;
+  options.min_flat_mm2 = settings.min_flat_mm2;
   options.time = {settings.time_model[0], settings.time_model[1]};
   if (!settings.thickness_mm.empty()) {
-    if (const std::string wrong = read_thicknesses(settings.thickness_mm, options.set); !wrong.empty()) {
-      return Error{Fault::kUsage, "heights.thickness_mm: " + wrong};
-    }
+    Result<ThicknessSet> set = read_thicknesses(settings.thickness_mm);
+    if (!set) return Error{Fault::kUsage, "heights.thickness_mm: " + set.error().message};
+    options.set = std::move(*set);
   } else if (settings.mode == Mode::kUniform) {
     options.set.values = {static_cast<Nm>(nm_of(layer_mm))};
   } else {
@@ -38,22 +39,6 @@ Result<Options> options_of(const Settings& settings, double layer_mm) {
   }
   if (Status status = check_options(options); !status) return status.error();
   return options;
-}
-
-std::string text_of(const Settings& settings, double layer_mm) {
-  std::string text = fmt::format("of {} mm", settings.thickness_mm.empty() ? number_text(layer_mm) : settings.thickness_mm);
-  if (settings.mode == Mode::kUniform) return text;
-  text += fmt::format(", {}", mode_name(settings.mode));
-  if (settings.mode == Mode::kAngle) return text + fmt::format(", from {} degrees", number_text(settings.adapt_angle_deg));
-  return text + fmt::format(", steps up to {} mm", number_text(settings.cusp_mm));
-}
-
-std::string small_peaks_text(const Plan& plan, double least_flat_mm2) {
-  if (plan.small_peaks == 0) return {};
-  return fmt::format(
-      "{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
-      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(least_flat_mm2),
-      plan.small_peaks == 1 ? "is" : "are", plan.small_peaks == 1 ? "" : "s");
 }
 
 Status check_options(const Options& options) {
@@ -83,17 +68,18 @@ Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options) {
   if (Status status = check_options(options); !status) return status.error();
   if (options.mode == Mode::kUniform) {
     Plan plan;
-    plan.table = LayerTable::uniform(index.top, options.set.least());
+    plan.table = LayerTable::uniform(index.top, options.set.minimum());
     return plan;
   }
-  const Result<Ladder> ladder = Ladder::reachable(options.set, std::int64_t{index.top} + options.set.most());
-  if (!ladder) return ladder.error();
-  switch (options.mode) {
-    case Mode::kAngle: return plan_by_angle(index, options, *ladder);
-    case Mode::kCusp: return plan_by_cusp(index, options, *ladder);
-    case Mode::kStepwise: return plan_stepwise(index, options, *ladder);
-    default: return plan_optimal(index, options, *ladder);
+  Result<CandidateHeights> candidate_heights =
+      CandidateHeights::reachable(options.set, std::int64_t{index.top} + options.set.maximum());
+  if (!candidate_heights) return candidate_heights.error();
+  if (options.mode == Mode::kOptimal) return plan_optimal(index, options, *candidate_heights);
+  Plan plan;
+  GreedyLayers layers(index, options, std::move(*candidate_heights), plan);
+  while (layers.advance(plan)) {
   }
+  return plan;
 }
 
 }  // namespace lamina::heights

@@ -13,11 +13,11 @@
 
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
+#include "stages/heights/candidate_heights.h"
 #include "stages/heights/flats.h"
 #include "stages/heights/settings.h"
 #include "stages/heights/surface.h"
 #include "stages/heights/table.h"
-#include "stages/heights/thickness_set.h"
 
 namespace lamina::heights {
 
@@ -38,12 +38,12 @@ struct Options {
   double adapt_angle_deg = 45;  // angle: slopes at least this flat get thinner layers
   SurfaceOptions surface;
   Facets facets = Facets::kRange;  // angle, cusp, stepwise
-  double least_flat_mm2 = 1;       // smaller flats are not aimed at
+  double min_flat_mm2 = 1;         // smaller flats are not aimed at
   Peaks peaks = Peaks::kFlats;     // angle
   bool cover_top = false;          // angle, optimal: the last layer ends at or above the top, within the flat tolerance
   bool flats = true;               // optimal: end layers on flats and on tops and bottoms of parts
   TimeModel time;                  // optimal
-  bool tells_time = false;         // evaluate: by kPlainTime if no model is given
+  bool estimates_time = false;     // evaluate: by kPlainTime if no model is given
   std::int64_t slab = 0;           // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
                                    // nearer below the top than the least thickness
 };
@@ -57,7 +57,7 @@ struct FlatHit {
 /// A table and what can be said for it.
 struct Plan {
   LayerTable table;
-  std::vector<Steepness> looked_at;  // angle: of each layer, the flattest slope that decided; else empty
+  std::vector<Steepness> inspected;  // angle: of each layer, the flattest slope that decided; else empty
   std::vector<bool> stepped_back;    // cusp: thinner than the slopes at its bottom ask for
   std::uint32_t small_peaks = 0;     // angle: heights with horizontal facets that are peaks in the documents, but no flats
   /// optimal: no table of one layer less (or, with a time model, of less time) that ends as near to the flats and keeps
@@ -66,15 +66,9 @@ struct Plan {
   std::int64_t largest_miss = 0;  // optimal: nm, the smallest that any table can have
 };
 
-/// What a person has to know of the peaks that were passed over, as "2 horizontal faces ..."; empty if there are none.
-std::string small_peaks_text(const Plan& plan, double least_flat_mm2);
-
 /// Settings as the stage takes them. layer_mm is the thickness where settings name none.
 /// errors  kUsage, one line that begins with the key: no thicknesses to choose from; of read_thicknesses and check_options
 Result<Options> options_of(const Settings& settings, double layer_mm);
-
-/// The same for messages: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
-std::string text_of(const Settings& settings, double layer_mm);
 
 /// Whether options make sense together. errors  kUsage, one line that begins with the key
 Status check_options(const Options& options);

@@ -7,48 +7,52 @@
 
 namespace lamina::heights {
 
-std::string OnRecord::fault(const Layer& layer) {
+Status OnRecord::check(const Layer& layer) {
   const bool uniform = options_ && options_->mode == Mode::kUniform;
   if (layer.index == 0) begins_ = 0;
-  if (uniform) begins_ = std::int64_t{layer.index} * options_->set.least();
+  if (uniform) begins_ = std::int64_t{layer.index} * options_->set.minimum();
   const auto begins = std::exchange(begins_, std::int64_t{layer.bottom} + layer.thickness);
-  const std::string thick = options_ ? fault_of_thickness(layer) : std::string();
+  const Status thick = options_ ? check_thickness(layer) : Status();
   if (begins && layer.bottom != *begins) {
-    return fmt::format("layer {}: begins {} nm above the bed, the manifest says {}", layer.index, *begins, layer.bottom);
+    return Error{Fault::kVerification,
+                 fmt::format("layer {}: begins {} nm above the bed, the manifest says {}", layer.index, *begins, layer.bottom)};
   }
-  return thick.empty() ? thick : fmt::format("layer {}: {}", layer.index, thick);
+  return thick;
 }
 
-std::string OnRecord::fault_of_thickness(const Layer& layer) {
+Status OnRecord::check_thickness(const Layer& layer) {
   const ThicknessSet& set = options_->set;
+  const auto wrong = [&](const std::string& what) {
+    return Error{Fault::kVerification, fmt::format("layer {}: {}", layer.index, what)};
+  };
   if (options_->mode == Mode::kStepwise) {
     if (divides_slab(layer)) return {};
-    return fmt::format("divides no slab of {} nm evenly, from {} to {} nm", set.most(), layer.bottom,
-                       std::int64_t{layer.bottom} + layer.thickness);
+    return wrong(fmt::format("divides no slab of {} nm evenly, from {} to {} nm", set.maximum(), layer.bottom,
+                             std::int64_t{layer.bottom} + layer.thickness));
   }
   if (std::ranges::binary_search(set.values, layer.thickness)) return {};
   if (options_->mode == Mode::kUniform) {
-    return fmt::format("is {} nm thick as all of the job, the manifest says {}", set.least(), layer.thickness);
+    return wrong(fmt::format("is {} nm thick as all of the job, the manifest says {}", set.minimum(), layer.thickness));
   }
-  return fmt::format("is {} nm thick, by the manifest, which is none of the job's thicknesses", layer.thickness);
+  return wrong(fmt::format("is {} nm thick, by the manifest, which is none of the job's thicknesses", layer.thickness));
 }
 
 bool OnRecord::divides_slab(const Layer& layer) {
-  const std::int64_t slab = options_->set.most(), low = layer.bottom % slab, high = low + layer.thickness;
+  const std::int64_t slab = options_->set.maximum(), low = layer.bottom % slab, high = low + layer.thickness;
   if (low == 0) {
     count_ = 0;
     fewest_ = 1;
-    most_ = slab / options_->set.least();
+    max_ = slab / options_->set.minimum();
   }
   if (count_ < 0) return high <= slab;
   // Boundary i of n divisions lies at floor(slab * i / n).
-  const auto meet = [&](std::int64_t i, std::int64_t place) {
-    fewest_ = std::max(fewest_, slab * i / (place + 1) + 1);
-    if (place > 0) most_ = std::min(most_, slab * i / place);
+  const auto meet = [&](std::int64_t i, std::int64_t position) {
+    fewest_ = std::max(fewest_, slab * i / (position + 1) + 1);
+    if (position > 0) max_ = std::min(max_, slab * i / position);
   };
   meet(count_, low);
   meet(++count_, high);
-  if (high <= slab && fewest_ <= most_) return true;
+  if (high <= slab && fewest_ <= max_) return true;
   count_ = -1;
   return false;
 }

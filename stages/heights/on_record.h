@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "stages/heights/heights.h"
@@ -18,17 +17,17 @@ class OnRecord {
   /// options  none: they are not known
   explicit OnRecord(std::optional<Options> options) : options_(std::move(options)) {}
 
-  /// "", or what is wrong with the next layer: "layer 3: begins 300000 nm above the bed, the manifest says 300001".
-  std::string fault(const Layer& layer);
+  /// Takes the next layer. errors  kVerification: "layer 3: begins 300000 nm above the bed, the manifest says 300001"
+  Status check(const Layer& layer);
 
  private:
-  std::string fault_of_thickness(const Layer& layer);
+  Status check_thickness(const Layer& layer);
   bool divides_slab(const Layer& layer);
 
   std::optional<Options> options_;
   std::optional<std::int64_t> begins_;  // the next layer
   // Of a slab that is divided evenly: the layers of it so far, and into how many it can be divided.
-  std::int64_t count_ = -1, fewest_ = 1, most_ = 1;  // count_: below 0 within a slab whose first layers are not known
+  std::int64_t count_ = -1, fewest_ = 1, max_ = 1;  // count_: below 0 within a slab whose first layers are not known
 };
 
 }  // namespace lamina::heights

@@ -5,7 +5,6 @@
 #include <limits>
 #include <type_traits>
 
-#include "stages/heights/least_steps.h"
 #include "stages/heights/section.h"
 #include "stages/heights/steepest.h"
 
@@ -27,41 +26,47 @@ constexpr Cost unreached() {
 
 // The highest rung to which the steps allow a layer from each rung. Both ends only move up: if a layer keeps the limit,
 // one inside of it does.
-Buffer<std::uint32_t> highest_by_cusp(const Ladder& ladder, const Buffer<Steepness>& cells, std::int64_t cusp,
-                                      std::int64_t most) {
-  Buffer<std::uint32_t> highest(ladder.rungs());
-  Buffer<std::uint32_t> window(ladder.cells());  // cells of decreasing steepness, the first is the steepest in the window
+Buffer<std::uint32_t> highest_by_cusp(const CandidateHeights& candidate_heights, const Buffer<Steepness>& cells,
+                                      std::int64_t cusp, std::int64_t maximum) {
+  Buffer<std::uint32_t> highest(candidate_heights.candidates());
+  Buffer<std::uint32_t> window(
+      candidate_heights.cells());  // cells of decreasing steepness, the first is the steepest in the window
   std::uint32_t front = 0, back = 0, end = 0;
-  for (std::uint32_t rung = 0; rung < ladder.rungs(); ++rung) {
-    const std::int64_t bottom = ladder[rung];
-    end = std::max(end, rung);
-    while (front < back && window[front] < rung) ++front;
-    while (end + 1 < ladder.rungs()) {
-      const std::int64_t thickness = ladder[end + 1] - bottom;
+  for (std::uint32_t candidate = 0; candidate < candidate_heights.candidates(); ++candidate) {
+    const std::int64_t bottom = candidate_heights[candidate];
+    end = std::max(end, candidate);
+    while (front < back && window[front] < candidate) ++front;
+    while (end + 1 < candidate_heights.candidates()) {
+      const std::int64_t thickness = candidate_heights[end + 1] - bottom;
       const Steepness flattest = std::max(cells[end], front < back ? cells[window[front]] : 0);
-      if (thickness > most || cusp_of(thickness, flattest) > cusp) break;
+      if (thickness > maximum || cusp_of(thickness, flattest) > cusp) break;
       while (front < back && cells[window[back - 1]] <= cells[end]) --back;
       window[back++] = end++;
     }
-    highest[rung] = end;
+    highest[candidate] = end;
   }
   return highest;
 }
 
 class Solver {
  public:
-  Solver(const SurfaceIndex& index, const Options& options, const Ladder& ladder)
-      : index_(index), options_(options), ladder_(ladder), set_(options.set), tolerance_(options.surface.flat_tolerance) {
+  Solver(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights)
+      : index_(index),
+        options_(options),
+        candidate_heights_(candidate_heights),
+        set_(options.set),
+        tolerance_(options.surface.flat_tolerance) {
     // Where every height is within the tolerance of a rung, the rung that is nearest has to be met.
-    hit_ = ladder.step() > 0 ? std::min<std::int64_t>(tolerance_, ladder.step() / 2) : tolerance_;
-    highest_ = highest_by_cusp(ladder, steepest_in_cells(index, index.parts, ladder), options.cusp, set_.most());
+    hit_ = candidate_heights.step() > 0 ? std::min<std::int64_t>(tolerance_, candidate_heights.step() / 2) : tolerance_;
+    highest_ = highest_by_cusp(candidate_heights, steepest_in_cells(index, index.parts, candidate_heights), options.cusp,
+                               set_.maximum());
     if (options.flats) {
-      for (const Flat& flat : find_flats(index, tolerance_, options.least_flat_mm2)) {
+      for (const Flat& flat : find_flats(index, tolerance_, options.min_flat_mm2)) {
         if (flat.height < index.top) flats_.push_back(flat.height);
       }
     }
-    if (ladder.step() > 0) {
-      for (const Nm value : set_.values) strides_.push_back(static_cast<std::uint32_t>(value / ladder.step()));
+    if (candidate_heights.step() > 0) {
+      for (const Nm value : set_.values) strides_.push_back(static_cast<std::uint32_t>(value / candidate_heights.step()));
     }
     weigh_layers();
   }
@@ -71,7 +76,7 @@ class Solver {
     allow(hit_);
     std::vector<std::uint32_t> thicknesses = weights_.empty() ? solve<Layers>() : solve<Time>();
     if (thicknesses.empty()) {
-      plan.largest_miss = least_largest_miss();
+      plan.largest_miss = smallest_largest_miss();
       allow(plan.largest_miss);
       thicknesses = solve<MissesThenTime>();
     }
@@ -88,16 +93,16 @@ class Solver {
   // Costs of layers by the rung at their bottom, in microseconds; empty if each counts 1.
   void weigh_layers() {
     if (!options_.time.on()) return;
-    const Buffer<double> section = section_at_rungs(index_, ladder_, tolerance_);
-    weights_.resize(ladder_.rungs());
-    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      weights_[rung] = std::max<std::int64_t>(1, std::llround(seconds_of_layer(options_.time, section[rung]) * 1e6));
+    const Buffer<double> section = section_at_candidates(index_, candidate_heights_, tolerance_);
+    weights_.resize(candidate_heights_.candidates());
+    for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
+      weights_[candidate] = std::max<std::int64_t>(1, std::llround(seconds_of_layer(options_.time, section[candidate]) * 1e6));
     }
   }
 
-  bool is_end(std::uint32_t rung) const {
-    const std::int64_t height = ladder_[rung];
-    if (rung == 0) return false;
+  bool is_end(std::uint32_t candidate) const {
+    const std::int64_t height = candidate_heights_[candidate];
+    if (candidate == 0) return false;
     return options_.flats ? covers(height) && std::abs(height - index_.top) <= allowed_ : height >= index_.top;
   }
   bool covers(std::int64_t height) const { return !options_.cover_top || height >= index_.top - hit_; }
@@ -105,67 +110,71 @@ class Solver {
 
   // Calls visit(thickness index, upper rung) for every thickness from a rung, thin to thick.
   template <class Visit>
-  void for_each_layer(std::uint32_t rung, const Visit& visit) const {
+  void for_each_layer(std::uint32_t candidate, const Visit& visit) const {
     for (std::uint32_t i = 0; i < set_.size(); ++i) {
-      const std::uint32_t up = strides_.empty() ? ladder_.rungs_up_to(ladder_[rung] + set_.values[i]) - 1 : rung + strides_[i];
-      if (up > limit_[rung]) return;
+      const std::uint32_t up = strides_.empty()
+                                   ? candidate_heights_.candidates_up_to(candidate_heights_[candidate] + set_.values[i]) - 1
+                                   : candidate + strides_[i];
+      if (up > limit_[candidate]) return;
       visit(i, up);
     }
   }
   // The highest rung that a layer from each rung may reach if every flat has to have a boundary within `distance`.
   void allow(std::int64_t distance) {
     allowed_ = distance;
-    limit_.resize(ladder_.rungs());
+    limit_.resize(candidate_heights_.candidates());
     const std::int64_t ceiling = options_.flats ? index_.top + distance : INT64_MAX;
     std::size_t flat = 0;
-    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      const std::int64_t bottom = ladder_[rung];
+    for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
+      const std::int64_t bottom = candidate_heights_[candidate];
       while (flat < flats_.size() && flats_[flat] - distance <= bottom) ++flat;
-      std::int64_t most = std::min(ceiling, bottom + set_.most());
-      if (flat < flats_.size()) most = std::min(most, flats_[flat] + distance);
+      std::int64_t maximum = std::min(ceiling, bottom + set_.maximum());
+      if (flat < flats_.size()) maximum = std::min(maximum, flats_[flat] + distance);
       if (options_.slab > 0) {
         // A boundary so near to the top that no layer fits between them would leave the top missed.
         const std::int64_t boundary = (bottom / options_.slab + 1) * options_.slab;
-        if (boundary >= index_.top || index_.top - boundary >= set_.least()) most = std::min(most, boundary);
+        if (boundary >= index_.top || index_.top - boundary >= set_.minimum()) maximum = std::min(maximum, boundary);
       }
       // The least thickness is allowed whatever the slopes ask for.
-      const std::uint32_t thinnest = ladder_.rungs_up_to(bottom + set_.least()) - 1;
-      limit_[rung] = std::min(ladder_.rungs_up_to(most) - 1, std::max(highest_[rung], thinnest));
-      if (bottom + set_.least() > most) limit_[rung] = rung;
+      const std::uint32_t thinnest = candidate_heights_.candidates_up_to(bottom + set_.minimum()) - 1;
+      limit_[candidate] = std::min(candidate_heights_.candidates_up_to(maximum) - 1, std::max(highest_[candidate], thinnest));
+      if (bottom + set_.minimum() > maximum) limit_[candidate] = candidate;
     }
   }
 
   // The cost of a layer. first_flat: the first one above its bottom.
   template <class Cost>
-  Cost weight(std::uint32_t rung, std::size_t first_flat, std::uint32_t up) const {
-    Cost cost = weights_.empty() ? Cost{1} : static_cast<Cost>(weights_[rung]);
+  Cost weight(std::uint32_t candidate, std::size_t first_flat, std::uint32_t up) const {
+    Cost cost = weights_.empty() ? Cost{1} : static_cast<Cost>(weights_[candidate]);
     if constexpr (sizeof(Cost) > 8) {
-      for_each_miss(first_flat, ladder_[rung], ladder_[up], [&](std::int64_t miss) { cost += Cost{miss} << 64; });
+      for_each_miss(first_flat, candidate_heights_[candidate], candidate_heights_[up],
+                    [&](std::int64_t miss) { cost += Cost{miss} << 64; });
     }
     return cost;
   }
   template <class Cost>
-  Cost end_cost(std::uint32_t rung) const {
-    std::int64_t missed = counted(std::abs(ladder_[rung] - index_.top));
-    for (std::size_t i = first_flat_above(ladder_[rung]); i < flats_.size(); ++i) missed += counted(flats_[i] - ladder_[rung]);
+  Cost end_cost(std::uint32_t candidate) const {
+    std::int64_t missed = counted(std::abs(candidate_heights_[candidate] - index_.top));
+    for (std::size_t i = first_flat_above(candidate_heights_[candidate]); i < flats_.size(); ++i)
+      missed += counted(flats_[i] - candidate_heights_[candidate]);
     return static_cast<Cost>(static_cast<__int128>(missed) << 64);
   }
   // Nothing is built upon an end, but where ends are missed the next rung may be nearer.
   template <class Cost>
-  bool is_last(std::uint32_t rung) const {
-    return sizeof(Cost) > 8 ? ladder_[rung] >= index_.top : is_end(rung);
+  bool is_last(std::uint32_t candidate) const {
+    return sizeof(Cost) > 8 ? candidate_heights_[candidate] >= index_.top : is_end(candidate);
   }
 
   // The costs of reaching every rung that layers within limit_ reach.
   template <class Cost>
   Buffer<Cost> costs_by_layers() const {
-    Buffer<Cost> cost(ladder_.rungs(), unreached<Cost>());
+    Buffer<Cost> cost(candidate_heights_.candidates(), unreached<Cost>());
     cost[0] = 0;
-    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      if (cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
-      const std::size_t flat = first_flat_above(ladder_[rung]);
-      for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {
-        cost[up] = std::min(cost[up], cost[rung] + weight<Cost>(rung, flat, up));
+    for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
+      if (cost[candidate] == unreached<Cost>() || is_last<Cost>(candidate)) continue;
+      const std::size_t flat = first_flat_above(candidate_heights_[candidate]);
+      for_each_layer(candidate, [&](std::uint32_t, std::uint32_t up) {
+        cost[up] = std::min(cost[up], cost[candidate] + weight<Cost>(candidate, flat, up));
       });
     }
     return cost;
@@ -175,17 +184,18 @@ class Solver {
   // them costs O(1) a rung.
   template <class Cost>
   Buffer<Cost> costs_by_windows() const {
-    Buffer<Cost> cost(ladder_.rungs(), unreached<Cost>());
+    Buffer<Cost> cost(candidate_heights_.candidates(), unreached<Cost>());
     cost[0] = 0;
-    Buffer<std::uint32_t> window(ladder_.rungs());  // of increasing cost of what is built on them, the first is the cheapest
-    Buffer<Cost> built(ladder_.rungs());
+    Buffer<std::uint32_t> window(
+        candidate_heights_.candidates());  // of increasing cost of what is built on them, the first is the cheapest
+    Buffer<Cost> built(candidate_heights_.candidates());
     std::uint32_t front = 0, back = 0;
-    for (std::uint32_t up = strides_.front(); up < ladder_.rungs(); ++up) {
-      const std::uint32_t rung = up - strides_.front();
-      if (cost[rung] != unreached<Cost>() && limit_[rung] > rung && !is_last<Cost>(rung)) {
-        built[rung] = cost[rung] + weight<Cost>(rung, 0, 0);
-        while (front < back && built[window[back - 1]] >= built[rung]) --back;
-        window[back++] = rung;
+    for (std::uint32_t up = strides_.front(); up < candidate_heights_.candidates(); ++up) {
+      const std::uint32_t candidate = up - strides_.front();
+      if (cost[candidate] != unreached<Cost>() && limit_[candidate] > candidate && !is_last<Cost>(candidate)) {
+        built[candidate] = cost[candidate] + weight<Cost>(candidate, 0, 0);
+        while (front < back && built[window[back - 1]] >= built[candidate]) --back;
+        window[back++] = candidate;
       }
       while (front < back && limit_[window[front]] < up) ++front;
       if (front < back) cost[up] = built[window[front]];
@@ -199,25 +209,25 @@ class Solver {
     const Buffer<Cost> cost = sizeof(Cost) <= 8 && even_range() ? costs_by_windows<Cost>() : costs_by_layers<Cost>();
     std::uint32_t end = kNone;
     Cost best = unreached<Cost>();
-    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      if (cost[rung] == unreached<Cost>() || !is_end(rung)) continue;
-      const Cost whole = cost[rung] + (sizeof(Cost) > 8 ? end_cost<Cost>(rung) : Cost{0});
-      if (whole < best || (whole == best && nearer_top(rung, end))) {
-        end = rung;
+    for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
+      if (cost[candidate] == unreached<Cost>() || !is_end(candidate)) continue;
+      const Cost whole = cost[candidate] + (sizeof(Cost) > 8 ? end_cost<Cost>(candidate) : Cost{0});
+      if (whole < best || (whole == best && nearer_top(candidate, end))) {
+        end = candidate;
         best = whole;
       }
     }
     if (end == kNone) return {};
-    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      if (cost[rung] < best && !is_end(rung)) one_less_ = ladder_[rung];
+    for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
+      if (cost[candidate] < best && !is_end(candidate)) one_less_ = candidate_heights_[candidate];
     }
     return trace(cost, end);
   }
   // Whether the thicknesses are all the multiples of the ladder's step in a range.
-  bool even_range() const { return !strides_.empty() && set_.is_contiguous() && set_.step() == ladder_.step(); }
+  bool even_range() const { return !strides_.empty() && set_.is_contiguous() && set_.step() == candidate_heights_.step(); }
 
   bool nearer_top(std::uint32_t a, std::uint32_t b) const {
-    return std::abs(ladder_[a] - index_.top) < std::abs(ladder_[b] - index_.top);
+    return std::abs(candidate_heights_[a] - index_.top) < std::abs(candidate_heights_[b] - index_.top);
   }
 
   // Calls visit(miss) for each flat strictly between two heights that is missed.
@@ -233,20 +243,21 @@ class Solver {
   }
 
   // The least that the largest miss of any stack can be.
-  std::int64_t least_largest_miss() {
-    allow(index_.top + set_.most());
-    Buffer<std::int64_t> worst(ladder_.rungs(), unreached<std::int64_t>());
+  std::int64_t smallest_largest_miss() {
+    allow(index_.top + set_.maximum());
+    Buffer<std::int64_t> worst(candidate_heights_.candidates(), unreached<std::int64_t>());
     worst[0] = 0;
     std::int64_t best = unreached<std::int64_t>();
-    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      if (worst[rung] == unreached<std::int64_t>()) continue;
-      const std::int64_t bottom = ladder_[rung];
-      if (rung > 0 && covers(bottom)) best = std::min(best, std::max(worst[rung], counted(std::abs(bottom - index_.top))));
+    for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
+      if (worst[candidate] == unreached<std::int64_t>()) continue;
+      const std::int64_t bottom = candidate_heights_[candidate];
+      if (candidate > 0 && covers(bottom))
+        best = std::min(best, std::max(worst[candidate], counted(std::abs(bottom - index_.top))));
       if (bottom >= index_.top) continue;
       const std::size_t flat = first_flat_above(bottom);
-      for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {
-        std::int64_t value = worst[rung];
-        for_each_miss(flat, bottom, ladder_[up], [&](std::int64_t miss) { value = std::max(value, miss); });
+      for_each_layer(candidate, [&](std::uint32_t, std::uint32_t up) {
+        std::int64_t value = worst[candidate];
+        for_each_miss(flat, bottom, candidate_heights_[up], [&](std::int64_t miss) { value = std::max(value, miss); });
         worst[up] = std::min(worst[up], value);
       });
     }
@@ -256,41 +267,42 @@ class Solver {
   // Of all stacks that reach `end` at its cost, the one with the least mean cusp.
   template <class Cost>
   std::vector<std::uint32_t> trace(const Buffer<Cost>& cost, std::uint32_t end) const {
-    const Buffer<double> below = projected_below(index_, index_.parts, ladder_, Sign::kBoth);
+    const Buffer<double> below = projected_below(index_, index_.parts, candidate_heights_, Sign::kBoth);
     Buffer<std::uint32_t> via;  // the next rung of the stack from each rung
     if constexpr (std::is_same_v<Cost, Layers>) {
-      if (even_range()) via = least_steps({cost, limit_, below, strides_.front(), end});
+      if (even_range()) via = fewest_steps({cost, limit_, below, strides_.front(), end});
     }
-    if (via.empty()) via = least_steps_by_layers(cost, below, end);
+    if (via.empty()) via = fewest_steps_by_layers(cost, below, end);
     std::vector<std::uint32_t> thicknesses;
-    for (std::uint32_t rung = 0; rung != end; rung = via[rung]) {
-      const auto value = std::ranges::lower_bound(set_.values, ladder_[via[rung]] - ladder_[rung]);
+    for (std::uint32_t candidate = 0; candidate != end; candidate = via[candidate]) {
+      const auto value =
+          std::ranges::lower_bound(set_.values, candidate_heights_[via[candidate]] - candidate_heights_[candidate]);
       thicknesses.push_back(static_cast<std::uint32_t>(value - set_.values.begin()));
     }
     return thicknesses;
   }
   template <class Cost>
-  Buffer<std::uint32_t> least_steps_by_layers(const Buffer<Cost>& cost, const Buffer<double>& below, std::uint32_t end) const {
+  Buffer<std::uint32_t> fewest_steps_by_layers(const Buffer<Cost>& cost, const Buffer<double>& below, std::uint32_t end) const {
     constexpr double kNowhere = std::numeric_limits<double>::infinity();
     Buffer<double> steps(end + 1, kNowhere);  // mm2 nm, from a rung to the end
     Buffer<std::uint32_t> via(end + 1, kNone);
     steps[end] = 0;
-    for (std::uint32_t rung = end; rung-- > 0;) {
-      if (cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
-      const std::size_t flat = first_flat_above_if<Cost>(rung);
-      for_each_layer(rung, [&](std::uint32_t i, std::uint32_t up) {
-        if (up > end || steps[up] == kNowhere || cost[rung] + weight<Cost>(rung, flat, up) != cost[up]) return;
-        const double value = steps[up] + set_.values[i] * (below[up] - below[rung]);
-        if (value > steps[rung]) return;  // of equal ones the thickest
-        steps[rung] = value;
-        via[rung] = up;
+    for (std::uint32_t candidate = end; candidate-- > 0;) {
+      if (cost[candidate] == unreached<Cost>() || is_last<Cost>(candidate)) continue;
+      const std::size_t flat = first_flat_above_if<Cost>(candidate);
+      for_each_layer(candidate, [&](std::uint32_t i, std::uint32_t up) {
+        if (up > end || steps[up] == kNowhere || cost[candidate] + weight<Cost>(candidate, flat, up) != cost[up]) return;
+        const double value = steps[up] + set_.values[i] * (below[up] - below[candidate]);
+        if (value > steps[candidate]) return;  // of equal ones the thickest
+        steps[candidate] = value;
+        via[candidate] = up;
       });
     }
     return via;
   }
   template <class Cost>
-  std::size_t first_flat_above_if(std::uint32_t rung) const {
-    return sizeof(Cost) > 8 ? first_flat_above(ladder_[rung]) : 0;
+  std::size_t first_flat_above_if(std::uint32_t candidate) const {
+    return sizeof(Cost) > 8 ? first_flat_above(candidate_heights_[candidate]) : 0;
   }
 
   LayerReason reason(std::int64_t bottom, std::uint32_t i) const {
@@ -301,13 +313,14 @@ class Solver {
       const auto flat = std::ranges::lower_bound(flats_, top - tolerance_);
       if (flat != flats_.end() && *flat <= top + tolerance_) return LayerReason::kFlat;
     }
-    const bool limited = ladder_[highest_[ladder_.rungs_up_to(bottom) - 1]] < bottom + set_.values[i + 1];
+    const bool limited =
+        candidate_heights_[highest_[candidate_heights_.candidates_up_to(bottom) - 1]] < bottom + set_.values[i + 1];
     return limited || !options_.flats ? LayerReason::kCusp : LayerReason::kFlat;
   }
 
   const SurfaceIndex& index_;
   const Options& options_;
-  const Ladder& ladder_;
+  const CandidateHeights& candidate_heights_;
   const ThicknessSet& set_;
   const Nm tolerance_;
   std::vector<std::int64_t> flats_;     // below the top
@@ -319,8 +332,97 @@ class Solver {
 
 }  // namespace
 
-Plan plan_optimal(const SurfaceIndex& index, const Options& options, const Ladder& ladder) {
-  return Solver(index, options, ladder).solve();
+Plan plan_optimal(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights) {
+  return Solver(index, options, candidate_heights).solve();
 }
+
+namespace {
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+class HeightSearch {
+ public:
+  explicit HeightSearch(const Stacks& stacks)
+      : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, UINT32_MAX) {}
+
+  Buffer<std::uint32_t> all() {
+    sort_by_layers();
+    steps_[stacks_.end] = 0;
+    columns_ = {stacks_.end};
+    for (std::int32_t layers = stacks_.layers[stacks_.end]; layers-- > 0;) {
+      find_rows(layers);
+      if (!rows_.empty()) halve(0, rows_.size(), 0, columns_.size() - 1);
+      columns_.clear();
+      for (const CandidateRow& row : rows_) columns_.push_back(row.candidate);
+    }
+    return std::move(via_);
+  }
+
+ private:
+  // A rung and the columns, [first, last), on which a layer from it may end.
+  struct CandidateRow {
+    std::uint32_t candidate;
+    std::size_t first, last;
+  };
+
+  void sort_by_layers() {
+    const std::int32_t maximum = stacks_.layers[stacks_.end];
+    begin_.assign(maximum + 2, 0);
+    const auto counts = [&](std::uint32_t candidate) { return stacks_.layers[candidate] < maximum; };
+    for (std::uint32_t candidate = 0; candidate < stacks_.end; ++candidate) {
+      if (counts(candidate)) ++begin_[stacks_.layers[candidate] + 1];
+    }
+    for (std::int32_t layers = 0; layers < maximum; ++layers) begin_[layers + 1] += begin_[layers];
+    candidates_.resize(begin_[maximum]);
+    Buffer<std::uint32_t> next = begin_;
+    for (std::uint32_t candidate = 0; candidate < stacks_.end; ++candidate) {
+      if (counts(candidate)) candidates_[next[stacks_.layers[candidate]]++] = candidate;
+    }
+  }
+
+  // The rungs from which a layer reaches a column. Both ends of what they reach only move up.
+  void find_rows(std::int32_t layers) {
+    rows_.clear();
+    std::size_t first = 0, last = 0;
+    for (std::uint32_t i = begin_[layers]; i < begin_[layers + 1]; ++i) {
+      const std::uint32_t candidate = candidates_[i], limit = stacks_.limit[candidate];
+      if (limit < candidate + stacks_.minimum) continue;
+      while (first < columns_.size() && columns_[first] < candidate + stacks_.minimum) ++first;
+      while (last < columns_.size() && columns_[last] <= limit) ++last;
+      if (first < last) rows_.push_back({candidate, first, last});
+    }
+  }
+
+  // Rows [first, last), whose best columns lie in [low, high].
+  void halve(std::size_t first, std::size_t last, std::size_t low, std::size_t high) {
+    const std::size_t middle = first + (last - first) / 2;
+    const CandidateRow& row = rows_[middle];
+    const double below = stacks_.below[row.candidate];
+    std::size_t best = low;
+    double minimum = kFar;
+    for (std::size_t i = std::max(row.first, low); i <= std::min(row.last - 1, high); ++i) {
+      const std::uint32_t up = columns_[i];
+      const double value = steps_[up] + (up - row.candidate) * (stacks_.below[up] - below);
+      if (value > minimum) continue;  // of equal ones the thickest
+      minimum = value;
+      best = i;
+    }
+    steps_[row.candidate] = minimum;
+    via_[row.candidate] = columns_[best];
+    if (first < middle) halve(first, middle, low, best);
+    if (middle + 1 < last) halve(middle + 1, last, best, high);
+  }
+
+  const Stacks& stacks_;
+  Buffer<double> steps_;  // mm2 times rungs, from a rung to the end
+  Buffer<std::uint32_t> via_;
+  Buffer<std::uint32_t> candidates_, begin_;  // rungs by number of layers below them, with the offset of each number
+  Buffer<std::uint32_t> columns_;             // rungs of one layer more from which the end is reached
+  Buffer<CandidateRow> rows_;
+};
+
+}  // namespace
+
+Buffer<std::uint32_t> fewest_steps(const Stacks& stacks) { return HeightSearch(stacks).all(); }
 
 }  // namespace lamina::heights

@@ -8,17 +8,17 @@
 namespace lamina::heights {
 
 std::int64_t slab_height(const ThicknessSet& set) {
-  const std::int64_t least = set.least(), most = set.most();
-  return set.is_contiguous() ? ceil_div(most, least) * least : std::lcm(least, most);
+  const std::int64_t minimum = set.minimum(), maximum = set.maximum();
+  return set.is_contiguous() ? ceil_div(maximum, minimum) * minimum : std::lcm(minimum, maximum);
 }
 
 Status check_slab(const ThicknessSet& set) {
   const std::int64_t slab = slab_height(set);
-  if (slab <= kMostSlab * set.most()) return {};
+  if (slab <= kMaxSlab * set.maximum()) return {};
   return Error{Fault::kUsage,
                fmt::format("heights.per_part: {} and {} mm meet only every {} mm; give thicknesses with a smaller "
                            "common multiple, or a range",
-                           mm(set.least()), mm(set.most()), mm(slab))};
+                           mm(set.minimum()), mm(set.maximum()), mm(slab))};
 }
 
 Result<PerPartPlan> plan_per_part(SurfaceIndex index, const Options& options) {

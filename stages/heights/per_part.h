@@ -22,7 +22,7 @@ struct PerPartPlan {
 std::int64_t slab_height(const ThicknessSet& set);
 
 /// Slabs of more than so many times the greatest thickness would leave the parts with hardly a boundary in common.
-constexpr std::int64_t kMostSlab = 16;
+constexpr std::int64_t kMaxSlab = 16;
 
 /// Whether slabs of these thicknesses are low enough. errors  kUsage
 Status check_slab(const ThicknessSet& set);

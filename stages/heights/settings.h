@@ -51,11 +51,11 @@ struct Settings {
   double peak_angle_deg = 90;
   double normal_tolerance = 1e-3;
   Facets facets = Facets::kRange;
-  double least_facet_mm2 = 0;
+  double min_facet_mm2 = 0;
   Peaks peaks = Peaks::kFlats;
   bool cover_top = false;
   bool flats = true;
-  double least_flat_mm2 = 1;
+  double min_flat_mm2 = 1;
   double flat_tolerance_um = 1;
   std::array<double, 2> time_model{0, 0};  // seconds a layer, seconds a mm2 of its section
   Containment containment = Containment::kAcross;

@@ -43,8 +43,8 @@ class RangeRaiser {
   static constexpr std::uint32_t kBlockBits = kLevels - 2, kMask = (1u << kBlockBits) - 1;
   using Levels = std::vector<Buffer<Steepness>>;
 
-  static Levels make_levels(std::uint32_t count, std::uint32_t most) {
-    Levels levels(std::min<std::uint32_t>(std::bit_width(count), most));
+  static Levels make_levels(std::uint32_t count, std::uint32_t maximum) {
+    Levels levels(std::min<std::uint32_t>(std::bit_width(count), maximum));
     for (auto& level : levels) level.assign(count, 0);
     return levels;
   }
@@ -70,7 +70,7 @@ class RangeRaiser {
   Levels fine_, coarse_;
 };
 
-struct Range {
+struct FacetRange {
   std::uint32_t first, last;
 };
 
@@ -84,7 +84,7 @@ Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSur
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
     RangeRaiser raiser(entries);
     const auto raise = [&](Nm lo, Nm hi, Steepness steepness, double) {
-      const Range range = range_of(lo, hi);
+      const FacetRange range = range_of(lo, hi);
       if (range.first < range.last) raiser.raise(range.first, range.last, steepness);
     };
     for (const PartSurface& part : parts) for_each_slope(index, part, share, shares, raise, slope);
@@ -100,19 +100,19 @@ Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSur
 struct Spread {
   Buffer<double> within;  // mm2 inside of a cell
   Buffer<double> slope;   // mm2 per nm that begins (or ends) to cover whole cells at a rung
-  explicit Spread(std::uint32_t rungs) : within(rungs, 0.0), slope(rungs + 1, 0.0) {}
+  explicit Spread(std::uint32_t candidates) : within(candidates, 0.0), slope(candidates + 1, 0.0) {}
 
-  void add(const Ladder& ladder, Nm lo, Nm hi, double mm2) {
-    const auto [first, last] = ladder.cells_between(lo, hi);
+  void add(const CandidateHeights& candidate_heights, Nm lo, Nm hi, double mm2) {
+    const auto [first, last] = candidate_heights.cells_between(lo, hi);
     if (first >= last) return;
-    if (last - first == 1 && lo >= ladder[first] && hi <= ladder[last]) {
+    if (last - first == 1 && lo >= candidate_heights[first] && hi <= candidate_heights[last]) {
       within[first] += mm2;
       return;
     }
     const double density = mm2 / (static_cast<double>(hi) - lo);
     const auto share = [&](std::uint32_t cell) {
-      return density *
-             static_cast<double>(std::min<std::int64_t>(hi, ladder[cell + 1]) - std::max<std::int64_t>(lo, ladder[cell]));
+      return density * static_cast<double>(std::min<std::int64_t>(hi, candidate_heights[cell + 1]) -
+                                           std::max<std::int64_t>(lo, candidate_heights[cell]));
     };
     within[first] += share(first);
     if (last - first < 2) return;
@@ -129,42 +129,44 @@ struct Spread {
 
 }  // namespace
 
-Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
-                                    Slope slope) {
-  return steepest_by(index, parts, ladder.cells(), slope, [&](Nm lo, Nm hi) {
-    const auto [first, last] = ladder.cells_between(lo, hi);
-    return Range{first, last};
+Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts,
+                                    const CandidateHeights& candidate_heights, Slope slope) {
+  return steepest_by(index, parts, candidate_heights.cells(), slope, [&](Nm lo, Nm hi) {
+    const auto [first, last] = candidate_heights.cells_between(lo, hi);
+    return FacetRange{first, last};
   });
 }
 
-Buffer<Steepness> steepest_at_rungs(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
-                                    Slope slope) {
-  return steepest_by(index, parts, ladder.rungs(), slope, [&](Nm lo, Nm hi) {
-    return Range{ladder.rungs_up_to(lo), ladder.rungs_up_to(hi)};
+Buffer<Steepness> steepest_at_candidates(const SurfaceIndex& index, std::span<const PartSurface> parts,
+                                         const CandidateHeights& candidate_heights, Slope slope) {
+  return steepest_by(index, parts, candidate_heights.candidates(), slope, [&](Nm lo, Nm hi) {
+    return FacetRange{candidate_heights.candidates_up_to(lo), candidate_heights.candidates_up_to(hi)};
   });
 }
 
-Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder, Sign sign) {
-  const std::uint32_t shares = worthwhile_shares(index, parts, 4 * ladder.rungs());  // doubles of two arrays
+Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts,
+                               const CandidateHeights& candidate_heights, Sign sign) {
+  const std::uint32_t shares = worthwhile_shares(index, parts, 4 * candidate_heights.candidates());  // doubles of two arrays
   std::vector<std::optional<Spread>> spreads(shares);
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
-    Spread& spread = spreads[share].emplace(ladder.rungs());
+    Spread& spread = spreads[share].emplace(candidate_heights.candidates());
     for (const PartSurface& part : parts) {
-      for (const Standing& standing : part.standing) {
-        const MeshSlopes& mesh = index.meshes[standing.mesh];
-        for_each_slope(mesh, standing, share, shares, [&](Nm lo, Nm hi, Steepness, double projected) {
-          spread.add(ladder, lo, hi, sign == Sign::kBoth ? std::abs(projected) * mesh.step_share : projected);
+      for (const PlacedSurface& placed : part.placed) {
+        const MeshSlopes& mesh = index.meshes[placed.mesh];
+        for_each_slope(mesh, placed, share, shares, [&](Nm lo, Nm hi, Steepness, double projected) {
+          spread.add(candidate_heights, lo, hi, sign == Sign::kBoth ? std::abs(projected) * mesh.step_share : projected);
         });
       }
     }
   });
   Spread& all = *spreads[0];
   for (std::uint32_t share = 1; share < shares; ++share) all.add(*spreads[share]);
-  Buffer<double> below(ladder.rungs(), 0.0);
+  Buffer<double> below(candidate_heights.candidates(), 0.0);
   double density = 0;
-  for (std::uint32_t cell = 0; cell < ladder.cells(); ++cell) {
+  for (std::uint32_t cell = 0; cell < candidate_heights.cells(); ++cell) {
     density += all.slope[cell];
-    below[cell + 1] = below[cell] + all.within[cell] + density * static_cast<double>(ladder[cell + 1] - ladder[cell]);
+    below[cell + 1] =
+        below[cell] + all.within[cell] + density * static_cast<double>(candidate_heights[cell + 1] - candidate_heights[cell]);
   }
   return below;
 }

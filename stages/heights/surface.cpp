@@ -38,7 +38,7 @@ Normal normal_of(const Triangle& t) {
 struct Limits {
   double horizontal;  // |n_z| from which a facet is horizontal
   Nm tolerance;
-  double least_mm2;
+  double min_mm2;
   bool nominal_cusps;
 };
 
@@ -48,19 +48,19 @@ class FlatJoiner {
  public:
   explicit FlatJoiner(std::vector<FlatFacet>& out) : out_(out) {}
   ~FlatJoiner() {
-    for (const FlatFacet& flat : places_) list(flat);
+    for (const FlatFacet& flat : table_) list(flat);
   }
   FlatJoiner(const FlatJoiner&) = delete;
   FlatJoiner& operator=(const FlatJoiner&) = delete;
 
   void add(const FlatFacet& flat) {
     const std::uint32_t mixed = (static_cast<std::uint32_t>(flat.height) * 2 + flat.up) * 2654435769u;
-    FlatFacet& place = places_[mixed >> (32 - kBits)];
-    if (place.height == flat.height && place.up == flat.up) {
-      place.mm2 += flat.mm2;
+    FlatFacet& position = table_[mixed >> (32 - kBits)];
+    if (position.height == flat.height && position.up == flat.up) {
+      position.mm2 += flat.mm2;
     } else {
-      list(place);
-      place = flat;
+      list(position);
+      position = flat;
     }
   }
 
@@ -70,11 +70,11 @@ class FlatJoiner {
     if (flat.mm2 > 0) out_.push_back(flat);
   }
   std::vector<FlatFacet>& out_;
-  std::array<FlatFacet, 1 << kBits> places_{};
+  std::array<FlatFacet, 1 << kBits> table_{};
 };
 
 // Facets whose roots and quotients are taken together, two and more at a time.
-struct Group {
+struct FacetBatch {
   double x[kGroup], y[kGroup], z[kGroup], length[kGroup];
   double up[kGroup];     // |n_z| of the unit normal; no number for a facet without area
   double angle[kGroup];  // the same before a stretch, and
@@ -95,7 +95,7 @@ struct Group {
     }
   }
   // A stretch by s turns a normal n, as long as twice the area, into (n_x / s_x, n_y / s_y, n_z / s_z) s_x s_y s_z.
-  void undo(const Stretch& by, std::size_t count) {
+  void undo(const ScaleFactors& by, std::size_t count) {
     const double volume = by[0] * by[1] * by[2];
     for (std::size_t k = 0; k < count; ++k) {
       const double nx = x[k] * by[0], ny = y[k] * by[1], nz = z[k] * by[2], size = std::sqrt(nx * nx + ny * ny + nz * nz);
@@ -113,14 +113,14 @@ Steepness rounded_up(double up) {
 }
 
 // A mesh that is stretched by factors other than 1 gets angles of its own, and with Limits::nominal_cusps also steps.
-MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits, const Stretch& stretch) {
-  const bool stretched = stretch != Stretch{1, 1, 1}, steps = stretched && limits.nominal_cusps;
+MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits, const ScaleFactors& scale) {
+  const bool is_scaled = scale != ScaleFactors{1, 1, 1}, steps = is_scaled && limits.nominal_cusps;
   MeshSlopes slopes;
   const std::size_t count = mesh.triangles.size();
   slopes.facets = mesh.triangles;
   slopes.steepness.resize(count);
-  if (stretched) slopes.nominal.resize(count);
-  if (steps) slopes.step_share = 1 / (stretch[0] * stretch[1] * stretch[2]);
+  if (is_scaled) slopes.nominal.resize(count);
+  if (steps) slopes.step_share = 1 / (scale[0] * scale[1] * scale[2]);
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   std::vector<std::vector<FlatFacet>> flats(blocks);
   std::vector<double> areas(blocks);
@@ -130,28 +130,28 @@ MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits, const Stretch& stre
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
     double block_area = 0;
     FlatJoiner joiner(flats[block]);
-    Group g;
+    FacetBatch g;
     const std::size_t block_end = std::min(count, (block + 1) * kBlock);
     for (std::size_t first = block * kBlock; first < block_end; first += kGroup) {
       const std::size_t group = std::min(kGroup, block_end - first);
       g.measure(triangles + first, group);
-      if (stretched) g.undo(stretch, group);
-      const double* angle = stretched ? g.angle : g.up;
+      if (is_scaled) g.undo(scale, group);
+      const double* angle = is_scaled ? g.angle : g.up;
       const double* surface = steps ? g.whole : g.length;
       std::uint32_t level[kGroup], levels = 0;
       for (std::size_t k = 0; k < group; ++k) {
-        const bool counts = (g.z[k] != 0) & (g.length[k] * 0.5e-12 >= limits.least_mm2);
+        const bool counts = (g.z[k] != 0) & (g.length[k] * 0.5e-12 >= limits.min_mm2);
         const bool flat = counts & (angle[k] >= limits.horizontal) & (std::int64_t{g.hi[k]} - g.lo[k] <= limits.tolerance);
         level[levels] = static_cast<std::uint32_t>(k);
         levels += flat;
         block_area += flat ? 0 : surface[k] * 0.5e-12;
         to_steepness[first + k] = rounded_up((counts & !flat) ? g.up[k] : 0);
       }
-      for (std::size_t k = 0; stretched && k < group; ++k) {
+      for (std::size_t k = 0; is_scaled && k < group; ++k) {
         const bool slope = to_steepness[first + k] != 0;
         to_nominal[first + k] = rounded_up(slope ? angle[k] : 0);
         // The step of a layer that shrinks with the part; factors below a half are no shrinkage.
-        if (steps) to_steepness[first + k] = rounded_up(slope ? std::min(angle[k] / stretch[2], 1.999) : 0);
+        if (steps) to_steepness[first + k] = rounded_up(slope ? std::min(angle[k] / scale[2], 1.999) : 0);
       }
       for (std::uint32_t l = 0; l < levels; ++l) {
         const std::size_t k = level[l];
@@ -177,21 +177,21 @@ double angle_of(Steepness steepness) {
 std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries) {
   std::size_t facets = 0;
   for (const PartSurface& part : parts) {
-    for (const Standing& standing : part.standing) facets += index.meshes[standing.mesh].steepness.size();
+    for (const PlacedSurface& placed : part.placed) facets += index.meshes[placed.mesh].steepness.size();
   }
-  constexpr std::size_t kFacetsAnEntry = 1, kMost = 32;
-  return static_cast<std::uint32_t>(std::clamp<std::size_t>(facets / (kFacetsAnEntry * entries + 1), 1, kMost));
+  constexpr std::size_t kFacetsAnEntry = 1, kMax = 32;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(facets / (kFacetsAnEntry * entries + 1), 1, kMax));
 }
 
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
-                           const SurfaceOptions& options, std::span<const Stretch> stretch) {
+                           const SurfaceOptions& options, std::span<const ScaleFactors> scale) {
   const Limits limits{std::sin(options.peak_angle_deg * std::numbers::pi / 180) - options.normal_tolerance,
-                      options.flat_tolerance, options.least_facet_mm2, options.nominal_cusps};
+                      options.flat_tolerance, options.min_facet_mm2, options.nominal_cusps};
   SurfaceIndex index;
   index.meshes.reserve(meshes.size());
   for (std::size_t m = 0; m < meshes.size(); ++m) {
-    index.meshes.push_back(slopes_of(meshes[m], limits, stretch.empty() ? Stretch{1, 1, 1} : stretch[m]));
+    index.meshes.push_back(slopes_of(meshes[m], limits, scale.empty() ? ScaleFactors{1, 1, 1} : scale[m]));
   }
 
   std::map<std::tuple<std::uint32_t, std::uint32_t, Nm>, std::uint32_t> copies;  // (part, mesh, raise)
@@ -199,16 +199,16 @@ SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instanc
     ++copies[{part_of_instance[i], instances[i].mesh, instances[i].offset.z}];
   }
   index.parts.resize(part_count);
-  std::vector<bool> seen(part_count);
+  std::vector<bool> detected(part_count);
   for (const auto& [key, count] : copies) {
     const auto& [part, mesh, raise] = key;
     const Box& box = meshes[mesh].bounds;
     PartSurface& surface = index.parts[part];
-    surface.standing.push_back({mesh, raise, count});
+    surface.placed.push_back({mesh, raise, count});
     const Nm bottom = box.lo.z + raise, top = box.hi.z + raise;
-    surface.bottom = seen[part] ? std::min(surface.bottom, bottom) : bottom;
-    surface.top = seen[part] ? std::max(surface.top, top) : top;
-    seen[part] = true;
+    surface.bottom = detected[part] ? std::min(surface.bottom, bottom) : bottom;
+    surface.top = detected[part] ? std::max(surface.top, top) : top;
+    detected[part] = true;
     index.top = std::max(index.top, top);
     index.area_mm2 += index.meshes[mesh].area_mm2 * count;
   }

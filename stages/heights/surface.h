@@ -40,12 +40,12 @@ struct SurfaceOptions {
   double peak_angle_deg = 90;      // facets at least as flat as this are horizontal
   double normal_tolerance = 1e-3;  // of |n_z|, for all comparisons of angles
   Nm flat_tolerance = 1000;        // nm: a horizontal facet may be that much out of level
-  double least_facet_mm2 = 0;      // smaller facets ask for nothing
+  double min_facet_mm2 = 0;        // smaller facets ask for nothing
   bool nominal_cusps = false;      // steps as they are left on the part once it has shrunk, not as printed
 };
 
 /// Factors per axis of the bed by which a mesh was stretched to make up for shrinkage.
-using Stretch = std::array<double, 3>;
+using ScaleFactors = std::array<double, 3>;
 
 /// A horizontal facet, or several at the same height that face the same way.
 struct FlatFacet {
@@ -70,7 +70,7 @@ struct MeshSlopes {
 enum class Slope { kSteps, kAngles };
 
 /// A mesh at a height; copies that stand on the same level count as one with a larger area.
-struct Standing {
+struct PlacedSurface {
   std::uint32_t mesh;
   Nm raise;  // nm, added to every height
   std::uint32_t copies;
@@ -78,7 +78,7 @@ struct Standing {
 
 /// One part of the job.
 struct PartSurface {
-  std::vector<Standing> standing;
+  std::vector<PlacedSurface> placed;
   Nm bottom = 0, top = 0;  // nm above the bed
 };
 
@@ -105,7 +105,7 @@ struct SurfaceIndex {
 /// cost  O(facets); 4 bytes a facet, 8 of a stretched mesh
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
-                           const SurfaceOptions& options, std::span<const Stretch> stretch = {});
+                           const SurfaceOptions& options, std::span<const ScaleFactors> scale = {});
 
 /// Into how many shares a pass over the sloped facets of these parts may be cut whose every share fills `entries` numbers
 /// of its own: 1 where filling them would cost more than the facets. The same for any number of threads.
@@ -114,7 +114,7 @@ std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartS
 /// Calls visit(lo, hi, steepness, projected) for each sloped facet of one of `shares` shares of a mesh that stands
 /// somewhere: heights in nm above the bed, mm2 of all copies, negative where the facet looks down.
 template <class Visit>
-void for_each_slope(const MeshSlopes& mesh, const Standing& standing, std::uint32_t share, std::uint32_t shares,
+void for_each_slope(const MeshSlopes& mesh, const PlacedSurface& placed, std::uint32_t share, std::uint32_t shares,
                     const Visit& visit, Slope slope = Slope::kSteps) {
   const Triangle* facets = mesh.facets.data();
   const bool nominal = slope == Slope::kAngles && !mesh.nominal.empty();
@@ -124,7 +124,7 @@ void for_each_slope(const MeshSlopes& mesh, const Standing& standing, std::uint3
     if (steepness[i] == 0) continue;
     const Triangle& t = facets[i];
     const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
-    visit(lo + standing.raise, hi + standing.raise, steepness[i], projected_mm2(t) * standing.copies);
+    visit(lo + placed.raise, hi + placed.raise, steepness[i], projected_mm2(t) * placed.copies);
   }
 }
 
@@ -132,8 +132,8 @@ void for_each_slope(const MeshSlopes& mesh, const Standing& standing, std::uint3
 template <class Visit>
 void for_each_slope(const SurfaceIndex& index, const PartSurface& part, std::uint32_t share, std::uint32_t shares,
                     const Visit& visit, Slope slope = Slope::kSteps) {
-  for (const Standing& standing : part.standing) {
-    for_each_slope(index.meshes[standing.mesh], standing, share, shares, visit, slope);
+  for (const PlacedSurface& placed : part.placed) {
+    for_each_slope(index.meshes[placed.mesh], placed, share, shares, visit, slope);
   }
 }
 

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "stages/data/buffer.h"
 #include "stages/data/layer.h"
+#include "stages/data/machine.h"
+#include "stages/data/status.h"
 
 namespace lamina::heights {
 
@@ -22,6 +25,9 @@ class LayerTable {
   }
   LayerTable() = default;
 
+  /// Layers are then added without moving the others; not of a uniform table.
+  void reserve(std::uint32_t layers) { entries_.reserve(layers); }
+  std::size_t capacity() const { return entries_.capacity(); }
   void add(Nm thickness, LayerReason reason) {
     entries_.push_back({static_cast<Nm>(top()), thickness, reason});
     ++count_;
@@ -38,7 +44,7 @@ class LayerTable {
     if (thickness_ > 0) {
       return {index, static_cast<Nm>(std::int64_t{index} * thickness_), thickness_, LayerReason::kUniform};
     }
-    const Entry& entry = entries_[index];
+    const LayerEntry& entry = entries_[index];
     return {index, entry.bottom, entry.thickness, entry.reason};
   }
   /// Where the last layer ends, nm.
@@ -48,13 +54,20 @@ class LayerTable {
   }
 
  private:
-  struct Entry {
+  struct LayerEntry {
     Nm bottom, thickness;
     LayerReason reason;
   };
   Nm thickness_ = 0;  // > 0: uniform, and nothing is stored
   std::uint32_t count_ = 0;
-  Buffer<Entry> entries_;
+  Buffer<LayerEntry> entries_;
 };
+
+// --- whether the build vat of a powder printer can make a table of layers.
+
+/// Empty, or a warning if some layers end between two steps of the vat.
+/// errors  kUsage: a layer thinner than a step
+/// cost    O(layers)
+Result<std::string> check_build_steps(const Machine& machine, const LayerTable& table);
 
 }  // namespace lamina::heights

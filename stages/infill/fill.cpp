@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/merge.h"
-#include "stages/infill/expression.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/raster.h"
+#include "stages/infill/spacing.h"
 #include "stages/infill/waves.h"
 
 namespace lamina::infill {
@@ -30,8 +30,8 @@ void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpa
 Status append_lines(const ContoursView& region, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
   const Frame frame = frame_of(context, parameters);
   const Contours turned = frame.to(region);
-  const auto places = place_across(turned, frame, context, parameters);
-  if (!places) return places.error();
+  const auto positions = positions_across(turned, frame, context, parameters);
+  if (!positions) return positions.error();
   if (is_wave(parameters.pattern)) {
     // Crests are counted from the part's side as well.
     std::int64_t start_u = INT64_MAX;
@@ -39,37 +39,37 @@ Status append_lines(const ContoursView& region, const FillContext& context, cons
     for (const Nm x : {part.lo.x, part.hi.x}) {
       for (const Nm y : {part.lo.y, part.hi.y}) start_u = std::min<std::int64_t>(start_u, frame.to(Point2{x, y}).x);
     }
-    return append_waves(turned, parameters, *places, start_u, frame, out);
+    return append_waves(turned, parameters, *positions, start_u, frame, out);
   }
   RasterOptions options{parameters.width, parameters.longest_link, parameters.shortest_line};
   if (parameters.longest_link < 0) {
     std::int64_t widest = 0;
-    for (std::size_t i = 1; i < places->at.size(); ++i) widest = std::max(widest, places->at[i] - places->at[i - 1]);
+    for (std::size_t i = 1; i < positions->at.size(); ++i) widest = std::max(widest, positions->at[i] - positions->at[i - 1]);
     options.longest_link = 3 * widest;
   }
-  append_raster(turned, *places, frame, options, out);
+  append_raster(turned, *positions, frame, options, out);
   return {};
 }
 
 /// Closed curves from the edge of the region inwards, numbered as their places: all that fit, or `most` of them. Leaves in
 /// `region` what the place of the next one encloses.
-Status append_curves(Contours& region, const FillContext& context, const FillParameters& parameters, std::uint32_t most,
+Status append_curves(Contours& region, const FillContext& context, const FillParameters& parameters, std::uint32_t maximum,
                      Toolpaths& out) {
-  if (most == 0) return {};
-  const auto places = place_inwards(region, context, parameters);
-  if (!places) return places.error();
+  if (maximum == 0) return {};
+  const auto positions = positions_inwards(region, context, parameters);
+  if (!positions) return positions.error();
   const auto depth = region_depth(context, parameters);
   if (!depth) return depth.error();
   std::int64_t at = *depth;
-  for (std::size_t k = 0; k < places->at.size() && region.size() > 0; ++k) {
-    if (places->at[k] != at) {
-      auto next = offset_contours(region, at - places->at[k]);
+  for (std::size_t k = 0; k < positions->at.size() && region.size() > 0; ++k) {
+    if (positions->at[k] != at) {
+      auto next = offset_contours(region, at - positions->at[k]);
       if (!next) return next.error();
       region = std::move(*next);
-      at = places->at[k];
+      at = positions->at[k];
     }
-    if (k == most) return {};
-    const std::int32_t number = places->first_number + static_cast<std::int32_t>(k);
+    if (k == maximum) return {};
+    const std::int32_t number = positions->first_number + static_cast<std::int32_t>(k);
     append_closed(region, PathKind::kContour, parameters.width, out, number);
   }
   region.clear();  // no place is left inside the last curve
@@ -79,7 +79,7 @@ Status append_curves(Contours& region, const FillContext& context, const FillPar
 /// Points of the first `curves` closed curves, at most. The region is looked at in a few depths: from one to the next its
 /// corners can only part where one that points inwards meets an edge, so they at most double.
 Result<std::uint64_t> bound_curves(const ContoursView& region, const FillContext& context, const FillParameters& parameters,
-                                   const LinePlaces& places, std::size_t curves) {
+                                   const LinePositions& positions, std::size_t curves) {
   constexpr std::size_t kDepths = 8, kCurvesADepth = 8;  // so looking takes an eighth of the time that laying will
   const std::size_t step = std::max(kCurvesADepth, (curves + kDepths - 1) / kDepths);
   const auto depth = region_depth(context, parameters);
@@ -89,8 +89,8 @@ Result<std::uint64_t> bound_curves(const ContoursView& region, const FillContext
   for (std::size_t k = 0; k < curves; k += step) {
     ContoursView here = region;
     if (k > 0) {
-      auto next =
-          offset_contours(k == step ? region : ContoursView(inner), (k == step ? *depth : places.at[k - step]) - places.at[k]);
+      auto next = offset_contours(k == step ? region : ContoursView(inner),
+                                  (k == step ? *depth : positions.at[k - step]) - positions.at[k]);
       if (!next) return next.error();
       inner = std::move(*next);
       here = inner;
@@ -174,12 +174,6 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
   return made;
 }
 
-Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
-  auto made = outlines_of(contours, context, parameters);
-  if (!made) return made.error();
-  return std::move(made->region);
-}
-
 Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
                              const FillParameters& parameters) {
   // Clipper takes an offset's or a line's points as edges, joins, scan beams and result at once.
@@ -187,41 +181,41 @@ Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& r
   const std::uint64_t surface = contours.point.size(), own = region.point.size();
   FillBound bound;
   bound.points = parameters.walls * (2 * surface + contours.size());
-  bound.paths = bound.stretches = bound.points / 4;  // a closed path has three corners or more, and its first one again
+  bound.paths = bound.intervals = bound.points / 4;  // a closed path has three corners or more, and its first one again
   if (parameters.walls > 0) bound.scratch_bytes = kOfClipper * surface;
   if (region.size() == 0) return bound;
   if (parameters.pattern == Pattern::kContour || parameters.pattern == Pattern::kContourRaster) {
-    const auto places = place_inwards(region, context, parameters);
-    if (!places) return places.error();
-    std::size_t curves = places->at.size();
+    const auto positions = positions_inwards(region, context, parameters);
+    if (!positions) return positions.error();
+    std::size_t curves = positions->at.size();
     if (parameters.pattern == Pattern::kContourRaster) curves = std::min<std::size_t>(curves, parameters.loops);
-    const auto points = bound_curves(region, context, parameters, *places, curves);
+    const auto points = bound_curves(region, context, parameters, *positions, curves);
     if (!points) return points.error();
     bound.points += *points;
-    bound.paths = bound.stretches = bound.points / 4;
+    bound.paths = bound.intervals = bound.points / 4;
     bound.scratch_bytes += kOfClipper * 2 * own;
     if (parameters.pattern == Pattern::kContour) return bound;
   }
   const Frame frame = frame_of(context, parameters);
   const Contours turned = frame.to(region);
-  const auto places = place_across(turned, frame, context, parameters);
-  if (!places) return places.error();
+  const auto positions = positions_across(turned, frame, context, parameters);
+  if (!positions) return positions.error();
   if (is_wave(parameters.pattern)) {
     Nm low = turned.point.front().x, high = low;
     for (const Point2 p : turned.point) low = std::min(low, p.x), high = std::max(high, p.x);
     const std::uint64_t of_wave = wave_points(parameters, std::int64_t{high} - low);
-    const std::uint64_t all = places->at.size() * of_wave;
-    const WaveBound waves = bound_waves(turned, parameters, *places);
+    const std::uint64_t all = positions->at.size() * of_wave;
+    const WaveBound waves = bound_waves(turned, parameters, *positions);
     bound.points += waves.points;
     bound.paths += waves.pieces;
-    bound.stretches += waves.pieces;
+    bound.intervals += waves.pieces;
     bound.scratch_bytes += kOfClipper * (own + std::min(all, of_wave + wave_batch(own)));
   } else {
-    const std::uint64_t crossings = count_crossings(turned, *places);
+    const std::uint64_t crossings = count_crossings(turned, *positions);
     bound.points += crossings + own;
     bound.paths += crossings / 2;  // a line ends at two of them
-    bound.stretches += crossings;  // lines, and links between them
-    bound.scratch_bytes += 30 * crossings + 24 * own + 24 * places->at.size();
+    bound.intervals += crossings;  // lines, and links between them
+    bound.scratch_bytes += 30 * crossings + 24 * own + 24 * positions->at.size();
   }
   return bound;
 }

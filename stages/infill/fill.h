@@ -45,16 +45,13 @@ Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& co
 /// The same, with the outlines made beforehand.
 Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
-/// The region of outlines_of().
-Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
-
 /// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region
 /// counted, curves counted by their places and what the region is like at some of these, waves by what of them lies within
 /// reach of the region.
 struct FillBound {
   std::uint64_t points = 0;  // of toolpaths
   std::uint64_t paths = 0;
-  std::uint64_t stretches = 0;      // of one kind each, into which files divide paths
+  std::uint64_t intervals = 0;      // of one kind each, into which files divide paths
   std::uint64_t scratch_bytes = 0;  // while they are made
 };
 /// errors  as append_fill

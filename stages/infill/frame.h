@@ -1,7 +1,6 @@
 // stages/infill/frame.h: a layer turned so that its lines run along +x.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -21,9 +20,11 @@ class Frame {
       : quarter_(static_cast<int>(angle % (kTurn / 2) / (kTurn / 4))),
         exact_(angle % (kTurn / 4) == 0),
         reversed_(angle >= kTurn / 2),
-        turn_(static_cast<double>(angle % (kTurn / 2)) * 1e-6 * std::numbers::pi / 180),
-        back_(turn_.inverse()),
-        centre_(centre) {}
+        centre_(centre) {
+    const double turn = static_cast<double>(angle % (kTurn / 2)) * 1e-6 * std::numbers::pi / 180;
+    cos_ = std::cos(turn);
+    sin_ = std::sin(turn);
+  }
 
   /// Whether lines are laid towards -u first.
   bool reversed() const { return reversed_; }
@@ -31,8 +32,8 @@ class Frame {
   Point2 to(Point2 p) const {
     const std::int64_t x = std::int64_t{p.x} - centre_.x, y = std::int64_t{p.y} - centre_.y;
     if (exact_) return quarter_ == 0 ? whole(x, y) : whole(y, -x);
-    const Eigen::Vector2d turned = back_ * Eigen::Vector2d(static_cast<double>(x), static_cast<double>(y));
-    return whole(std::llround(turned.x()), std::llround(turned.y()));
+    const auto u = static_cast<double>(x), v = static_cast<double>(y);
+    return whole(std::llround(cos_ * u + sin_ * v), std::llround(cos_ * v - sin_ * u));
   }
 
   Point2 from(Point2 p) const {
@@ -40,8 +41,8 @@ class Frame {
       return quarter_ == 0 ? whole(std::int64_t{p.x} + centre_.x, std::int64_t{p.y} + centre_.y)
                            : whole(std::int64_t{centre_.x} - p.y, std::int64_t{centre_.y} + p.x);
     }
-    const Eigen::Vector2d turned = turn_ * Eigen::Vector2d(p.x, p.y);
-    return whole(std::llround(turned.x()) + centre_.x, std::llround(turned.y()) + centre_.y);
+    const double u = p.x, v = p.y;
+    return whole(std::llround(cos_ * u - sin_ * v) + centre_.x, std::llround(sin_ * u + cos_ * v) + centre_.y);
   }
 
   Contours to(const ContoursView& contours) const {
@@ -57,7 +58,7 @@ class Frame {
 
   int quarter_;
   bool exact_, reversed_;
-  Eigen::Rotation2Dd turn_, back_;
+  double cos_, sin_;
   Point2 centre_;
 };
 

@@ -7,7 +7,7 @@
 namespace lamina::infill {
 namespace {
 
-struct Range {
+struct NumberRange {
   std::int64_t low = INT64_MAX, high = INT64_MIN;
   void add(std::int64_t v) {
     low = std::min(low, v);
@@ -17,7 +17,7 @@ struct Range {
 
 /// The part's sides across the lines, and nothing to fill.
 Extent sides_of(const Box& part, const Frame& frame) {
-  Range v;
+  NumberRange v;
   for (const Nm x : {part.lo.x, part.hi.x}) {
     for (const Nm y : {part.lo.y, part.hi.y}) v.add(frame.to(Point2{x, y}).y);
   }
@@ -34,7 +34,7 @@ Result<std::int64_t> distance_from_wall(const FillContext& context, const FillPa
   FillParameters from_surface = parameters;
   from_surface.first_line.reset();
   from_surface.walls = 0;
-  const auto first = first_place(from_surface, context, sides_of(context.part, frame_of(context, parameters)));
+  const auto first = first_position(from_surface, context, sides_of(context.part, frame_of(context, parameters)));
   if (!first) return first;
   return *first + parameters.width / 2;
 }
@@ -57,29 +57,30 @@ Result<std::int64_t> region_depth(const FillContext& context, const FillParamete
          std::min<std::int64_t>(0, *distance - parameters.width);
 }
 
-Result<LinePlaces> place_across(const ContoursView& region, const Frame& frame, const FillContext& context,
-                                const FillParameters& parameters) {
+Result<LinePositions> positions_across(const ContoursView& region, const Frame& frame, const FillContext& context,
+                                       const FillParameters& parameters) {
   Extent extent = sides_of(context.part, frame);
   for (const Point2 p : region.point) {
     extent.low = std::min<std::int64_t>(extent.low, p.y);
     extent.high = std::max<std::int64_t>(extent.high, p.y);
   }
-  if (!is_wave(parameters.pattern)) return place_lines(parameters, context, extent);
+  if (!is_wave(parameters.pattern)) return line_positions(parameters, context, extent);
   // Waves are cut off at the region's edge: those that begin outside it count.
   extent.line_height = wave_height(parameters);
   extent.low -= extent.line_height;
   extent.off_sides = false;
   FillParameters own = parameters;
   if (!own.first_line) own.first_line = parameters.width / 2;
-  return place_lines(own, context, extent);
+  return line_positions(own, context, extent);
 }
 
-Result<LinePlaces> place_inwards(const ContoursView& region, const FillContext& context, const FillParameters& parameters) {
+Result<LinePositions> positions_inwards(const ContoursView& region, const FillContext& context,
+                                        const FillParameters& parameters) {
   const auto depth = region_depth(context, parameters);
   if (!depth) return depth.error();
-  Range x, y;
+  NumberRange x, y;
   for (const Point2 p : region.point) x.add(p.x), y.add(p.y);
-  LinePlaces none;
+  LinePositions none;
   if (region.point.empty()) return none;
   FillParameters own = parameters;
   if (!own.first_line) own.first_line = static_cast<Nm>(std::min<std::int64_t>(*depth, kNmReach));
@@ -88,7 +89,7 @@ Result<LinePlaces> place_inwards(const ContoursView& region, const FillContext& 
   const std::int64_t high = *depth + std::min(x.high - x.low, y.high - y.low) / 2 + 1;
   Extent extent{0, high, low, high};
   extent.off_sides = false;
-  return place_lines(own, context, extent);
+  return line_positions(own, context, extent);
 }
 
 }  // namespace lamina::infill

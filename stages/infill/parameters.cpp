@@ -18,7 +18,7 @@ std::vector<Nm> list_nm(const std::vector<double>& list) {
 
 }  // namespace
 
-FillParameters parameters_of(const Settings& settings) {
+FillParameters parameters_of(const FillSettings& settings) {
   FillParameters p;
   p.pattern = settings.pattern;
   p.width = short_nm(settings.width_mm);

@@ -40,7 +40,7 @@ struct FillParameters {
   std::vector<Nm> gaps{0};                             // edge to edge; may be negative
   std::uint32_t group = 1;                             // beads in contact before a gap
   std::vector<std::pair<std::int64_t, Nm>> gap_table;  // (height above the part's bottom, gap), heights increasing
-  std::string gap_expression;                          // mm; see expression.h for its variables
+  std::string gap_expression;                          // mm; see spacing.h for its variables
   std::vector<Nm> distances;                           // centre to centre, in turn; empty: by gaps
 
   // --- stagger: lines of layers with the same angle are moved sideways by these amounts in turn
@@ -57,7 +57,7 @@ struct FillParameters {
 };
 
 /// Settings as the stage takes them, in nm and micro-degrees; not checked, see check() in fill.h.
-FillParameters parameters_of(const Settings& settings);
+FillParameters parameters_of(const FillSettings& settings);
 
 /// The mean distance of lines, mm; for estimates: tables and expressions of gaps do not count.
 double mean_distance_mm(const FillParameters& fill);

@@ -17,15 +17,15 @@ struct Crossing {
 };
 
 /// A stretch of a line inside the region.
-struct Stretch {
+struct LineInterval {
   Nm begin, end;                       // u, nm, begin < end
   std::uint32_t begin_edge, end_edge;  // that they lie on
-  bool laid = false;
+  bool deposited = false;
 };
 
 class Scan {
  public:
-  Scan(const ContoursView& region, const LinePlaces& places) : point_(region.point), at_(places.at) {
+  Scan(const ContoursView& region, const LinePositions& positions) : point_(region.point), at_(positions.at) {
     next_.resize(point_.size());
     previous_.resize(point_.size());
     for (std::uint32_t c = 0; c < region.size(); ++c) {
@@ -36,13 +36,13 @@ class Scan {
       }
     }
     find_crossings();
-    find_stretches();
+    find_intervals();
   }
 
   std::uint32_t lines() const { return static_cast<std::uint32_t>(at_.size()); }
   std::uint32_t begin_of(std::uint32_t line) const { return offset_[line]; }
   std::uint32_t end_of(std::uint32_t line) const { return offset_[line + 1]; }
-  Stretch& stretch(std::uint32_t i) { return stretch_[i]; }
+  LineInterval& interval(std::uint32_t i) { return intervals_[i]; }
 
   /// Walks from the crossing of `line` with `edge` along the contour towards the next line. Returns the stretch of
   /// that line which begins (or ends) where the walk arrives, and the contour's points on the way; kNone if there is
@@ -59,9 +59,9 @@ class Scan {
       const std::uint32_t ahead = at_end ? next_[e] : e;  // the point that is walked to
       const Point2 p = point_[ahead];
       if (p.y > there) {  // crosses the next line
-        const std::uint32_t found = stretch_at(line + 1, e, at_end);
+        const std::uint32_t found = interval_at(line + 1, e, at_end);
         if (found == kNone) return kNone;
-        const Nm u = at_end ? stretch_[found].end : stretch_[found].begin;
+        const Nm u = at_end ? intervals_[found].end : intervals_[found].begin;
         length += std::hypot(static_cast<double>(u) - last.x, static_cast<double>(there) - last.y);
         return length <= static_cast<double>(longest) ? found : kNone;
       }
@@ -96,11 +96,11 @@ class Scan {
     std::uint32_t total = 0;
     for (std::uint32_t& offset : crossing_offset_) total += std::exchange(offset, total);
     crossing_.resize(total);
-    Buffer<std::uint32_t> place(crossing_offset_.begin(), crossing_offset_.end());
+    Buffer<std::uint32_t> position(crossing_offset_.begin(), crossing_offset_.end());
     for_each([&](std::uint32_t line, std::uint32_t e, Point2 a, Point2 b) {
       const double share = static_cast<double>(at_[line] - a.y) / static_cast<double>(std::int64_t{b.y} - a.y);
       const double u = a.x + share * static_cast<double>(std::int64_t{b.x} - a.x);
-      crossing_[place[line]++] = {u, e, b.y < a.y};
+      crossing_[position[line]++] = {u, e, b.y < a.y};
     });
     for (std::uint32_t line = 0; line < at_.size(); ++line) {
       std::sort(crossing_.begin() + crossing_offset_[line], crossing_.begin() + crossing_offset_[line + 1],
@@ -139,7 +139,7 @@ class Scan {
     return static_cast<Nm>(crossing.enters ? ceil_div<__int128>(numerator, d) : floor_div<__int128>(numerator, d));
   }
 
-  void find_stretches() {
+  void find_intervals() {
     offset_.assign(1, 0);
     for (std::uint32_t line = 0; line < at_.size(); ++line) {
       std::int32_t winding = 0;
@@ -150,15 +150,15 @@ class Scan {
         winding += crossing.enters ? 1 : -1;
         if (winding != 0) continue;
         const Nm from = end_inside(begin, at_[line]), to = end_inside(crossing, at_[line]);
-        if (from < to) stretch_.push_back({from, to, begin.edge, crossing.edge});
+        if (from < to) intervals_.push_back({from, to, begin.edge, crossing.edge});
       }
-      offset_.push_back(static_cast<std::uint32_t>(stretch_.size()));
+      offset_.push_back(static_cast<std::uint32_t>(intervals_.size()));
     }
   }
 
-  std::uint32_t stretch_at(std::uint32_t line, std::uint32_t edge, bool at_end) const {
+  std::uint32_t interval_at(std::uint32_t line, std::uint32_t edge, bool at_end) const {
     for (std::uint32_t i = offset_[line]; i < offset_[line + 1]; ++i) {
-      if ((at_end ? stretch_[i].end_edge : stretch_[i].begin_edge) == edge) return i;
+      if ((at_end ? intervals_[i].end_edge : intervals_[i].begin_edge) == edge) return i;
     }
     return kNone;
   }
@@ -169,14 +169,14 @@ class Scan {
   Buffer<std::uint32_t> crossing_offset_;
   Buffer<Crossing> crossing_;
   Buffer<std::uint32_t> offset_;  // lines + 1, into stretch_
-  Buffer<Stretch> stretch_;
+  Buffer<LineInterval> intervals_;
 };
 
 }  // namespace
 
-std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& places) {
+std::uint64_t count_crossings(const ContoursView& region, const LinePositions& positions) {
   const auto line_at = [&](std::int64_t v) {
-    return std::lower_bound(places.at.begin(), places.at.end(), v) - places.at.begin();
+    return std::lower_bound(positions.at.begin(), positions.at.end(), v) - positions.at.begin();
   };
   std::uint64_t total = 0;
   for (std::uint32_t c = 0; c < region.size(); ++c) {
@@ -190,29 +190,29 @@ std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& plac
   return total;
 }
 
-void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame, const RasterOptions& options,
+void append_raster(const ContoursView& region, const LinePositions& positions, const Frame& frame, const RasterOptions& options,
                    Toolpaths& out) {
-  if (region.size() == 0 || places.at.empty()) return;
-  Scan scan(region, places);
+  if (region.size() == 0 || positions.at.empty()) return;
+  Scan scan(region, positions);
   Buffer<Point2> way;
   for (std::uint32_t first = 0; first < scan.lines(); ++first) {
     for (std::uint32_t start = scan.begin_of(first); start < scan.end_of(first); ++start) {
-      if (scan.stretch(start).laid) continue;
+      if (scan.interval(start).deposited) continue;
       std::uint32_t line = first, current = start;
       const std::size_t points_before = out.point.size();
       for (;;) {
-        Stretch& stretch = scan.stretch(current);
-        stretch.laid = true;
-        if (std::int64_t{stretch.end} - stretch.begin < options.shortest_line) break;
-        const std::int32_t number = places.first_number + static_cast<std::int32_t>(line);
+        LineInterval& interval = scan.interval(current);
+        interval.deposited = true;
+        if (std::int64_t{interval.end} - interval.begin < options.shortest_line) break;
+        const std::int32_t number = positions.first_number + static_cast<std::int32_t>(line);
         const bool forwards = (number % 2 == 0) != frame.reversed();
-        const auto v = static_cast<Nm>(places.at[line]);
-        const Point2 from{forwards ? stretch.begin : stretch.end, v}, to{forwards ? stretch.end : stretch.begin, v};
+        const auto v = static_cast<Nm>(positions.at[line]);
+        const Point2 from{forwards ? interval.begin : interval.end, v}, to{forwards ? interval.end : interval.begin, v};
         out.add(frame.from(from), PathKind::kRaster, options.width, number);
         const std::uint32_t found =
-            scan.walk(line, forwards ? stretch.end_edge : stretch.begin_edge, forwards, to, options.longest_link, way);
-        const bool links = found != kNone && !scan.stretch(found).laid &&
-                           std::int64_t{scan.stretch(found).end} - scan.stretch(found).begin >= options.shortest_line;
+            scan.walk(line, forwards ? interval.end_edge : interval.begin_edge, forwards, to, options.longest_link, way);
+        const bool links = found != kNone && !scan.interval(found).deposited &&
+                           std::int64_t{scan.interval(found).end} - scan.interval(found).begin >= options.shortest_line;
         if (!links) {
           out.add(frame.from(to), PathKind::kRaster, options.width, number);
           break;

@@ -25,14 +25,14 @@ struct RasterOptions {
 };
 
 /// How often `places` cross the edges of `region`, both in the frame.
-std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& places);
+std::uint64_t count_crossings(const ContoursView& region, const LinePositions& positions);
 
 /// Appends the lines of `places` (nm across the lines, in the frame) within `region`, turned back to the bed.
 ///
 /// region   clean contours, already turned into the frame
 /// returns  paths in the order of their first lines; even lines run towards +u (-u in a reversed frame), odd ones back
 /// cost     O(P + X log X) for P points and X crossings, count, scan, fill; no allocation for a line
-void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame, const RasterOptions& options,
+void append_raster(const ContoursView& region, const LinePositions& positions, const Frame& frame, const RasterOptions& options,
                    Toolpaths& out);
 
 }  // namespace lamina::infill

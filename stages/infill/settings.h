@@ -19,7 +19,7 @@ enum class Pattern : std::uint8_t {
 };
 
 /// One filling as people describe it: lengths in mm, angles in degrees. Lists are taken in turn.
-struct Settings {
+struct FillSettings {
   Pattern pattern = Pattern::kNone;
   double width_mm = 0.4;
   double wall_width_mm = 0;  // 0: like width_mm

@@ -3,15 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
-
-#include "stages/infill/expression.h"
 
 namespace lamina::infill {
 namespace {
 
-constexpr std::int64_t kMostLines = 10'000'000;
+constexpr std::int64_t kMaxLines = 10'000'000;
 
 std::int64_t wrapped(std::int64_t i, std::int64_t size) { return ((i % size) + size) % size; }
 
@@ -39,13 +38,13 @@ class Distances {
   }
 
   /// From line i, which lies `place` nm from the part's side, to line i + 1. nm, > 0
-  Result<std::int64_t> operator()(std::int64_t i, std::int64_t place) {
+  Result<std::int64_t> operator()(std::int64_t i, std::int64_t position) {
     std::int64_t distance = 0;
     if (!parameters_.distances.empty()) {
       const auto size = static_cast<std::int64_t>(parameters_.distances.size());
       distance = parameters_.distances[static_cast<std::size_t>(wrapped(i, size))];
     } else {
-      const auto gap = gap_after(i, place);
+      const auto gap = gap_after(i, position);
       if (!gap) return gap;
       distance = parameters_.width + *gap;
     }
@@ -68,7 +67,7 @@ class Distances {
   Distances(const FillParameters& parameters, const FillContext& context, const Extent& extent)
       : parameters_(parameters), context_(context), extent_(extent) {}
 
-  Result<std::int64_t> gap_after(std::int64_t i, std::int64_t place) {
+  Result<std::int64_t> gap_after(std::int64_t i, std::int64_t position) {
     const auto group = static_cast<std::int64_t>(parameters_.group);
     if (wrapped(i + 1, group) != 0) return std::int64_t{0};
     const std::int64_t z = std::int64_t{context_.layer.plane()} - context_.part.lo.z;
@@ -82,7 +81,7 @@ class Distances {
       variables.i = static_cast<double>(i);
       // A line that would lie outside of the part counts as one at its side: so does the wall that a part without walls
       // has half a bead before its surface. A formula has to hold within the part only.
-      const std::int64_t within = std::clamp<std::int64_t>(place, 0, extent_.length);
+      const std::int64_t within = std::clamp<std::int64_t>(position, 0, extent_.length);
       variables.s = mm(within);
       variables.u = length > 0 ? static_cast<double>(within) / length : 0;
       const auto value = (*expression_)(variables);
@@ -113,7 +112,7 @@ std::int64_t wall_centre(const FillParameters& parameters) {
 
 }  // namespace
 
-Result<std::int64_t> first_place(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
+Result<std::int64_t> first_position(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
   if (parameters.first_line) return std::int64_t{*parameters.first_line};
   auto distances = Distances::make(parameters, context, extent);
   if (!distances) return distances.error();
@@ -124,8 +123,8 @@ Result<std::int64_t> first_place(const FillParameters& parameters, const FillCon
   return wall_centre(parameters) + *distance;
 }
 
-Result<LinePlaces> place_lines(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
-  const auto first = first_place(parameters, context, extent);
+Result<LinePositions> line_positions(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
+  const auto first = first_position(parameters, context, extent);
   if (!first) return first.error();
   auto distances = Distances::make(parameters, context, extent);
   if (!distances) return distances.error();
@@ -142,41 +141,59 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
 
   const auto too_many = [&] {
     return Error{Fault::kUsage,
-                 fmt::format("layer {}: more than {} lines; give wider beads or gaps", context.layer.index, kMostLines)};
+                 fmt::format("layer {}: more than {} lines; give wider beads or gaps", context.layer.index, kMaxLines)};
   };
-  LinePlaces places;
+  LinePositions positions;
   Buffer<std::int64_t> before;
-  std::int64_t place = *first;
-  for (std::int64_t i = -1; place > lowest; --i) {
+  std::int64_t position = *first;
+  for (std::int64_t i = -1; position > lowest; --i) {
     // Backwards: the distance is that of line i, asked where it would be if its gap were that of line i + 1.
-    const auto distance = (*distances)(i, place);
+    const auto distance = (*distances)(i, position);
     if (!distance) return distance.error();
-    place -= *distance + extent.line_height;
-    if (place < lowest) break;
-    before.push_back(place);
-    if (static_cast<std::int64_t>(before.size()) > kMostLines) return too_many();
+    position -= *distance + extent.line_height;
+    if (position < lowest) break;
+    before.push_back(position);
+    if (static_cast<std::int64_t>(before.size()) > kMaxLines) return too_many();
   }
   std::reverse(before.begin(), before.end());
   std::int32_t number = -static_cast<std::int32_t>(before.size());
   bool begun = false;
   const auto add = [&](std::int64_t at) {
     if (at >= lowest && at <= high) {
-      if (!begun) places.first_number = number;
+      if (!begun) positions.first_number = number;
       begun = true;
-      places.at.push_back(at + extent.side + shift);
+      positions.at.push_back(at + extent.side + shift);
     }
     ++number;
   };
   for (const std::int64_t at : before) add(at);
-  place = *first;
-  for (std::int64_t i = 0; place <= high; ++i) {
-    add(place);
-    if (i > kMostLines) return too_many();
-    const auto distance = (*distances)(i, place);
+  position = *first;
+  for (std::int64_t i = 0; position <= high; ++i) {
+    add(position);
+    if (i > kMaxLines) return too_many();
+    const auto distance = (*distances)(i, position);
     if (!distance) return distance.error();
-    place += *distance + extent.line_height;
+    position += *distance + extent.line_height;
   }
-  return places;
+  return positions;
+}
+
+Result<Expression> Expression::parse(const std::string& text) {
+  static constexpr std::string_view kNames[] = {"z", "h", "n", "a", "i", "s", "u"};
+  auto formula = Formula::parse(text, kNames);
+  if (!formula) return formula.error();
+  return Expression(std::move(*formula));
+}
+
+Result<double> Expression::operator()(const Variables& of) {
+  const std::array values{of.z, of.h, of.n, of.a, of.i, of.s, of.u};
+  const Result<double> value = formula_(values);
+  if (value && !std::isfinite(*value)) {
+    return Error{Fault::kUsage, fmt::format("'{}': is {} where z = {:g}, n = {:g}, i = {:g}, s = {:g}; it has to be a "
+                                            "finite number of mm",
+                                            formula_.text(), *value, of.z, of.n, of.i, of.s)};
+  }
+  return value;
 }
 
 }  // namespace lamina::infill

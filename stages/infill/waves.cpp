@@ -13,8 +13,8 @@
 namespace lamina::infill {
 namespace {
 
-constexpr std::int64_t kMostPeriods = 1'000'000;  // of a wave
-constexpr int kCosineSteps = 48;                  // a period; off by less than 0.4 % of the wave's height
+constexpr std::int64_t kMaxPeriods = 1'000'000;  // of a wave
+constexpr int kCosineSteps = 48;                 // a period; off by less than 0.4 % of the wave's height
 
 Nm side_length(const FillParameters& parameters) {
   return static_cast<Nm>(std::llround(parameters.cell / std::numbers::sqrt3));
@@ -34,7 +34,7 @@ std::vector<Point2> period_of(const FillParameters& parameters) {
 }
 
 /// A piece of a wave that Clipper gave, in any order and direction.
-struct Piece {
+struct WavePiece {
   std::size_t line;  // into places
   Nm u;
   std::uint32_t index;
@@ -42,27 +42,28 @@ struct Piece {
 };
 
 /// The wave in whose strip a piece lies, by the middle of the piece, which rounding left there.
-std::size_t line_of(const LinePlaces& places, Nm height, std::span<const Point2> piece) {
+std::size_t line_of(const LinePositions& positions, Nm height, std::span<const Point2> piece) {
   const Nm v = piece[piece.size() / 2].y;
-  const auto above = std::upper_bound(places.at.begin(), places.at.end(), v);
-  auto line = static_cast<std::size_t>(above - places.at.begin());
+  const auto above = std::upper_bound(positions.at.begin(), positions.at.end(), v);
+  auto line = static_cast<std::size_t>(above - positions.at.begin());
   if (line == 0) return 0;
   // Between two strips: in the nearer one.
-  if (above == places.at.end() || v - (places.at[line - 1] + height) <= *above - v) --line;
+  if (above == positions.at.end() || v - (positions.at[line - 1] + height) <= *above - v) --line;
   return line;
 }
 
-void append_pieces(const Contours& pieces, const FillParameters& parameters, const LinePlaces& places, const Frame& frame,
+void append_pieces(const Contours& pieces, const FillParameters& parameters, const LinePositions& positions, const Frame& frame,
                    Toolpaths& out) {
-  std::vector<Piece> order;
+  std::vector<WavePiece> order;
   const Nm height = wave_height(parameters);
   for (std::uint32_t c = 0; c < pieces.size(); ++c) {
     const auto points = pieces[c];
     const bool turned = points.front().x > points.back().x;
-    order.push_back({line_of(places, height, points), std::min(points.front().x, points.back().x), c, turned});
+    order.push_back({line_of(positions, height, points), std::min(points.front().x, points.back().x), c, turned});
   }
-  std::ranges::sort(
-      order, [](const Piece& a, const Piece& b) { return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index); });
+  std::ranges::sort(order, [](const WavePiece& a, const WavePiece& b) {
+    return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index);
+  });
   Buffer<Point2> whole, own;
   for (std::size_t i = 0; i < order.size();) {
     // Pieces that meet end to end are one.
@@ -75,7 +76,7 @@ void append_pieces(const Contours& pieces, const FillParameters& parameters, con
       if (!whole.empty() && whole.back() != own.front()) break;
       whole.insert(whole.end(), own.begin() + (whole.empty() ? 0 : 1), own.end());
     }
-    const std::int32_t number = places.first_number + static_cast<std::int32_t>(order[i].line);
+    const std::int32_t number = positions.first_number + static_cast<std::int32_t>(order[i].line);
     i = end;
     if (std::int64_t{whole.back().x} - whole.front().x < parameters.shortest_line) continue;
     if ((number % 2 != 0) != frame.reversed()) std::reverse(whole.begin(), whole.end());
@@ -97,7 +98,7 @@ std::uint64_t wave_points(const FillParameters& parameters, std::int64_t length)
   return (static_cast<std::uint64_t>(length / (std::int64_t{3} * side_length(parameters))) + 3) * of_period;
 }
 
-WaveBound bound_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places) {
+WaveBound bound_waves(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions) {
   const Nm a = side_length(parameters), height = wave_height(parameters);
   const std::int64_t period = std::int64_t{3} * a;
   const bool straight = parameters.pattern == Pattern::kHoneycomb;
@@ -109,16 +110,17 @@ WaveBound bound_waves(const ContoursView& region, const FillParameters& paramete
   struct Reach {
     std::int64_t low = INT64_MAX, high = INT64_MIN;
   };
-  std::vector<Reach> reach(places.at.size());
+  std::vector<Reach> reach(positions.at.size());
   std::uint64_t crossings = 0;
   for (std::uint32_t c = 0; c < region.size(); ++c) {
     Point2 p = region[c].back();
     for (const Point2 q : region[c]) {
       const Point2 low = p.y <= q.y ? p : q, high = p.y <= q.y ? q : p;
       p = q;
-      const auto begin_of_strips = places.at.begin();
-      const auto first = std::lower_bound(begin_of_strips, places.at.end(), std::int64_t{low.y} - height - 1) - begin_of_strips;
-      const auto last = std::upper_bound(begin_of_strips, places.at.end(), std::int64_t{high.y} + 1) - begin_of_strips;
+      const auto begin_of_strips = positions.at.begin();
+      const auto first =
+          std::lower_bound(begin_of_strips, positions.at.end(), std::int64_t{low.y} - height - 1) - begin_of_strips;
+      const auto last = std::upper_bound(begin_of_strips, positions.at.end(), std::int64_t{high.y} + 1) - begin_of_strips;
       const auto u_at = [&](std::int64_t v) {
         if (v <= low.y || low.y == high.y) return static_cast<double>(low.x);
         if (v >= high.y) return static_cast<double>(high.x);
@@ -126,7 +128,7 @@ WaveBound bound_waves(const ContoursView& region, const FillParameters& paramete
         return low.x + (static_cast<double>(high.x) - low.x) * share;
       };
       for (auto i = first; i < last; ++i) {
-        double from = u_at(places.at[i] - 1), to = u_at(places.at[i] + height + 1);
+        double from = u_at(positions.at[i] - 1), to = u_at(positions.at[i] + height + 1);
         if (low.y == high.y) from = low.x, to = high.x;
         if (from > to) std::swap(from, to);
         const auto begin = static_cast<std::int64_t>(std::floor(from)) - 2, end = static_cast<std::int64_t>(std::ceil(to)) + 2;
@@ -147,32 +149,33 @@ WaveBound bound_waves(const ContoursView& region, const FillParameters& paramete
   return bound;
 }
 
-Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places,
+Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions,
                     std::int64_t start_u, const Frame& frame, Toolpaths& out) {
-  if (region.size() == 0 || places.at.empty()) return {};
+  if (region.size() == 0 || positions.at.empty()) return {};
   const Nm height = wave_height(parameters);
   const std::int64_t length = std::int64_t{3} * side_length(parameters);
   Nm low = region.point.front().x, high = low;
   for (const Point2 p : region.point) low = std::min(low, p.x), high = std::max(high, p.x);
-  if ((std::int64_t{high} - low) / length > kMostPeriods) {
+  if ((std::int64_t{high} - low) / length > kMaxPeriods) {
     return Error{Fault::kUsage, fmt::format("cells of {} mm are too many; give larger ones", mm(parameters.cell))};
   }
   const std::vector<Point2> period = period_of(parameters);
   Contours waves;
-  for (std::size_t i = 0; i < places.at.size(); ++i) {
-    const bool mirrored = (places.first_number + static_cast<std::int64_t>(i)) % 2 != 0;
+  for (std::size_t i = 0; i < positions.at.size(); ++i) {
+    const bool mirrored = (positions.first_number + static_cast<std::int64_t>(i)) % 2 != 0;
     for (std::int64_t k = floor_div<std::int64_t>(low - start_u, length) - 1; start_u + k * length <= high; ++k) {
       for (const Point2 p : period) {
         const std::int64_t at_u = std::clamp<std::int64_t>(start_u + k * length + p.x, -kNmReach, kNmReach);
-        const std::int64_t at_v = std::clamp<std::int64_t>(places.at[i] + (mirrored ? height - p.y : p.y), -kNmReach, kNmReach);
+        const std::int64_t at_v =
+            std::clamp<std::int64_t>(positions.at[i] + (mirrored ? height - p.y : p.y), -kNmReach, kNmReach);
         waves.point.push_back({static_cast<Nm>(at_u), static_cast<Nm>(at_v)});
       }
     }
     waves.close();
-    if (waves.point.size() < wave_batch(region.point.size()) && i + 1 < places.at.size()) continue;
+    if (waves.point.size() < wave_batch(region.point.size()) && i + 1 < positions.at.size()) continue;
     const auto pieces = clip_lines(waves, region);
     if (!pieces) return pieces.error();
-    append_pieces(*pieces, parameters, places, frame, out);
+    append_pieces(*pieces, parameters, positions, frame, out);
     waves.clear();
   }
   return {};

@@ -35,13 +35,13 @@ struct WaveBound {
   std::uint64_t points = 0, pieces = 0;
 };
 /// cost  O(edges x strips that they pass)
-WaveBound bound_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places);
+WaveBound bound_waves(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions);
 
-/// Appends the waves that lie in `region` (clean contours in the frame), their troughs at `places` (of place_across).
+/// Appends the waves that lie in `region` (clean contours in the frame), their troughs at `places` (of positions_across).
 /// `start_u` is where crests are counted from. Pieces shorter than shortest_line along u are left out.
 /// errors  kUsage: too many cells; kInternal of the clipping library
 /// memory  some megabytes beside the result: waves are clipped a few at a time
-Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places,
+Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions,
                     std::int64_t start_u, const Frame& frame, Toolpaths& out);
 
 }  // namespace lamina::infill

@@ -4,6 +4,8 @@
 // counted from 1 or backwards from -1; polygons become fans from their first corner; lines end with LF, CRLF or CR and
 // go on after a backslash. Groups, materials, normals, lines and points do not matter to a solid. Numbers are read in
 // double precision: other readers of this format keep floats.
+#include "stages/load/obj.h"
+
 #include <fmt/core.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -11,7 +13,7 @@
 #include <array>
 #include <vector>
 
-#include "stages/load/reader.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 
 namespace lamina::load {

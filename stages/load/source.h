@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "stages/data/buffer.h"
-#include "stages/data/input/file_reader.h"
 #include "stages/data/status.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina::load {
 
@@ -21,14 +23,14 @@ class Source {
   static Result<Source> open(const std::string& path);
   static Source of_memory(std::string path, Buffer<char> bytes);
 
-  const std::string& path() const { return path_; }
+  std::string_view path() const { return path_; }
   std::uint64_t size() const { return size_; }
 
   /// Fills all of `to`; false if the file is shorter or cannot be read.
   bool read(std::uint64_t offset, char* to, std::size_t count) const;
 
-  /// At most `count` bytes from the start.
-  std::string head(std::size_t count) const;
+  /// The bytes from the start that fit into `space`, which has to outlive them; none if they cannot be read.
+  std::string_view head(std::span<char> space) const;
 
   /// An error about this file: "path: message".
   Error error(const std::string& message) const { return {Fault::kInput, path_ + ": " + message}; }
@@ -41,7 +43,7 @@ class Source {
   std::uint64_t size_ = 0;
 };
 
-/// Inflates a gzip file (all of its members).
+/// Inflates a gzip file (RFC 1952), all of its members.
 /// errors  kInput: cut short, damaged, more than `limit` bytes, or a bomb (gzip_ratio_is_absurd)
 Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit);
 

@@ -5,6 +5,8 @@
 // between facets, behind corners and before "endfacet"; signed numbers; normals that are no numbers (they are not used). Not
 // tolerated, because it would lose facets in silence: words out of place within a facet, facets that do not have three corners,
 // numbers with a decimal comma.
+#include "stages/load/stl_ascii.h"
+
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
@@ -12,16 +14,16 @@
 #include <cstring>
 #include <vector>
 
-#include "stages/load/reader.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 
 namespace lamina::load {
 namespace {
 
-constexpr std::size_t kWindow = std::size_t{32} << 20, kBlock = std::size_t{1} << 20;
+constexpr std::size_t kWindowBytes = std::size_t{32} << 20, kBlock = std::size_t{1} << 20;
 
 /// What a block of text holds. Blocks begin and end between facets.
-struct Block {
+struct TextBlock {
   Buffer<Triangle> triangles;
   Box bounds;
   std::uint64_t solids = 0, ends = 0, dropped = 0;
@@ -31,7 +33,7 @@ struct Block {
 
 class BlockParser {
  public:
-  BlockParser(const char* begin, const char* end, const Snapper& snapper, bool drop_bad, Block& block)
+  BlockParser(const char* begin, const char* end, const Snapper& snapper, bool drop_bad, TextBlock& block)
       : at_(begin), end_(end), snapper_(snapper), drop_bad_(drop_bad), block_(block) {}
 
   void parse() {
@@ -182,7 +184,7 @@ class BlockParser {
   const char* const end_;
   const Snapper& snapper_;
   const bool drop_bad_;
-  Block& block_;
+  TextBlock& block_;
 };
 
 /// Bytes up to behind the last "endfacet" that is the first word of its line (a solid may be called that) or has another
@@ -221,10 +223,10 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
       cuts.push_back(cuts.back() + usable);
     }
     cuts.push_back(end);
-    std::vector<Block> blocks(cuts.size() - 1);
+    std::vector<TextBlock> blocks(cuts.size() - 1);
     tbb::parallel_for(std::size_t{0}, blocks.size(),
                       [&](std::size_t i) { BlockParser(cuts[i], cuts[i + 1], snapper, options.drop_bad, blocks[i]).parse(); });
-    for (Block& block : blocks) {
+    for (TextBlock& block : blocks) {
       if (block.error_at != nullptr)
         return source.error(fmt::format(
             "line {}: {}", line_of(source, offset + static_cast<std::uint64_t>(block.error_at - begin)), block.error));
@@ -237,15 +239,16 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
     }
     return {};
   };
-  if (const Status read = for_each_window(source, kWindow, behind_last_facet, read_window); !read) return read.error();
+  if (const Status read = for_each_window(source, kWindowBytes, behind_last_facet, read_window); !read) return read.error();
   if (facets.triangles.empty() && dropped == 0) return source.error("holds no facets");
   if (dropped > 0)
     facets.notes.push_back(
         {true, fmt::format("{} facet{} with coordinates that are not finite dropped", dropped, dropped == 1 ? "" : "s")});
   if (solids > 1) facets.notes.push_back({false, fmt::format("{} solids are planned as one part", solids)});
   if (ends < solids)
-    facets.doubt = Doubt{"the last solid has no 'endsolid', but its facets close",
-                         "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
+    facets.warning =
+        ReadWarning{"the last solid has no 'endsolid', but its facets close",
+                    "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
   return facets;
 }
 

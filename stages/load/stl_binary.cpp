@@ -1,20 +1,71 @@
-// stages/load/stl_binary.cpp: binary STL, read in blocks and snapped straight into the mesh.
+// stages/load/stl_binary.cpp: read in blocks and snapped straight into the mesh; a sound file becomes blocks in one pass, each
+// read, snapped, judged and stored in a core's cache, and the list of triangles never exists.
+#include "stages/load/stl_binary.h"
+
 #include <fmt/core.h>
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <memory>
 
+#include "stages/geometry/blocks/block_maker.h"
 #include "stages/geometry/blocks/pages.h"
-#include "stages/load/stl_facets.h"
+#include "stages/geometry/isa.h"
+#include "stages/load/kernels/kernels.h"
+#include "stages/load/repair/census.h"
 
 namespace lamina::load {
+
+struct Scratch {
+  /// What a thread needs for a block, and what it found in all of its blocks.
+  struct Worker {
+    std::array<char, kBlockSize * kFacetBytes> bytes;
+    std::array<Triangle, kBlockSize> facets;
+    const LoadKernels& kernels;
+    BlockMaker maker;
+    CensusSums sums;
+    FacetBox box;
+
+    explicit Worker(Isa isa) : kernels(load_kernels_for(isa)), maker(isa) {}
+  };
+
+  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers;
+
+  explicit Scratch(Isa isa) : workers([isa] { return std::make_unique<Worker>(isa); }) {}
+};
+
+std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch>(limited_isa(isa)); }
+
 namespace {
 
-constexpr std::size_t kBlock = 5120;  // facets, 250 KiB: a block and its triangles stay in a core's cache
+bool snap_transformed(const char* facets, std::size_t count, const Snapper& snapper, Triangle* out, Box& box) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (snap_facet(facets + i * kFacetBytes, snapper, out[i]) != Snapped::kYes) return false;
+    box.add(out[i].a);
+    box.add(out[i].b);
+    box.add(out[i].c);
+  }
+  return true;
+}
+
+/// The bounds of a file in plain millimetres, in nm.
+Box snapped_box(const CoordinateBox& from, const Snapper& snapper) {
+  Box box;
+  if (from.lo[0] > from.hi[0]) return box;
+  for (const auto& corner : {from.lo, from.hi}) {
+    Point3 at{};
+    snapper.snap(static_cast<double>(corner[0]), static_cast<double>(corner[1]), static_cast<double>(corner[2]), at);
+    box.add(at);
+  }
+  return box;
+}
+
+constexpr std::size_t kFacetsOfBlock = 5120;  // facets, 250 KiB: a block and its triangles stay in a core's cache
 
 std::uint32_t little_endian(const char* bytes) {
   const auto* b = reinterpret_cast<const unsigned char*>(bytes);
@@ -27,9 +78,9 @@ Status read_carefully(const Source& source, const Snapper& snapper, const LoadOp
                       Facets& facets) {
   facets.bounds = {};
   std::uint64_t dropped = 0, first_dropped = 0, kept = 0;
-  Buffer<char> block(kBlock * kFacetBytes);
-  for (std::uint64_t first = 0; first < count; first += kBlock) {
-    const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, count - first));
+  Buffer<char> block(kFacetsOfBlock * kFacetBytes);
+  for (std::uint64_t first = 0; first < count; first += kFacetsOfBlock) {
+    const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kFacetsOfBlock, count - first));
     if (!source.read(kHeaderBytes + first * kFacetBytes, block.data(), in_block * kFacetBytes))
       return source.changed_while_read();
     for (std::size_t i = 0; i < in_block; ++i) {
@@ -71,15 +122,15 @@ Status read_facets(const Source& source, const Snapper& snapper, const LoadOptio
   prefer_large_pages(facets.triangles);
   Triangle* const out = facets.triangles.data();
 
-  tbb::enumerable_thread_specific<Buffer<char>> scratch([] { return Buffer<char>(kBlock * kFacetBytes); });
+  tbb::enumerable_thread_specific<Buffer<char>> scratch([] { return Buffer<char>(kFacetsOfBlock * kFacetBytes); });
   std::atomic<bool> unreadable{false}, bad{false};
   const FacetBox box = tbb::parallel_reduce(
-      tbb::blocked_range<std::uint64_t>(0, (count + kBlock - 1) / kBlock), FacetBox{},
+      tbb::blocked_range<std::uint64_t>(0, (count + kFacetsOfBlock - 1) / kFacetsOfBlock), FacetBox{},
       [&](const tbb::blocked_range<std::uint64_t>& blocks, FacetBox so_far) {
         char* const block = scratch.local().data();
         for (std::uint64_t b = blocks.begin(); b != blocks.end() && !unreadable && !bad; ++b) {
-          const std::uint64_t first = b * kBlock;
-          const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, count - first));
+          const std::uint64_t first = b * kFacetsOfBlock;
+          const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kFacetsOfBlock, count - first));
           if (!source.read(kHeaderBytes + first * kFacetBytes, block, in_block * kFacetBytes)) {
             unreadable = true;
           } else if (!snap_facets(block, in_block, snapper, options.isa, out + first, so_far)) {
@@ -98,8 +149,8 @@ Status read_facets(const Source& source, const Snapper& snapper, const LoadOptio
   return {};
 }
 
-}  // namespace
-
+/// How many facets a file holds, with what there is to say about it in `facets`.
+/// errors  kInput: the header and the length of the file contradict each other, or there are more than the limit
 Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& options, Facets& facets) {
   std::array<char, 4> bytes;
   if (source.size() < kHeaderBytes || !source.read(80, bytes.data(), 4))
@@ -115,15 +166,83 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     facets.notes.push_back({false, stray_bytes(stray, claimed)});
   } else if (claimed < held) {
     const std::string differ = fmt::format("the header says {} facets, the file holds {}", claimed, held);
-    facets.doubt =
-        Doubt{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacetBytes, claimed)};
+    facets.warning =
+        ReadWarning{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacetBytes, claimed)};
   } else if (claimed > held) {
-    facets.doubt = Doubt{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
-                         cut_short(source, claimed, held), 0, ""};
+    facets.warning =
+        ReadWarning{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
+                    cut_short(source, claimed, held), 0, ""};
   }
   if (count > options.triangle_limit)
     return source.error(fmt::format("{} facets are more than the limit of {}", count, options.triangle_limit));
   return count;
+}
+
+/// Reads one block. false  it cannot be read or snapped
+bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, const SeeTriangles& see,
+                Scratch::Worker& worker, MeshBlocks& blocks, Prisms& prisms) {
+  const std::uint64_t first = blocks.first_triangle(block), count = blocks.triangles_in(block);
+  if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
+  if (!snap_facets(worker.bytes.data(), count, snapper, worker.kernels.isa, worker.facets.data(), worker.box)) return false;
+  if (see) see(static_cast<std::uint32_t>(first), {worker.facets.data(), count});
+  SortedBlock& sorted = worker.maker.sort({worker.facets.data(), count}, blocks, block);
+  worker.kernels.census(sorted, share, worker.sums);
+  prisms = worker.kernels.prisms(sorted, worker.facets.front().a.z);
+  worker.maker.store(blocks, block);
+  return true;
+}
+
+/// Whether too many blocks are in disorder for who looks at edges: a file of such is better read as a list.
+class Disorder {
+ public:
+  bool is_found(const MeshBlocks& blocks, std::uint32_t block) {
+    constexpr std::uint32_t kFew = 8;
+    const std::uint32_t visited = ++detected_;
+    if (blocks.indexed(block * MeshBlocks::kClusters).cluster != nullptr) return false;
+    return ++listed_ > kFew + visited / 4;
+  }
+
+ private:
+  std::atomic<std::uint32_t> detected_{0}, listed_{0};
+};
+
+/// Of all facets, nm3; the sum is taken in the order of blocks, whichever thread read them.
+double sixfold_volume(const Buffer<Prisms>& pieces, Nm plane) {
+  double sum = 0;
+  for (const Prisms& piece : pieces) sum += piece.sixfold_volume_above(plane);
+  return sum;
+}
+
+}  // namespace
+
+void FacetBox::add(const FacetBox& other) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    plain.lo[k] = std::min(plain.lo[k], other.plain.lo[k]);
+    plain.hi[k] = std::max(plain.hi[k], other.plain.hi[k]);
+  }
+  transformed.add(other.transformed);
+}
+
+Box FacetBox::nm(const Snapper& snapper) const { return is_plain(snapper) ? snapped_box(plain, snapper) : transformed; }
+
+Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
+  std::array<float, 9> corner;
+  std::memcpy(corner.data(), facet + 12, 36);
+  Triangle triangle{};
+  const std::array<Point3*, 3> points =
+      snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b} : std::array{&triangle.a, &triangle.b, &triangle.c};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Snapped snapped = snapper.snap(static_cast<double>(corner[3 * i]), static_cast<double>(corner[3 * i + 1]),
+                                         static_cast<double>(corner[3 * i + 2]), *points[i]);
+    if (snapped != Snapped::kYes) return snapped;
+  }
+  out = triangle;
+  return Snapped::kYes;
+}
+
+bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box) {
+  return is_plain(snapper) ? load_kernels_for(limited_isa(isa)).snap(facets, count, out, box.plain)
+                           : snap_transformed(facets, count, snapper, out, box.transformed);
 }
 
 Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options) {
@@ -131,16 +250,64 @@ Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, con
   const Result<std::uint64_t> count = count_facets(source, options, facets);
   if (!count) return count.error();
   Status read = read_facets(source, snapper, options, *count, facets);
-  if (!read && facets.doubt && facets.doubt->claimed > 0) {
+  if (!read && facets.warning && facets.warning->claimed > 0) {
     // What follows the claimed facets is none.
-    facets.notes.push_back({false, facets.doubt->rest_left_out});
-    read = read_facets(source, snapper, options, facets.doubt->claimed, facets);
-    facets.doubt.reset();
-  } else if (!read && facets.doubt) {
-    return source.error(facets.doubt->error);
+    facets.notes.push_back({false, facets.warning->rest_left_out});
+    read = read_facets(source, snapper, options, facets.warning->claimed, facets);
+    facets.warning.reset();
+  } else if (!read && facets.warning) {
+    return source.error(facets.warning->error);
   }
   if (!read) return read.error();
   return facets;
+}
+
+std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
+                                   const SeeTriangles& see, std::vector<Note>& notes) {
+  Facets header;
+  const Result<std::uint64_t> count = count_facets(source, options, header);
+  if (!count || header.warning) return std::nullopt;
+  const auto triangles = static_cast<std::uint32_t>(*count);
+  const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
+  Buffer<Prisms> pieces(blocks->block_count());
+  const std::uint64_t share = sampled_share(triangles);
+  const std::shared_ptr<Scratch> scratch = options.scratch ? options.scratch : make_scratch(options.isa);
+  auto& workers = scratch->workers;
+  for (auto& worker : workers) {  // of the file before
+    worker->sums = {};
+    worker->box = {};
+  }
+  std::atomic<bool> failed{false};
+  Disorder disorder;
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
+                    [&](const tbb::blocked_range<std::uint32_t>& range) {
+                      Scratch::Worker& worker = *workers.local();
+                      for (std::uint32_t b = range.begin(); b != range.end() && !failed; ++b) {
+                        if (!read_block(source, snapper, b, share, see, worker, *blocks, pieces[b])) failed = true;
+                        if (see && !failed && disorder.is_found(*blocks, b)) failed = true;
+                      }
+                    });
+  if (failed) return std::nullopt;
+  blocks->seal();
+
+  CensusSums sums;
+  FacetBox box;
+  for (const auto& worker : workers) {
+    sums.add(worker->sums);
+    box.add(worker->box);
+  }
+  Mesh mesh;
+  mesh.bounds = box.nm(snapper);
+  mesh.fingerprint = sums.fingerprint;
+  mesh.volume_mm3 = sixfold_volume(pieces, mesh.bounds.middle().z) / 6e18;
+  const double of_box = mm(mesh.bounds.width()) * mm(mesh.bounds.depth()) * mm(mesh.bounds.height());
+  const bool sound = sums.boundary == 0 && mesh.volume_mm3 > kHardlyAny * of_box && !any_reversed(sums.sampled);
+  if (!sound) return std::nullopt;
+  mesh.name = source.path();
+  mesh.repaired_from = triangles;
+  mesh.blocks = blocks;
+  notes.insert(notes.end(), header.notes.begin(), header.notes.end());
+  return mesh;
 }
 
 }  // namespace lamina::load

@@ -20,10 +20,4 @@ std::uint64_t line_of(const Source& source, std::uint64_t offset) {
   return line;
 }
 
-std::string quoted(std::string_view word) {
-  std::string text = "'";
-  for (const char c : word.substr(0, 24)) text += (c >= ' ' && c <= '~') ? c : '?';
-  return text + (word.size() > 24 ? "...'" : "'");
-}
-
 }  // namespace lamina::load

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -44,16 +45,14 @@ inline bool parse_number(std::string_view word, double& value) {
 /// The line, from 1, that holds a byte. Reads the file again up to there: only errors need it.
 std::uint64_t line_of(const Source& source, std::uint64_t offset);
 
-/// A word of the file for an error message: short, and without bytes that a terminal would act on.
-std::string quoted(std::string_view word);
-
 /// Gives a text to `handle(begin, end, offset of begin)` window by window, each cut where `cut(begin, end)` says: how
 /// many bytes, from the beginning, can be handled alone; 0 asks for a larger window. A byte order mark is left out.
 /// errors  those of `handle`; kInput if nothing can be cut off within 256 MiB
 template <class Cut, class Handle>
 Status for_each_window(const Source& source, std::size_t window, const Cut& cut, const Handle& handle) {
   constexpr std::size_t kLargest = std::size_t{256} << 20;
-  std::uint64_t offset = source.head(3) == "\xef\xbb\xbf" ? 3 : 0;
+  std::array<char, 3> mark;
+  std::uint64_t offset = source.head(mark) == "\xef\xbb\xbf" ? 3 : 0;
   Buffer<char> text;
   while (offset < source.size()) {
     const std::uint64_t left = source.size() - offset;

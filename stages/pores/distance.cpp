@@ -14,7 +14,7 @@ namespace {
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 /// Distances along a line from those that its voxels have: the lowest of the parabolas that stand on each of them.
-class Line {
+class DistanceRow {
  public:
   /// values  count of them, `stride` apart
   void lower(float* values, std::size_t stride, std::uint32_t count, bool periodic, double step_squared) {
@@ -23,7 +23,7 @@ class Line {
     const std::int64_t first = periodic ? -n / 2 - 1 : 0, end = periodic ? n + n / 2 + 1 : n;
     value_.resize(count);
     for (std::uint32_t i = 0; i < count; ++i) value_[i] = values[i * stride];
-    stands_.clear();
+    set_.clear();
     from_.clear();
     std::int64_t wrapped = (first + 2 * n) % n;
     for (std::int64_t at = first; at < end; ++at) {
@@ -31,36 +31,36 @@ class Line {
       if (++wrapped == n) wrapped = 0;
       if (height == static_cast<double>(kFar)) continue;
       double from = -std::numeric_limits<double>::infinity();
-      while (!stands_.empty()) {
-        from = crossing(stands_.back(), {at, height}, step_squared);
+      while (!set_.empty()) {
+        from = crossing(set_.back(), {at, height}, step_squared);
         if (from > from_.back()) break;
-        stands_.pop_back();
+        set_.pop_back();
         from_.pop_back();
       }
-      if (stands_.empty()) from = -std::numeric_limits<double>::infinity();
-      stands_.push_back({at, height});
+      if (set_.empty()) from = -std::numeric_limits<double>::infinity();
+      set_.push_back({at, height});
       from_.push_back(from);
     }
-    if (stands_.empty()) return;
+    if (set_.empty()) return;
     std::size_t k = 0;
     for (std::int64_t i = 0; i < n; ++i) {
       while (k + 1 < from_.size() && from_[k + 1] <= static_cast<double>(i)) ++k;
-      const auto away = static_cast<double>(i - stands_[k].at);
-      values[static_cast<std::size_t>(i) * stride] = static_cast<float>(stands_[k].height + step_squared * away * away);
+      const auto away = static_cast<double>(i - set_[k].at);
+      values[static_cast<std::size_t>(i) * stride] = static_cast<float>(set_[k].height + step_squared * away * away);
     }
   }
 
  private:
-  struct Stand {
+  struct PlacedPart {
     std::int64_t at;
     double height;
   };
-  static double crossing(const Stand& a, const Stand& b, double step_squared) {
+  static double crossing(const PlacedPart& a, const PlacedPart& b, double step_squared) {
     const auto p = static_cast<double>(a.at), q = static_cast<double>(b.at);
     return ((b.height + step_squared * q * q) - (a.height + step_squared * p * p)) / (2 * step_squared * (q - p));
   }
   std::vector<float> value_;
-  std::vector<Stand> stands_;
+  std::vector<PlacedPart> set_;
   std::vector<double> from_;
 };
 
@@ -89,9 +89,9 @@ Distances distances(const VoxelView& solid, const VoxelWindow& window) {
   const std::size_t slice = std::size_t{n[0]} * n[1];
   result.squared.resize(slice * n[2]);
   float* const squared = result.squared.data();
-  tbb::enumerable_thread_specific<Line> lines;
+  tbb::enumerable_thread_specific<DistanceRow> lines;
   tbb::parallel_for(std::uint32_t{0}, n[2], [&](std::uint32_t z) {
-    Line& line = lines.local();
+    DistanceRow& line = lines.local();
     float* const first = squared + slice * z;
     for (std::uint32_t y = 0; y < n[1]; ++y) {
       float* const row = first + std::size_t{n[0]} * y;
@@ -101,7 +101,7 @@ Distances distances(const VoxelView& solid, const VoxelWindow& window) {
     for (std::uint32_t x = 0; x < n[0]; ++x) line.lower(first + x, n[0], n[1], result.periodic[1], step_squared[1]);
   });
   tbb::parallel_for(std::uint32_t{0}, n[1], [&](std::uint32_t y) {
-    Line& line = lines.local();
+    DistanceRow& line = lines.local();
     float* const first = squared + std::size_t{n[0]} * y;
     for (std::uint32_t x = 0; x < n[0]; ++x) line.lower(first + x, slice, n[2], result.periodic[2], step_squared[2]);
   });

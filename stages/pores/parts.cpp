@@ -19,7 +19,7 @@ class Sets {
     while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
     return a;
   }
-  void unite(std::uint32_t a, std::uint32_t b) {
+  void merge(std::uint32_t a, std::uint32_t b) {
     a = find(a), b = find(b);
     if (a != b) parent_[std::max(a, b)] = std::min(a, b);
   }
@@ -54,7 +54,7 @@ class CellSets {
     return a;
   }
   /// Where a lies in some cell, b lies one further along the axis.
-  void unite(std::uint32_t a, std::uint32_t b, int axis) {
+  void merge(std::uint32_t a, std::uint32_t b, int axis) {
     const std::uint32_t top_a = find(a), top_b = find(b);
     Cell miss = cell_[a];  // cell of b as a has it less cell of b as b has it
     ++miss[static_cast<std::size_t>(axis)];
@@ -105,7 +105,7 @@ class Finder {
     Sets sets(parts_.piece);
     const std::uint32_t a = first_of(one), b = first_of(other);
     for_each_overlap(set_.row(one), set_.row(other), [&](std::size_t i, std::size_t j) {
-      sets.unite(a + static_cast<std::uint32_t>(i), b + static_cast<std::uint32_t>(j));
+      sets.merge(a + static_cast<std::uint32_t>(i), b + static_cast<std::uint32_t>(j));
     });
   }
   void join_slices(std::uint32_t z) {
@@ -138,7 +138,7 @@ class Finder {
   void join_ends(CellSets& sets, std::size_t last, std::size_t first, int axis) {
     const std::uint32_t a = first_of(last), b = first_of(first);
     for_each_overlap(set_.row(last), set_.row(first),
-                     [&](std::size_t i, std::size_t j) { sets.unite(parts_.piece[a + i], parts_.piece[b + j], axis); });
+                     [&](std::size_t i, std::size_t j) { sets.merge(parts_.piece[a + i], parts_.piece[b + j], axis); });
   }
 
   void join_pieces(std::uint32_t pieces) {
@@ -149,7 +149,7 @@ class Finder {
         const Row own = set_.row(y, z);
         if (own.empty() || own.front() != 0 || own.back() != set_.nx) continue;
         const std::uint32_t first = first_of(row(y, z));
-        sets.unite(parts_.piece[first + own.size() / 2 - 1], parts_.piece[first], 0);
+        sets.merge(parts_.piece[first + own.size() / 2 - 1], parts_.piece[first], 0);
       }
     }
     for (std::uint32_t y = 0; y < set_.ny && set_.periodic[2] && set_.nz > 0; ++y) {
@@ -206,26 +206,28 @@ Parts parts_of(const VoxelView& set) {
   return parts;
 }
 
-Buffer<std::uint8_t> parts_beside(const VoxelView& set, const Parts& parts, const VoxelView& other) {
-  Buffer<std::uint8_t> beside(parts.size(), std::uint8_t{0});
+Buffer<std::uint8_t> adjacent_parts(const VoxelView& set, const Parts& parts, const VoxelView& other) {
+  Buffer<std::uint8_t> neighbour(parts.size(), std::uint8_t{0});
   for (std::uint32_t z = 0; z < set.nz; ++z) {
     for (std::uint32_t y = 0; y < set.ny; ++y) {
       const std::size_t r = y + std::size_t{set.ny} * z, first = set.row_offset[r] / 2;
       const Row own = set.row(r), same = other.row(r);
-      const auto mark = [&](std::size_t i, std::size_t = 0) { beside[parts.part_of(first + i)] = 1; };
+      const auto mark = [&](std::size_t i, std::size_t = 0) { neighbour[parts.part_of(first + i)] = 1; };
       for_each_meeting(own, same, mark);
       if (set.periodic[0] && !own.empty() && !same.empty()) {
         if (own.front() == 0 && same.back() == set.nx) mark(0);
         if (own.back() == set.nx && same.front() == 0) mark(own.size() / 2 - 1);
       }
-      const auto look = [&](std::uint32_t at_y, std::uint32_t at_z) { for_each_overlap(own, other.row(at_y, at_z), mark); };
-      if (y > 0 || set.periodic[1]) look(y > 0 ? y - 1 : set.ny - 1, z);
-      if (y + 1 < set.ny || set.periodic[1]) look(y + 1 < set.ny ? y + 1 : 0, z);
-      if (z > 0 || set.periodic[2]) look(y, z > 0 ? z - 1 : set.nz - 1);
-      if (z + 1 < set.nz || set.periodic[2]) look(y, z + 1 < set.nz ? z + 1 : 0);
+      const auto inspection = [&](std::uint32_t at_y, std::uint32_t at_z) {
+        for_each_overlap(own, other.row(at_y, at_z), mark);
+      };
+      if (y > 0 || set.periodic[1]) inspection(y > 0 ? y - 1 : set.ny - 1, z);
+      if (y + 1 < set.ny || set.periodic[1]) inspection(y + 1 < set.ny ? y + 1 : 0, z);
+      if (z > 0 || set.periodic[2]) inspection(y, z > 0 ? z - 1 : set.nz - 1);
+      if (z + 1 < set.nz || set.periodic[2]) inspection(y, z + 1 < set.nz ? z + 1 : 0);
     }
   }
-  return beside;
+  return neighbour;
 }
 
 }  // namespace lamina::pores

@@ -52,6 +52,6 @@ Parts parts_of(const VoxelView& set);
 
 /// Which parts of `set` share a face with a voxel of `other`, by part. Both have one size and no voxel in common.
 /// cost  O(runs)
-Buffer<std::uint8_t> parts_beside(const VoxelView& set, const Parts& parts, const VoxelView& other);
+Buffer<std::uint8_t> adjacent_parts(const VoxelView& set, const Parts& parts, const VoxelView& other);
 
 }  // namespace lamina::pores

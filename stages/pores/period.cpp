@@ -41,16 +41,16 @@ double missed(const RunsView& image, bool columns, std::uint32_t shift, double s
 
 }  // namespace
 
-std::uint32_t period(const RunsView& image, bool columns, std::uint32_t least, double miss) {
+std::uint32_t period(const RunsView& image, bool columns, std::uint32_t minimum, double miss) {
   const double share = static_cast<double>(set_pixels(image)) / (static_cast<double>(image.columns) * image.rows());
   if (!(share > 0 && share < 1)) return 0;
-  const std::uint32_t most = (columns ? image.columns : image.rows()) / 5 * 2;
-  least = std::max(least, 1u);
-  if (most < least) return 0;
-  std::vector<double> at(most + std::size_t{1} - least);
-  for (std::uint32_t shift = least; shift <= most; ++shift) at[shift - least] = missed(image, columns, shift, share);
+  const std::uint32_t maximum = (columns ? image.columns : image.rows()) / 5 * 2;
+  minimum = std::max(minimum, 1u);
+  if (maximum < minimum) return 0;
+  std::vector<double> at(maximum + std::size_t{1} - minimum);
+  for (std::uint32_t shift = minimum; shift <= maximum; ++shift) at[shift - minimum] = missed(image, columns, shift, share);
   const double worst = *std::ranges::max_element(at);
-  if (worst < kUniform) return least;
+  if (worst < kUniform) return minimum;
   const double pass = std::min(miss, kClear * worst);
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (at[i] > pass) continue;
@@ -58,7 +58,7 @@ std::uint32_t period(const RunsView& image, bool columns, std::uint32_t least, d
     for (; i < at.size() && at[i] <= pass; ++i)
       if (at[i] < at[best]) best = i;
     // At the first shift it may only begin to differ.
-    if (best > 0) return least + static_cast<std::uint32_t>(best);
+    if (best > 0) return minimum + static_cast<std::uint32_t>(best);
   }
   return 0;
 }

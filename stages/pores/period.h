@@ -16,7 +16,7 @@ namespace lamina::pores {
 ///          in a row that pass, the one that differs least is taken
 /// returns  `least` for an image that is the same all along; 0 if there is no period, or the image is empty or full
 /// cost     O(runs) a shift
-std::uint32_t period(const RunsView& image, bool columns, std::uint32_t least, double miss);
+std::uint32_t period(const RunsView& image, bool columns, std::uint32_t minimum, double miss);
 
 /// The share of the set pixels of two images of one size that are set in one of them alone, of those of both; 0 of empty ones.
 double mismatch(const RunsView& one, const RunsView& other);

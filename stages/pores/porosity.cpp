@@ -1,7 +1,6 @@
 #include "stages/pores/porosity.h"
 
 #include "stages/pores/rows.h"
-#include "stages/pores/voids.h"
 
 namespace lamina::pores {
 
@@ -10,7 +9,7 @@ Porosity porosity(const VoxelView& solid, const VoxelView* body, Faces outside) 
   const VoxelStack empty = void_of(solid, body);
   const Parts parts = parts_of(empty);
   Buffer<std::uint8_t> open(parts.size(), std::uint8_t{0});
-  if (body != nullptr) open = parts_beside(empty, parts, without(void_of(solid), *body));
+  if (body != nullptr) open = adjacent_parts(empty, parts, without(void_of(solid), *body));
   result.body = body == nullptr ? solid.voxels() : set_voxels(*body);
   result.voxel_mm3 = mm(solid.edge[0]) * mm(solid.edge[1]) * mm(solid.edge[2]);
   result.parts = static_cast<std::uint32_t>(parts.size());

@@ -22,7 +22,6 @@ struct Porosity {
   double total() const { return share(empty); }
   double connected() const { return share(open); }
   double percolating(int axis) const { return share(through[static_cast<std::size_t>(axis)]); }
-  double cavities_mm3() const { return static_cast<double>(empty - open) * voxel_mm3; }
 
  private:
   double share(std::uint64_t voxels) const { return body == 0 ? 0 : static_cast<double>(voxels) / static_cast<double>(body); }

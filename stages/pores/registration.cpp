@@ -88,17 +88,17 @@ bool better(const Candidate& a, const Candidate& b) {
 }
 
 /// The best of all shifts that are at most `reach` from a place, and within the range.
-Match best_around(const VoxelView& small, const VoxelView& large, std::uint32_t range, const std::array<std::int32_t, 3>& place,
-                  std::int32_t reach, std::uint32_t side) {
-  const std::int32_t row = 2 * reach + 1, most = static_cast<std::int32_t>(range);
+Match best_around(const VoxelView& small, const VoxelView& large, std::uint32_t range,
+                  const std::array<std::int32_t, 3>& position, std::int32_t reach, std::uint32_t side) {
+  const std::int32_t row = 2 * reach + 1, maximum = static_cast<std::int32_t>(range);
   Buffer<Candidate> found(static_cast<std::size_t>(row) * row * row);
   tbb::parallel_for(std::int32_t{0}, row * row * row, [&](std::int32_t i) {
-    std::array<std::int32_t, 3> shift{place[0] + i % row - reach, place[1] + i / row % row - reach,
-                                      place[2] + i / row / row - reach};
+    std::array<std::int32_t, 3> shift{position[0] + i % row - reach, position[1] + i / row % row - reach,
+                                      position[2] + i / row / row - reach};
     std::array<std::uint32_t, 3> from{};
     for (std::size_t a = 0; a < 3; ++a) {
-      shift[a] = std::clamp(shift[a], -most, most);
-      from[a] = static_cast<std::uint32_t>(most + shift[a]);
+      shift[a] = std::clamp(shift[a], -maximum, maximum);
+      from[a] = static_cast<std::uint32_t>(maximum + shift[a]);
     }
     Candidate& candidate = found[static_cast<std::size_t>(i)];
     candidate = {match_at(small, large, from), squares_at(small, large, from, side)};
@@ -110,21 +110,21 @@ Match best_around(const VoxelView& small, const VoxelView& large, std::uint32_t 
 }  // namespace
 
 Match find_shift(const VoxelView& small, const VoxelView& large, std::uint32_t range) {
-  constexpr std::uint32_t kLeastSide = 8;  // of a box, in coarse voxels
+  constexpr std::uint32_t kMinSide = 8;  // of a box, in coarse voxels
   std::uint32_t factor = 1;
   while (range % (2 * factor) == 0 && range / (2 * factor) >= 2 &&
-         std::min({small.nx, small.ny, small.nz}) / (2 * factor) >= kLeastSide)
+         std::min({small.nx, small.ny, small.nz}) / (2 * factor) >= kMinSide)
     factor *= 2;
   std::optional<Match> match;
   for (; factor > 0; factor /= 2) {
-    std::array<std::int32_t, 3> place{};
+    std::array<std::int32_t, 3> position{};
     if (match)
-      for (std::size_t a = 0; a < 3; ++a) place[a] = 2 * match->shift[a];
+      for (std::size_t a = 0; a < 3; ++a) position[a] = 2 * match->shift[a];
     const std::int32_t reach = match ? 2 : static_cast<std::int32_t>(range / factor);
-    if (factor == 1) return best_around(small, large, range, place, reach, kBlock);
+    if (factor == 1) return best_around(small, large, range, position, reach, kBlock);
     const std::array<std::uint32_t, 3> block{factor, factor, factor};
     const VoxelStack few = coarser(small, block), many = coarser(large, block);
-    match = best_around(few, many, range / factor, place, reach, std::max(1u, kBlock / factor));
+    match = best_around(few, many, range / factor, position, reach, std::max(1u, kBlock / factor));
   }
   return {};
 }

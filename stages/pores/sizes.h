@@ -1,11 +1,13 @@
 // stages/pores/sizes.h: pores as they are seen from above: their lengths and widths, slice by slice.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/units.h"
 #include "stages/data/voxels.h"
 
 namespace lamina::pores {
@@ -40,7 +42,7 @@ PoreSizes pore_sizes(const VoxelView& solid, const VoxelView* body = nullptr);
 /// Mean, standard deviation (of a sample, n - 1) and histogram.
 struct Distribution {
   std::uint64_t count = 0;
-  double mean = 0, deviation = 0, least = 0, most = 0;
+  double mean = 0, deviation = 0, minimum = 0, maximum = 0;
   double bin = 0;
   std::vector<std::uint64_t> bins;  // bin i holds i * bin <= value < (i + 1) * bin; the last holds all beyond too
 };
@@ -49,5 +51,24 @@ struct Distribution {
 Distribution distribution(std::span<const double> values, double bin, std::uint32_t bins);
 Distribution lengths(const PoreSizes& sizes, double bin_mm, std::uint32_t bins);
 Distribution widths(const PoreSizes& sizes, double bin_mm, std::uint32_t bins);
+
+// --- the box of least area around pixels; internal to pores.
+
+/// A pixel of an endless plane.
+struct Pixel {
+  std::int32_t x, y;
+  bool operator==(const Pixel&) const = default;
+};
+
+struct BoxSides {
+  double length, width;  // nm, length >= width
+};
+
+/// The box around the pixels' centres, wider by the larger of what a pixel's sides measure in each direction: so rows of pixels
+/// and diagonals of them have the length of their line. Two boxes of one area: the narrower one. Mirrored and transposed pixels
+/// have the same box, to the last bit.
+/// pixels  at least one, any order; they are sorted, and their convex hull is left in front
+/// edge    nm, along x and y
+BoxSides smallest_box(std::span<Pixel> pixels, std::array<Nm, 2> edge);
 
 }  // namespace lamina::pores

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "stages/pores/rows.h"
-#include "stages/pores/voids.h"
 
 namespace lamina::pores {
 namespace {
@@ -95,10 +94,10 @@ std::array<double, 13> shares_of_directions(const std::array<Nm, 3>& edge) {
       p[(face + 1) % 3] = (2 * (i % kSteps) + 1.0) / kSteps - 1;
       p[(face + 2) % 3] = (2 * (i / kSteps) + 1.0) / kSteps - 1;
       std::size_t nearest = 0;
-      double most = -1;
+      double maximum = -1;
       for (std::size_t d = 0; d < 13; ++d) {
         const double along = std::abs(p[0] * unit[d][0] + p[1] * unit[d][1] + p[2] * unit[d][2]);
-        if (along > most) most = along, nearest = d;
+        if (along > maximum) maximum = along, nearest = d;
       }
       const double squared = p[0] * p[0] + p[1] * p[1] + p[2] * p[2], solid_angle = 1 / (squared * std::sqrt(squared));
       share[nearest] += solid_angle;

@@ -18,15 +18,15 @@ class Passage {
     const Nm longest = std::max({solid.edge[0], solid.edge[1], solid.edge[2]});
     cubes_ = longest == distances_.unit;
     wall_ = static_cast<double>(longest) / static_cast<double>(distances_.unit);
-    for (const float squared : distances_.squared) most_ = std::max(most_, squared);
+    for (const float squared : distances_.squared) max_ = std::max(max_, squared);
   }
 
   double diameter_mm(int axis) {
     if (box_.voxels() == 0) return 0;
-    if (most_ == std::numeric_limits<float>::infinity()) return most_;
+    if (max_ == std::numeric_limits<float>::infinity()) return max_;
     const double parts = cubes_ ? 1 : 64;  // of a squared unit; distances of cubes are whole
     // Through at `low`, not at `high`.
-    auto low = std::int64_t{0}, high = static_cast<std::int64_t>(std::floor(most_ * parts)) + 1;
+    auto low = std::int64_t{0}, high = static_cast<std::int64_t>(std::floor(max_ * parts)) + 1;
     while (high - low > 1) {
       const std::int64_t middle = low + (high - low) / 2;
       (leads_through(static_cast<float>(static_cast<double>(middle) / parts), axis) ? low : high) = middle;
@@ -37,14 +37,14 @@ class Passage {
   }
 
  private:
-  bool leads_through(float least, int axis) {
+  bool leads_through(float minimum, int axis) {
     const float* const squared = distances_.squared.data();
     const std::uint32_t nx = box_.nx;
     make_rows(box_, far_, [&](std::size_t r, const auto& take) {
       const float* const row = squared + r * nx;
       bool before = false;
       for (std::uint32_t x = 0; x < nx; ++x) {
-        const bool now = row[x] >= least;
+        const bool now = row[x] >= minimum;
         if (now != before) take(x);
         before = now;
       }
@@ -62,7 +62,7 @@ class Passage {
   VoxelStack far_;
   bool cubes_ = true;
   double wall_ = 1;
-  float most_ = 0;
+  float max_ = 0;
 };
 
 }  // namespace

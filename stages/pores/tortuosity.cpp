@@ -9,15 +9,15 @@
 namespace lamina::pores {
 namespace {
 
-using Place = std::array<std::uint32_t, 3>;
+using VoxelIndex = std::array<std::uint32_t, 3>;
 
 constexpr std::uint32_t kUnit = 4096;  // of the shortest edge
 constexpr std::uint32_t kSolid = UINT32_MAX, kUnreached = UINT32_MAX - 1;
-constexpr std::uint32_t kMostWay = UINT32_MAX - (1u << 24);
+constexpr std::uint32_t kMaxDistance = UINT32_MAX - (1u << 24);
 
-class Ways {
+class PathSearch {
  public:
-  Ways(const VoxelView& solid, const VoxelWindow& window, std::size_t axis) : axis_(axis) {
+  PathSearch(const VoxelView& solid, const VoxelWindow& window, std::size_t axis) : axis_(axis) {
     const Nm shortest = std::min({solid.edge[0], solid.edge[1], solid.edge[2]});
     for (std::size_t i = 0; i < 3; ++i) {
       n_[i] = window.size(static_cast<int>(i));
@@ -56,7 +56,7 @@ class Ways {
     for (std::uint32_t way = 0; count > 0; ++way) {
       std::vector<std::uint64_t>& bucket = waiting_[way & mask];
       if (bucket.empty()) continue;
-      if (way > kMostWay) throw std::length_error("a way through the void has more than 2^20 voxels");
+      if (way > kMaxDistance) throw std::length_error("a way through the void has more than 2^20 voxels");
       now.clear();
       now.swap(bucket);
       count -= now.size();
@@ -68,19 +68,19 @@ class Ways {
 
   Tortuosity result() const {
     Tortuosity sum;
-    double ways = 0;
+    double paths = 0;
     const double thickness = (n_[axis_] - 1.0) * step_[axis_];
     for_each_of_face(n_[axis_] - 1, [&](std::size_t at) {
       if (way_[at] == kSolid) return;
       ++sum.outlet;
       if (way_[at] == kUnreached) return;
       const double ratio = thickness > 0 ? way_[at] / thickness : 1;
-      sum.least = sum.reached == 0 ? ratio : std::min(sum.least, ratio);
-      sum.most = std::max(sum.most, ratio);
+      sum.minimum = sum.reached == 0 ? ratio : std::min(sum.minimum, ratio);
+      sum.maximum = std::max(sum.maximum, ratio);
       ++sum.reached;
-      ways += ratio;
+      paths += ratio;
     });
-    if (sum.reached > 0) sum.mean = ways / static_cast<double>(sum.reached);
+    if (sum.reached > 0) sum.mean = paths / static_cast<double>(sum.reached);
     return sum;
   }
 
@@ -100,7 +100,7 @@ class Ways {
   }
 
   /// By how much the index of a voxel grows with a step along an axis; false at an end.
-  bool step(const Place& from, std::size_t i, int side, std::ptrdiff_t& by) const {
+  bool step(const VoxelIndex& from, std::size_t i, int side, std::ptrdiff_t& by) const {
     const bool leaves = side < 0 ? from[i] == 0 : from[i] + 1 == n_[i];
     if (leaves && !periodic_[i]) return false;
     by = side * static_cast<std::ptrdiff_t>(stride_[i] * (leaves ? 1 - std::ptrdiff_t{n_[i]} : 1));
@@ -109,8 +109,8 @@ class Ways {
 
   // In each of the eight corners around a voxel, whose bits tell along which axes a neighbour lies.
   std::uint64_t leave(std::size_t at, std::uint32_t way) {
-    const Place from{static_cast<std::uint32_t>(at % n_[0]), static_cast<std::uint32_t>(at / stride_[1] % n_[1]),
-                     static_cast<std::uint32_t>(at / stride_[2])};
+    const VoxelIndex from{static_cast<std::uint32_t>(at % n_[0]), static_cast<std::uint32_t>(at / stride_[1] % n_[1]),
+                          static_cast<std::uint32_t>(at / stride_[2])};
     std::uint64_t count = 0;
     for (int corner = 0; corner < 8; ++corner) {
       std::array<std::ptrdiff_t, 3> by{};
@@ -139,7 +139,7 @@ class Ways {
   }
 
   std::size_t axis_;
-  Place n_{};
+  VoxelIndex n_{};
   std::array<bool, 3> periodic_{};
   std::array<double, 3> step_{};
   std::array<std::size_t, 3> stride_{};
@@ -153,9 +153,9 @@ class Ways {
 Tortuosity tortuosity(const VoxelView& solid, const VoxelWindow& window, int axis) {
   const auto a = static_cast<std::size_t>(axis);
   if (window.size(0) == 0 || window.size(1) == 0 || window.size(2) == 0) return {};
-  Ways ways(solid, window, a);
-  ways.run();
-  return ways.result();
+  PathSearch paths(solid, window, a);
+  paths.run();
+  return paths.result();
 }
 
 }  // namespace lamina::pores

@@ -9,9 +9,9 @@
 namespace lamina::pores {
 
 struct Tortuosity {
-  double mean = 0, least = 0, most = 0;  // shortest way / thickness, over the void voxels of the far face that are reached
-  std::uint64_t reached = 0;             // of these
-  std::uint64_t outlet = 0;              // void voxels of the far face
+  double mean = 0, minimum = 0, maximum = 0;  // shortest way / thickness, over the void voxels of the far face that are reached
+  std::uint64_t reached = 0;                  // of these
+  std::uint64_t outlet = 0;                   // void voxels of the far face
 };
 
 /// Ways from any void voxel of the lower face of the window along an axis to each of the upper one, from centre to centre, by

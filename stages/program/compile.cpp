@@ -25,7 +25,7 @@ class LayerCompiler {
       const RunsView frame = to_scan_frame(grid, planes[p], scratch.scan[p]);
       for (std::uint32_t l = 0; l < grid.lines; ++l) scratch.line[std::size_t{p} * grid.lines + l] = frame.row(l);
     }
-    scratch.nozzle.assign(std::size_t{grid.nozzles} * grid.drop_bits, Line());
+    scratch.nozzle.assign(std::size_t{grid.nozzles} * grid.drop_bits, ColumnChanges());
     fired_.resize(grid.sweep_drops);
     if (grid.first_swath == FirstSwath::kLayer) {
       while (first_ + 1 < grid.lines && scratch.line[static_cast<std::size_t>(first_)].empty()) ++first_;
@@ -68,7 +68,7 @@ class LayerCompiler {
   std::uint32_t top() const { return static_cast<std::uint32_t>(std::max<std::int64_t>(first_, 0)); }
 
   /// A line of the plane at hand.
-  Line& line(std::uint32_t number) { return scratch_.line[std::size_t{plane_} * grid_.lines + number]; }
+  ColumnChanges& line(std::uint32_t number) { return scratch_.line[std::size_t{plane_} * grid_.lines + number]; }
 
   /// Another line, in a buffer that lives as long as the layer.
   Buffer<std::uint32_t>& new_line() {
@@ -90,17 +90,17 @@ class LayerCompiler {
   }
 
   /// What nozzle i of a sweep has to fire.
-  Line under(std::uint32_t swath, std::uint32_t pass, std::uint32_t i) {
+  ColumnChanges under(std::uint32_t swath, std::uint32_t pass, std::uint32_t i) {
     const std::uint32_t own = pass + i * grid_.passes;  // line in the swath
     const std::int64_t over = first_line(swath, pass) + std::int64_t{i} * grid_.passes;
     if (over < 0 || over >= grid_.lines || blocked_[i]) return {};
     const auto number = static_cast<std::uint32_t>(over);
-    const Line whole = line(number);
+    const ColumnChanges whole = line(number);
     const bool lower = swath > 0 && own < grid_.overlap, upper = swath + 1 < swaths_ && own >= stride_;
     if (whole.empty() || (!lower && !upper)) return whole;
     if (nozzle_blocked(lower ? own + stride_ : own - stride_)) return whole;  // the other swath cannot
-    const std::uint32_t place = lower ? own : own - stride_;
-    const std::uint32_t share = (grid_.overlap - place) * 64 / (grid_.overlap + 1);
+    const std::uint32_t position = lower ? own : own - stride_;
+    const std::uint32_t share = (grid_.overlap - position) * 64 / (grid_.overlap + 1);
     Buffer<std::uint32_t>& part = new_line();
     divide(whole, number, share, upper, part);
     return part;
@@ -110,7 +110,7 @@ class LayerCompiler {
   template <class Under>
   void load(const Under& under) {
     plane_ = first_drop_;
-    most_here_ = 1;
+    max_here_ = 1;
     if (grid_.drop_bits == 1) {
       for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(i);
       return;
@@ -121,7 +121,7 @@ class LayerCompiler {
       std::uint32_t drops = 0;
       for (plane_ = first_drop_; plane_ < end && !(fired_[drops] = under(i)).empty(); ++plane_) ++drops;
       scratch_.bits.add({fired_.data(), drops});
-      most_here_ = std::max(most_here_, drops);
+      max_here_ = std::max(max_here_, drops);
     }
     scratch_.bits.end(scratch_.nozzle);
     plane_ = first_drop_;
@@ -137,8 +137,8 @@ class LayerCompiler {
     backward_ = !backward_;
     // A sweep of all drops that the head has would have fired these with those before.
     const auto whole = [&](std::uint32_t drops) { return (drops + grid_.head_drops - 1) / grid_.head_drops; };
-    sweep.drops = most_here_;
-    sweep.added = whole(first_drop_ + most_here_) == whole(first_drop_);
+    sweep.drops = max_here_;
+    sweep.added = whole(first_drop_ + max_here_) == whole(first_drop_);
     count_.added += sweep.added ? 1 : 0;
     for (std::size_t i = 0; i < scratch_.nozzle.size(); ++i) {
       count_.drops += pixels_of(scratch_.nozzle[i]) << (i / grid_.nozzles);
@@ -153,12 +153,12 @@ class LayerCompiler {
     const std::int64_t next = grid_.passes;
     for (std::uint32_t l = top(); l < grid_.lines; ++l) {
       if (line(l).empty() || !dead(l)) continue;
-      Line left = line(l);
+      ColumnChanges left = line(l);
       line(l) = {};
       for (const std::int64_t neighbour : {l - next, l + next}) {
         if (grid_.blocked_rule != BlockedRule::kNeighbour || left.empty()) break;
         if (neighbour < top() || neighbour >= grid_.lines || dead(static_cast<std::uint32_t>(neighbour))) continue;
-        Line& target = line(static_cast<std::uint32_t>(neighbour));
+        ColumnChanges& target = line(static_cast<std::uint32_t>(neighbour));
         Buffer<std::uint32_t>& both = new_line();
         combine(target, left, LineOperation::kUnion, both);
         Buffer<std::uint32_t>& added = new_line();
@@ -192,7 +192,7 @@ class LayerCompiler {
           return other >= 0 && other < grid_.nozzles && !blocked_[static_cast<std::size_t>(other)];
         };
         if (std::ranges::none_of(waiting, served)) continue;
-        load([&](std::uint32_t i) -> Line {
+        load([&](std::uint32_t i) -> ColumnChanges {
           const std::int64_t j = i - d;
           if (blocked_[i] || j < 0 || !std::ranges::binary_search(waiting, j)) return {};
           return line(static_cast<std::uint32_t>(first_line(swath, pass) + j * grid_.passes));
@@ -213,9 +213,9 @@ class LayerCompiler {
   CompileScratch& scratch_;
   const EmitSweep& emit_;
   std::vector<bool> blocked_;
-  std::uint32_t planes_, plane_ = 0, first_drop_ = 0, most_here_ = 1;
-  std::vector<Line> fired_;  // of a nozzle, drop after drop
-  std::int64_t first_ = 0;   // line of the first swath
+  std::uint32_t planes_, plane_ = 0, first_drop_ = 0, max_here_ = 1;
+  std::vector<ColumnChanges> fired_;  // of a nozzle, drop after drop
+  std::int64_t first_ = 0;            // line of the first swath
   std::uint32_t stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;
   std::size_t kept_ = 0;  // made lines that are needed to the end of the layer
   bool backward_ = false;

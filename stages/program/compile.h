@@ -9,8 +9,8 @@
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/program/drop_bits.h"
 #include "stages/program/fire.h"
+#include "stages/program/line_sets.h"
 #include "stages/program/scan_frame.h"
 
 namespace lamina::program {
@@ -20,8 +20,8 @@ struct CompileScratch {
   std::deque<ScanScratch> scan;  // of each plane
   FireScratch fire;
   SweepVectors vectors;
-  Buffer<Line> line;                       // every line of the layer, plane after plane
-  std::vector<Line> nozzle;                // what is under each nozzle of a sweep, bit after bit of the drops
+  Buffer<ColumnChanges> line;              // every line of the layer, plane after plane
+  std::vector<ColumnChanges> nozzle;       // what is under each nozzle of a sweep, bit after bit of the drops
   std::deque<Buffer<std::uint32_t>> made;  // lines that are not those of the image: shared or moved ones
   std::size_t made_used = 0;
   DropBits bits;  // of heads that fire several drops in a sweep
@@ -29,7 +29,7 @@ struct CompileScratch {
   std::uint64_t bytes() const {
     std::uint64_t total = bytes_held(fire.event_offset) + bytes_held(fire.event_bit) + bytes_held(fire.rows) +
                           bytes_held(fire.current) + bytes_held(vectors.bits) + bytes_held(vectors.firing) + bytes_held(line) +
-                          nozzle.capacity() * sizeof(Line);
+                          nozzle.capacity() * sizeof(ColumnChanges);
     for (const ScanScratch& one : scan) {
       total += bytes_held(one.turned.row_offset) + bytes_held(one.turned.change) + bytes_held(one.next);
     }

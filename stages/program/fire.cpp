@@ -48,15 +48,15 @@ void add_firing(std::uint32_t step, std::uint32_t count, Buffer<std::uint32_t>& 
 }
 
 // Every change of a line turns its nozzle on or off from a step on; steps of one residue belong together.
-void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors) {
+void fire_changes(const HeadGrid& grid, std::span<const ColumnChanges> lines, FireScratch& scratch, SweepVectors& vectors) {
   const std::uint32_t ticks = grid.steps_per_pixel, words = vectors.words;
   auto& offset = scratch.event_offset;
   offset.assign(std::size_t{vectors.steps} + 2, 0);
-  const auto place_of = [&](std::uint32_t change, std::uint32_t lag) {
+  const auto position_of = [&](std::uint32_t change, std::uint32_t lag) {
     return std::min(std::uint64_t{change} * ticks + lag - vectors.first_step, std::uint64_t{vectors.steps});
   };
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    for (const std::uint32_t change : lines[l]) ++offset[place_of(change, grid.lag[l % grid.nozzles]) + 1];
+    for (const std::uint32_t change : lines[l]) ++offset[position_of(change, grid.lag[l % grid.nozzles]) + 1];
   }
   for (std::size_t s = 0; s + 1 < offset.size(); ++s) offset[s + 1] += offset[s];
   scratch.event_bit.resize(offset.back());
@@ -64,7 +64,7 @@ void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch
     const auto i = static_cast<std::uint32_t>(l % grid.nozzles);
     const std::size_t bit = (i ^ grid.bit_order) + l / grid.nozzles * grid.words() * 64;
     for (const std::uint32_t change : lines[l]) {
-      scratch.event_bit[offset[place_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(bit);
+      scratch.event_bit[offset[position_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(bit);
     }
   }
   // Filling moved each offset to the end of its step.
@@ -93,7 +93,7 @@ void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch
   }
 }
 
-void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors) {
+void fire_blocks(const HeadGrid& grid, std::span<const ColumnChanges> lines, FireScratch& scratch, SweepVectors& vectors) {
   const std::uint32_t ticks = grid.steps_per_pixel, words = vectors.words;
   std::fill(vectors.bits.begin(), vectors.bits.end(), 0);
   const std::uint64_t end_step = std::uint64_t{vectors.first_step} + vectors.steps;
@@ -108,7 +108,7 @@ void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch&
       for (std::uint32_t bit = 0; bit < 64; ++bit) {
         const std::uint32_t nozzle = (word % grid.words() * 64 + bit) ^ grid.bit_order;
         if (nozzle >= grid.nozzles || grid.lag[nozzle] % ticks != residue) continue;
-        const Line line = lines[word / grid.words() * grid.nozzles + nozzle];
+        const ColumnChanges line = lines[word / grid.words() * grid.nozzles + nozzle];
         if (line.empty()) continue;
         const std::uint64_t shift = grid.lag[nozzle] / ticks - base;
         std::uint64_t* const row = scratch.rows.data() + bit * row_words;
@@ -140,11 +140,12 @@ void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch&
 
 }  // namespace
 
-bool fire(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors, FireWay way) {
+bool fire(const HeadGrid& grid, std::span<const ColumnChanges> lines, FireScratch& scratch, SweepVectors& vectors,
+          FireWay way) {
   const std::uint64_t ticks = grid.steps_per_pixel;
   std::uint64_t first = UINT64_MAX, last = 0, changes = 0;
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    const Line line = lines[l];
+    const ColumnChanges line = lines[l];
     if (line.empty()) continue;
     const std::uint64_t lag = grid.lag[l % grid.nozzles];
     first = std::min(first, line.front() * ticks + lag);

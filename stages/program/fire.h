@@ -10,7 +10,7 @@
 namespace lamina::program {
 
 /// One line as places where its colour changes (data/runs.h); empty if its nozzle has nothing to fire.
-using Line = std::span<const std::uint32_t>;
+using ColumnChanges = std::span<const std::uint32_t>;
 
 struct FireScratch {
   Buffer<std::uint32_t> event_offset;
@@ -29,7 +29,7 @@ enum class FireWay : std::uint8_t { kCheapest, kChanges, kBlocks };
 /// cost   by changes: each line's changes sorted by step, and copies of the vector between them; nothing is expanded.
 ///        by blocks, for patterns with a change every few pixels: 64 lines at a time expanded to bits, and blocks of
 ///        64 x 64 of them transposed
-bool fire(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors,
+bool fire(const HeadGrid& grid, std::span<const ColumnChanges> lines, FireScratch& scratch, SweepVectors& vectors,
           FireWay way = FireWay::kCheapest);
 
 }  // namespace lamina::program

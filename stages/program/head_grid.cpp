@@ -63,7 +63,7 @@ class Builder {
   bool scan_x_ = machine_.mounting.scan_axis == ScanAxis::kX;
   double pitch_nm_ = machine_.head.pitch_um * kNmPerUm;  // of nozzles
   double angle_ = 0, sine_ = 0, cosine_ = 0;             // between row and scan
-  Pitch line_, place_;
+  Pitch line_, position_;
 };
 
 Status Builder::check_head() {
@@ -76,12 +76,12 @@ Status Builder::check_head() {
   grid_.joint_shift = mount.joint_shift_lines;
   grid_.first_swath = mount.first_swath;
   grid_.both_directions = machine_.motion.both_directions;
-  grid_.head_drops = head.most_drops;
-  grid_.drop_bits = head.most_drops <= 1 ? 1 : head.most_drops <= 3 ? 2 : 4;
+  grid_.head_drops = head.max_drops;
+  grid_.drop_bits = head.max_drops <= 1 ? 1 : head.max_drops <= 3 ? 2 : 4;
   if (head.nozzles == 0 || head.nozzles > 65'535) return wrong(machine_, "head.nozzles", "give 1 to 65535");
-  if (head.most_drops == 0 || head.most_drops > 15) return wrong(machine_, "head.most_drops", "give 1 to 15");
+  if (head.max_drops == 0 || head.max_drops > 15) return wrong(machine_, "head.max_drops", "give 1 to 15");
   if (grid_.words() * 64 * grid_.drop_bits > 65'536) {
-    return wrong(machine_, "head.most_drops",
+    return wrong(machine_, "head.max_drops",
                  fmt::format("{} nozzles of {} bits of drops; {} nozzles of so many bits are planned, or 65535 of one drop",
                              head.nozzles, grid_.drop_bits, 65'536 / grid_.drop_bits));
   }
@@ -158,21 +158,21 @@ Status Builder::turn_by_tilt() {
 Status Builder::divide_scan() {
   const auto& mount = machine_.mounting;
   const auto& motion = machine_.motion;
-  place_ = line_;
+  position_ = line_;
   if (motion.ticks_per_pixel > 0) {
     if (!(motion.encoder_dpi >= 1 && motion.encoder_dpi <= 25'400)) {
       return wrong(machine_, "motion.ticks_per_pixel", "needs motion.encoder_dpi, the ticks an inch, 1 to 25400");
     }
     if (motion.ticks_per_pixel > 1000) return wrong(machine_, "motion.ticks_per_pixel", "give at most 1000");
-    place_ = pitch_of_dpi(motion.encoder_dpi);
-    place_.span *= motion.ticks_per_pixel;
+    position_ = pitch_of_dpi(motion.encoder_dpi);
+    position_.span *= motion.ticks_per_pixel;
   } else if (mount.along_dpi != 0) {
     if (!(mount.along_dpi >= 1 && mount.along_dpi <= 25'400)) {
       return wrong(machine_, "mounting.along_dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.along_dpi));
     }
-    place_ = pitch_of_dpi(mount.along_dpi);
+    position_ = pitch_of_dpi(mount.along_dpi);
   }
-  if (place_.nm() < 1000) return wrong(machine_, "mounting.along_dpi", "pixels along the scan are shorter than 1 um");
+  if (position_.nm() < 1000) return wrong(machine_, "mounting.along_dpi", "pixels along the scan are shorter than 1 um");
   if (motion.lag_unit == LagUnit::kTick) {
     if (motion.ticks_per_pixel == 0) {
       return wrong(machine_, "motion.lag_unit", "tick needs motion.ticks_per_pixel; use pixel otherwise");
@@ -180,8 +180,8 @@ Status Builder::divide_scan() {
     grid_.steps_per_pixel = motion.ticks_per_pixel;
   }
   grid_.line_nm = line_.nm();
-  grid_.place_nm = place_.nm();
-  grid_.lag_pixels = pitch_nm_ * cosine_ / place_.nm();
+  grid_.position_nm = position_.nm();
+  grid_.lag_pixels = pitch_nm_ * cosine_ / position_.nm();
   return {};
 }
 
@@ -192,14 +192,14 @@ Status Builder::make_image() {
     made = PixelAxis(pitch.dots, nm_of(mm_long), pitch.span);
     return true;
   };
-  if (!axis(scan_x_ ? place_ : line_, machine_.bed.size_mm[0], grid_.image.x) ||
-      !axis(scan_x_ ? line_ : place_, machine_.bed.size_mm[1], grid_.image.y)) {
+  if (!axis(scan_x_ ? position_ : line_, machine_.bed.size_mm[0], grid_.image.x) ||
+      !axis(scan_x_ ? line_ : position_, machine_.bed.size_mm[1], grid_.image.y)) {
     return wrong(machine_, "bed.size_mm", "give sides above 0 and up to 2147 mm");
   }
   grid_.lines = scan_x_ ? grid_.image.rows() : grid_.image.columns();
-  grid_.places = scan_x_ ? grid_.image.columns() : grid_.image.rows();
+  grid_.positions = scan_x_ ? grid_.image.columns() : grid_.image.rows();
   grid_.lines_from_end = mount.nozzle_0 == Side::kFront || mount.nozzle_0 == Side::kRight;
-  grid_.places_from_end = mount.scan_from == Side::kRight || mount.scan_from == Side::kBack;
+  grid_.positions_from_end = mount.scan_from == Side::kRight || mount.scan_from == Side::kBack;
   return {};
 }
 
@@ -221,17 +221,18 @@ Status Builder::aim_nozzles() {
                  fmt::format("a nozzle lies {:.1f} um beside its line, more than a quarter of a pixel; use another angle",
                              grid_.worst_line_nm / kNmPerUm));
   }
-  const double least = *std::min_element(behind.begin(), behind.end());
+  const double minimum = *std::min_element(behind.begin(), behind.end());
   const double step = grid_.step_nm();
   std::vector<std::int64_t> steps(head.nozzles);
   for (std::uint32_t i = 0; i < head.nozzles; ++i) {
-    steps[i] = static_cast<std::int64_t>(round_half_down((behind[i] - least) / step));
-    grid_.worst_place_nm = std::max(grid_.worst_place_nm, std::abs((behind[i] - least) - static_cast<double>(steps[i]) * step));
+    steps[i] = static_cast<std::int64_t>(round_half_down((behind[i] - minimum) / step));
+    grid_.worst_position_nm =
+        std::max(grid_.worst_position_nm, std::abs((behind[i] - minimum) - static_cast<double>(steps[i]) * step));
     if (steps[i] > 100'000'000) return wrong(machine_, "head.row_offset_um", "a nozzle lags behind by metres");
   }
   for (const std::int64_t lag : steps) {
     grid_.lag.push_back(static_cast<std::uint32_t>(lag));
-    grid_.most_lag = std::max(grid_.most_lag, grid_.lag.back());
+    grid_.max_lag = std::max(grid_.max_lag, grid_.lag.back());
   }
   return {};
 }
@@ -256,17 +257,17 @@ Status Builder::block_nozzles() {
 Status Builder::check_speed() {
   const auto& head = machine_.head;
   const auto& motion = machine_.motion;
-  const double frequency = motion.scan_speed_mm_s * kNmPerMm / grid_.place_nm;
+  const double frequency = motion.scan_speed_mm_s * kNmPerMm / grid_.position_nm;
   if (!(motion.scan_speed_mm_s > 0)) return wrong(machine_, "motion.scan_speed_mm_s", "give a speed above 0");
   if (frequency > head.highest_frequency_hz * (1 + 1e-9)) {
     return wrong(machine_, "motion.scan_speed_mm_s",
                  fmt::format("{:g} mm/s fires a nozzle {:.0f} times a second, it can {:.0f}; scan at {:.1f} mm/s or slower",
                              motion.scan_speed_mm_s, frequency, head.highest_frequency_hz,
-                             std::floor(head.highest_frequency_hz * grid_.place_nm / kNmPerMm * 10) / 10));
+                             std::floor(head.highest_frequency_hz * grid_.position_nm / kNmPerMm * 10) / 10));
   }
   // Drops of a pixel follow each other before the next place.
   const double fits = std::floor(head.highest_frequency_hz / frequency * (1 + 1e-9));
-  grid_.sweep_drops = static_cast<std::uint32_t>(std::clamp(fits, 1.0, static_cast<double>(head.most_drops)));
+  grid_.sweep_drops = static_cast<std::uint32_t>(std::clamp(fits, 1.0, static_cast<double>(head.max_drops)));
   return {};
 }
 
@@ -274,16 +275,17 @@ Status Builder::check_speed() {
 
 Result<HeadGrid> make_head_grid(const Machine& machine) { return Builder(machine).build(); }
 
-std::string idle_joints(const Machine& machine, const HeadGrid& grid) {
+void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
   const std::uint32_t apart = grid.swath_lines() - grid.overlap;
-  if (grid.joint_shift == 0 || grid.joint_shift % apart != 0) return {};
-  return fmt::format(
-      "{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so that joints of all layers lie over each "
-      "other; give a number that comes round late, as {}",
-      machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8));
+  if (grid.joint_shift == 0 || grid.joint_shift % apart != 0) return;
+  warnings.push_back(
+      {"stitching",
+       fmt::format("{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so that joints of all layers lie "
+                   "over each other; give a number that comes round late, as {}",
+                   machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});
 }
 
-Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {
+Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {
   const auto refuse = [](const std::string& what) { return Error{Fault::kUsage, "bed.dpi: " + what}; };
   const bool scan_x = machine.mounting.scan_axis == ScanAxis::kX;
   const auto across = static_cast<double>(dpi[scan_x ? 1 : 0]), along = static_cast<double>(dpi[scan_x ? 0 : 1]);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
@@ -25,13 +26,13 @@ namespace lamina::program {
 ///         rows that do not land on lines, all nozzles blocked or one that does not exist, too fast for the nozzles
 Result<HeadGrid> make_head_grid(const Machine& machine);
 
-/// Empty, or why joints of swaths do not move from layer to layer though mounting.joint_shift_lines says so.
-std::string idle_joints(const Machine& machine, const HeadGrid& grid);
+/// Warns if stitch lines do not move from layer to layer though mounting.joint_shift_lines says so.
+void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings);
 
 /// Changes a machine so that it prints at these dpi, along x and y, if its head can: across the scan by its number of
 /// interlaced passes, along it by the length of a pixel.
 /// grid    of the machine as it is
 /// errors  kUsage, "bed.dpi: what is wrong": dpi that the head or the encoder cannot reach
-Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi);
+Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi);
 
 }  // namespace lamina::program

@@ -4,6 +4,9 @@
 #include <cstddef>
 
 #include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+#include "stages/data/machine.h"
+#include "stages/data/runs.h"
 
 namespace lamina::program {
 
@@ -11,5 +14,10 @@ namespace lamina::program {
 /// the far end (+y), and a step of 1 mm on top of the foot tells top from bottom. It has no symmetry, so that a print that
 /// can be read is neither mirrored nor turned over.
 Buffer<std::byte> orientation_target();
+
+// --- the layer that fills a machine's bed.
+
+/// The image of a layer that sets every pixel whose centre lies on the bed.
+Runs image_of_bed(const Machine& machine, const PixelGrid& grid);
 
 }  // namespace lamina::program

@@ -12,11 +12,11 @@ std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, c
   const std::int64_t depth = nm_of(machine.bed.size_mm[1]);
   std::optional<Outside> worst;
   __int128 farthest = 0;
-  const auto look = [&](const Point3& vertex) {
+  const auto inspection = [&](const Point3& vertex) {
     const std::int64_t x = std::int64_t{vertex.x} + offset.x, y = std::int64_t{vertex.y} + offset.y;
     const std::int64_t z = std::int64_t{vertex.z} + offset.z;
-    const Point3 place{static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)};
-    if (z > top && (!worst || !worst->above || place.z > worst->place.z)) worst = Outside{place, true, mm(z - top)};
+    const Point3 position{static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)};
+    if (z > top && (!worst || !worst->above || position.z > worst->position.z)) worst = Outside{position, true, mm(z - top)};
     if (worst && worst->above) return;
     if (machine.bed.shape == BedShape::kRound) {
       const __int128 dx = 2 * x - width, dy = 2 * y - width;
@@ -24,15 +24,15 @@ std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, c
       if (beyond <= farthest) return;
       farthest = beyond;
       const double radius = std::hypot(static_cast<double>(dx), static_cast<double>(dy)) / 2;
-      worst = Outside{place, false, (radius - static_cast<double>(width) / 2) / kNmPerMm};
+      worst = Outside{position, false, (radius - static_cast<double>(width) / 2) / kNmPerMm};
     } else {
       const std::int64_t beyond = std::max(std::max(-x, x - width), std::max(-y, y - depth));
       if (beyond <= farthest) return;
       farthest = beyond;
-      worst = Outside{place, false, mm(beyond)};
+      worst = Outside{position, false, mm(beyond)};
     }
   };
-  each_vertex(mesh, look);
+  each_vertex(mesh, inspection);
   return worst;
 }
 

@@ -11,7 +11,7 @@
 namespace lamina::program {
 
 struct Outside {
-  Point3 place;          // nm on the bed
+  Point3 position;       // nm on the bed
   bool above = false;    // of the build height, else beside the bed
   double beyond_mm = 0;  // how far
 };

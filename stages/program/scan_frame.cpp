@@ -68,14 +68,14 @@ void transpose(const RunsView& image, Runs& result, Buffer<std::uint32_t>& next)
 
 RunsView to_scan_frame(const HeadGrid& grid, const RunsView& image, ScanScratch& scratch) {
   if (grid.scan_axis == ScanAxis::kX) {
-    if (!grid.lines_from_end && !grid.places_from_end) return image;
-    mirror(image, grid.places_from_end, grid.lines_from_end, scratch.turned);
+    if (!grid.lines_from_end && !grid.positions_from_end) return image;
+    mirror(image, grid.positions_from_end, grid.lines_from_end, scratch.turned);
     return scratch.turned;
   }
   transpose(image, scratch.turned, scratch.next);
-  if (!grid.places_from_end || grid.lines_from_end) {
+  if (!grid.positions_from_end || grid.lines_from_end) {
     Runs turned;
-    mirror(scratch.turned, !grid.places_from_end, grid.lines_from_end, turned);
+    mirror(scratch.turned, !grid.positions_from_end, grid.lines_from_end, turned);
     std::swap(turned, scratch.turned);
   }
   return scratch.turned;

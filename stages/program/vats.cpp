@@ -63,16 +63,4 @@ Status VatPlan::status() const {
                           powder.base_layers > 0 ? fmt::format(" with a base of {:g} mm", powder.base_mm()) : "")};
 }
 
-std::string refills_text(const std::vector<std::uint32_t>& refills) {
-  constexpr std::size_t kTold = 6;
-  if (refills.empty()) return {};
-  std::string text = refills.size() == 1 ? "pauses before layer " : "pauses before layers ";
-  for (std::size_t i = 0; i < std::min(kTold, refills.size()); ++i) {
-    const bool last = i + 1 == refills.size();
-    text += fmt::format("{}{}", i == 0 ? "" : last ? " and " : ", ", refills[i]);
-  }
-  if (refills.size() > kTold) text += fmt::format(" and {} more", refills.size() - kTold);
-  return text + " for vats to be filled";
-}
-
 }  // namespace lamina::program

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "stages/data/layer.h"
@@ -39,8 +38,5 @@ class VatPlan {
   std::uint32_t vat_ = 0;
   bool empties_ = false, too_small_ = false;
 };
-
-/// "pauses before layers 812, 1630 and 4 more for vats to be filled"; empty without refills.
-std::string refills_text(const std::vector<std::uint32_t>& refills);
 
 }  // namespace lamina::program

@@ -76,19 +76,19 @@ void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
 }
 
 /// The spans of a bead in the image rows [first_row, last_row), which it may reach.
-void BeadRaster::cover(const Laid& laid, std::uint32_t first_row, std::uint32_t last_row) {
-  const Point2 a = laid.a, b = laid.b;
+void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t last_row) {
+  const Point2 a = deposited.a, b = deposited.b;
   Bead bead{a.x,
             a.y,
             std::int64_t{b.x} - a.x,
             std::int64_t{b.y} - a.y,
-            static_cast<Wide>(laid.width) * laid.width,
+            static_cast<Wide>(deposited.width) * deposited.width,
             0,
-            laid.ends == BeadEnds::kSquare};
+            deposited.ends == BeadEnds::kSquare};
   bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
   const auto rows = static_cast<std::int64_t>(grid_.rows()), columns = static_cast<std::int64_t>(grid_.columns());
   // A guess is wrong by the rounding of doubles, and by the nanometre that a centre is rounded down: one pixel is ample.
-  const double radius = static_cast<double>(laid.width) / 2;
+  const double radius = static_cast<double>(deposited.width) / 2;
   for (std::uint32_t row = first_row; row < last_row; ++row) {
     const std::int64_t y = grid_.y.centre(rows - 1 - row);
     Interval x = estimate(bead, radius, static_cast<double>(y - bead.ay));
@@ -110,7 +110,7 @@ void BeadRaster::cover(const Laid& laid, std::uint32_t first_row, std::uint32_t 
 }
 
 /// Unites the spans of the image rows [first_row, last_row) in band_.
-void BeadRaster::unite(std::uint32_t first_row, std::uint32_t last_row) {
+void BeadRaster::merge(std::uint32_t first_row, std::uint32_t last_row) {
   const std::uint32_t rows = last_row - first_row;
   start_.assign(std::size_t{rows} + 1, 0);
   for (const Span& span : spans_) ++start_[span.row - first_row + 1];
@@ -139,7 +139,7 @@ void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const Run
   const std::uint32_t rows = grid_.rows(), bands = (rows + kBandRows - 1) / kBandRows;
   // Beads by the band of their first row.
   band_begin_.assign(std::size_t{bands} + 1, 0);
-  for (const Laid& bead : beads_) ++band_begin_[bead.first_row / kBandRows + 1];
+  for (const DepositedParts& bead : beads_) ++band_begin_[bead.first_row / kBandRows + 1];
   for (std::uint32_t b = 0; b < bands; ++b) band_begin_[b + 1] += band_begin_[b];
   by_band_.resize(beads_.size());
   for (std::uint32_t i = 0; i < beads_.size(); ++i) by_band_[band_begin_[beads_[i].first_row / kBandRows]++] = i;
@@ -151,12 +151,12 @@ void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const Run
     spans_.clear();
     std::size_t stay = 0;
     for (const std::uint32_t i : reaching_) {
-      const Laid& bead = beads_[i];
+      const DepositedParts& bead = beads_[i];
       cover(bead, std::max(first, bead.first_row), std::min(last, bead.last_row));
       if (bead.last_row > last) reaching_[stay++] = i;
     }
     reaching_.resize(stay);
-    unite(first, last);
+    merge(first, last);
     take(first, band_);
   }
 }
@@ -171,6 +171,20 @@ void BeadRaster::runs(Runs& out) {
     out.change.insert(out.change.end(), band.change.begin(), band.change.end());
     for (const std::uint32_t offset : band.row_offset.subspan(1)) out.row_offset.push_back(before + offset);
   });
+}
+
+// Beads of a toolpath file, and the grid to look at them.
+
+void BeadRaster::add(std::span<const DepositedBead> beads, Point2 origin) {
+  const auto at = [&](Point2 p) { return Point2{p.x - origin.x, p.y - origin.y}; };
+  for (const DepositedBead& bead : beads) add(at(bead.from), at(bead.to), bead.width, BeadEnds::kRound);
+}
+
+PixelGrid bead_grid(const Box& box) {
+  constexpr std::int64_t kMaxDots = 508, kMaxPixels = 20'000;  // an inch; along a side
+  const std::int64_t longest = std::max<std::int64_t>({box.width(), box.depth(), 1});
+  const std::int64_t dots = std::clamp<std::int64_t>(kMaxPixels * kNmPerInch / longest, 1, kMaxDots);
+  return {PixelAxis(dots, std::max<std::int64_t>(box.width(), 1)), PixelAxis(dots, std::max<std::int64_t>(box.depth(), 1))};
 }
 
 }  // namespace lamina::raster

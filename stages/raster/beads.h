@@ -30,7 +30,7 @@ class BeadRaster {
   /// width  nm, > 0 and below 2^27 (134 mm)
   void add(Point2 a, Point2 b, Nm width, BeadEnds ends);
   /// All beads of a layer, with round ends. origin  nm on the bed: the front left corner of the grid
-  void add(std::span<const LaidBead> beads, Point2 origin);
+  void add(std::span<const DepositedBead> beads, Point2 origin);
   /// Gives the union of all beads, as bands of image rows from row 0 (at the back) on; each serves until the next.
   /// take  called with the image row that is the band's first
   /// cost  O(S log(S of a row) + rows) for S rows that beads cover, each counted on its own
@@ -46,7 +46,7 @@ class BeadRaster {
  private:
   static constexpr std::uint32_t kBandRows = 64;  // so that the spans of a band stay within a second-level cache
 
-  struct Laid {
+  struct DepositedParts {
     Point2 a, b;
     std::uint32_t first_row, last_row;  // image rows that it may reach
     Nm width;
@@ -55,11 +55,11 @@ class BeadRaster {
   struct Span {
     std::uint32_t row, begin, end;
   };
-  void cover(const Laid& laid, std::uint32_t first_row, std::uint32_t last_row);
-  void unite(std::uint32_t first_row, std::uint32_t last_row);
+  void cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t last_row);
+  void merge(std::uint32_t first_row, std::uint32_t last_row);
 
   PixelGrid grid_;
-  Buffer<Laid> beads_;
+  Buffer<DepositedParts> beads_;
   Buffer<std::uint32_t> by_band_, band_begin_;  // beads by the band of their first row; where each band's end
   Buffer<std::uint32_t> reaching_;              // into the band at work
   Buffer<Span> spans_, ordered_;                // of the band, as they come and by row

@@ -7,17 +7,17 @@
 #include <limits>
 #include <vector>
 
-#include "stages/data/handles/embree.h"
 #include "stages/raster/height_runs.h"
+#include "stages/support/late/embree.h"
 
 namespace lamina::raster {
 namespace {
 
 /// Spare room of every box, nm: float holds coordinates up to 2.1e9 nm to 128 nm, and an instance adds two roundings.
-constexpr float kRoundingRoom = 1024;
+constexpr float kRoundingMargin = 1024;
 
 /// What Embree hands back with a run of clusters.
-struct Source {
+struct BeamSource {
   const PlacedMesh* placed;  // the first, or only, instance of the mesh
   HeightRuns runs;
   bool shared = false;         // several instances: the beam says which one
@@ -64,17 +64,17 @@ void shoot(Beam& beam, RTCScene scene, Point3 offset) {
 }
 
 void run_bounds(const RTCBoundsFunctionArguments* arguments) {
-  const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
+  const auto& source = *static_cast<const BeamSource*>(arguments->geometryUserPtr);
   const Box& box = source.runs.box(arguments->primID);
   const Point3 move = source.shared ? Point3{0, 0, 0} : source.placed->offset;
   const auto at = [](Nm coordinate, Nm offset) { return static_cast<float>(std::int64_t{coordinate} + offset); };
   RTCBounds& bounds = *arguments->bounds_o;
-  bounds.lower_x = at(box.lo.x, move.x) - kRoundingRoom;
-  bounds.lower_y = at(box.lo.y, move.y) - kRoundingRoom - source.half_band;
-  bounds.lower_z = at(box.lo.z, move.z) - kRoundingRoom;
-  bounds.upper_x = at(box.hi.x, move.x) + kRoundingRoom;
-  bounds.upper_y = at(box.hi.y, move.y) + kRoundingRoom + source.half_band;
-  bounds.upper_z = at(box.hi.z, move.z) + kRoundingRoom;
+  bounds.lower_x = at(box.lo.x, move.x) - kRoundingMargin;
+  bounds.lower_y = at(box.lo.y, move.y) - kRoundingMargin - source.half_band;
+  bounds.lower_z = at(box.lo.z, move.z) - kRoundingMargin;
+  bounds.upper_x = at(box.hi.x, move.x) + kRoundingMargin;
+  bounds.upper_y = at(box.hi.y, move.y) + kRoundingMargin + source.half_band;
+  bounds.upper_z = at(box.hi.z, move.z) + kRoundingMargin;
 }
 
 void copy_bounds(const RTCBoundsFunctionArguments* arguments) {
@@ -83,12 +83,12 @@ void copy_bounds(const RTCBoundsFunctionArguments* arguments) {
   const Point3 move = all.placed[copy.instance].offset;
   RTCBounds& bounds = *arguments->bounds_o;
   rtcGetSceneBounds(all.scenes[copy.scene], &bounds);
-  bounds.lower_x += static_cast<float>(move.x) - kRoundingRoom;
-  bounds.lower_y += static_cast<float>(move.y) - kRoundingRoom;
-  bounds.lower_z += static_cast<float>(move.z) - kRoundingRoom;
-  bounds.upper_x += static_cast<float>(move.x) + kRoundingRoom;
-  bounds.upper_y += static_cast<float>(move.y) + kRoundingRoom;
-  bounds.upper_z += static_cast<float>(move.z) + kRoundingRoom;
+  bounds.lower_x += static_cast<float>(move.x) - kRoundingMargin;
+  bounds.lower_y += static_cast<float>(move.y) - kRoundingMargin;
+  bounds.lower_z += static_cast<float>(move.z) - kRoundingMargin;
+  bounds.upper_x += static_cast<float>(move.x) + kRoundingMargin;
+  bounds.upper_y += static_cast<float>(move.y) + kRoundingMargin;
+  bounds.upper_z += static_cast<float>(move.z) + kRoundingMargin;
 }
 
 /// Embree reports its own lack of memory, or of threads, by a code.
@@ -100,7 +100,7 @@ Error failed(RTCError code, const std::string& what) {
 /// Notes the run's clusters and never reports a hit, so that the traversal goes on.
 void visit_run(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
-  const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
+  const auto& source = *static_cast<const BeamSource*>(arguments->geometryUserPtr);
   auto& beam = *reinterpret_cast<Beam*>(arguments->context);
   const std::uint32_t instance = source.shared ? beam.instance : source.instance;
   const Point3& offset = beam.placed[instance].offset;
@@ -123,7 +123,7 @@ void visit_copy(const RTCIntersectFunctionNArguments* arguments) {
 struct BeamIndex::State {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  std::vector<Source> sources;  // of each mesh
+  std::vector<BeamSource> sources;  // of each mesh
   Copies copies;
   std::span<const PlacedMesh> placed;
   std::atomic<std::int64_t> bytes{0};
@@ -147,7 +147,7 @@ struct BeamIndex::State {
     rtcReleaseGeometry(geometry);
   }
 
-  void attach_runs(RTCScene parent, Source& source) const {
+  void attach_runs(RTCScene parent, BeamSource& source) const {
     attach(parent, source.runs.count(), &source, run_bounds, visit_run);
   }
 
@@ -208,8 +208,8 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
     std::size_t end = begin + 1;
     while (end < order.size() && placed[order[end]].mesh == placed[order[begin]].mesh) ++end;
     const PlacedMesh& first = placed[order[begin]];
-    Source& source =
-        state.sources.emplace_back(Source{&first, HeightRuns(first.mesh->bounds), end - begin > 1, order[begin], half_band});
+    BeamSource& source = state.sources.emplace_back(
+        BeamSource{&first, HeightRuns(first.mesh->bounds), end - begin > 1, order[begin], half_band});
     if (!source.shared) {
       state.attach_runs(state.scene, source);
     } else {
@@ -232,7 +232,7 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
 void BeamIndex::find_clusters(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                               ClusterVisits& out) const {
   Beam beam{};
-  beam.x = static_cast<std::int64_t>(-4 * kRoundingRoom);
+  beam.x = static_cast<std::int64_t>(-4 * kRoundingMargin);
   beam.low = sampling.y.centre(first_row);
   beam.high = sampling.y.centre(last_row - 1);
   beam.y = (beam.low + beam.high) / 2;
@@ -245,7 +245,7 @@ void BeamIndex::find_clusters(const PixelSampling& sampling, Nm plane, std::uint
 std::uint64_t BeamIndex::bytes() const {
   std::uint64_t total =
       static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes)) + bytes_held(state_->copies.copies);
-  for (const Source& source : state_->sources) total += source.runs.bytes();
+  for (const BeamSource& source : state_->sources) total += source.runs.bytes();
   return total;
 }
 

@@ -24,7 +24,7 @@ class ClusteredMesh {
   std::uint32_t cluster_count() const { return static_cast<std::uint32_t>(bounds.size()); }
 
   /// A cluster, where it is stored or expanded into `room`; the reference lives as long as both.
-  const Cluster& cluster(std::uint32_t index, Cluster& room) const { return blocks_->cluster(index, room); }
+  const Cluster& cluster(std::uint32_t index, Cluster& unpacked) const { return blocks_->cluster(index, unpacked); }
 
   /// What names a cluster's corners, or the cluster itself (mesh_blocks.h).
   MeshBlocks::Indexed indexed(std::uint32_t index) const { return blocks_->indexed(index); }

@@ -15,4 +15,10 @@ void cut_clusters(const Kernels& kernels, const PixelSampling& sampling, std::sp
                   std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                   Segments& out);
 
+// --- planes that meet a facet, of meshes in clusters.
+
+/// Sets the entry of every plane that a facet crosses; planes rise. cost  O(C log P) for C clusters of each mesh at its own
+/// height, and 16 times that for those that meet a plane
+void mark_crossed(std::span<const PlacedMesh> placed, std::span<const Nm> planes, std::span<std::uint8_t> crossed);
+
 }  // namespace lamina::raster

@@ -78,15 +78,15 @@ inline std::uint32_t HeightRuns::lanes_met(const Group& group, const Search& sea
   const auto eight = [](const std::uint16_t* row, int half) {
     return _mm_load_si128(reinterpret_cast<const __m128i*>(row) + half);
   };
-  const auto beside = [&](const std::uint16_t* begin, const std::uint16_t* last, __m128i low, __m128i high, int half) {
+  const auto neighbour = [&](const std::uint16_t* begin, const std::uint16_t* last, __m128i low, __m128i high, int half) {
     return _mm_or_si128(_mm_subs_epu16(eight(begin, half), high), _mm_subs_epu16(low, eight(last, half)));
   };
   const __m128i z = all(search.z);
-  __m128i gap[2] = {beside(group.z_begin, group.z_last, z, z, 0), beside(group.z_begin, group.z_last, z, z, 1)};
+  __m128i gap[2] = {neighbour(group.z_begin, group.z_last, z, z, 0), neighbour(group.z_begin, group.z_last, z, z, 1)};
   if (!search.all_rows) {
     const __m128i low = all(search.y_low), high = all(search.y_high);
     for (int half = 0; half < 2; ++half) {
-      gap[half] = _mm_or_si128(gap[half], beside(group.y_begin, group.y_last, low, high, half));
+      gap[half] = _mm_or_si128(gap[half], neighbour(group.y_begin, group.y_last, low, high, half));
     }
   }
   const __m128i none = _mm_setzero_si128();

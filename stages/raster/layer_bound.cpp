@@ -12,9 +12,9 @@
 
 namespace lamina::raster {
 
-CrossingSums::CrossingSums(Nm lowest, Nm highest, std::size_t most, Isa isa) : kernels_(tents_for(isa_at_most(isa))) {
+CrossingSums::CrossingSums(Nm lowest, Nm highest, std::size_t maximum, Isa isa) : kernels_(tents_for(limited_isa(isa))) {
   const auto slabs_between = [&] { return (std::int64_t{highest} >> shift_) - (lowest >> shift_) + 1; };
-  while (slabs_between() > static_cast<std::int64_t>(most)) ++shift_;
+  while (slabs_between() > static_cast<std::int64_t>(maximum)) ++shift_;
   first_ = lowest >> shift_;
   bend_.resize(static_cast<std::size_t>(slabs_between()) + kBeyond);
   segments_.resize(bend_.size());
@@ -27,7 +27,7 @@ void CrossingSums::add(const ClusteredMesh& mesh, std::uint32_t cluster) {
   Sides sides;
   const MeshBlocks::Indexed indexed = mesh.indexed(cluster);
   if (indexed.cluster != nullptr) {
-    kernels_.look_up(*indexed.cluster, indexed.vertex, sides);
+    kernels_.find(*indexed.cluster, indexed.vertex, sides);
   } else {
     const Cluster& listed = mesh.listed(cluster);
     std::memcpy(sides.z, listed.z, sizeof sides.z);
@@ -80,13 +80,13 @@ const CrossingSums::Slab* CrossingSums::Table::at(std::int64_t plane) const {
   return number < 0 || number >= static_cast<std::int64_t>(slab.size()) ? nullptr : &slab[static_cast<std::size_t>(number)];
 }
 
-void CrossingSums::Table::fit(std::size_t most) {
+void CrossingSums::Table::fit(std::size_t maximum) {
   const auto holds = [](const Slab& one) { return one.depth > 0 || one.segments != 0 || one.clusters != 0; };
   while (!slab.empty() && !holds(slab.back())) slab.pop_back();
   const auto lowest = std::find_if(slab.begin(), slab.end(), holds);
   first += lowest - slab.begin();
   slab.erase(slab.begin(), lowest);
-  for (; slab.size() > most; ++shift) {
+  for (; slab.size() > maximum; ++shift) {
     const std::int64_t begin = first >> 1, last = (first + static_cast<std::int64_t>(slab.size()) - 1) >> 1;
     for (std::size_t i = 0; i < slab.size(); ++i) {
       const std::int64_t number = first + static_cast<std::int64_t>(i);
@@ -129,12 +129,12 @@ CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa) {
   constexpr std::uint32_t kTogether = 1024;  // clusters
   constexpr std::size_t kFiner = 16;         // times as many slabs as are kept
   const Heights heights = heights_of(mesh);
-  const std::size_t most = std::min(CrossingSums::kMostSlabs, kFiner * most_slabs_of(mesh.cluster_count()));
+  const std::size_t maximum = std::min(CrossingSums::kMaxSlabs, kFiner * max_slabs_of(mesh.cluster_count()));
   const Clusters clusters(0, mesh.cluster_count(), kTogether);
   const auto add = [&](const Clusters& range, CrossingSums& to) {
     for (std::uint32_t c = range.begin(); c != range.end(); ++c) to.add(mesh, c);
   };
-  CrossingSums all(heights.lowest, heights.highest, most, isa);
+  CrossingSums all(heights.lowest, heights.highest, maximum, isa);
   if (clusters.size() <= kTogether) {
     add(clusters, all);
     return all;
@@ -149,7 +149,7 @@ std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> 
   std::vector<CrossingSums::Table> tables(meshes.size());
   tbb::parallel_for(std::size_t{0}, meshes.size(), [&](std::size_t i) {
     tables[i] = sum_crossings(meshes[i], isa).table();
-    tables[i].fit(most_slabs_of(meshes[i].cluster_count()));
+    tables[i].fit(max_slabs_of(meshes[i].cluster_count()));
   });
   return tables;
 }
@@ -162,7 +162,7 @@ LayerBound::LayerBound(std::span<const PlacedMesh> placed, std::span<const Clust
   for (const auto& [key, copies] : count) copies_.push_back({key.first, key.second, copies});
 }
 
-LayerBound::Count LayerBound::of(const CrossingSums::Slab& slab, std::uint64_t copies) const {
+LayerBound::CrossingCount LayerBound::of(const CrossingSums::Slab& slab, std::uint64_t copies) const {
   // A cut of n rows' depth crosses less than n + 1 of them. Sums in double are known to far better than a millionth.
   const auto segments = static_cast<std::uint64_t>(slab.segments);
   const auto rows = static_cast<std::uint64_t>(slab.depth * rows_per_nm_ * (1 + 1e-6)) + 1;
@@ -170,23 +170,23 @@ LayerBound::Count LayerBound::of(const CrossingSums::Slab& slab, std::uint64_t c
           static_cast<std::uint64_t>(slab.clusters) * copies};
 }
 
-LayerBound::Count LayerBound::at(Nm plane) const {
-  Count total;
+LayerBound::CrossingCount LayerBound::at(Nm plane) const {
+  CrossingCount total;
   for (const Copies& one : copies_) {
     const CrossingSums::Slab* slab = tables_[one.table].at(std::int64_t{plane} - one.lift);
     if (slab == nullptr) continue;
-    const Count count = of(*slab, one.count);
+    const CrossingCount count = of(*slab, one.count);
     total = {total.segments + count.segments, total.crossings + count.crossings, total.clusters + count.clusters};
   }
   return total;
 }
 
-std::uint64_t LayerBound::most_crossings() const {
+std::uint64_t LayerBound::max_crossings() const {
   std::uint64_t total = 0;
   for (const Copies& one : copies_) {
-    std::uint64_t most = 0;
-    for (const CrossingSums::Slab& slab : tables_[one.table].slab) most = std::max(most, of(slab, one.count).crossings);
-    total += most;
+    std::uint64_t maximum = 0;
+    for (const CrossingSums::Slab& slab : tables_[one.table].slab) maximum = std::max(maximum, of(slab, one.count).crossings);
+    total += maximum;
   }
   return total;
 }

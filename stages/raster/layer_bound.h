@@ -19,21 +19,21 @@ namespace lamina::raster {
 /// corner and falls again: a tent. Its height is the facet's area seen along x, doubled, over its height. A tent over slabs is
 /// four changes of slope, so the sums of all facets take four additions each and are read by adding twice.
 ///
-/// Slabs are 2^k nm high, counted from height 0 of the mesh, and no more than kMostSlabs. Sums are made by many threads, in any
+/// Slabs are 2^k nm high, counted from height 0 of the mesh, and no more than kMaxSlabs. Sums are made by many threads, in any
 /// order: slopes are rounded up so that doubles add them exactly. Copyable; 16 bytes a slab.
 class CrossingSums {
  public:
   /// lowest, highest  between which clusters lie, nm
-  /// most             slabs at most, within kMostSlabs
+  /// most             slabs at most, within kMaxSlabs
   /// isa              the widest instruction set to use; sums are the same with any
-  CrossingSums(Nm lowest, Nm highest, std::size_t most = kMostSlabs, Isa isa = Isa::kAuto);
+  CrossingSums(Nm lowest, Nm highest, std::size_t maximum = kMaxSlabs, Isa isa = Isa::kAuto);
 
   /// Counts a cluster of the mesh. cost: 16 facets side by side, some nanoseconds each
   void add(const ClusteredMesh& mesh, std::uint32_t cluster);
   /// Adds what another sum of the same heights counted.
   void merge(const CrossingSums& other);
 
-  static constexpr std::size_t kMostSlabs = 8192;
+  static constexpr std::size_t kMaxSlabs = 8192;
   struct Slab {
     double depth = 0;  // nm, of all cuts together
     std::int64_t segments = 0, clusters = 0;
@@ -46,7 +46,7 @@ class CrossingSums {
     const Slab* at(std::int64_t plane) const;  // nullptr: nothing is there
     /// Leaves out slabs without anything at both ends, and joins the others in pairs, of which the larger counts, until there
     /// are no more than `most`, at least 2.
-    void fit(std::size_t most);
+    void fit(std::size_t maximum);
   };
   Table table() const;
 
@@ -63,7 +63,7 @@ class CrossingSums {
 };
 
 /// Slabs that are kept of a mesh at most: 6 bytes a triangle, so that thousands of small parts take little beside their meshes.
-constexpr std::size_t most_slabs_of(std::uint32_t clusters) { return std::size_t{64} + 4 * std::size_t{clusters}; }
+constexpr std::size_t max_slabs_of(std::uint32_t clusters) { return std::size_t{64} + 4 * std::size_t{clusters}; }
 
 /// Counts all clusters of a mesh. cost: one parallel pass over its facets
 CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa = Isa::kAuto);
@@ -74,16 +74,16 @@ std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> 
 /// The same of everything on the bed.
 class LayerBound {
  public:
-  struct Count {
+  struct CrossingCount {
     std::uint64_t segments = 0, crossings = 0, clusters = 0;
   };
   /// tables  of each of `meshes`, to which `placed` refers
   LayerBound(std::span<const PlacedMesh> placed, std::span<const ClusteredMesh> meshes, std::vector<CrossingSums::Table> tables,
              const PixelGrid& grid);
 
-  Count at(Nm plane) const;
+  CrossingCount at(Nm plane) const;
   /// Crossings of the layer that may have the most.
-  std::uint64_t most_crossings() const;
+  std::uint64_t max_crossings() const;
   std::uint64_t bytes() const;
 
  private:
@@ -93,7 +93,7 @@ class LayerBound {
     Nm lift;
     std::uint64_t count;
   };
-  Count of(const CrossingSums::Slab& slab, std::uint64_t copies) const;
+  CrossingCount of(const CrossingSums::Slab& slab, std::uint64_t copies) const;
 
   double rows_per_nm_;
   std::vector<CrossingSums::Table> tables_;  // of each mesh

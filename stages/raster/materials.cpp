@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <string>
 #include <utility>
 
 #include "stages/geometry/combine.h"
@@ -17,7 +18,7 @@ void MaterialImages::start(std::size_t materials, std::uint32_t columns, std::ui
   }
 }
 
-void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& whole, bool parity) {
+void MaterialImages::deposit(std::uint32_t material, const RunsView& section, Runs& whole, bool parity) {
   if (section.change.empty()) return;
   if (parity) {
     Runs own, others;
@@ -25,7 +26,7 @@ void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& 
     combine(whole, section, SetOperation::kDifference, others);
     keep(others);
     std::swap(whole, others);
-    return lay(material, own, whole);
+    return deposit(material, own, whole);
   }
   for (std::uint32_t m = 0; m < image.size(); ++m) {
     if (m != material && image[m].change.empty()) continue;
@@ -77,7 +78,7 @@ bool lies_within(const RunsView& inner, const RunsView& outer) {
   return beyond.change.empty();
 }
 
-void unite(const Runs& image, Runs& plane) {
+void merge(const Runs& image, Runs& plane) {
   Runs both;
   combine(plane, image, SetOperation::kUnion, both);
   plane = std::move(both);
@@ -85,23 +86,24 @@ void unite(const Runs& image, Runs& plane) {
 
 }  // namespace
 
-std::string DropPlanes::add(Runs&& image, std::uint32_t drop) {
+Status DropPlanes::add(Runs&& image, std::uint32_t drop) {
+  const auto wrong = [](std::string what) { return Error{Fault::kVerification, std::move(what)}; };
   if (planes.empty()) {
     Runs none;
     none.columns = image.columns;
     none.row_offset.assign(image.row_offset.size(), 0);
-    planes.resize(most_, none);
+    planes.resize(max_, none);
   }
-  if (drop >= most_) return fmt::format("get more than {} drops", most_);
-  if (drop > 0 && !lies_within(image, before_)) return "get no drop before";
-  if (most_ > 1) before_ = image;
+  if (drop >= max_) return wrong(fmt::format("get more than {} drops", max_));
+  if (drop > 0 && !lies_within(image, before_)) return wrong("get no drop before");
+  if (max_ > 1) before_ = image;
   if (!shared_) {
     if (planes[drop].change.empty()) {
       planes[drop] = std::move(image);
     } else if (drop == 0 && meets(planes[0], image)) {
-      return "another material's image sets as well";
+      return wrong("another material's image sets as well");
     } else {
-      unite(image, planes[drop]);
+      merge(image, planes[drop]);
     }
     return {};
   }
@@ -110,10 +112,10 @@ std::string DropPlanes::add(Runs&& image, std::uint32_t drop) {
     if (image.change.empty()) break;
     Runs upon;
     combine(plane, image, SetOperation::kIntersection, upon);
-    unite(image, plane);
+    merge(image, plane);
     image = std::move(upon);
   }
-  return image.change.empty() ? std::string() : fmt::format("get more than {} drops", most_);
+  return image.change.empty() ? Status() : wrong(fmt::format("get more than {} drops", max_));
 }
 
 }  // namespace lamina::raster

@@ -3,10 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "stages/data/runs.h"
+#include "stages/data/status.h"
 
 namespace lamina::raster {
 
@@ -18,7 +18,7 @@ struct MaterialImages {
   void start(std::size_t materials, std::uint32_t columns, std::uint32_t rows);
   /// Lays a solid's section over the others: it is set in `whole` and in its material's image, and in no other one.
   /// parity  what is set in both becomes neither (even-odd over all solids)
-  void lay(std::uint32_t material, const RunsView& section, Runs& whole, bool parity = false);
+  void deposit(std::uint32_t material, const RunsView& section, Runs& whole, bool parity = false);
   /// Keeps only what is set in `whole`.
   void keep(const RunsView& whole);
   std::uint64_t bytes() const;
@@ -33,17 +33,17 @@ class DropPlanes {
  public:
   /// most    drops of a pixel; at least 1
   /// shared  a pixel can get drops of several materials
-  DropPlanes(std::uint32_t most, bool shared) : most_(most), shared_(shared) {}
+  DropPlanes(std::uint32_t maximum, bool shared) : max_(maximum), shared_(shared) {}
 
   /// Images come material by material, those of a material drop by drop, all of one size. drop  of its material, from 0
-  /// returns  empty, or what its pixels contradict: "get no drop before"; `planes` are then of no use
-  std::string add(Runs&& image, std::uint32_t drop);
+  /// errors  kVerification: its pixels contradict the others, "get no drop before"; `planes` are then of no use
+  Status add(Runs&& image, std::uint32_t drop);
 
   /// The pixels that get at least one drop of any material, two, ...: `most` of them, once an image was added.
   std::vector<Runs> planes;
 
  private:
-  std::uint32_t most_;
+  std::uint32_t max_;
   bool shared_;
   Runs before_;  // the image of the drop before
 };

@@ -12,7 +12,7 @@ struct BeadWidths {
   bool segmented = false;  // what fills beside thick and thin stretches is `continuous`, else as wide as its path
   Nm thick = 0, thin = 0, continuous = 0;
 
-  Nm of(const Stretch& s) const;
+  Nm of(const PathInterval& s) const;
 };
 
 /// Lays the stretches of a part in a layer, in their order.
@@ -21,7 +21,7 @@ class BeadPen {
   /// beads  gains them; outlives the pen
   BeadPen(BeadRaster& beads, const BeadWidths& widths, BeadEnds ends) : beads_(beads), widths_(widths), ends_(ends) {}
 
-  void lay(const Stretch& s);
+  void deposit(const PathInterval& s);
 
  private:
   BeadRaster& beads_;

@@ -5,12 +5,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "stages/geometry/interval_table.h"
 #include "stages/geometry/isa.h"
 #include "stages/raster/beams.h"
 #include "stages/raster/clusters.h"
-#include "stages/raster/crossed_planes.h"
 #include "stages/raster/cut_clusters.h"
-#include "stages/raster/height_buckets.h"
 #include "stages/raster/layer_bound.h"
 
 namespace lamina::raster {
@@ -21,7 +20,7 @@ namespace {
 constexpr std::uint64_t kBandCrossings = 1 << 17;
 
 /// Clusters that engine `contours` cuts at once, at most: up to 40 MB of segments.
-constexpr std::size_t kMostClusters = 1 << 16;
+constexpr std::size_t kMaxClusters = 1 << 16;
 
 /// Segments that a kernel may write behind those of a layer.
 constexpr std::uint64_t kMoreSegments = kClusterSize;
@@ -31,7 +30,7 @@ std::uint64_t with_spare(std::uint64_t count) { return count + count / 8; }
 
 /// Empties the buffer and makes room. A bound is told beforehand, so buffers never double as they fill.
 template <class T>
-void make_room(Buffer<T>& buffer, std::uint64_t count) {
+void ensure_capacity(Buffer<T>& buffer, std::uint64_t count) {
   buffer.clear();
   if (count <= buffer.capacity()) return;
   buffer = {};
@@ -50,7 +49,7 @@ struct Rasterizer::State {
   std::uint32_t first_row = 0, last_row = 0;  // geometry rows that any part can reach
   std::uint32_t band_rows = 1;                // rows a ray; they are equal shares of the rows above
   std::vector<BeamIndex> beams;               // one, or none
-  std::vector<HeightBuckets> buckets;         // one a mesh, or none
+  std::vector<IntervalTable<Nm>> heights;     // of clusters, one table a mesh, or none: engine `contours`
   std::vector<LayerBound> bound;              // one
 
   State(const PixelGrid& pixel_grid, FillRule fill_rule, Isa isa)
@@ -88,7 +87,7 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
     state.bound.emplace_back(state.placed, state.meshes, crossing_tables(state.meshes, *usable), grid);
   };
   const auto sort_by_height = [&] {
-    for (const ClusteredMesh& mesh : state.meshes) state.buckets.emplace_back(mesh);
+    for (const ClusteredMesh& mesh : state.meshes) state.heights.push_back(heights_of(mesh.bounds));
   };
   if (contours) {
     tbb::parallel_invoke(sum_up, sort_by_height);
@@ -96,7 +95,7 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
     sum_up();
   }
   const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
-  const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().most_crossings() / kBandCrossings, 1, rows);
+  const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().max_crossings() / kBandCrossings, 1, rows);
   state.band_rows = ceil_div(rows, static_cast<std::uint32_t>(bands));
   if (rays) {
     auto beams = BeamIndex::build(state.placed, grid, state.band_rows);
@@ -109,17 +108,17 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
 LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const {
   const State& state = *state_;
   LayerReport report;
-  const LayerBound::Count bound = state.bound.front().at(plane);
+  const LayerBound::CrossingCount bound = state.bound.front().at(plane);
   const std::uint32_t rows = state.grid.rows();
   out.columns = state.grid.columns();
-  make_room(out.change, bound.crossings + RowsTask::kMoreCrossings);
+  ensure_capacity(out.change, bound.crossings + RowsTask::kMoreCrossings);
   out.row_offset.reserve(std::size_t{rows} + 1);
   out.row_offset.assign(1, 0);
   out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
 
   const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
     scratch.segments.size = 0;
-    scratch.segments.make_room(std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kMoreSegments);
+    scratch.segments.ensure_capacity(std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kMoreSegments);
     cut_clusters(state.kernels, state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
     scratch.scan.append_rows(state.kernels, state.sampling, scratch.segments, state.placed, plane, state.rule, first_row,
                              last_row, out, report);
@@ -132,7 +131,7 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
       last = first;
     }
   };
-  make_room(scratch.visits, bound.clusters);
+  ensure_capacity(scratch.visits, bound.clusters);
   if (engine == Engine::kRays) {
     each_band([&](std::uint32_t first, std::uint32_t last) {
       scratch.visits.clear();
@@ -142,10 +141,12 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   } else {
     for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
       const PlacedMesh& placed = state.placed[i];
-      state.buckets[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find_clusters(
-          std::int64_t{plane} - placed.offset.z, i, scratch.visits);
+      const std::int64_t z = std::int64_t{plane} - placed.offset.z;
+      state.heights[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find(z, z, [&](std::uint32_t cluster) {
+        scratch.visits.push_back({cluster, i});
+      });
     }
-    if (scratch.visits.size() <= kMostClusters) {
+    if (scratch.visits.size() <= kMaxClusters) {
       append(scratch.visits, state.first_row, state.last_row);
     } else {
       each_band([&](std::uint32_t first, std::uint32_t last) {
@@ -168,17 +169,17 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
 }
 
 std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
-  const LayerBound::Count count = state_->bound.front().at(plane);
-  const std::uint64_t rows = state_->grid.rows(), places = state_->last_row - state_->first_row;
+  const LayerBound::CrossingCount count = state_->bound.front().at(plane);
+  const std::uint64_t rows = state_->grid.rows(), positions = state_->last_row - state_->first_row;
   // Segments of open parts are held twice, and close at most as many crossings as they have; buffers double for these.
   const bool open = !std::ranges::all_of(state_->meshes, &ClusteredMesh::closed);
   const bool caps = std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.cluster_count(); });
   const std::uint64_t closing = open ? 2 * count.segments * (Segments::kBytes + 4) + 5 * 8 * count.crossings : 0;
-  const std::uint64_t visits = (count.clusters > kMostClusters ? 3 : 1) * count.clusters * sizeof(ClusterVisit);
+  const std::uint64_t visits = (count.clusters > kMaxClusters ? 3 : 1) * count.clusters * sizeof(ClusterVisit);
   // Crossings and changes; the place of each row, its offset, and whether it is capped.
   return with_spare(visits + (count.segments + kMoreSegments) * Segments::kBytes +
                     2 * 4 * (count.crossings + RowsTask::kMoreCrossings)) +
-         4 * (places + rows + 2) + (open || caps ? places : 0) + closing;
+         4 * (positions + rows + 2) + (open || caps ? positions : 0) + closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }
@@ -199,7 +200,7 @@ std::uint64_t Rasterizer::index_bytes() const {
   std::uint64_t total = bytes_held(state_->sampling.row_centre) + state_->placed.capacity() * sizeof(PlacedMesh);
   total += state_->bound.front().bytes();
   for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bounds_bytes();
-  for (const HeightBuckets& buckets : state_->buckets) total += buckets.bytes();
+  for (const IntervalTable<Nm>& heights : state_->heights) total += heights.bytes();
   for (const BeamIndex& beams : state_->beams) total += beams.bytes();
   return total;
 }

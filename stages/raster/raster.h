@@ -54,7 +54,7 @@ class Rasterizer {
   /// Crossings that the layer at `plane` may have at most.
   std::uint64_t crossings_bound(Nm plane) const;
 
-  /// Sets the entry of every plane that a facet crosses (crossed_planes.h).
+  /// Sets the entry of every plane that a facet crosses (cut_clusters.h).
   void mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const;
 
   Isa isa() const;  // that kernels use, not kAuto

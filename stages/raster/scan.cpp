@@ -17,22 +17,22 @@ void LayerReport::add_solid(const LayerReport& solid) {
   open_rows += solid.open_rows;
 }
 
-void ScanConverter::place_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows) {
-  place_.assign(std::size_t{rows} + 1, 0);
-  std::uint32_t* const place = place_.data();
+void ScanConverter::sort_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows) {
+  position_.assign(std::size_t{rows} + 1, 0);
+  std::uint32_t* const position = position_.data();
   for (std::size_t i = 0; i < segments.size; ++i) {
     const SegmentRows segment = segments.rows[i];
-    ++place[segment.first - first_row];
-    --place[segment.end() - first_row];
+    ++position[segment.first - first_row];
+    --position[segment.end() - first_row];
   }
   for (const Closing& closing : closing_) {
-    ++place[closing.row - first_row];
-    --place[closing.row - first_row + 1];
+    ++position[closing.row - first_row];
+    --position[closing.row - first_row + 1];
   }
   std::uint32_t in_row = 0, total = 0;
   for (std::uint32_t row = 0; row < rows; ++row) {
-    in_row += place[row];
-    place[row] = total;
+    in_row += position[row];
+    position[row] = total;
     total += in_row;
   }
   crossings_ = total;
@@ -41,7 +41,7 @@ void ScanConverter::place_segments(const Segments& segments, std::uint32_t first
 
 void ScanConverter::fill(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
                          std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row) {
-  kernels.fill({sampling, segments, placed, plane, first_row, place_.data(), crossing_.data()});
+  kernels.fill({sampling, segments, placed, plane, first_row, position_.data(), crossing_.data()});
 }
 
 /// The crossings that close the part whose crossings are filled in.
@@ -49,7 +49,7 @@ void ScanConverter::close_part(std::uint32_t first_row, std::uint32_t rows, Buff
   for (std::uint32_t row = 0; row < rows; ++row) {
     std::int32_t winding = 0;
     std::uint32_t last = 0;
-    for (std::uint32_t i = row == 0 ? 0 : place_[row - 1]; i < place_[row]; ++i) {
+    for (std::uint32_t i = row == 0 ? 0 : position_[row - 1]; i < position_[row]; ++i) {
       winding += (crossing_[i] & 1) != 0 ? 1 : -1;
       last = std::max(last, crossing_[i] >> 1);
     }
@@ -70,13 +70,13 @@ void ScanConverter::close_open_parts(const Kernels& kernels, const PixelSampling
   }
   std::ranges::sort(of_open_parts_, {}, instance_of);
   of_part_.size = 0;
-  of_part_.make_room(of_open_parts_.size());
+  of_part_.ensure_capacity(of_open_parts_.size());
   Buffer<Closing> closings;  // closing_ stays empty while the crossings of single parts are placed
   for (auto i = of_open_parts_.begin(); i != of_open_parts_.end();) {
     const std::uint32_t instance = instance_of(*i);
     of_part_.size = 0;
     for (; i != of_open_parts_.end() && instance_of(*i) == instance; ++i) of_part_.append(segments, *i);
-    place_segments(of_part_, first_row, rows);
+    sort_segments(of_part_, first_row, rows);
     fill(kernels, sampling, of_part_, placed, plane, first_row);
     close_part(first_row, rows, closings);
   }
@@ -124,8 +124,8 @@ void ScanConverter::append_rows(const Kernels& kernels, const PixelSampling& sam
   }
 
   close_open_parts(kernels, sampling, segments, placed, plane, first_row, rows, report);
-  place_segments(segments, first_row, rows);
-  for (const Closing& closing : closing_) crossing_[place_[closing.row - first_row]++] = closing.crossing;
+  sort_segments(segments, first_row, rows);
+  for (const Closing& closing : closing_) crossing_[position_[closing.row - first_row]++] = closing.crossing;
   fill(kernels, sampling, segments, placed, plane, first_row);
   report.segments += static_cast<std::uint32_t>(segments.size);
   report.crossings += crossings_;
@@ -134,7 +134,7 @@ void ScanConverter::append_rows(const Kernels& kernels, const PixelSampling& sam
   out.change.resize(out_changes + crossings_ + RowsTask::kMoreCrossings);  // a change has a crossing of its own
   std::uint32_t* const changes = out.change.data();
   const std::uint32_t* const end =
-      kernels.rows({crossing_.data(), place_.data(), rows, rule, changes, changes + out_changes, row_end});
+      kernels.rows({crossing_.data(), position_.data(), rows, rule, changes, changes + out_changes, row_end});
   out.change.resize(static_cast<std::size_t>(end - changes));
 }
 

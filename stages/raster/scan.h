@@ -42,7 +42,7 @@ class ScanConverter {
                    Runs& out, LayerReport& report);
 
   std::uint64_t bytes() const {
-    return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + of_part_.bytes() +
+    return bytes_held(position_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + of_part_.bytes() +
            bytes_held(closing_);
   }
 
@@ -61,7 +61,7 @@ class ScanConverter {
     }
     crossing_.resize(count);
   }
-  void place_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows);
+  void sort_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows);
   void fill(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments, std::span<const PlacedMesh> placed,
             Nm plane, std::uint32_t first_row);
   void close_open_parts(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
@@ -71,7 +71,7 @@ class ScanConverter {
   void report_caps(const Segments& segments, std::span<const PlacedMesh> placed, std::uint32_t first_row, std::uint32_t rows,
                    LayerReport& report);
 
-  Buffer<std::uint32_t> place_;          // per geometry row of the band: where its next crossing goes
+  Buffer<std::uint32_t> position_;       // per geometry row of the band: where its next crossing goes
   Buffer<std::uint32_t> crossing_;       // column * 2 + (1 if it enters), row by row
   std::size_t crossings_ = 0;            // of the band; crossing_ is longer
   Buffer<std::uint8_t> capped_;          // per geometry row of the band

@@ -25,20 +25,20 @@ PixelSampling::PixelSampling(const PixelGrid& grid)
   }
 }
 
-void Segments::make_room(std::size_t more) {
+void Segments::ensure_capacity(std::size_t more) {
   if (column.size() - size >= more) return;
-  const std::size_t room = size + more + (size + more) / 8;
+  const std::size_t capacity = size + more + (size + more) / 8;
   const auto lengthen = [&](auto& array) {
     if (size == 0) array.clear();  // nothing is worth moving
-    array.reserve(room);           // resize() alone would double, beyond what layers are said to need
-    array.resize(room);
+    array.reserve(capacity);       // resize() alone would double, beyond what layers are said to need
+    array.resize(capacity);
   };
   lengthen(origin), lengthen(rows), lengthen(columns_per_nm);
   lengthen(column);  // last: its length stands for all
 }
 
 void Segments::append(const Segments& other, std::size_t i) {
-  make_room(1);
+  ensure_capacity(1);
   column[size] = other.column[i];
   columns_per_nm[size] = other.columns_per_nm[i];
   rows[size] = other.rows[i];

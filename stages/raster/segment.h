@@ -58,7 +58,7 @@ struct Segments {
 
   /// Makes all arrays so long that `more` segments can be written behind those that are there, and an eighth more where they
   /// have to grow.
-  void make_room(std::size_t more);
+  void ensure_capacity(std::size_t more);
   /// Appends one of another list's.
   void append(const Segments& other, std::size_t i);
   std::uint64_t bytes() const {

@@ -53,9 +53,9 @@ class ByteReader {
 class Passes {
  public:
   explicit Passes(Printing& printing) : printing_(printing), along_(printing.profile().mounting.scan_axis == ScanAxis::kX) {
-    const Standing stand = printing.standing();
-    at_along_ = along_ ? stand.x_mm : stand.y_mm;
-    at_across_ = along_ ? stand.y_mm : stand.x_mm;
+    const AxisPositions position = printing.axis_positions();
+    at_along_ = along_ ? position.x_mm : position.y_mm;
+    at_across_ = along_ ? position.y_mm : position.x_mm;
   }
 
   /// Ends the sweep before. across_mm  of the carriage
@@ -74,14 +74,14 @@ class Passes {
     const double along = along_ ? x_mm : y_mm, across = along_ ? y_mm : x_mm;
     const double speed = works_mm_s > 0 ? works_mm_s : printing_.profile().motion.travel_speed_mm_s;
     go(along, across, speed);
-    printing_.head_stands_at(x_mm, y_mm, works_mm_s);
+    printing_.head_is_at(x_mm, y_mm, works_mm_s);
   }
   /// A step that fires, in the order of the movement. drops  the most of a nozzle there
   void at(std::int64_t step, std::uint32_t drops = 1) {
     if (left_out_) return;
-    if (!any_) first_ = step, most_ = 1;
+    if (!any_) first_ = step, max_ = 1;
     last_ = step;
-    most_ = std::max(most_, drops);
+    max_ = std::max(max_, drops);
     any_ = true;
   }
   /// Ends the sweep before; the head stays where that ends.
@@ -91,8 +91,8 @@ class Passes {
   double y_mm() const { return along_ ? at_across_ : at_along_; }
   /// Ends the last sweep; the head goes back.
   void end() {
-    const Standing stand = printing_.standing();
-    visit(stand.x_mm, stand.y_mm, 0);
+    const AxisPositions position = printing_.axis_positions();
+    visit(position.x_mm, position.y_mm, 0);
   }
 
  private:
@@ -105,11 +105,11 @@ class Passes {
     const double from = printing_.position_of(static_cast<double>(first_)) - ramp;
     const double to = printing_.position_of(static_cast<double>(last_)) + ramp;
     go(from, across_, motion.travel_speed_mm_s);
-    printing_.head_stands_at(along_ ? from : across_, along_ ? across_ : from, 0);
-    printing_.head_moves(to - from, motion.scan_speed_mm_s, true, most_);
+    printing_.head_is_at(along_ ? from : across_, along_ ? across_ : from, 0);
+    printing_.head_moves(to - from, motion.scan_speed_mm_s, true, max_);
     at_along_ = to;
     any_ = false;
-    printing_.head_stands_at(along_ ? to : across_, along_ ? across_ : to, 0);
+    printing_.head_is_at(along_ ? to : across_, along_ ? across_ : to, 0);
   }
   void go(double along, double across, double mm_s) {
     printing_.head_moves(std::hypot(along - at_along_, across - at_across_), mm_s, false);
@@ -121,7 +121,7 @@ class Passes {
   bool along_;  // the scan is along x
   double at_along_ = 0, at_across_ = 0, across_ = 0;
   std::int64_t first_ = 0, last_ = 0;
-  std::uint32_t most_ = 1;  // drops of a nozzle at a step
+  std::uint32_t max_ = 1;  // drops of a nozzle at a step
   bool backward_ = false, any_ = false;
   bool left_out_ = false, turned_ = false, anew_ = false;  // anew_: the next one of those that are left runs back
 };

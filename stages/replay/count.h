@@ -3,7 +3,8 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
+
+#include "stages/data/status.h"
 
 namespace lamina {
 struct Machine;
@@ -12,13 +13,13 @@ struct Machine;
 namespace lamina::replay {
 
 /// A layer that is said to take longer takes so long: a program may say anything, and sums must hold.
-inline constexpr double kMostSeconds = 1e6;
+inline constexpr double kMaxSeconds = 1e6;
 
 /// Totals of a program. Time is that of head, roller and vats one after the other, and of the layer's pause.
 struct Count {
   std::uint64_t drops = 0, vectors = 0;
   std::uint32_t sweeps = 0;
-  std::uint32_t most_at_place = 0;                       // drops that a nozzle fires there in one sweep
+  std::uint32_t max_per_position = 0;                    // drops that a nozzle fires there in one sweep
   std::uint32_t added = 0;                               // sweeps beyond those that the head's own drops would take
   double scan_mm = 0, travel_mm = 0;                     // of the head
   std::int64_t microseconds = 0;                         // of the machine; whole, so that sums of layers are exact
@@ -34,9 +35,9 @@ struct Count {
   void add(const Count& other);
 };
 
-/// Empty, or the first number in which a program differs from what is told of it: drops, sweeps, added sweeps and times; a time
-/// of 0 is untold.
-std::string fault_of_count(const Machine& machine, const Count& told, const Count& found);
+/// Compares a program's numbers with what is recorded of it; a time of 0 is not recorded.
+/// errors  kVerification: the first that differs: drops, sweeps, added sweeps, times
+Status check_count(const Machine& machine, const Count& reported, const Count& found);
 
 /// Binder and powder used by a program.
 struct Material {

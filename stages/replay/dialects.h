@@ -1,4 +1,4 @@
-// stages/replay/dialects.h: readers of print programs, one per dialect; stages/write/program/ documents the formats.
+// stages/replay/dialects.h: readers of print programs, one per dialect; stages/program/ documents the formats.
 #pragma once
 
 #include <string_view>

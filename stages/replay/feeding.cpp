@@ -23,35 +23,37 @@ std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t>
   return 0;
 }
 
-std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
-                           std::span<const std::uint64_t> recorded, std::uint32_t feeds) {
+Status check_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
+                   std::span<const std::uint64_t> recorded, std::uint32_t feeds) {
   const auto none = [](std::uint64_t pixels) { return pixels == 0; };
   if (std::ranges::all_of(recorded, none)) return {};
   for (std::size_t m = 0; m < set.size(); ++m) {
     const std::uint64_t unfed = (feeds >> vat[m] & 1) != 0 ? 0 : set[m];
     if (recorded[m] == unfed) continue;
-    return fmt::format("{} pixels of material {} lie in another powder, the manifest says {}", unfed, m, recorded[m]);
+    return Error{Fault::kVerification,
+                 fmt::format("{} pixels of material {} lie in another powder, the manifest says {}", unfed, m, recorded[m])};
   }
   return {};
 }
 
-std::string VatLevels::take(std::uint32_t layer, const std::optional<Count>& taken) {
+Status VatLevels::take(std::uint32_t layer, const std::optional<Count>& taken) {
   const bool fills = layer == 0 || (taken && taken->refills > 0);
   known_ = taken && (fills || (known_ && layer == next_));
   next_ = layer + 1;
   if (!known_) return {};
   if (fills) left_mm_ = depth_mm_;
   const Count& count = *taken;
-  std::string fault;
+  Status status;
   for (std::size_t vat = 0; vat < 2; ++vat) {
     const double before = left_mm_[vat];
     left_mm_[vat] -= count.fed_mm[vat];
-    if (depth_mm_[vat] == 0 || told_[vat] || left_mm_[vat] > -1e-3) continue;
-    told_[vat] = true;
-    fault = fmt::format("layer {}: takes {:g} mm of the {} vat, where {:g} of {:g} are left", layer, count.fed_mm[vat],
-                        vat == 0 ? "first" : "second", before, depth_mm_[vat]);
+    if (depth_mm_[vat] == 0 || reports_[vat] || left_mm_[vat] > -1e-3) continue;
+    reports_[vat] = true;
+    status =
+        Error{Fault::kVerification, fmt::format("layer {}: takes {:g} mm of the {} vat, where {:g} of {:g} are left", layer,
+                                                count.fed_mm[vat], vat == 0 ? "first" : "second", before, depth_mm_[vat])};
   }
-  return fault;
+  return status;
 }
 
 std::optional<Count> with_fed_by_host(const Machine& machine, const Layer& layer, std::optional<Count> count) {
@@ -60,11 +62,6 @@ std::optional<Count> with_fed_by_host(const Machine& machine, const Layer& layer
   const double fed = machine.powder.dose * (mm(layer.thickness) + base) / std::popcount(count->vats & 3);
   for (std::size_t vat = 0; vat < 2; ++vat) count->fed_mm[vat] = (count->vats >> vat & 1) != 0 ? fed : 0;
   return count;
-}
-
-std::string vats_text(std::uint32_t vats) {
-  constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
-  return kTexts[vats & 3];
 }
 
 Material material_of(const Machine& machine, const Count& count) {

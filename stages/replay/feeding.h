@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
 
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
+#include "stages/data/status.h"
 #include "stages/replay/count.h"
 
 namespace lamina::replay {
@@ -19,10 +19,10 @@ namespace lamina::replay {
 /// vat  of each material
 std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat);
 
-/// Empty, or which material is recorded to have other pixels in the powder of another vat than `feeds` leaves it; records of
-/// older builds have none. feeds  a bit for each vat
-std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
-                           std::span<const std::uint64_t> recorded, std::uint32_t feeds);
+/// Records of older builds have no such pixels. feeds  a bit for each vat
+/// errors  kVerification: a material is recorded to have other pixels in the powder of another vat than `feeds` leaves it
+Status check_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
+                   std::span<const std::uint64_t> recorded, std::uint32_t feeds);
 
 /// What is left in vats of stated depth, layer by layer in their order; a pause fills all of them. Behind a layer that is left
 /// out, or that nobody could carry out, nothing is known of them until they are filled.
@@ -31,21 +31,18 @@ class VatLevels {
   /// They are full.
   explicit VatLevels(const Machine& machine) : depth_mm_(machine.powder.vat_depth_mm), left_mm_(depth_mm_) {}
 
-  /// Empty, or which vat had less than the layer took, once for each vat. count  none: the layer could not be carried out
-  std::string take(std::uint32_t layer, const std::optional<Count>& count);
+  /// count  none: the layer could not be carried out. errors  kVerification: a vat had less than the layer took; once each
+  Status take(std::uint32_t layer, const std::optional<Count>& count);
 
  private:
   std::array<double, 2> depth_mm_, left_mm_;
-  std::array<bool, 2> told_{};
+  std::array<bool, 2> reports_{};
   std::uint32_t next_ = 0;  // layer
   bool known_ = false;
 };
 
 /// The count of a layer with what its host feeds by the profile, of a program that names its vats and moves none.
 std::optional<Count> with_fed_by_host(const Machine& machine, const Layer& layer, std::optional<Count> count);
-
-/// "both vats feed"
-std::string vats_text(std::uint32_t vats);
 
 Material material_of(const Machine& machine, const Count& count);
 

@@ -24,7 +24,7 @@ std::optional<std::string_view> add_words(std::string_view text, std::map<char, 
 
 void GcodeReader::fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
 
-bool GcodeReader::take(GcodeLine& line, bool all_words) {
+bool GcodeReader::next(GcodeLine& line) {
   while (!left_.empty() && printing_.ok()) {
     const std::size_t end = left_.find('\n');
     if (end == std::string_view::npos) {
@@ -48,7 +48,6 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
     line.rest = space == std::string_view::npos ? std::string_view() : now_.substr(space + 1);
     line.word.clear();
     if (line.command[0] != 'G' && line.command[0] != 'M' && line.command[0] != 'T') return true;
-    if (!all_words && line.command == "M117") return true;
     if (const auto wrong = add_words(line.rest, line.word)) {
       fault(fmt::format("'{}' is no word", *wrong));
       return false;
@@ -76,18 +75,18 @@ std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) {
 
 Axes::Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reader_(reader) {
   const auto& profile = printing.profile();
-  const Standing stand = printing.standing();
-  at_[profile.powder.build_axis[0]] = stand.build_mm;
-  at_[profile.powder.roller_axis[0]] = stand.roller_mm;
-  at_[profile.motion.x_axis[0]] = stand.x_mm;
-  at_[profile.motion.y_axis[0]] = stand.y_mm;
+  const AxisPositions position = printing.axis_positions();
+  at_[profile.powder.build_axis[0]] = position.build_mm;
+  at_[profile.powder.roller_axis[0]] = position.roller_mm;
+  at_[profile.motion.x_axis[0]] = position.x_mm;
+  at_[profile.motion.y_axis[0]] = position.y_mm;
   // Oasis's spreader spreads where it turns, which its reader sees.
   roller_on_gantry_ = profile.dialect != "oasis" && printing.roller_on_gantry();
 }
 
 // One line moves one part, and no part comes into the way of another.
-bool Axes::ways_are_free(const GcodeLine& line) {
-  using Part = Printing::Part;
+bool Axes::paths_are_clear(const GcodeLine& line) {
+  using MovingPart = Printing::MovingPart;
   const auto& [powder, motion] = std::tie(printing_.profile().powder, printing_.profile().motion);
   const auto has = [&](const std::string& axis) { return line.has(axis[0]); };
   const bool head = has(motion.x_axis) || has(motion.y_axis);
@@ -97,7 +96,8 @@ bool Axes::ways_are_free(const GcodeLine& line) {
     reader_.fault("moves two of head, roller and vats at a time");
     return false;
   }
-  if (head + roller + vat == 1) printing_.check_way(head ? Part::kHead : roller ? Part::kRoller : Part::kVat, feed_mm_s_);
+  if (head + roller + vat == 1)
+    printing_.check_way(head ? MovingPart::kHead : roller ? MovingPart::kRoller : MovingPart::kVat, feed_mm_s_);
   return true;
 }
 
@@ -115,7 +115,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     reader_.fault("moves at no speed");
     return true;
   }
-  if (!ways_are_free(line)) return true;
+  if (!paths_are_clear(line)) return true;
   for (const auto& [letter, value] : line.word) {
     if (letter == 'F') continue;
     double& at = at_[letter];
@@ -127,14 +127,14 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     if (axis == profile.motion.x_axis || axis == profile.motion.y_axis) {
       head = true;
       head_squared += way * way;
-      if (roller_on_gantry_ && axis == profile.powder.roller_axis) printing_.roller_stands_at(at, line.command == "G1");
+      if (roller_on_gantry_ && axis == profile.powder.roller_axis) printing_.roller_is_at(at, line.command == "G1");
     } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
       printing_.takes(std::abs(way) / feed_mm_s_);
       alone += std::abs(way);
       if (axis == profile.powder.build_axis) {
-        printing_.build_vat_stands_at(at);
+        printing_.build_vat_is_at(at);
       } else {
-        printing_.roller_stands_at(at);
+        printing_.roller_is_at(at);
       }
     } else if (axis == profile.powder.feed_axes[0] || (profile.powder.vats > 1 && axis == profile.powder.feed_axes[1])) {
       if (!relative_) {
@@ -152,15 +152,15 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
   printing_.takes((std::sqrt(all_squared - head_squared) - alone) / feed_mm_s_);
   if (head_squared > 0) printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
   if (head) {  // where it stands already, too
-    printing_.head_stands_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]],
-                             line.command == "G1" && !scanning ? feed_mm_s_ : 0);
+    printing_.head_is_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]],
+                         line.command == "G1" && !scanning ? feed_mm_s_ : 0);
   }
   return true;
 }
 
 void Axes::end() {
   if (relative_) reader_.fault("the layer ends in G91, and the next one goes to places");
-  if (roller_on_gantry_) printing_.roller_stands_at(printing_.profile().powder.roller_mm[0]);  // where the head waits for it
+  if (roller_on_gantry_) printing_.roller_is_at(printing_.profile().powder.roller_mm[0]);  // where the head waits for it
 }
 
 }  // namespace lamina::replay

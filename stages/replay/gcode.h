@@ -28,16 +28,13 @@ class GcodeReader {
  public:
   GcodeReader(std::string_view text, Printing& printing) : left_(text), printing_(printing) {}
 
-  bool next(GcodeLine& line) { return take(line, true); }
-  /// The same, without parsing words of M117, whose argument is text.
-  bool next_comment(GcodeLine& line) { return take(line, false); }
+  bool next(GcodeLine& line);
   /// A required word of the line; 0 at a fault.
   double number(const GcodeLine& line, char letter);
   std::uint32_t count(const GcodeLine& line, char letter);
   void fault(std::string_view what);
 
  private:
-  bool take(GcodeLine& line, bool all_words);
   std::string_view left_, now_;
   Printing& printing_;
   std::size_t number_ = 0;
@@ -70,7 +67,7 @@ class Axes {
   double last_way(const std::string& axis) { return way_[axis[0]]; }
 
  private:
-  bool ways_are_free(const GcodeLine& line);
+  bool paths_are_clear(const GcodeLine& line);
   Printing& printing_;
   GcodeReader& reader_;
   std::map<char, double> at_, way_;

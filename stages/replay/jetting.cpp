@@ -9,7 +9,7 @@
 namespace lamina::replay {
 namespace {
 
-struct SweepSeen {
+struct SweepCheck {
   std::int64_t first_line;
   std::uint32_t first_step, last_step;
   bool backward;
@@ -17,15 +17,16 @@ struct SweepSeen {
 
 /// How many fell on each pixel; 255 stand for more.
 Levels levels_of_drops(std::vector<VirtualMachine::Drop>& drops, std::uint32_t columns, std::uint32_t rows) {
-  const auto place = [](const VirtualMachine::Drop& drop) { return std::pair(drop.row, drop.column); };
-  std::ranges::sort(drops, {}, place);
+  const auto position = [](const VirtualMachine::Drop& drop) { return std::pair(drop.row, drop.column); };
+  std::ranges::sort(drops, {}, position);
   Levels levels;
   levels.start(columns);
   auto next = drops.begin();
   for (std::uint32_t row = 0; row < rows; ++row) {
     while (next != drops.end() && next->row == row) {
       const std::uint32_t column = next->column;
-      const auto end = std::find_if(next, drops.end(), [&](const auto& drop) { return place(drop) != std::pair(row, column); });
+      const auto end =
+          std::find_if(next, drops.end(), [&](const auto& drop) { return position(drop) != std::pair(row, column); });
       levels.append(column, column + 1, static_cast<std::uint8_t>(std::min<std::ptrdiff_t>(end - next, 255)));
       next = end;
     }
@@ -37,11 +38,11 @@ Levels levels_of_drops(std::vector<VirtualMachine::Drop>& drops, std::uint32_t c
 /// A layer's program carried out, and what is looked at.
 struct Carried {
   std::vector<VirtualMachine::Drop> drops;  // in the order of the program
-  std::map<std::uint32_t, SweepSeen> sweeps;
+  std::map<std::uint32_t, SweepCheck> sweeps;
   std::vector<std::uint32_t> order;   // of the sweeps that fire
   std::uint32_t swath = 0, step = 0;  // what is chosen of them
 
-  const SweepSeen& present() const { return sweeps.at(swath); }
+  const SweepCheck& present() const { return sweeps.at(swath); }
   /// Those of earlier sweeps, and of this one up to the step.
   std::vector<VirtualMachine::Drop> fired() const {
     std::vector<VirtualMachine::Drop> so_far;
@@ -62,7 +63,7 @@ Result<Carried> carry_out(const VirtualMachine& machine, std::string_view progra
       [&](const VirtualMachine::Drop& drop) {
         carried.drops.push_back(drop);
         const auto [found, fresh] =
-            carried.sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
+            carried.sweeps.try_emplace(drop.sweep, SweepCheck{drop.first_line, drop.step, drop.step, false});
         if (fresh) carried.order.push_back(drop.sweep);
         found->second.first_step = std::min(found->second.first_step, drop.step);
         found->second.last_step = std::max(found->second.last_step, drop.step);
@@ -111,7 +112,7 @@ Result<Jetting> jet_until(const VirtualMachine& machine, std::string_view progra
   Jetting jetting;
   jetting.swath = swath;
   jetting.step = step;
-  jetting.place = static_cast<std::size_t>(std::ranges::find(order, swath) - order.begin()) + 1;
+  jetting.position = static_cast<std::size_t>(std::ranges::find(order, swath) - order.begin()) + 1;
   jetting.sweeps = order.size();
   jetting.fired = fired.size();
   jetting.drops = drops.size();

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "stages/data/grid.h"
+#include "stages/data/jetting.h"
 #include "stages/data/levels.h"
-#include "stages/data/picture/jetting.h"
 #include "stages/data/status.h"
 #include "stages/replay/machine.h"
 
@@ -23,13 +23,13 @@ struct StepChoice {
 
 /// The state of a layer's program after a step.
 struct Jetting {
-  std::uint32_t swath = 0, step = 0;  // the chosen step
-  std::size_t place = 0, sweeps = 0;  // index of this sweep among those that fire, from 1; their number
-  std::size_t fired = 0, drops = 0;   // drops so far; of the whole layer
-  Levels printed;                     // drops so far of each pixel
-  std::vector<SwathBand> bands;       // of the sweeps that fire, in order of their numbers
-  std::vector<NozzlePlace> nozzles;   // at this step
-  std::size_t firing = 0;             // number of nozzles that fire
+  std::uint32_t swath = 0, step = 0;     // the chosen step
+  std::size_t position = 0, sweeps = 0;  // index of this sweep among those that fire, from 1; their number
+  std::size_t fired = 0, drops = 0;      // drops so far; of the whole layer
+  Levels printed;                        // drops so far of each pixel
+  std::vector<SwathBand> bands;          // of the sweeps that fire, in order of their numbers
+  std::vector<NozzlePosition> nozzles;   // at this step
+  std::size_t firing = 0;                // number of nozzles that fire
 };
 
 /// grid    of the layer's image

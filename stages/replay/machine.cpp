@@ -33,14 +33,14 @@ Status read(std::string_view dialect, std::string_view program, Printing& printi
 
 }  // namespace
 
-std::uint32_t drop_bits(std::uint32_t most_drops) { return most_drops < 2 ? 1 : most_drops < 4 ? 2 : 4; }
+std::uint32_t drop_bits(std::uint32_t max_drops) { return max_drops < 2 ? 1 : max_drops < 4 ? 2 : 4; }
 
 void Count::add(const Count& other) {
   drops += other.drops;
   vectors += other.vectors;
   sweeps += other.sweeps;
   added += other.added;
-  most_at_place = std::max(most_at_place, other.most_at_place);
+  max_per_position = std::max(max_per_position, other.max_per_position);
   scan_mm += other.scan_mm;
   travel_mm += other.travel_mm;
   microseconds += other.microseconds;
@@ -73,24 +73,24 @@ Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32
   if (machine.mounting.dpi > 0) angle = std::asin(std::min(1.0, 25'400 * passes / machine.mounting.dpi / pitch));
   angle = std::abs(angle);
   made.line_um_ = machine.mounting.dpi > 0 ? 25'400 / machine.mounting.dpi : pitch * std::sin(angle) / passes;
-  made.place_um_ = made.line_um_;
+  made.position_um_ = made.line_um_;
   if (machine.motion.ticks_per_pixel > 0) {
-    made.place_um_ = 25'400 / machine.motion.encoder_dpi * machine.motion.ticks_per_pixel;
+    made.position_um_ = 25'400 / machine.motion.encoder_dpi * machine.motion.ticks_per_pixel;
   } else if (machine.mounting.along_dpi > 0) {
-    made.place_um_ = 25'400 / machine.mounting.along_dpi;
+    made.position_um_ = 25'400 / machine.mounting.along_dpi;
   }
-  if (!(made.line_um_ > 0.5 && made.place_um_ > 0.5)) return wrong("its pixels have no size");
+  if (!(made.line_um_ > 0.5 && made.position_um_ > 0.5)) return wrong("its pixels have no size");
   made.ticks_ = machine.motion.lag_unit == LagUnit::kTick ? std::max(1u, machine.motion.ticks_per_pixel) : 1;
-  made.step_um_ = made.place_um_ / static_cast<double>(made.ticks_);
+  made.step_um_ = made.position_um_ / static_cast<double>(made.ticks_);
   made.lines_ = x ? rows : columns;
-  made.places_ = x ? columns : rows;
+  made.positions_ = x ? columns : rows;
   const auto expected = [](double bed_mm, double pixel_um) { return bed_mm * 1000 / pixel_um; };
   const double want_lines = expected(machine.bed.size_mm[x ? 1 : 0], made.line_um_);
-  const double want_places = expected(machine.bed.size_mm[x ? 0 : 1], made.place_um_);
-  if (made.lines_ + 0.01 < want_lines || made.lines_ > want_lines + 1.01 || made.places_ + 0.01 < want_places ||
-      made.places_ > want_places + 1.01) {
-    return wrong(fmt::format("its bed has {:.1f} x {:.1f} pixels along and across the scan, the images {} x {}", want_places,
-                             want_lines, made.places_, made.lines_));
+  const double want_positions = expected(machine.bed.size_mm[x ? 0 : 1], made.position_um_);
+  if (made.lines_ + 0.01 < want_lines || made.lines_ > want_lines + 1.01 || made.positions_ + 0.01 < want_positions ||
+      made.positions_ > want_positions + 1.01) {
+    return wrong(fmt::format("its bed has {:.1f} x {:.1f} pixels along and across the scan, the images {} x {}", want_positions,
+                             want_lines, made.positions_, made.lines_));
   }
   // Where the nozzles are: across from nozzle 0, and behind the foremost one.
   const auto& offsets = machine.head.row_offset_um;
@@ -118,20 +118,20 @@ Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32
 
 VirtualMachine::Counts VirtualMachine::counts() const {
   return {machine_.head.nozzles,
-          places_,
+          positions_,
           lines_,
           static_cast<std::uint32_t>(ticks_),
-          drop_bits(machine_.head.most_drops),
+          drop_bits(machine_.head.max_drops),
           step_um_};
 }
 
 std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double step, std::uint32_t number) const {
   const Nozzle& nozzle = nozzle_[number];
   const double line = static_cast<double>(first_line + nozzle.line) + nozzle.across_um / line_um_;
-  const double place =
-      (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / place_um_;
+  const double position =
+      (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / position_um_;
   const bool x = machine_.mounting.scan_axis == ScanAxis::kX;
-  double column = x ? place : line, row = x ? line : place;
+  double column = x ? position : line, row = x ? line : position;
   const auto has = [&](Side side) { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; };
   if (has(Side::kRight)) column = columns_ - 1 - column;
   if (has(Side::kFront)) row = rows_ - 1 - row;

@@ -21,7 +21,7 @@
 namespace lamina::replay {
 
 /// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
-std::uint32_t drop_bits(std::uint32_t most_drops);
+std::uint32_t drop_bits(std::uint32_t max_drops);
 
 /// The pixels of a machine, derived independently from its profile.
 class VirtualMachine {
@@ -35,7 +35,7 @@ class VirtualMachine {
   std::uint32_t layers() const { return layers_; }
   /// Sizes that headers of programs tell. steps: of a pixel; drop_bits: of a nozzle's drops at a place
   struct Counts {
-    std::uint32_t nozzles, places, lines, steps, drop_bits;
+    std::uint32_t nozzles, positions, lines, steps, drop_bits;
     double step_um;
   };
   Counts counts() const;
@@ -82,8 +82,8 @@ class VirtualMachine {
   friend class Printing;
   Machine machine_;
   std::uint32_t columns_ = 0, rows_ = 0, layers_ = 0;
-  double line_um_ = 0, place_um_ = 0, step_um_ = 0;
-  std::uint32_t lines_ = 0, places_ = 0;
+  double line_um_ = 0, position_um_ = 0, step_um_ = 0;
+  std::uint32_t lines_ = 0, positions_ = 0;
   struct Nozzle {
     std::int64_t line;           // from that of nozzle 0
     std::int64_t step_offset;    // steps after the foremost nozzle, rounded

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace lamina::replay {
@@ -22,7 +23,7 @@ Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose pu
       fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0),
       fires_row_(purpose == Purpose::kPrint ? machine.rows_ : 0, 0) {}
 
-Standing Printing::standing() const {
+AxisPositions Printing::axis_positions() const {
   const auto& motion = profile().motion;
   return {motion.safe_mm[0], motion.safe_mm[1], profile().powder.build_sign * (mm(layer_.bottom) - base_mm()),
           profile().powder.roller_mm[0]};
@@ -35,18 +36,18 @@ void Printing::fail(std::string what) {
 void Printing::fault(std::string_view what) {
   if (!ok()) return;
   const bool ahead = reading_sweep_ != INT64_MIN;  // its words are read, and it has not begun
-  std::string place = fmt::format("layer {}", layer_.index);
+  std::string position = fmt::format("layer {}", layer_.index);
   if (ahead || sweeping_) {
-    place += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
+    position += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
     if (reading_ != INT64_MIN) {
-      place += fmt::format(", step {}", reading_);
+      position += fmt::format(", step {}", reading_);
     } else {
-      place += stepped_ && !ahead ? fmt::format(", step {}", step_) : ", before its first step";
+      position += stepped_ && !ahead ? fmt::format(", step {}", step_) : ", before its first step";
     }
   } else {
-    place += ", before its first swath";
+    position += ", before its first swath";
   }
-  fail(fmt::format("{}: {}", place, what));
+  fail(fmt::format("{}: {}", position, what));
 }
 
 void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<std::uint32_t> of) {
@@ -65,7 +66,7 @@ void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<st
   fired_here_ = false;
   ++count.sweeps;
   host_spread_ = true;
-  if (of) tells_sweep(*of);
+  if (of) state_sweep(*of);
   check_spread();
 }
 
@@ -85,8 +86,8 @@ void Printing::go_across(double carriage_mm) {
 
 double Printing::position_of(double step) const {
   const auto& mount = profile().mounting;
-  double um = 0.5 * machine_.place_um_ + step * machine_.step_um_;
-  if (mount.scan_from == Side::kRight || mount.scan_from == Side::kBack) um = machine_.places_ * machine_.place_um_ - um;
+  double um = 0.5 * machine_.position_um_ + step * machine_.step_um_;
+  if (mount.scan_from == Side::kRight || mount.scan_from == Side::kBack) um = machine_.positions_ * machine_.position_um_ - um;
   return um / 1000 + mount.offset_mm[mount.scan_axis == ScanAxis::kX ? 0 : 1];
 }
 
@@ -112,11 +113,11 @@ void Printing::at_step(std::int64_t step) {
   ++count.vectors;
 }
 
-bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const {
-  if (line < 0 || place < 0 || line >= machine_.lines_ || place >= machine_.places_) return false;
+bool Printing::pixel(std::int64_t line, std::int64_t position, std::uint32_t& column, std::uint32_t& row) const {
+  if (line < 0 || position < 0 || line >= machine_.lines_ || position >= machine_.positions_) return false;
   const auto& mount = profile().mounting;
   const bool x = mount.scan_axis == ScanAxis::kX;
-  const auto from_left = x ? place : line, from_back = x ? line : place;
+  const auto from_left = x ? position : line, from_back = x ? line : position;
   const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
   column = static_cast<std::uint32_t>(has(Side::kRight) ? machine_.columns_ - 1 - from_left : from_left);
   row = static_cast<std::uint32_t>(has(Side::kFront) ? machine_.rows_ - 1 - from_back : from_back);
@@ -124,8 +125,8 @@ bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& colum
 }
 
 void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops) {
-  const double hertz = drops * mm_s * 1000 / machine_.place_um_;
-  const double rounded = drops * kHalfMmPerMinute * 1000 / machine_.place_um_;  // speeds are written so
+  const double hertz = drops * mm_s * 1000 / machine_.position_um_;
+  const double rounded = drops * kHalfMmPerMinute * 1000 / machine_.position_um_;  // speeds are written so
   if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4) + rounded) {
     return fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
                              profile().head.highest_frequency_hz));
@@ -135,10 +136,10 @@ void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t d
   const double way = std::abs(mm), a = profile().motion.acceleration_mm_s2;
   takes(a == 0 ? way / mm_s : way < mm_s * mm_s / a ? 2 * std::sqrt(way / a) : way / mm_s + mm_s / a);
   if (!scanning) return;
-  const auto& care = profile().care;
-  if (care.spits()) check_care("fired off the bed", care.spit_layers, care.spit_seconds, spat_s_);
-  if (care.wipes()) check_care("wiped", care.wipe_layers, care.wipe_seconds, wiped_s_);
-  if (care.spits() && wiped_s_ > spat_s_) fault("scans behind the wiper before the head is fired off the bed");
+  const auto& maintenance = profile().maintenance;
+  if (maintenance.spits()) check_maintenance("fired off the bed", maintenance.spit_layers, maintenance.spit_seconds, spat_s_);
+  if (maintenance.wipes()) check_maintenance("wiped", maintenance.wipe_layers, maintenance.wipe_seconds, wiped_s_);
+  if (maintenance.spits() && wiped_s_ > spat_s_) fault("scans behind the wiper before the head is fired off the bed");
   if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
@@ -150,16 +151,16 @@ void Printing::check_speed(double mm_s, bool scanning) {
     if (std::abs(mm_s - motion.scan_speed_mm_s) < 1.01 * kHalfMmPerMinute) return;
     return fault(fmt::format("scans at {:g} mm/s where {:g} have to be", mm_s, motion.scan_speed_mm_s));
   }
-  const double wipe = profile().care.wipes() ? profile().care.wipe_speed_mm_s : 0;
+  const double wipe = profile().maintenance.wipes() ? profile().maintenance.wipe_speed_mm_s : 0;
   const double roller = roller_on_gantry() ? profile().powder.roller_speed_mm_s : 0;
-  const double most = std::max({motion.travel_speed_mm_s, motion.scan_speed_mm_s, wipe, roller});
-  if (mm_s > most + 1.01 * kHalfMmPerMinute)
-    fault(fmt::format("the head travels at {:g} mm/s, the profile's fastest is {:g}", mm_s, most));
+  const double maximum = std::max({motion.travel_speed_mm_s, motion.scan_speed_mm_s, wipe, roller});
+  if (mm_s > maximum + 1.01 * kHalfMmPerMinute)
+    fault(fmt::format("the head travels at {:g} mm/s, the profile's fastest is {:g}", mm_s, maximum));
 }
 
-bool Printing::has_ramps(double before_mm, double behind_mm, double beside_mm) {
+bool Printing::has_ramps(double before_mm, double behind_mm, double adjacent_mm) {
   const double ramp = profile().motion.ramp_mm;
-  if (std::min(before_mm, behind_mm) > ramp - beside_mm) return true;
+  if (std::min(before_mm, behind_mm) > ramp - adjacent_mm) return true;
   fault(fmt::format("{:g} mm before the first drops and {:g} behind the last are left, where ramps of {:g} have to be",
                     before_mm, behind_mm, ramp));
   return false;
@@ -174,12 +175,599 @@ const Count& Printing::finish() {
                             2 * std::abs(powder.roller_mm[1] - powder.roller_mm[0]) / powder.roller_speed_mm_s;
     takes(powder.spread_s > 0 ? powder.spread_s : by_moves);
   };
-  if (!tells_powder_) {
+  if (!moves_powder_) {
     for (std::uint32_t below = 0; below < base_layers(); ++below) spread(powder.base_layer_mm);
     spread(mm(layer_.thickness));
   }
-  count.microseconds = std::llround((seconds_ < kMostSeconds ? seconds_ : kMostSeconds) * 1e6);
+  count.microseconds = std::llround((seconds_ < kMaxSeconds ? seconds_ : kMaxSeconds) * 1e6);
   return count;
+}
+
+// Drops of nozzles on pixels: Printing::fire.
+
+void Printing::fire(std::uint32_t number, std::uint32_t drops) {
+  if (purpose_ == Purpose::kTime) return;
+  if (number >= machine_.nozzle_.size()) return fault(fmt::format("nozzle {} does not exist", number));
+  const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[number];
+  if (nozzle.blocked) return fault(fmt::format("nozzle {} fires, which is blocked", number));
+  if (!fired_here_) sweeps_.push_back({sweep_, first_line_});
+  fired_here_ = true;
+  const std::int64_t late = step_ - nozzle.step_offset;
+  std::uint32_t column = 0, row = 0;
+  if (late < 0 || late % machine_.ticks_ != 0 || !pixel(first_line_ + nozzle.line, late / machine_.ticks_, column, row)) {
+    return fault(fmt::format("nozzle {} fires where there is no pixel", number));
+  }
+  if (drops > profile().head.max_drops) {
+    return fault(
+        fmt::format("nozzle {} fires {} drops at a place, the head has at most {}", number, drops, profile().head.max_drops));
+  }
+  std::uint64_t* const fired = &fired_[(std::size_t{row} * row_words_ + column / 64) * times_bits_];
+  const unsigned bit = column % 64;
+  std::uint32_t times = drops;
+  for (std::uint32_t b = 0; b < times_bits_; ++b) times += static_cast<std::uint32_t>(fired[b] >> bit & 1) << b;
+  if (times > planes_) {
+    return fault(fmt::format("nozzle {} fires on column {}, row {} {}", number, column, row,
+                             planes_ == 1 ? "a second time" : fmt::format("more than {} times", planes_)));
+  }
+  for (std::uint32_t b = 0; b < times_bits_; ++b) {
+    fired[b] = (fired[b] & ~(std::uint64_t{1} << bit)) | std::uint64_t{times >> b & 1} << bit;
+  }
+  fires_row_[row] = 1;
+  count.drops += drops;
+  sweep_max_ = std::max(sweep_max_, drops);
+  count.max_per_position = std::max(count.max_per_position, drops);
+  count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
+  count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
+  for (std::uint32_t k = 0; watch_ != nullptr && k < drops; ++k) {
+    (*watch_)({column, row, sweep_, static_cast<std::uint32_t>(step_), number, first_line_});
+  }
+}
+
+std::uint64_t Printing::fired_more(std::uint32_t times, std::size_t word) const {
+  std::uint64_t more = 0, same = ~std::uint64_t{0};
+  for (std::uint32_t b = times_bits_; b-- > 0;) {
+    const std::uint64_t fired = fired_[word * times_bits_ + b];
+    if ((times >> b & 1) == 0) more |= same & fired;
+    same &= (times >> b & 1) != 0 ? fired : ~fired;
+  }
+  return more;
+}
+
+std::uint32_t Printing::sweeps_per_position() const {
+  const auto& head = profile().head;
+  const double hertz = profile().motion.scan_speed_mm_s * 1000 / machine_.position_um_;
+  const double fits = std::clamp(std::floor(head.highest_frequency_hz / hertz + 1e-9), 1.0, double(head.max_drops));
+  return static_cast<std::uint32_t>(std::ceil(planes_ / fits));
+}
+
+void Printing::leave_sweep() {
+  if (sweep_max_ == 0 || profile().head.max_drops < 2) return;
+  const std::uint32_t number = sweep_ / sweeps_per_position();
+  if (number != position_.number) position_ = {};
+  position_.number = number;
+  const std::uint32_t maximum = profile().head.max_drops;
+  const auto needed = [&] { return (position_.drops + maximum - 1) / maximum; };  // sweeps, for the drops so far
+  const std::uint32_t before = needed();
+  position_.drops += sweep_max_;
+  if (needed() == before) added_.insert(sweep_);
+  count.added = static_cast<std::uint32_t>(added_.size());
+  sweep_max_ = 0;
+}
+
+std::uint32_t Printing::drop_bits() const { return replay::drop_bits(profile().head.max_drops); }
+
+void Printing::fire_words(std::span<const std::uint64_t> words) {
+  if (purpose_ == Purpose::kTime) return;
+  for (std::size_t w = 0; w < words.size(); ++w) {
+    for (std::uint64_t left = words[w]; left != 0 && ok();) {
+      const int bit = std::countl_zero(left);
+      left &= ~(std::uint64_t{1} << (63 - bit));
+      fire(static_cast<std::uint32_t>(w * 64) + static_cast<std::uint32_t>(bit));
+    }
+  }
+}
+
+// What a program says of its layer and of its sweeps, against the layer and where the sweeps are.
+
+void Printing::state_layers(std::uint32_t layers) {
+  if (machine_.layers_ == 0 || layers == machine_.layers_) return;
+  fault(fmt::format("the program is of {} layers, the job has {}", layers, machine_.layers_));
+}
+
+void Printing::state_heights(std::optional<double> bottom_mm, double thickness_mm) {
+  const double bottom = mm(layer_.bottom), thickness = mm(layer_.thickness);
+  if (std::abs(thickness_mm - thickness) > 1e-4) {
+    wrong_powder(fmt::format("it is told to be {:g} mm thick where {:g} have to be", thickness_mm, thickness));
+  } else if (bottom_mm && std::abs(*bottom_mm - bottom) > 1e-4) {
+    wrong_powder(fmt::format("it is told to begin at {:g} mm where {:g} have to be", *bottom_mm, bottom));
+  }
+}
+
+void Printing::state_sweep(std::uint32_t of) {
+  if (backward_ && !profile().motion.both_directions) fault("runs back, and the profile's head fires on the way there alone");
+  if (swaths_stated_ && *swaths_stated_ != of)
+    fault(fmt::format("is one of {} swaths, those before of {}", of, *swaths_stated_));
+  swaths_stated_ = of;
+}
+
+// The first line of the layer that has something; the last one if none has.
+std::int64_t Printing::first_of_layer(const RunsView& image) const {
+  std::int64_t first = machine_.lines_ - 1;
+  for (std::uint32_t row = 0; row < image.rows(); ++row) {
+    const auto line = image.row(row);
+    if (!line.empty()) first = std::min({first, line_of(line.front(), row), line_of(line.back() - 1, row)});
+  }
+  return first;
+}
+
+// Numbers follow from where sweeps begin: a swath after the other, of each its passes, of each the sweeps for its drops.
+void Printing::check_numbers(std::span<const RunsView> planes) {
+  if (!swaths_stated_) return;
+  const auto& mount = profile().mounting;
+  const std::int64_t lines = std::int64_t{nozzles()} * mount.passes, stride = lines - mount.overlap_lines;
+  std::int64_t first = mount.first_swath == FirstSwath::kLayer ? first_of_layer(planes[0]) : 0;
+  first -= static_cast<std::int64_t>(layer_.index) * mount.joint_shift_lines % stride;
+  const std::int64_t left = machine_.lines_ - first;
+  const std::int64_t swaths = left <= lines ? 1 : 1 + (left - lines + stride - 1) / stride;
+  const std::int64_t per_position = sweeps_per_position(), of = swaths * mount.passes * per_position;
+  if (*swaths_stated_ != of)
+    return fail(fmt::format("layer {}, before its first swath: is told to have {} swaths, and has {}", layer_.index,
+                            *swaths_stated_, of));
+  const bool further = profile().head.blocked_rule == BlockedRule::kSecondPass && !profile().head.blocked.empty();
+  for (const Sweep& sweep : sweeps_) {
+    if (sweep.number >= of) {
+      if (further) continue;
+      return fail(fmt::format("layer {}, swath {}, before its first step: is beyond the {} that the layer has", layer_.index,
+                              sweep.number, of));
+    }
+    const std::int64_t position = sweep.number / per_position,
+                       at = first + position / mount.passes * stride + position % mount.passes;
+    if (sweep.first_line == at) continue;
+    return fail(
+        fmt::format("layer {}, swath {}, before its first step: begins at line {}, and the swath of that number at line {}",
+                    layer_.index, sweep.number, sweep.first_line, at));
+  }
+}
+
+// What a layer printed against its image: Printing::compare.
+
+std::int64_t Printing::line_of(std::uint32_t column, std::uint32_t row) const {
+  const auto& mount = profile().mounting;
+  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
+  if (mount.scan_axis == ScanAxis::kX) return has(Side::kFront) ? machine_.rows_ - 1 - row : row;
+  return has(Side::kRight) ? machine_.columns_ - 1 - column : column;
+}
+
+// Where the nozzle is that has to see to a pixel.
+std::string Printing::describe_position(std::uint32_t column, std::uint32_t row) const {
+  const auto& mount = profile().mounting;
+  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
+  const std::int64_t from_left = has(Side::kRight) ? machine_.columns_ - 1 - column : column;
+  const std::int64_t from_back = has(Side::kFront) ? machine_.rows_ - 1 - row : row;
+  const bool x = mount.scan_axis == ScanAxis::kX;
+  const std::int64_t line = x ? from_back : from_left, position = x ? from_left : from_back;
+  for (const Sweep& sweep : sweeps_) {
+    for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
+      if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
+      return fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number,
+                         position * machine_.ticks_ + nozzle.step_offset);
+    }
+  }
+  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, position);
+}
+
+// Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
+// nobody fires is not known; what no sweep comes over may be one.
+void Printing::coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const {
+  for (const Sweep& sweep : sweeps_) {
+    for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
+      const std::int64_t over = sweep.first_line + nozzle.line;
+      if (over >= 0 && over < machine_.lines_) (nozzle.blocked ? blocked : worked)[std::size_t(over)] = true;
+    }
+  }
+}
+
+void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
+                             Differences& differ) const {
+  const bool x = profile().mounting.scan_axis == ScanAxis::kX;
+  const std::int64_t next = profile().mounting.passes;
+  const auto may_be_lost = [&](std::int64_t column, std::int64_t row) {
+    const auto over = std::size_t(line_of(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
+    return differ.blocked[over] || !differ.worked[over];
+  };
+  const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
+    if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row))
+      return false;
+    const auto line = image.row(static_cast<std::uint32_t>(row));
+    const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
+    const std::uint64_t fired = fired_more(plane, std::size_t(row) * row_words_ + std::size_t(column) / 64);
+    return after % 2 == 1 && (fired >> (column % 64) & 1) == 0;
+  };
+  std::vector<std::uint64_t>& wanted = differ.wanted;
+  for (std::uint32_t row = 0; row < image.rows(); ++row) {
+    const auto line = image.row(row);
+    if (line.empty() && fires_row_[row] == 0) continue;
+    std::fill(wanted.begin(), wanted.end(), 0);
+    for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
+      for (std::uint32_t c = line[i]; c < line[i + 1];) {
+        const std::uint32_t to = std::min((c / 64 + 1) * 64, line[i + 1]);
+        const std::uint64_t ones = to - c == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << (to - c)) - 1;
+        wanted[c / 64] |= ones << (c % 64);
+        c = to;
+      }
+    }
+    for (std::uint32_t w = 0; w < row_words_; ++w) {
+      const std::uint64_t got = fired_more(plane, std::size_t{row} * row_words_ + w);
+      for (std::uint64_t different = got ^ wanted[w]; different != 0; different &= different - 1) {
+        const auto bit = static_cast<std::uint32_t>(std::countr_zero(different));
+        const std::uint32_t column = w * 64 + bit;
+        const bool extra = (got >> bit & 1) != 0;
+        (extra ? differ.added : differ.missing) += 1;
+        const bool explained =
+            !extra ? moved + lost > 0 && may_be_lost(column, row)
+                   : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
+                                     : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
+        if (differ.first_of_all.empty()) differ.first_of_all = describe_position(column, row);
+        if (differ.first.empty() && !explained) {
+          differ.first = fmt::format("{}: column {}, row {} is {}{}", describe_position(column, row), column, row,
+                                     extra ? "fired and not set in the image" : "set in the image and not fired",
+                                     planes_ == 1 ? "" : fmt::format(", drop {}", plane + 1));
+        }
+      }
+    }
+  }
+}
+
+void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, std::uint64_t lost) {
+  Differences differ;
+  differ.wanted.resize(row_words_);
+  differ.worked.resize(machine_.lines_);
+  differ.blocked.resize(machine_.lines_);
+  coverage(differ.worked, differ.blocked);
+  for (std::uint32_t plane = 0; plane < planes.size(); ++plane) {
+    const RunsView& image = planes[plane];
+    if (image.columns != machine_.columns_ || image.rows() != machine_.rows_) return fault("the image is of another size");
+    compare_plane(image, plane, moved, lost, differ);
+  }
+  const auto& [missing, added, first, first_of_all, worked, blocked, wanted] = differ;
+  if (first.empty()) check_numbers(planes);
+  if (!first.empty()) {
+    return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", first, missing, added));
+  }
+  if (added != moved || missing != moved + lost) {
+    // The manifest alone may speak of such pixels.
+    const std::string position = first_of_all.empty() ? fmt::format("layer {}", layer_.index) : first_of_all;
+    fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", position, missing, added,
+                     moved + lost, moved));
+  }
+}
+
+// Care of head and powder on the virtual machine, whatever the dialect: stages/replay/printing.h.
+
+void Printing::leaves_wiper(std::string_view what) {
+  if (own_ > 0) fault(fmt::format("{} before all lines of the machine's own stand there", what));
+  own_ = 0;
+  at_wiper_ = false;
+}
+
+// A wipe is a G1 as fast as the profile has it: travels may have the same ends.
+void Printing::head_is_at(double x_mm, double y_mm, double works_mm_s) {
+  const auto& maintenance = profile().maintenance;
+  leaves_wiper("the head goes on");
+  leaves_position();
+  if (lamp_on_) {
+    fault(fmt::format("the head moves before '{}', which ends the pause to dry", profile().powder.dry_off_lines.front()));
+  }
+  if (filled_ && std::hypot(x_mm - profile().motion.safe_mm[0], y_mm - profile().motion.safe_mm[1]) > 1e-3) {
+    fault(fmt::format("the head goes to {:g}, {:g} mm behind the pause to fill vats, not to its safe place", x_mm, y_mm));
+  }
+  filled_ = false;
+  const bool slow = std::abs(works_mm_s - maintenance.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
+  if (const auto& wiper = maintenance.wipe_mm; wiper && slow) {
+    const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
+    if (std::hypot(x - (*wiper)[0], y - (*wiper)[1]) + std::hypot(x_mm - (*wiper)[2], y_mm - (*wiper)[3]) < 1e-3) {
+      at_wiper_ = true;
+      wiped_s_ = seconds_;
+      ++count.wipes;
+    }
+  }
+  head_mm_ = {x_mm, y_mm};
+}
+
+void Printing::leaves_position() {
+  const std::uint32_t drops = profile().maintenance.spit_drops;
+  if (spat_here_ % std::max(1u, drops) != 0) {
+    fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, drops));
+  }
+  spat_here_ = 0;
+}
+
+void Printing::check_maintenance(std::string_view what, std::uint32_t every, double limit_s, double done_s) {
+  const bool due = limit_s > 0 || (every > 0 && layer_.index % every == 0);
+  if (done_s < 0 && due) return fault(fmt::format("scans before the head is {}, as it has to be in this layer", what));
+  if (limit_s == 0 || seconds_ - done_s <= limit_s) return;
+  fault(fmt::format("a sweep ends {:.2f} s after the head was {} where {:g} may pass", seconds_ - done_s, what, limit_s));
+}
+
+void Printing::outside_bed(double x_mm, double y_mm) {
+  const auto& mount = profile().mounting;
+  const bool x = mount.scan_axis == ScanAxis::kX;
+  double um = ((x ? y_mm : x_mm) - mount.offset_mm[x ? 1 : 0]) * 1000;
+  if (mount.nozzle_0 == Side::kBack || mount.nozzle_0 == Side::kRight) um = machine_.lines_ * machine_.line_um_ - um;
+  const auto line = static_cast<std::int64_t>(std::floor(um / machine_.line_um_));
+  const double step = ((x ? x_mm : y_mm) - position_of(0)) / (position_of(1) - position_of(0));
+  for (std::uint32_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
+    const auto [column, row] = machine_.nozzle_at(line, step, nozzle);
+    if (machine_.nozzle_[nozzle].blocked || column < -0.5 || row < -0.5 || column > machine_.columns_ - 0.5 ||
+        row > machine_.rows_ - 0.5) {
+      continue;
+    }
+    return fault(fmt::format("nozzle {} fires off the bed where column {:.0f}, row {:.0f} of it is", nozzle, column, row));
+  }
+}
+
+void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double seconds) {
+  const auto& maintenance = profile().maintenance;
+  if (!maintenance.spits() || !maintenance.spit_mm) return fault("fires off the bed, and the profile has no place for it");
+  if (std::hypot(x_mm - (*maintenance.spit_mm)[0], y_mm - (*maintenance.spit_mm)[1]) > 1e-3) {
+    return fault(fmt::format("fires off the bed at {:g}, {:g} mm, not at {:g}, {:g}", x_mm, y_mm, (*maintenance.spit_mm)[0],
+                             (*maintenance.spit_mm)[1]));
+  }
+  outside_bed(x_mm, y_mm);
+  for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) count.spat += nozzle.blocked ? 0 : drops;
+  leaves_wiper("nozzles fire off the bed");
+  takes(seconds);
+  spat_here_ += drops;
+  if (spat_here_ > maintenance.spit_drops) {
+    return fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, maintenance.spit_drops));
+  }
+  if (spat_here_ < maintenance.spit_drops) return;
+  spat_s_ = seconds_;
+  ++count.spits;
+}
+
+// Where the profile has the head wait in pauses.
+bool Printing::capped() const {
+  const auto at = profile().maintenance.cap_mm.value_or(profile().motion.safe_mm);
+  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
+  return std::hypot(x - at[0], y - at[1]) < 1e-3;
+}
+
+void Printing::waits_capped(std::string_view what) {
+  const auto& cap = profile().maintenance.cap_mm;
+  const auto at = cap.value_or(profile().motion.safe_mm);
+  if (capped()) return;
+  fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe place", at[0], at[1]));
+}
+
+void Printing::refills() {
+  if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
+  waits_capped("the vats are filled");
+  filled_ = profile().maintenance.cap_mm.has_value();
+  if (++count.refills > 1) fault("waits for the vats to be filled a second time");
+}
+
+void Printing::dwells(double seconds) {
+  waits_capped("the layer dries");
+  leaves_wiper("the layer dries");
+  dwelt_s_ += seconds;
+  takes(seconds);
+}
+
+bool Printing::takes_own(std::string_view line) {
+  const auto& powder = profile().powder;
+  // The block that may come now.
+  const auto& lines = at_wiper_ ? profile().maintenance.wipe_lines : dwelt_s_ > 0 ? powder.dry_off_lines : powder.dry_on_lines;
+  if (own_ < lines.size() && lines[own_] == line) {
+    if (under_way_) fault(fmt::format("'{}' comes while the head may still move; G4 P0 waits for it", line));
+    if (!at_wiper_) waits_capped(fmt::format("'{}' of the pause to dry comes", line));
+    if (++own_ < lines.size()) return true;
+    own_ = 0;
+    ++(at_wiper_ ? wiper_blocks_ : lamp_blocks_);
+    lamp_on_ = !at_wiper_ && dwelt_s_ == 0 && !profile().powder.dry_off_lines.empty();
+    at_wiper_ = false;
+    return true;
+  }
+  if (own_ > 0) fault(fmt::format("'{}' stands where the machine's own '{}' has to", line, lines[own_]));
+  return false;
+}
+
+void Printing::roller_turns(double rpm) { rpm_ = rpm; }
+
+void Printing::state_host(std::string_view record, bool of_powder) {
+  if (of_powder && host_spread_) return fault(fmt::format("{} stands behind the layer's powder", record));
+  if (of_powder && record != "FILL" && !head_at_safe()) {
+    return fault(fmt::format("{} stands where the head is not at its safe place, and the powder is spread", record));
+  }
+  host_spread_ = host_spread_ || !of_powder;
+}
+
+void Printing::state_base(std::uint32_t layers, double layer_mm) {
+  if (based_) return fault("tells a base of powder a second time");
+  based_ = true;
+  if (layers == base_layers() && std::abs(layer_mm - profile().powder.base_layer_mm) < 1e-6) return;
+  fault(fmt::format("tells a base of {} layers of {:g} mm, where {} of {:g} have to be", layers, layer_mm, base_layers(),
+                    profile().powder.base_layer_mm));
+}
+
+void Printing::check_pauses() {
+  const auto& powder = profile().powder;
+  if (std::abs(dwelt_s_ - powder.dry_s) > 1e-3) {
+    wrong_cycle(fmt::format("the layer dries for {:g} s where {:g} have to be", dwelt_s_, powder.dry_s));
+  }
+  const std::uint32_t lamps = (powder.dry_on_lines.empty() ? 0 : 1) + (powder.dry_off_lines.empty() ? 0 : 1);
+  const std::uint32_t wipers = profile().maintenance.wipe_lines.empty() ? 0 : count.wipes;
+  if (lamp_blocks_ == lamps && wiper_blocks_ == wipers) return;
+  wrong_cycle(
+      fmt::format("the machine's own lines stand {} times where {} have to", lamp_blocks_ + wiper_blocks_, lamps + wipers));
+}
+
+// Of a program that moves no powder.
+void Printing::check_stated() {
+  check_pauses();
+  if (base_layers() > 0 && !based_) wrong_cycle(fmt::format("its base of {} layers is not told", base_layers()));
+  if (const double rpm = profile().powder.roller_rpm; std::abs(rpm_ - rpm) > 1e-3) {
+    wrong_cycle(fmt::format("the roller is told to make {:g} turns a minute where {:g} have to be", rpm_, rpm));
+  }
+}
+
+// The powder of a layer: the order and the places of roller, vats and head. What is wrong is told by check_cycle alone, which
+// knows the layer's heights for true.
+
+void Printing::wrong_cycle(std::string_view what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); }
+
+void Printing::wrong_powder(std::string what) {
+  if (spread_wrong_.empty()) spread_wrong_ = std::move(what);
+}
+
+bool Printing::roller_on_gantry() const {
+  const auto& [powder, motion] = std::tie(profile().powder, profile().motion);
+  return powder.roller_axis == motion.x_axis || powder.roller_axis == motion.y_axis;
+}
+
+bool Printing::roller_at_home() const { return std::abs(roller_mm_ - profile().powder.roller_mm[0]) < 1e-3; }
+
+bool Printing::head_at_safe() const {
+  const auto& safe = profile().motion.safe_mm;
+  const auto [x, y] = head_mm_.value_or(safe);
+  return std::hypot(x - safe[0], y - safe[1]) < 1e-3;
+}
+
+void Printing::check_way(MovingPart part, double mm_s) {
+  const auto& powder = profile().powder;
+  const bool gantry = roller_on_gantry();
+  const auto at_roller = [&] {
+    return fmt::format("while the roller is at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]);
+  };
+  if (part == MovingPart::kHead) {
+    if (!gantry && !roller_at_home()) wrong_powder(fmt::format("the head moves {}", at_roller()));
+    return;
+  }
+  const bool roller = part == MovingPart::kRoller;
+  if (roller && !head_at_safe()) {
+    wrong_powder(fmt::format("the roller moves while the head is at {:g}, {:g} mm, not at its safe place", (*head_mm_)[0],
+                             (*head_mm_)[1]));
+  }
+  // Oasis lowers its pistons before the spreader goes back.
+  if (!roller && profile().dialect != "oasis" && !roller_at_home() && !(gantry && head_at_safe())) {
+    wrong_powder(fmt::format("a vat moves {}", at_roller()));
+  }
+  const double speed = roller ? powder.roller_speed_mm_s : powder.vat_speed_mm_s;
+  if (std::abs(mm_s - speed) < 1.01 * kHalfMmPerMinute) return;
+  wrong_powder(fmt::format("{} moves at {:g} mm/s where {:g} have to be", roller ? "the roller" : "a vat", mm_s, speed));
+}
+
+void Printing::check_spread() {
+  const std::string& dialect = profile().dialect;
+  if (dialect == "raw" || dialect == "planes") return;
+  if (!rolled_) return wrong_powder("the first sweep begins before powder is spread");
+  const double top = mm(std::int64_t{layer_.bottom} + layer_.thickness);
+  if (dialect == "brundlefab" || std::abs(count.build_mm - top) < 1e-3) return;  // its bins give way to the carriage
+  wrong_powder(fmt::format("a sweep begins with the build vat at {:g} mm where {:g} have to be", count.build_mm, top));
+}
+
+void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
+  count.fed_mm[vat] += mm;
+  if (mm > 0) count.vats |= 1u << vat;
+  moves_powder_ = true;
+  takes(std::abs(mm) / mm_s);
+}
+
+void Printing::build_vat_is_at(double mm) {
+  count.moves = moves_powder_ = true;
+  count.build_mm = mm * profile().powder.build_sign;
+}
+
+void Printing::build_vat_goes_down(double mm) {
+  count.moves = moves_powder_ = true;
+  lowered_mm_ = mm;
+}
+
+void Printing::roller_is_at(double mm, bool may_spread) {
+  moves_powder_ = true;
+  const double far = profile().powder.roller_mm[1];
+  const bool comes = std::abs(roller_mm_ - far) >= 1e-3 || std::abs(profile().powder.roller_mm[0] - far) < 1e-3;
+  if (may_spread && std::abs(mm - far) < 1e-3 && comes)
+    strokes(count.moves ? count.build_mm : lamina::mm(layer_.bottom) - base_mm(), count.fed_mm[0] + count.fed_mm[1]);
+  rolled_ = rolled_ || strokes_ > base_layers();
+  const double home = profile().powder.roller_mm[0];
+  if (rpm_ != 0 && std::abs(mm - home) < 1e-3 && std::abs(roller_mm_ - home) >= 1e-3) {
+    wrong_powder(fmt::format("the roller returns with {:g} turns a minute, and has to stand still", rpm_));
+  }
+  roller_mm_ = mm;
+}
+
+void Printing::strokes(double build_mm, double fed_mm) {
+  const auto& powder = profile().powder;
+  ++strokes_;
+  if (powder.roller_rpm > 0 && std::abs(rpm_ - powder.roller_rpm) > 1e-3) {
+    wrong_powder(fmt::format("the roller spreads with {:g} turns a minute where {:g} have to be", rpm_, powder.roller_rpm));
+  }
+  if (profile().dialect == "oasis") return;  // whose reader sees where it turns
+  if (strokes_ > base_layers() + 1) {
+    if (!roller_on_gantry()) wrong_powder("the roller spreads once more than the layer needs");
+    return;
+  }
+  const bool base = strokes_ <= base_layers();
+  const double above = base ? base_mm() - strokes_ * powder.base_layer_mm : -mm(layer_.thickness);  // still to be spread
+  const double build = mm(layer_.bottom) - above, fed = powder.dose * (base_mm() - above);
+  if (std::abs(build_mm - build) > 1e-3 || std::abs(fed_mm - fed) > 1e-3 * strokes_) {
+    wrong_powder(fmt::format("{} is spread with the build vat at {:g} mm and {:g} mm fed, not {:g} and {:g}",
+                             base ? fmt::format("layer {} of the base", strokes_) : "powder", build_mm, fed_mm, build, fed));
+  }
+}
+
+void Printing::spreads(double build_mm, double fed_mm, double clearance_mm) {
+  const auto& powder = profile().powder;
+  const bool base = strokes_ < base_layers();
+  const double height = base ? (strokes_ + 1) * powder.base_layer_mm : base_mm() + mm(layer_.thickness);
+  const double build = build_mm * powder.build_sign, top = mm(layer_.bottom) - base_mm() + height - clearance_mm;
+  const double fed = powder.dose * height + clearance_mm;
+  if (std::abs(build - top) > 1e-3) {
+    wrong_powder(fmt::format("powder is spread with the build vat at {:g} mm where {:g} have to be", build, top));
+  } else if (std::abs(fed_mm - fed) > 1e-3) {
+    wrong_powder(fmt::format("powder is spread with {:g} mm fed where {:g} have to be", fed_mm, fed));
+  }
+}
+
+// SerialGRBL.py, NewLayer, takes it 1 mm down before a layer, which a thicker one's place lies below.
+void Printing::pistons_came(double build_mm, double feed_mm) {
+  constexpr double kThickMm = 1.25;
+  const auto& powder = profile().powder;
+  const double height = strokes_ < base_layers() ? powder.base_layer_mm : mm(layer_.thickness);
+  const bool build = build_mm * powder.build_sign < 0 || height >= kThickMm;
+  if (build && feed_mm * powder.feed_sign > 0) return;
+  wrong_powder(fmt::format("the {} piston comes to its place from above, and has play", build ? "feed" : "build"));
+}
+
+void Printing::check_cycle() {
+  const auto& powder = profile().powder;
+  const Layer& layer = layer_;
+  const auto wrong = [&](const std::string& what) { wrong_cycle(what); };
+  if (const AxisPositions next = axis_positions();
+      head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
+    wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
+                      (*head_mm_)[1], next.x_mm, next.y_mm));
+  }
+  if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
+  if (profile().dialect == "raw" || profile().dialect == "planes") {  // the head alone
+    if (!spread_wrong_.empty()) wrong(spread_wrong_);
+    return check_stated();
+  }
+  if (!count.moves) return wrong("the build vat does not move");
+  if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
+  if (!spread_wrong_.empty()) return wrong(spread_wrong_);
+  // Numbers are written to a tenth of a micrometre.
+  if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
+    wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
+  }
+  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer.thickness) + base_mm());
+  if (std::abs(fed - dose) > 1e-3 * (1 + base_layers())) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
+  check_pauses();
+  if (rpm_ != 0) wrong(fmt::format("the roller still makes {:g} turns a minute when the layer ends", rpm_));
+  if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
+    wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
+  }
 }
 
 }  // namespace lamina::replay

@@ -28,7 +28,7 @@ enum class Purpose : std::uint8_t {
 /// Where the axes stand between two layers, as programs count them: the head waits at its safe place, the roller at home,
 /// the build vat at the top of the layer below. Each layer's program begins and ends so (check_cycle), so that a layer is
 /// carried out without those before it.
-struct Standing {
+struct AxisPositions {
   double x_mm = 0, y_mm = 0, build_mm = 0, roller_mm = 0;
 };
 
@@ -47,7 +47,7 @@ class Printing {
   void leave_out(std::set<std::uint32_t> sweeps) { left_out_ = std::move(sweeps); }
   std::uint32_t layer() const { return layer_.index; }
   /// Where the program finds the machine.
-  Standing standing() const;
+  AxisPositions axis_positions() const;
   std::uint32_t nozzles() const { return static_cast<std::uint32_t>(machine_.nozzle_.size()); }
   /// "layer 12, swath 3, step 417: what"; before the first swath or its first step, the text says so instead.
   void fault(std::string_view what);
@@ -82,13 +82,13 @@ class Printing {
   std::uint32_t drop_bits() const;
 
   // --- what the program says of itself
-  void tells_layers(std::uint32_t layers);
-  void tells_heights(std::optional<double> bottom_mm, double thickness_mm);
+  void state_layers(std::uint32_t layers);
+  void state_heights(std::optional<double> bottom_mm, double thickness_mm);
 
   // --- movements; each takes its time
-  enum class Part : std::uint8_t { kHead, kRoller, kVat };
+  enum class MovingPart : std::uint8_t { kHead, kRoller, kVat };
   /// Before a part moves: whether the others are out of its way, and roller and vats as fast as the profile has it.
-  void check_way(Part part, double mm_s);
+  void check_way(MovingPart part, double mm_s);
   /// Roller and head have an axis in common.
   bool roller_on_gantry() const;
   /// The head may still move, or it rests: lines of the machine's own that do not wait for it belong there alone.
@@ -97,15 +97,15 @@ class Printing {
   /// drops  of a scan: the most that a nozzle fires at a place of it
   void head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops = 1);
   /// Whether a sweep has the profile's ramp before its first drops and behind its last, each so many mm long; a fault if not.
-  bool has_ramps(double before_mm, double behind_mm, double beside_mm = 1e-3);
+  bool has_ramps(double before_mm, double behind_mm, double adjacent_mm = 1e-3);
   /// works_mm_s  how fast it came, of a G1 beside sweeps; 0: by a travel, or in a sweep
-  void head_stands_at(double x_mm, double y_mm, double works_mm_s);
+  void head_is_at(double x_mm, double y_mm, double works_mm_s);
   void feeds(std::uint32_t vat, double mm, double mm_s);
-  void build_vat_stands_at(double mm);
+  void build_vat_is_at(double mm);
   /// The same, where a program tells but how far from where the layer before left it.
   void build_vat_goes_down(double mm);
   /// may_spread  such a movement can be that over the powder
-  void roller_stands_at(double mm, bool may_spread = true);
+  void roller_is_at(double mm, bool may_spread = true);
   /// What is wrong with the powder, the first of all; told at the layer's end, where its heights are known for true.
   void wrong_powder(std::string what);
   /// Powder is spread now: the build vat stands where it is told, vats have fed so much, and the spreader goes so far above
@@ -119,9 +119,9 @@ class Printing {
   /// Every nozzle that is not blocked fires so many drops where the carriage stands, off the bed.
   void spits(double x_mm, double y_mm, std::uint64_t drops, double seconds);
   /// Faults a nozzle that is not blocked and over the bed where the carriage stands.
-  void beside_bed(double x_mm, double y_mm);
+  void outside_bed(double x_mm, double y_mm);
   /// The head leaves the place where it stood: shots there have to be whole.
-  void leaves_place();
+  void leaves_position();
   /// The program waits for somebody to fill the vats; before powder is fed.
   void refills();
   /// It waits for the layer to dry; behind the sweeps.
@@ -133,9 +133,9 @@ class Printing {
   void roller_turns(double rpm);
   /// A program that moves no powder has a record that the host carries out; it spreads the layer before the first one that is
   /// not of its powder.
-  void tells_host(std::string_view record, bool of_powder);
+  void state_host(std::string_view record, bool of_powder);
   /// Of these: the layers of powder below this one.
-  void tells_base(std::uint32_t layers, double layer_mm);
+  void state_base(std::uint32_t layers, double layer_mm);
 
   /// Checks the powder cycle of the layer, and that it leaves the machine as the next one expects it; called at the end.
   void check_cycle();
@@ -168,28 +168,27 @@ class Printing {
   bool head_at_safe() const;
   void check_spread();
   void check_speed(double mm_s, bool scanning);
-  void tells_sweep(std::uint32_t of);
+  void state_sweep(std::uint32_t of);
   std::int64_t first_of_layer(const RunsView& image) const;
   void check_numbers(std::span<const RunsView> planes);
   // Of heads that fire several drops: sweeps follow each other over a place until its drops are fired.
-  std::uint32_t sweeps_a_place() const;
+  std::uint32_t sweeps_per_position() const;
   void leave_sweep();
   /// Whether care was taken before this sweep, which has just ended. since_s  of the layer, behind it; below 0: not yet
-  void check_care(std::string_view what, std::uint32_t every, double limit_s, double since_s);
+  void check_maintenance(std::string_view what, std::uint32_t every, double limit_s, double since_s);
   /// mm of powder below the layer, fed with it.
   double base_mm() const { return layer_.index == 0 ? profile().powder.base_mm() : 0; }
   std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
   void strokes(double build_mm, double fed_mm);
-  const std::vector<std::string>& own_lines() const;
   bool capped() const;
   void waits_capped(std::string_view what);
   void check_pauses();
-  void check_told();
+  void check_stated();
   void leaves_wiper(std::string_view what);
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
-  bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
-  std::string place_of(std::uint32_t column, std::uint32_t row) const;
+  bool pixel(std::int64_t line, std::int64_t position, std::uint32_t& column, std::uint32_t& row) const;
+  std::string describe_position(std::uint32_t column, std::uint32_t row) const;
 
   const VirtualMachine& machine_;
   const VirtualMachine::Watch* watch_;
@@ -201,21 +200,21 @@ class Printing {
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
   bool rolled_ = false;  // to the far end
   bool under_way_ = false, host_spread_ = false;
-  std::optional<std::uint32_t> told_of_;  // swaths of the layer
+  std::optional<std::uint32_t> swaths_stated_;  // swaths of the layer
   std::optional<double> lowered_mm_;
   double roller_mm_ = 0;
   std::optional<std::array<double, 2>> head_mm_;  // if the program says where
-  bool tells_powder_ = false;                     // moves a vat or the roller
+  bool moves_powder_ = false;                     // moves a vat or the roller
   double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::uint32_t planes_, times_bits_;
   std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
   std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
-  struct Place {
+  struct PositionCount {
     std::uint32_t number = 0, drops = 0;  // drops: of the pixel that gets most
-  } place_;
+  } position_;
   std::set<std::uint32_t> added_, left_out_;
-  std::uint32_t sweep_most_ = 0;  // drops of a nozzle at a step of the sweep at hand
+  std::uint32_t sweep_max_ = 0;  // drops of a nozzle at a step of the sweep at hand
   std::vector<Sweep> sweeps_;
   bool based_ = false;                 // told a base
   std::uint32_t strokes_ = 0;          // of the roller to its far end
@@ -228,7 +227,7 @@ class Printing {
   bool filled_ = false;           // vats are, and the head has not gone back to its safe place
   double dwelt_s_ = 0, rpm_ = 0;  // rpm: of the roller
   std::string fault_;             // the first one
-  std::string spread_wrong_;      // the first fault of spreading; see cycle.cpp
+  std::string spread_wrong_;      // the first fault of spreading
 };
 
 }  // namespace lamina::replay

@@ -22,7 +22,7 @@ struct LineCut {
   CutRule rule = CutRule::kAligned;
   std::int64_t thin = 1'500'000, thick = 1'500'000;  // > 0
   std::int64_t origin = 0;                           // where a thin stretch of the grid begins; any of them
-  std::int64_t least_end = 0;                        // no thin stretch is nearer to the end of a line; not used by kGrid
+  std::int64_t min_end = 0;                          // no thin stretch is nearer to the end of a line; not used by kGrid
 
   /// The same cuts for lines that are walked the other way, in coordinates with the sign changed.
   LineCut mirrored() const {
@@ -61,14 +61,14 @@ void cut_line(const LineCut& cut, std::int64_t from, std::int64_t to, Visit&& vi
   std::int64_t next;  // where the first thin stretch begins
   std::int64_t last;  // where it may begin at the latest
   if (cut.rule == CutRule::kThickEnds) {
-    const std::int64_t end = std::max<std::int64_t>(cut.least_end, 1);
-    const std::int64_t room = to - from - 2 * end + cut.thick;
-    const std::int64_t count = room < period ? 0 : room / period;
+    const std::int64_t end = std::max<std::int64_t>(cut.min_end, 1);
+    const std::int64_t available = to - from - 2 * end + cut.thick;
+    const std::int64_t count = available < period ? 0 : available / period;
     if (count == 0) return visit(from, to, Thickness::kThick);
     next = from + (to - from - count * period + cut.thick) / 2;
     last = next + (count - 1) * period;
   } else {
-    const std::int64_t end = std::max<std::int64_t>(cut.least_end, 1);
+    const std::int64_t end = std::max<std::int64_t>(cut.min_end, 1);
     next = cut.origin + ceil_div(from + end - cut.origin, period) * period;
     last = to - end - cut.thin;
     if (next > last) return visit(from, to, Thickness::kThick);

@@ -142,7 +142,7 @@ class Expander {
       const std::int64_t periods = whole / (cut.thin + cut.thick);
       if (periods > 0) cut.thick = whole / periods - cut.thin;
       cut.rule = CutRule::kThickEnds;
-      cut.least_end = cut.thick / 2;
+      cut.min_end = cut.thick / 2;
     }
     std::uint32_t k = i, corners = end - i - 1;  // that are still to be passed
     double walked = 0, edge = expand_detail::distance(paths_.point[k], paths_.point[k + 1]);
@@ -182,7 +182,7 @@ class Expander {
 
   void give(Point2 from, Point2 to, std::uint32_t i, Thickness thickness) {
     if (from == to) return;
-    visit_(Stretch{from, to, paths_.kind[i], thickness, paths_.width[i], paths_.line[i], jump_, i});
+    visit_(PathInterval{from, to, paths_.kind[i], thickness, paths_.width[i], paths_.line[i], jump_, i});
     jump_ = false;
   }
 
@@ -193,7 +193,7 @@ class Expander {
 };
 
 template <class Visit>
-void for_each_stretch(const ToolpathsView& paths, const LayerCut& cut, Visit&& visit) {
+void for_each_interval(const ToolpathsView& paths, const LayerCut& cut, Visit&& visit) {
   Expander<std::remove_reference_t<Visit>>(paths, cut, visit).run();
 }
 

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "stages/data/input/file_reader.h"
-#include "stages/data/picture/ticks.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/table.h"
+#include "stages/data/plot.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/table.h"
 
 namespace lamina::segment {
 namespace {
@@ -66,21 +66,21 @@ struct Columns {
   }
 };
 
-constexpr std::size_t kMostSamples = 1000;  // of a group: they are looked for one by one
+constexpr std::size_t kMaxSamples = 1000;  // of a group: they are looked for one by one
 
 /// The number of a sample within its group.
 std::uint32_t number_of(const std::string& sample, FlowGroup& group) {
   if (sample.empty()) return 0;
-  auto place = std::ranges::find(group.samples, sample);
-  if (place == group.samples.end()) place = group.samples.insert(place, sample);
-  return static_cast<std::uint32_t>(place - group.samples.begin());
+  auto position = std::ranges::find(group.samples, sample);
+  if (position == group.samples.end()) position = group.samples.insert(position, sample);
+  return static_cast<std::uint32_t>(position - group.samples.begin());
 }
 
 /// Adds the points of a row to its group. returns "" or what is wrong
 std::string add_row(const Columns& columns, const std::vector<std::string>& cells, const Medium& medium,
                     std::vector<FlowGroup>& groups) {
-  const auto number = [&](std::size_t column, double least, double& value) {
-    const auto wrong = read_number(cells[column], least, 1e12, "", value);
+  const auto number = [&](std::size_t column, double minimum, double& value) {
+    const auto wrong = read_number(cells[column], minimum, 1e12, "", value);
     return wrong.empty() ? wrong : fmt::format("{}: {}", columns.names[column], wrong);
   };
   if (cells.size() != columns.names.size())
@@ -97,7 +97,7 @@ std::string add_row(const Columns& columns, const std::vector<std::string>& cell
     if (const auto wrong = number(i, -1e12, drop); !wrong.empty()) return wrong;
     group->points.push_back(
         {velocity, drop * columns.drop_units[i] / medium.length_m, number_of(columns.sample_of(cells, i), *group)});
-    if (group->samples.size() > kMostSamples) return fmt::format("more than {} samples in one configuration", kMostSamples);
+    if (group->samples.size() > kMaxSamples) return fmt::format("more than {} samples in one configuration", kMaxSamples);
   }
   return {};
 }
@@ -105,7 +105,7 @@ std::string add_row(const Columns& columns, const std::vector<std::string>& cell
 }  // namespace
 
 Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium) {
-  auto file = FileReader::open(path, {.fault = Fault::kInput, .most_bytes = kMostTableBytes, .streams = true});
+  auto file = FileReader::open(path, {.fault = Fault::kInput, .max_bytes = kMaxTableBytes, .streams = true});
   return file ? read_flows(*file, medium) : Result<std::vector<FlowGroup>>(file.error());
 }
 
@@ -137,22 +137,20 @@ struct GradientUnit {
   double pa_m;
   const char* name;
 };
-GradientUnit unit_of(double most_pa_m) {
-  return most_pa_m >= 1e6   ? GradientUnit{1e6, "MPa/m"}
-         : most_pa_m >= 1e3 ? GradientUnit{1e3, "kPa/m"}
-                            : GradientUnit{1, "Pa/m"};
+GradientUnit unit_of(double max_pa_m) {
+  return max_pa_m >= 1e6 ? GradientUnit{1e6, "MPa/m"} : max_pa_m >= 1e3 ? GradientUnit{1e3, "kPa/m"} : GradientUnit{1, "Pa/m"};
 }
 
 /// Grid lines with their numbers, from 0 to the largest value of each axis.
-void draw_axes(double most_v, double most_y, const GradientUnit& unit, bool gas, Plot& plot) {
-  const double bottom = kPlotTop + kPlotHeight, v_step = tick_step(most_v, 6), y_step = tick_step(most_y / unit.pa_m, 6);
-  for (int i = 0; i * v_step <= most_v * (1 + 1e-9); ++i) {
-    const double x = kPlotLeft + kPlotWidth * i * v_step / most_v;
+void draw_axes(double max_v, double max_y, const GradientUnit& unit, bool gas, Plot& plot) {
+  const double bottom = kPlotTop + kPlotHeight, v_step = tick_step(max_v, 6), y_step = tick_step(max_y / unit.pa_m, 6);
+  for (int i = 0; i * v_step <= max_v * (1 + 1e-9); ++i) {
+    const double x = kPlotLeft + kPlotWidth * i * v_step / max_v;
     plot.boxes.push_back({x, kPlotTop, 1, kPlotHeight, kPale});
     plot.texts.push_back({x, bottom + 18, 12, Plot::Anchor::kMiddle, kInk, fmt::format("{:.4g}", i * v_step)});
   }
-  for (int i = 0; i * y_step * unit.pa_m <= most_y * (1 + 1e-9); ++i) {
-    const double y = bottom - kPlotHeight * i * y_step * unit.pa_m / most_y;
+  for (int i = 0; i * y_step * unit.pa_m <= max_y * (1 + 1e-9); ++i) {
+    const double y = bottom - kPlotHeight * i * y_step * unit.pa_m / max_y;
     plot.boxes.push_back({kPlotLeft, y, kPlotWidth, 1, kPale});
     plot.texts.push_back({kPlotLeft - 8, y + 4, 12, Plot::Anchor::kEnd, kInk, fmt::format("{:.4g}", i * y_step)});
   }
@@ -166,21 +164,21 @@ void draw_axes(double most_v, double most_y, const GradientUnit& unit, bool gas,
 }  // namespace
 
 Plot draw_fit(const FlowGroup& group, const Permeability& fit, bool gas) {
-  double most_v = 0, most_y = 0;
+  double max_v = 0, max_y = 0;
   for (const auto& p : group.points) {
-    most_v = std::max(most_v, p.velocity_m_s);
-    most_y = std::max(most_y, p.gradient_pa_m);
+    max_v = std::max(max_v, p.velocity_m_s);
+    max_y = std::max(max_y, p.gradient_pa_m);
   }
-  const auto x = [&](double v) { return kPlotLeft + kPlotWidth * v / most_v; };
-  const auto y = [&](double g) { return kPlotTop + kPlotHeight - kPlotHeight * g / most_y; };
+  const auto x = [&](double v) { return kPlotLeft + kPlotWidth * v / max_v; };
+  const auto y = [&](double g) { return kPlotTop + kPlotHeight - kPlotHeight * g / max_y; };
   Plot plot;
   plot.width = 640;
   plot.height = 430;
   // No axis where nothing flows or no pressure drops.
-  if (most_v > 0 && most_y > 0) draw_axes(most_v, most_y, unit_of(most_y), gas, plot);
+  if (max_v > 0 && max_y > 0) draw_axes(max_v, max_y, unit_of(max_y), gas, plot);
   auto& curve = plot.lines.emplace_back(Plot::Line{{}, "cc3333"});
   for (int i = 0; i <= 100; ++i) {
-    const double v = most_v * i / 100;
+    const double v = max_v * i / 100;
     curve.points.push_back({x(v), y(fit.linear * v + fit.quadratic * v * v)});
   }
   for (const auto& p : group.points) plot.dots.push_back({x(p.velocity_m_s), y(p.gradient_pa_m), 2.5, "2266cc"});

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/data/picture/plot.h"
+#include "stages/data/plot.h"
 #include "stages/data/status.h"
 #include "stages/segment/permeability.h"
 

@@ -25,37 +25,37 @@ std::array<double, 2> reach(const Box& part, const std::array<double, 2>& along)
   std::array<double, 2> ends{INFINITY, -INFINITY};
   for (const Nm px : {part.lo.x, part.hi.x}) {
     for (const Nm py : {part.lo.y, part.hi.y}) {
-      const double place = along[0] * px + along[1] * py;
-      ends = {std::min(ends[0], place), std::max(ends[1], place)};
+      const double position = along[0] * px + along[1] * py;
+      ends = {std::min(ends[0], position), std::max(ends[1], position)};
     }
   }
   return ends;
 }
 
-LayerCut layer_cut(const Segmentation& plan, const CutPlace& place, const Box& part) {
+LayerCut layer_cut(const Segmentation& plan, const CutPosition& position, const Box& part) {
   LayerCut cut;
-  cut.on = place.on;
+  cut.on = position.on;
   if (!cut.on) return cut;
-  const auto along = direction(place.angle);
+  const auto along = direction(position.angle);
   cut.along_x = along[0];
   cut.along_y = along[1];
   cut.continuous = plan.continuous;
-  cut.first = place.first;
-  cut.one_direction = place.one_direction;
-  cut.line = {plan.rule, nm_of(plan.thin_mm), nm_of(plan.thick_mm), 0, nm_of(plan.least_end_mm)};
+  cut.first = position.first;
+  cut.one_direction = position.one_direction;
+  cut.line = {plan.rule, nm_of(plan.thin_mm), nm_of(plan.thick_mm), 0, nm_of(plan.min_end_mm)};
   cut.line.origin = std::llround(reach(part, along)[0]);
-  if (place.first_line) {
-    const auto other = across(place.angle + kTurn / 4);
-    const double centre = *place.first_line * (other[0] * along[0] + other[1] * along[1]);
+  if (position.first_line) {
+    const auto other = across(position.angle + kTurn / 4);
+    const double centre = *position.first_line * (other[0] * along[0] + other[1] * along[1]);
     cut.line.origin = std::llround(centre) - cut.line.thin / 2;
   }
-  cut.shift = nm_of(place.shift_mm);
+  cut.shift = nm_of(position.shift_mm);
   cut.line.origin += cut.shift;
   return cut;
 }
 
-Status check_stretch_count(const Segmentation& plan, const LayerCut& cut, const ToolpathsView& paths, std::uint32_t layer) {
-  constexpr double kMostStretches = 1e7;
+Status check_interval_count(const Segmentation& plan, const LayerCut& cut, const ToolpathsView& paths, std::uint32_t layer) {
+  constexpr double kMaxIntervals = 1e7;
   if (!cut.on) return {};
   double length = 0;  // nm of segmented lines
   for (std::uint32_t p = 0; p < paths.size(); ++p) {
@@ -63,7 +63,7 @@ Status check_stretch_count(const Segmentation& plan, const LayerCut& cut, const 
       if (cut.segments(paths.kind[i], paths.line[i])) length += expand_detail::distance(paths.point[i], paths.point[i + 1]);
     }
   }
-  if (2 * length / static_cast<double>(kNmPerMm) <= kMostStretches * (plan.thick_mm + plan.thin_mm)) return {};
+  if (2 * length / static_cast<double>(kNmPerMm) <= kMaxIntervals * (plan.thick_mm + plan.thin_mm)) return {};
   return Error{Fault::kUsage,
                fmt::format("layer {}: lines of {:.0f} mm come to more than 10000000 thick and thin stretches; give a "
                            "longer segment.thick_mm or thin_mm",

@@ -16,7 +16,7 @@
 namespace lamina::segment {
 
 /// What a layer adds to a segmentation.
-struct CutPlace {
+struct CutPosition {
   bool on = false;
   std::int32_t first = 0;            // number of a segmented line
   bool one_direction = true;         // segmented lines are all laid the same way
@@ -37,10 +37,10 @@ std::array<double, 2> across(MicroDegrees angle);
 std::array<double, 2> reach(const Box& part, const std::array<double, 2>& along);
 
 /// The cut of a layer. part  nm on the bed: grids of all its layers begin at its side
-LayerCut layer_cut(const Segmentation& plan, const CutPlace& place, const Box& part);
+LayerCut layer_cut(const Segmentation& plan, const CutPosition& position, const Box& part);
 
 /// Refuses a layer whose lines would be cut into more than 10,000,000 stretches. errors  kUsage
 /// paths  of one part. layer  its number, for the message
-Status check_stretch_count(const Segmentation& plan, const LayerCut& cut, const ToolpathsView& paths, std::uint32_t layer);
+Status check_interval_count(const Segmentation& plan, const LayerCut& cut, const ToolpathsView& paths, std::uint32_t layer);
 
 }  // namespace lamina::segment

@@ -35,16 +35,16 @@ struct Tried {
     return of;
   }
   double deviation() const {
-    double most = 0;
+    double maximum = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       double low = INFINITY, high = 0;
       for (const auto& [name, widths] : regions) {
         low = std::min(low, widths[i].value());
         high = std::max(high, widths[i].value());
       }
-      most = std::max(most, high - low);
+      maximum = std::max(maximum, high - low);
     }
-    return most;
+    return maximum;
   }
 };
 

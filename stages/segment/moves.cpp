@@ -15,12 +15,12 @@ MoveTable::MoveTable(const Segmentation& plan, const LayerCut& cut, const Extrud
   inner_ = std::min(machine.speed.inner_wall_mm_s, limit);
 }
 
-void MoveTable::make(const Stretch& s, Entry& entry) const {
+void MoveTable::make(const PathInterval& s, MoveEntry& entry) const {
   const auto& material = machine_.material;
   const double full = bead_area(mm(s.width), height_, material.shape()) * material.flow;
   // What is laid is as wide as a bead of that volume; only an ellipse is another shape in truth.
-  const BeadShape laid = material.shape() == BeadShape::kEllipse ? BeadShape::kEllipse : BeadShape::kStadium;
-  const double width = bead_width(full, height_, laid);
+  const BeadShape deposited = material.shape() == BeadShape::kEllipse ? BeadShape::kEllipse : BeadShape::kStadium;
+  const double width = bead_width(full, height_, deposited);
   const bool fills = s.kind != PathKind::kOuter && s.kind != PathKind::kInner;
   double share = 1, speed = 100, bead = fills && cut_.on ? plan_.continuous_width_mm : width;
   if (s.thickness == Thickness::kThick)
@@ -32,7 +32,7 @@ void MoveTable::make(const Stretch& s, Entry& entry) const {
   entry.stored = s.width;
   entry.width = static_cast<Nm>(nm_of(s.thickness == Thickness::kReference ? width : bead));
   entry.area = full * share;
-  entry.measured = bead_area(bead, height_, laid);
+  entry.measured = bead_area(bead, height_, deposited);
   const double reference = s.kind == PathKind::kOuter ? wall_ : s.kind == PathKind::kInner ? inner_ : reference_;
   entry.speed = reference * speed / 100;
 }

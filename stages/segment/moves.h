@@ -15,8 +15,8 @@
 #include "stages/data/extruder.h"
 #include "stages/data/layer.h"
 #include "stages/data/toolpaths.h"
+#include "stages/segment/deposited/pores.h"
 #include "stages/segment/expand.h"
-#include "stages/segment/laid/pores.h"
 #include "stages/segment/predict.h"
 
 namespace lamina::segment {
@@ -27,32 +27,32 @@ class MoveTable {
   /// plan, cut, machine  have to outlive it
   MoveTable(const Segmentation& plan, const LayerCut& cut, const Extruder& machine, const Layer& layer);
 
-  struct Entry {
+  struct MoveEntry {
     Nm stored = -1, width = 0;                 // nm, of the path and of the bead
     double area = 0, measured = 0, speed = 0;  // mm2, mm2, mm/s
   };
   const Segmentation& plan() const { return plan_; }
   const Extruder& machine() const { return machine_; }
 
-  const Entry& of(const Stretch& s) {
+  const MoveEntry& of(const PathInterval& s) {
     if (s.thickness == Thickness::kThin && !plan_.sweep.empty()) {
       make(s, swept_);
       return swept_;
     }
-    Entry& entry = table_[static_cast<std::size_t>(s.kind) * 3 + static_cast<std::size_t>(s.thickness)];
+    MoveEntry& entry = table_[static_cast<std::size_t>(s.kind) * 3 + static_cast<std::size_t>(s.thickness)];
     if (entry.stored != s.width) make(s, entry);
     return entry;
   }
 
  private:
-  void make(const Stretch& s, Entry& entry) const;
+  void make(const PathInterval& s, MoveEntry& entry) const;
 
   const Segmentation& plan_;
   const LayerCut& cut_;
   const Extruder& machine_;
   double height_, reference_, wall_, inner_;  // mm, mm/s
-  std::array<Entry, 15> table_;
-  Entry swept_;  // of a line of its own kind: not kept
+  std::array<MoveEntry, 15> table_;
+  MoveEntry swept_;  // of a line of its own kind: not kept
 };
 
 /// Counts the stretches of a part in a layer, in the order in which they are laid.
@@ -60,7 +60,7 @@ class SegmentCounter {
  public:
   SegmentCounter(const LayerCut& cut, SegmentCounts& counts) : cut_(cut), counts_(counts) {}
 
-  void add(const Stretch& s) {
+  void add(const PathInterval& s) {
     if (!cut_.on) return;
     if (cut_.segments(s.kind, s.line) && (s.line != line_ || s.kind != kind_)) {
       ++counts_.lines;
@@ -72,7 +72,7 @@ class SegmentCounter {
       counts_.pieces += follows ? 0 : 1;
       // A curve's corners divide no stretch.
       const bool begins = !follows || s.thickness != before_;
-      counts_.stretches += begins ? 1 : 0;
+      counts_.intervals += begins ? 1 : 0;
       counts_.thin += begins && s.thickness == Thickness::kThin ? 1 : 0;
     }
     before_ = s.thickness;
@@ -93,10 +93,10 @@ class SegmentCounter {
 /// the speed that the machine changes at once. Lines that are not divided do not count.
 class SpeedCounter {
  public:
-  SpeedCounter(const Extruder& machine, ShortStretches& counts)
+  SpeedCounter(const Extruder& machine, ShortIntervals& counts)
       : acceleration_(machine.speed.acceleration_mm_s2), end_speed_(machine.speed.corner_mm_s / 2), counts_(counts) {}
 
-  void add(const Stretch& s, double length_mm, double speed_mm_s) {
+  void add(const PathInterval& s, double length_mm, double speed_mm_s) {
     const bool follows = s.run == run_ && s.from == at_ && before_ != Thickness::kReference;
     if (follows && s.thickness == before_) {
       length_ += length_mm;
@@ -125,7 +125,7 @@ class SpeedCounter {
   }
 
   double acceleration_, end_speed_;
-  ShortStretches& counts_;
+  ShortIntervals& counts_;
   std::uint32_t run_ = UINT32_MAX;
   Point2 at_{};
   Thickness before_ = Thickness::kReference;
@@ -133,33 +133,31 @@ class SpeedCounter {
   double entry_ = 0, length_ = 0, speed_ = 0;
 };
 
-/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives what the move has laid, a LaidMove, or
-/// nothing to stop: no further move is laid.
-/// sums     what was laid is added
-/// returns  false if `lay` stopped
-template <class Lay>
-bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& table, LaidSums& sums, Lay&& lay) {
+/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives what the move has laid, a
+/// DepositedMove, or nothing to stop: no further move is laid. sums     what was laid is added returns  false if `lay` stopped
+template <class Deposit>
+bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& table, DepositedSums& sums, Deposit&& deposit) {
   bool goes_on = true;
   SegmentCounter counter(cut, sums.segments);
   SpeedCounter speeds(table.machine(), sums.shorts);
   std::optional<PoreCounter> pores;
   if (cut.on) pores.emplace(paths, cut, table.plan(), sums.pores);
   std::uint32_t run = UINT32_MAX;
-  for_each_stretch(paths, cut, [&](const Stretch& s) {
+  for_each_interval(paths, cut, [&](const PathInterval& s) {
     if (!goes_on) return;
-    const MoveTable::Entry& entry = table.of(s);
-    const std::optional<LaidMove> laid =
-        lay(BeadMove{s.from, s.to, s.kind, s.jump, entry.width, entry.area, entry.speed, s.jump || s.run != run});
+    const MoveTable::MoveEntry& entry = table.of(s);
+    const std::optional<DepositedMove> deposited =
+        deposit(BeadMove{s.from, s.to, s.kind, s.jump, entry.width, entry.area, entry.speed, s.jump || s.run != run});
     run = s.run;
-    if (!laid) {
+    if (!deposited) {
       goes_on = false;
       return;
     }
-    sums.porosity.extruded_mm3 += laid->volume_mm3;
-    sums.porosity.measured_mm3 += laid->length_mm * entry.measured;
+    sums.porosity.extruded_mm3 += deposited->volume_mm3;
+    sums.porosity.measured_mm3 += deposited->length_mm * entry.measured;
     if (!pores) return;
     counter.add(s);
-    speeds.add(s, laid->length_mm, entry.speed);
+    speeds.add(s, deposited->length_mm, entry.speed);
     pores->add(s);
   });
   if (pores && goes_on) {

@@ -6,14 +6,6 @@
 
 namespace lamina::segment {
 
-std::string odd_about(const Fluid& fluid) {
-  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
-  return fmt::format(
-      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
-      "k2 for air is {:.4g} times smaller",
-      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
-}
-
 Result<std::vector<FlowPoint>> expanded(std::span<const FlowPoint> points, double length_m, const GasPressures& pressures) {
   std::vector<FlowPoint> gas(points.begin(), points.end());
   for (FlowPoint& point : gas) {
@@ -22,7 +14,7 @@ Result<std::vector<FlowPoint>> expanded(std::span<const FlowPoint> points, doubl
       return Error{Fault::kInput, fmt::format("a drop of {:.4g} Pa from an outlet at {:.6g} Pa leaves no pressure at the inlet",
                                               drop, pressures.outlet_pa)};
     }
-    point.gradient_pa_m *= (inlet + pressures.outlet_pa) / (2 * pressures.told_pa);
+    point.gradient_pa_m *= (inlet + pressures.outlet_pa) / (2 * pressures.reference_pa);
   }
   return gas;
 }

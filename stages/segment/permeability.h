@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "stages/data/status.h"
@@ -27,9 +26,6 @@ struct Fluid {
   double density_kg_m3 = 1.204;
 };
 
-/// A warning about implausible properties of a fluid, one line; "" if none.
-std::string odd_about(const Fluid& fluid);
-
 struct Permeability {
   double k1_m2 = 0, k2_m = 0;
   double k1_error_m2 = 0, k2_error_m = 0;  // standard errors, from the scatter of the points
@@ -45,7 +41,8 @@ Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const F
 /// Where a gas is measured, which expands on its way through the medium. Pa, absolute.
 struct GasPressures {
   double outlet_pa = 101325;
-  double told_pa = 101325;  // at which velocities and density are told: those of the outlet, of a flow meter, of a standard
+  double reference_pa =
+      101325;  // at which velocities and density are told: those of the outlet, of a flow meter, of a standard
 };
 
 /// The gradients that make the law of gases linear in the coefficients as the one above:

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "stages/data/text/number_text.h"
 #include "stages/segment/measured.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::segment {
 namespace {
@@ -27,7 +27,7 @@ TestPiece lines_to_measure(std::string name, std::string task, std::array<double
 }
 
 /// Such lines of one thin stretch between two thick ones.
-TestPiece thin_stretches(std::string name, std::string task, std::array<double, 3> size_mm) {
+TestPiece thin_intervals(std::string name, std::string task, std::array<double, 3> size_mm) {
   TestPiece piece = lines_to_measure(std::move(name), std::move(task), size_mm);
   piece.thick_mm = 10;
   piece.thin_mm = 30;
@@ -54,7 +54,7 @@ void add_flow_and_level(const PieceRequest& request, std::vector<TestPiece>& pie
 
 void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
   const std::vector<double>&speeds = request.thin_speeds, &extrusions = request.thin_extrusions;
-  TestPiece speed = thin_stretches(
+  TestPiece speed = thin_intervals(
       "4-speed",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
@@ -63,7 +63,7 @@ void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
           speeds.size(), number_text(speeds.front()), number_text(speeds.back())),
       {width_for(speeds.size(), request.width_mm), 50, request.height_mm});
   speed.thin_speed_sweep = speeds;
-  TestPiece extrusion = thin_stretches(
+  TestPiece extrusion = thin_intervals(
       "4-extrusion",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin with {} to {} % of the extrusion from right to left; measure the narrowest place (thin_mm)",
@@ -117,24 +117,6 @@ std::vector<TestPiece> test_pieces(const PieceRequest& request) {
   add_lines(request, pieces);
   add_layers(request, pieces);
   return pieces;
-}
-
-std::string steps_text(const std::vector<TestPiece>& pieces, const PieceRequest& request, std::string_view extension) {
-  std::string text = fmt::format(
-      "# Calibrating segmented lines\n\n1. Parameters: beads of {} mm, layers of {} mm, the speeds and temperatures of the machine's profile; keep them for all "
-      "pieces.\n",
-      number_text(request.width_mm), number_text(request.height_mm));
-  char step = '1';
-  for (const TestPiece& piece : pieces) {
-    if (piece.name[0] == '6' && step < '5') {
-      text +=
-          "5. Spacing: fill in widths.csv, then `lamina calibrate --measured widths.csv --machine MACHINE -o machine.toml`; plan the pieces of steps 6 and 7 "
-          "again with `lamina extrude --job FILE --machine machine.toml`.\n";
-    }
-    text += fmt::format("{}. `{}{}`: {}\n", piece.name[0], piece.name, extension, piece.task);
-    step = piece.name[0];
-  }
-  return text;
 }
 
 }  // namespace lamina::segment

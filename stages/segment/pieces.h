@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace lamina::segment {
@@ -39,8 +38,5 @@ struct TestPiece {
 
 /// The pieces of steps 2 to 7, in the order of the steps.
 std::vector<TestPiece> test_pieces(const PieceRequest& request);
-
-/// What to do with the pieces, step by step, as Markdown. extension  of the pieces' toolpaths
-std::string steps_text(const std::vector<TestPiece>& pieces, const PieceRequest& request, std::string_view extension);
 
 }  // namespace lamina::segment

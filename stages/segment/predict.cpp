@@ -4,12 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "stages/segment/pore_geometry.h"
 
 namespace lamina::segment {
 namespace {
 
 double group_distance(const Segmentation& s) {
   return 2 * s.spacing_sc_mm + (static_cast<double>(s.continuous) - 1) * s.spacing_cc_mm;
+}
+
+PoreSize planned_pore(const Segmentation& s) {
+  return pore_geometry({s.thick_width_mm, s.thin_width_mm, s.continuous_width_mm}, s.thin_mm, s.spacing_sc_mm);
 }
 
 }  // namespace
@@ -39,12 +46,12 @@ Status check(const Segmentation& s, double bead_width_mm) {
   }
   if (s.continuous < 1) return wrong("continuous_lines", "0; give 1 or more, lines between two segmented ones");
   // A bead that is squeezed more than this has no room: its neighbour's centre lies inside of it.
-  const double least = (s.thin_width_mm + s.continuous_width_mm) / 2;
-  if (!positive(s.spacing_sc_mm) || s.spacing_sc_mm < least - 1e-9) {
+  const double minimum = (s.thin_width_mm + s.continuous_width_mm) / 2;
+  if (!positive(s.spacing_sc_mm) || s.spacing_sc_mm < minimum - 1e-9) {
     return wrong("spacing_sc_mm",
                  fmt::format("{} mm is below the {:.3f} mm at which even thin stretches touch their neighbours and "
                              "no pore is left; give more",
-                             s.spacing_sc_mm, least));
+                             s.spacing_sc_mm, minimum));
   }
   if (s.continuous > 1 && (!positive(s.spacing_cc_mm) || s.spacing_cc_mm < bead_width_mm / 2)) {
     return wrong("spacing_cc_mm",
@@ -53,68 +60,69 @@ Status check(const Segmentation& s, double bead_width_mm) {
   return {};
 }
 
-std::vector<std::string> warnings(const Segmentation& s, const Calibration& calibration) {
-  std::vector<std::string> lines;
+std::vector<Warning> warnings(const Segmentation& s, const Calibration& calibration) {
+  std::vector<Warning> found;
+  const auto warn = [&](std::string text) { found.push_back({"pores", std::move(text)}); };
   if (!s.sweep.empty())
-    return {fmt::format("segment: thin stretches differ from line to line ({} kinds): a test piece to be measured",
-                        s.sweep.size())};
+    return {{"pores", fmt::format("segment: thin stretches differ from line to line ({} kinds): a test piece to be measured",
+                                  s.sweep.size())}};
   if (s.thin_speed > 100 && !calibration.by_speed.empty()) {
     const Reading stable = stable_distance(calibration, s.thin_speed);
     if (s.thin_mm > stable.value) {
-      lines.push_back(fmt::format(
+      warn(fmt::format(
           "segment.thin_mm: {} mm is longer than the {:.2f} mm after which a bead at {} % of the speed is as wide as before: "
           "pores close towards their ends; make it at most {:.2f} mm",
           s.thin_mm, stable.value, s.thin_speed, stable.value));
     }
     if (!stable.inside) {
-      lines.push_back(
+      warn(
           fmt::format("segment.thin_speed_percent: {} % is outside of what was measured (100 to {} %); the nearest "
                       "value is taken",
                       s.thin_speed, calibration.by_speed.back().percent));
     }
   }
   if (s.thin_speed <= 100 && s.thin_extrusion >= 100) {
-    lines.push_back("segment.thin_speed_percent: not above 100 % and no less extrusion: thin stretches will not be thin");
+    warn("segment.thin_speed_percent: not above 100 % and no less extrusion: thin stretches will not be thin");
   }
   if (s.thick_extrusion != s.thin_extrusion) {
-    lines.push_back(
+    warn(
         "segment.thin_extrusion_percent: differs from the thick one; extrusion follows with a delay of about 1 mm "
         "and more, so keep it the same along the line and change the speed");
   }
   if (!calibration.repeated.empty()) {
     const RepeatedReading reading = repeated_at(calibration, s.thick_extrusion);
     if (!reading.inside) {
-      lines.push_back(fmt::format(
+      warn(fmt::format(
           "segment.thick_extrusion_percent: {} % is outside of what was measured ({} to {} %); the nearest "
           "value is taken",
           s.thick_extrusion, calibration.repeated.front().extrusion_percent, calibration.repeated.back().extrusion_percent));
     } else if (std::abs(reading.thick_speed_percent - s.thick_speed) > 0.5) {
-      lines.push_back(
-          fmt::format("segment.thick_speed_percent: {} %; at {} % extrusion widths stay the same along the part at {:.4g} %",
-                      s.thick_speed, s.thick_extrusion, reading.thick_speed_percent));
+      warn(fmt::format("segment.thick_speed_percent: {} %; at {} % extrusion widths stay the same along the part at {:.4g} %",
+                       s.thick_speed, s.thick_extrusion, reading.thick_speed_percent));
     }
   }
-  const double gap = s.spacing_sc_mm - (s.thick_width_mm + s.continuous_width_mm) / 2;
+  const PoreSize pore = planned_pore(s);
+  const double gap = pore.gap_mm;
   if (gap > kBondGap) {
-    lines.push_back(
+    warn(
         fmt::format("segment.spacing_sc_mm: thick stretches and continuous lines will be {:.3f} mm apart and not bond; "
                     "give {:.3f} mm",
                     gap, s.spacing_sc_mm - gap));
   }
-  const double pore = predict_pores(s).length_mm;
-  if (pore <= 0) {
-    lines.push_back(
+  if (pore.length_mm <= 0) {
+    warn(
         fmt::format("segment.thin_mm: {} mm is not longer than a thick bead is wide ({:.2f} mm): its round ends meet and "
                     "close the pore; give more",
                     s.thin_mm, s.thick_width_mm));
   }
-  return lines;
+  return found;
 }
 
 Pores predict_pores(const Segmentation& s) {
   Pores pores{};
-  pores.length_mm = s.thin_mm - s.thick_width_mm;
-  pores.width_mm = s.spacing_sc_mm - (s.thin_width_mm + s.continuous_width_mm) / 2;
+  const PoreSize size = planned_pore(s);
+  pores.length_mm = size.length_mm;
+  pores.width_mm = size.width_mm;
   pores.aspect = pores.length_mm > 0 ? pores.width_mm / pores.length_mm : 0;
   pores.density_mm2 = 2 / ((s.thin_mm + s.thick_mm) * group_distance(s));
   return pores;

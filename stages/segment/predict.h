@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "stages/data/status.h"
@@ -16,7 +15,7 @@ namespace lamina::segment {
 struct Segmentation {
   CutRule rule = CutRule::kAligned;
   double thick_mm = 1.5, thin_mm = 1.5;
-  double least_end_mm = 0.75;
+  double min_end_mm = 0.75;
   std::uint32_t continuous = 1;
   double spacing_sc_mm = 0.43, spacing_cc_mm = 0.40;  // centre to centre
   double thick_extrusion = 100, thin_extrusion = 100;
@@ -39,19 +38,15 @@ struct Segmentation {
 /// Whether it can be laid. errors  kUsage, one line that begins with the key's name (as in [segment])
 Status check(const Segmentation& segmentation, double bead_width_mm);
 
-/// What a user should know: a pore that closes, speeds outside of what was measured, beads that do not touch.
-std::vector<std::string> warnings(const Segmentation& segmentation, const Calibration& calibration);
+/// What a user should know, of the code "pores": a pore that closes, speeds outside of what was measured, beads that do not
+/// touch.
+std::vector<Warning> warnings(const Segmentation& segmentation, const Calibration& calibration);
 
-/// Beads that are no further apart than this, mm, bond: they spread by as much.
-inline constexpr double kBondGap = 0.02;
-
-/// A pore beside a thin stretch. Beads are laid as by a round pen: thick stretches end in half circles that reach into
-/// the thin one, so a pore is shorter than the thin stretch by one thick width; across, it is what the spacing leaves
-/// between the thin stretch and the continuous line.
+/// A pore between a thin stretch and the continuous line next to it (pore_geometry.h).
 struct Pores {
   double length_mm, width_mm;
   double aspect;       // width / length
-  double density_mm2;  // pores in a mm2 of a layer: two beside each thin stretch
+  double density_mm2;  // pores in a mm2 of a layer: two at each thin stretch
 };
 Pores predict_pores(const Segmentation& segmentation);
 

@@ -5,14 +5,14 @@
 
 namespace lamina::segment {
 
-Result<Segmentation> resolve(const Settings& settings, const Calibration& calibration, double bead_mm) {
+Result<Segmentation> resolve(const SegmentSettings& settings, const Calibration& calibration, double bead_mm) {
   Segmentation plan;
   const RepeatedReading widths = repeated_at(calibration, settings.thick_extrusion);
   const double scale = bead_mm / calibration.width_mm;  // the tables are of one bead; others are taken in proportion
   plan.rule = settings.rule;
   plan.thick_mm = settings.thick_mm;
   plan.thin_mm = settings.thin_mm;
-  plan.least_end_mm = settings.least_end_mm.value_or(settings.thick_mm / 2);
+  plan.min_end_mm = settings.min_end_mm.value_or(settings.thick_mm / 2);
   plan.continuous = settings.continuous;
   plan.thick_extrusion = settings.thick_extrusion;
   plan.thin_extrusion = settings.thin_extrusion.value_or(settings.thick_extrusion);
@@ -50,8 +50,8 @@ std::vector<double> line_distances(const Segmentation& plan, std::int32_t first)
   const auto period = static_cast<std::int64_t>(plan.continuous) + 1;
   std::vector<double> distances;
   for (std::int64_t line = 0; line < period; ++line) {
-    const std::int64_t place = line - first - floor_div(line - first, period) * period;
-    distances.push_back(place == 0 || place == period - 1 ? plan.spacing_sc_mm : plan.spacing_cc_mm);
+    const std::int64_t position = line - first - floor_div(line - first, period) * period;
+    distances.push_back(position == 0 || position == period - 1 ? plan.spacing_sc_mm : plan.spacing_cc_mm);
   }
   return distances;
 }

@@ -14,7 +14,7 @@ namespace lamina::segment {
 /// Absent widths, speeds and spacings come from the calibration, in proportion to the bead.
 /// bead_mm  width of the filling's beads, > 0
 /// errors   of check(): kUsage, one line that begins with the key's name
-Result<Segmentation> resolve(const Settings& settings, const Calibration& calibration, double bead_mm);
+Result<Segmentation> resolve(const SegmentSettings& settings, const Calibration& calibration, double bead_mm);
 
 /// Centre-to-centre distances, mm, from each line to the next, in turn from line 0.
 /// first  number of a segmented line

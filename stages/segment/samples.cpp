@@ -53,12 +53,14 @@ Result<std::vector<DropsFit>> fit_drops(const std::string& path, const DropsSett
     DropsFit& fit = fits.emplace_back();
     fit.group = std::move(group);
     fit.pressures = settings.gas;
-    const std::string place = fit.group.name.empty() ? "" : fit.group.name + ": ";
-    const auto at = [&](const Error& error) { return Error{error.fault, fmt::format("{}: {}{}", path, place, error.message)}; };
+    const std::string position = fit.group.name.empty() ? "" : fit.group.name + ": ";
+    const auto at = [&](const Error& error) {
+      return Error{error.fault, fmt::format("{}: {}{}", path, position, error.message)};
+    };
     const auto take = [&](const char* form, Result<GroupFit> found, std::optional<GroupFit>& target) {
       target = std::move(*found);
       for (const std::string& line : target->left_out)
-        fit.warnings.push_back(fmt::format("{}{}{}; left out of the mean", place, form, line));
+        fit.warnings.push_back(fmt::format("{}{}{}; left out of the mean", position, form, line));
     };
     Result<GroupFit> plain = fit_group(fit.group, settings.fluid);
     if (!plain && !settings.gas) return at(plain.error());
@@ -66,7 +68,7 @@ Result<std::vector<DropsFit>> fit_drops(const std::string& path, const DropsSett
     if (plain)
       take("", std::move(plain), fit.plain);
     else
-      fit.warnings.push_back(fmt::format("{}as if it did not expand: {}", place, plain.error().message));
+      fit.warnings.push_back(fmt::format("{}as if it did not expand: {}", position, plain.error().message));
     if (!settings.gas) continue;
     fit.expanded = fit.group;
     auto points = expanded(fit.group.points, settings.medium.length_m, *settings.gas);

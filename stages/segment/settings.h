@@ -14,11 +14,11 @@ enum class CutRule : std::uint8_t {
 };
 
 /// One segmentation as people describe it, lengths in mm; resolve() decides what is absent by a calibration.
-struct Settings {
+struct SegmentSettings {
   bool on = false;
   CutRule rule = CutRule::kAligned;
   double thick_mm = 1.5, thin_mm = 1.5;
-  std::optional<double> least_end_mm;  // absent: half of thick_mm
+  std::optional<double> min_end_mm;  // absent: half of thick_mm
   std::uint32_t continuous = 1;
   std::int32_t first = 0;
   std::optional<double> spacing_sc_mm, spacing_cc_mm;  // centre to centre

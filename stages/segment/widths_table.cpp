@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/names.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/table.h"
-#include "stages/data/text/value.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/table.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::segment {
 namespace {
@@ -44,22 +44,8 @@ std::string set_cell(std::string_view column, const std::string& text, Measured&
 
 }  // namespace
 
-std::string widths_text(const PieceRequest& request) {
-  std::string text =
-      "# Widths in mm; leave cells empty where nothing was measured, add rows for further thick speeds or repeated measurements.\n"
-      "test,percent,thick_speed_percent,region,wall_mm,thick_mm,thin_mm,continuous_mm,stable_mm\n"
-      "flow,,,,,,,,\n";
-  for (const double percent : request.thin_speeds) text += fmt::format("speed,{},,,,,,,\n", number_text(percent));
-  for (const double percent : request.thin_extrusions) text += fmt::format("extrusion,{},,,,,,,\n", number_text(percent));
-  for (const double percent : request.extrusions) {
-    for (const char* region : {"initial", "central", "final"})
-      text += fmt::format("repeated,{},100,{},,,,,\n", number_text(percent), region);
-  }
-  return text;
-}
-
 Result<std::vector<Measured>> read_widths(const std::string& path) {
-  auto file = FileReader::open(path, {.fault = Fault::kInput, .most_bytes = kMostTableBytes, .streams = true});
+  auto file = FileReader::open(path, {.fault = Fault::kInput, .max_bytes = kMaxTableBytes, .streams = true});
   return file ? read_widths(*file) : Result<std::vector<Measured>>(file.error());
 }
 

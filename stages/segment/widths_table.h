@@ -6,16 +6,12 @@
 
 #include "stages/data/status.h"
 #include "stages/segment/measured.h"
-#include "stages/segment/pieces.h"
 
 namespace lamina {
 class FileReader;
 }
 
 namespace lamina::segment {
-
-/// The empty table: one row per line of the pieces.
-std::string widths_text(const PieceRequest& request);
 
 /// The rows of a completed table. errors  kInput: file, line, column, reason
 Result<std::vector<Measured>> read_widths(const std::string& path);

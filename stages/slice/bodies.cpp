@@ -47,7 +47,7 @@ std::vector<std::uint32_t> group_bodies(std::span<const Box> boxes) {
   return body;
 }
 
-std::vector<std::uint32_t> group_seen_from_above(std::vector<Box> boxes) {
+std::vector<std::uint32_t> group_from_above(std::vector<Box> boxes) {
   for (Box& box : boxes) box.lo.z = box.hi.z = 0;
   std::vector<std::uint32_t> group(boxes.size());
   for (std::uint32_t i = 0; i < group.size(); ++i) group[i] = i;

@@ -21,6 +21,6 @@ bool touch(const Box& a, const Box& b);
 std::vector<std::uint32_t> group_bodies(std::span<const Box> boxes);
 
 /// The same of boxes that touch seen from above, directly or through the box around those that do.
-std::vector<std::uint32_t> group_seen_from_above(std::vector<Box> boxes);
+std::vector<std::uint32_t> group_from_above(std::vector<Box> boxes);
 
 }  // namespace lamina::slice

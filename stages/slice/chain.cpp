@@ -19,18 +19,18 @@ void find_successors(const Cuts& cuts, ChainScratch& scratch) {
   scratch.next.resize(count);
   scratch.state.assign(count, 0);
   for (std::size_t i = 0; i < count; ++i) {
-    std::size_t place = cuts.from_hash[i] & mask;
-    while (scratch.slot[place] != 0) place = (place + 1) & mask;
-    scratch.slot[place] = static_cast<std::uint32_t>(i + 1);
+    std::size_t position = cuts.from_hash[i] & mask;
+    while (scratch.slot[position] != 0) position = (position + 1) & mask;
+    scratch.slot[position] = static_cast<std::uint32_t>(i + 1);
   }
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint64_t hash = cuts.to_hash[i];
     std::uint32_t found = kNone;
-    for (std::size_t place = hash & mask; scratch.slot[place] != 0; place = (place + 1) & mask) {
-      if (scratch.slot[place] == kTaken) continue;
-      const std::uint32_t other = scratch.slot[place] - 1;
+    for (std::size_t position = hash & mask; scratch.slot[position] != 0; position = (position + 1) & mask) {
+      if (scratch.slot[position] == kTaken) continue;
+      const std::uint32_t other = scratch.slot[position] - 1;
       if (cuts.from_hash[other] != hash || !(cuts.from[other] == cuts.to[i])) continue;
-      scratch.slot[place] = kTaken;
+      scratch.slot[position] = kTaken;
       scratch.state[other] |= kHasPrevious;
       found = other;
       break;

@@ -11,6 +11,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
 #include "stages/data/mesh.h"
+#include "stages/geometry/interval_table.h"
 
 namespace lamina::slice {
 
@@ -40,5 +41,16 @@ Point2 crossing(const Edge& edge, std::int64_t z);
 /// Cuts `facets` of `triangles`, all of which the plane crosses. `cuts` is overwritten.
 /// cost  one division for a facet
 void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> facets, std::int64_t z, Cuts& cuts);
+
+// --- which facets a plane crosses, for planes known beforehand.
+
+/// The planes [first, last) that each facet crosses, by their numbers; facets between planes are not in it. A corner at a plane
+/// is below it.
+using PlaneIndex = IntervalTable<std::uint32_t>;
+
+/// triangles  nm, frame of the mesh; fewer than 2^32
+/// planes     nm, same frame, strictly increasing
+/// cost       O(triangles + planes)
+PlaneIndex index_crossings(std::span<const Triangle> triangles, std::span<const std::int64_t> planes);
 
 }  // namespace lamina::slice

@@ -17,7 +17,7 @@ struct Bridge {
 };
 
 /// All bridges that are short enough, shortest first.
-std::vector<Bridge> find_bridges(const Contours& open, Nm most) {
+std::vector<Bridge> find_bridges(const Contours& open, Nm maximum) {
   const std::uint32_t count = open.size();
   std::vector<std::uint32_t> by_x(count);  // chains by the x of their start
   std::iota(by_x.begin(), by_x.end(), 0u);
@@ -26,13 +26,13 @@ std::vector<Bridge> find_bridges(const Contours& open, Nm most) {
   std::vector<Bridge> bridges;
   for (std::uint32_t from = 0; from < count; ++from) {
     const Point2 end = open[from].back();
-    const auto first = std::ranges::lower_bound(by_x, std::int64_t{end.x} - most, {},
+    const auto first = std::ranges::lower_bound(by_x, std::int64_t{end.x} - maximum, {},
                                                 [&](std::uint32_t chain) { return std::int64_t{start_x(chain)}; });
-    for (auto it = first; it != by_x.end() && start_x(*it) <= std::int64_t{end.x} + most; ++it) {
+    for (auto it = first; it != by_x.end() && start_x(*it) <= std::int64_t{end.x} + maximum; ++it) {
       const Point2 start = open[*it].front();
       const std::int64_t dx = std::int64_t{start.x} - end.x, dy = std::int64_t{start.y} - end.y;
       const __int128 squared = static_cast<__int128>(dx) * dx + static_cast<__int128>(dy) * dy;
-      if (squared <= static_cast<__int128>(most) * most) bridges.push_back({squared, from, *it});
+      if (squared <= static_cast<__int128>(maximum) * maximum) bridges.push_back({squared, from, *it});
     }
   }
   std::ranges::sort(bridges, [](const Bridge& a, const Bridge& b) {
@@ -43,12 +43,12 @@ std::vector<Bridge> find_bridges(const Contours& open, Nm most) {
 
 }  // namespace
 
-GapReport close_gaps(Contours& open, Nm most, Contours& closed) {
+GapReport close_gaps(Contours& open, Nm maximum, Contours& closed) {
   GapReport report;
   const std::uint32_t count = open.size();
   if (count == 0) return report;
   std::vector<std::uint32_t> next(count, kNone), previous(count, kNone);
-  for (const Bridge& bridge : find_bridges(open, most)) {
+  for (const Bridge& bridge : find_bridges(open, maximum)) {
     if (next[bridge.from] != kNone || previous[bridge.to] != kNone) continue;
     next[bridge.from] = bridge.to;
     previous[bridge.to] = bridge.from;

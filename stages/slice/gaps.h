@@ -26,6 +26,6 @@ struct GapReport {
 /// (then by the chains' order); every end and start once. What has become a loop goes to `closed`; what has not stays
 /// in `open`, joined.
 /// cost  O(K log K) for K chains as a rule
-GapReport close_gaps(Contours& open, Nm most, Contours& closed);
+GapReport close_gaps(Contours& open, Nm maximum, Contours& closed);
 
 }  // namespace lamina::slice

@@ -7,9 +7,7 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/order.h"
 #include "stages/geometry/contours/simplify.h"
-#include "stages/geometry/contours/tidy.h"
 
 namespace lamina::slice {
 namespace {
@@ -46,17 +44,17 @@ Result<Slicer> Slicer::build(std::span<const Mesh> meshes, std::span<const Insta
 
   std::map<std::pair<std::uint32_t, Nm>, std::uint32_t> known;
   std::vector<std::int64_t> own_planes(planes.size());
-  std::vector<Source> sources;
+  std::vector<SourceMesh> sources;
   for (const Instance& instance : instances) {
     const Nm z = instance.offset.z;
     const auto [found, is_new] = known.emplace(std::pair(instance.mesh, z), static_cast<std::uint32_t>(sources.size()));
     if (is_new) {
       std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return std::int64_t{plane} - z; });
-      sources.push_back({instance.mesh, z, PlaneIndex(meshes[instance.mesh].triangles, own_planes)});
+      sources.push_back({instance.mesh, z, index_crossings(meshes[instance.mesh].triangles, own_planes)});
     }
     slicer.instances_.push_back({found->second, {instance.offset.x, instance.offset.y}});
   }
-  slicer.sources_ = std::make_shared<const std::vector<Source>>(std::move(sources));
+  slicer.sources_ = std::make_shared<const std::vector<SourceMesh>>(std::move(sources));
   slicer.group(body_of);
   return slicer;
 }
@@ -78,18 +76,18 @@ void Slicer::group(std::span<const std::uint32_t> body_of) {
   }
   for (std::uint32_t b = 0; b < bodies_; ++b) body_offset_[b + 1] += body_offset_[b];
   placed_.resize(body_offset_.back());
-  std::vector<std::uint32_t> place(body_offset_.begin(), body_offset_.end() - 1);
+  std::vector<std::uint32_t> position(body_offset_.begin(), body_offset_.end() - 1);
   for (std::size_t i = 0; i < body_of.size(); ++i) {
-    if (body_of[i] != kLeftOut) placed_[place[body_of[i]]++] = instances_[i];
+    if (body_of[i] != kLeftOut) placed_[position[body_of[i]]++] = instances_[i];
   }
 }
 
-void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& scratch, Contours& closed,
-                      LayerReport& report) const {
+void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
+                      SectionReport& report) const {
   const std::int64_t z = std::int64_t{planes_[plane]} - source.z;
   const std::span<const Triangle> triangles = meshes_[source.mesh].triangles;
   scratch.facets.clear();
-  source.index.find(plane, scratch.facets);
+  source.index.append(plane, scratch.facets);
   cut(triangles, scratch.facets, z, scratch.cuts);
   scratch.open.clear();
   chain(scratch.cuts, z, scratch.chain, closed, scratch.open);
@@ -99,12 +97,12 @@ void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& s
   report.gaps.add(gaps);
 }
 
-Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& report) const {
+Status Slicer::clean(Contours& contours, SectionScratch& scratch, SectionReport& report) const {
   tidy(contours);
   if (!find_contacts(contours, scratch.contact, scratch.group)) scratch.group.clear();
-  const auto united = nest(contours, options_.fill_rule, scratch.group);
-  if (!united) return united.error();
-  report.united += *united;
+  const auto merged = nest(contours, options_.fill_rule, scratch.group);
+  if (!merged) return merged.error();
+  report.merged += *merged;
   order_by_outer(contours);
   if (options_.offset != 0) {
     auto moved = offset_contours(contours, options_.offset);
@@ -115,8 +113,8 @@ Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& rep
   return {};
 }
 
-Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, LayerContours& out) const {
-  LayerReport report;
+Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch, LayerContours& out) const {
+  SectionReport report;
   out.contours.clear();
   out.body.assign(1, 0);
   scratch.of_source.resize(sources_->size());
@@ -154,7 +152,7 @@ Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, La
 
 std::uint64_t Slicer::index_bytes() const {
   std::uint64_t total = 0;
-  for (const Source& source : *sources_) total += source.index.bytes();
+  for (const SourceMesh& source : *sources_) total += source.index.bytes();
   return total;
 }
 
@@ -162,15 +160,15 @@ std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
   // Of a cut: its two edges, hashes and point; slots, links and states; its edge in the grid; its points before and after,
   // and once more while points are left out.
   const std::uint64_t of_cut = 48 + 16 + 8 + 16 + 5 + 24 + 24 + (options_.tolerance > 0 ? 48 : 0);
-  std::uint64_t most = 0;
-  std::vector<std::uint8_t> seen(sources_->size(), 0);
-  for (const Placed& placed : placed_) seen[placed.source] = 1;
-  for (std::size_t s = 0; s < seen.size(); ++s) {
-    if (seen[s] != 0) most += (*sources_)[s].index.most_facets(plane) * of_cut;
+  std::uint64_t maximum = 0;
+  std::vector<std::uint8_t> visited(sources_->size(), 0);
+  for (const Placed& placed : placed_) visited[placed.source] = 1;
+  for (std::size_t s = 0; s < visited.size(); ++s) {
+    if (visited[s] != 0) maximum += (*sources_)[s].index.max_found(plane) * of_cut;
   }
   std::uint64_t points = 0;
-  for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.most_facets(plane);
-  return most + points * sizeof(Point2);
+  for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.max_found(plane);
+  return maximum + points * sizeof(Point2);
 }
 
 }  // namespace lamina::slice

@@ -25,7 +25,6 @@
 #include "stages/slice/chain.h"
 #include "stages/slice/cut.h"
 #include "stages/slice/gaps.h"
-#include "stages/slice/plane_index.h"
 
 namespace lamina::slice {
 
@@ -44,14 +43,14 @@ struct LayerContours {
   ContoursView of(std::uint32_t b, Buffer<std::uint32_t>& rebased) const;
 };
 
-struct LayerReport {
+struct SectionReport {
   std::uint64_t cuts = 0;    // facets that the plane crosses, with copies once
-  std::uint32_t united = 0;  // groups of contours that needed a boolean operation
+  std::uint32_t merged = 0;  // groups of contours that needed a boolean operation
   GapReport gaps;            // sums over bodies; first_open of the first one
 };
 
 /// Buffers of a layer in flight, reused.
-struct LayerScratch {
+struct SectionScratch {
   Buffer<std::uint32_t> facets;
   Cuts cuts;
   ChainScratch chain;
@@ -81,7 +80,7 @@ class Slicer {
   Slicer regrouped(std::span<const std::uint32_t> body_of) const;
 
   /// The contours of plane p. Pure: the same for any thread and order.
-  Result<LayerReport> layer(std::uint32_t plane, LayerScratch& scratch, LayerContours& out) const;
+  Result<SectionReport> layer(std::uint32_t plane, SectionScratch& scratch, LayerContours& out) const;
 
   std::uint32_t planes() const { return static_cast<std::uint32_t>(planes_.size()); }
   std::uint32_t bodies() const { return bodies_; }
@@ -92,7 +91,7 @@ class Slicer {
 
  private:
   /// A mesh at a height: what copies share.
-  struct Source {
+  struct SourceMesh {
     std::uint32_t mesh;
     Nm z;
     PlaneIndex index;
@@ -102,15 +101,16 @@ class Slicer {
     std::uint32_t source;
     Point2 by;
   };
-  void loops_of(const Source& source, std::uint32_t plane, LayerScratch& scratch, Contours& closed, LayerReport& report) const;
-  Status clean(Contours& contours, LayerScratch& scratch, LayerReport& report) const;
+  void loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
+                SectionReport& report) const;
+  Status clean(Contours& contours, SectionScratch& scratch, SectionReport& report) const;
 
   std::span<const Mesh> meshes_;
   std::vector<Nm> planes_;
   SliceOptions options_;
   void group(std::span<const std::uint32_t> body_of);
 
-  std::shared_ptr<const std::vector<Source>> sources_;
+  std::shared_ptr<const std::vector<SourceMesh>> sources_;
   std::vector<Placed> instances_;           // as given
   std::vector<Placed> placed_;              // body by body
   std::vector<std::uint32_t> body_offset_;  // bodies + 1, into placed_

@@ -9,24 +9,24 @@
 
 #include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/tidy.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/slice/chain.h"
 #include "stages/slice/cut.h"
-#include "stages/slice/plane_index.h"
 
 namespace lamina::slice {
 namespace {
 
 /// A mesh at a height, and where its copies stand.
-struct Source {
+struct SharedMesh {
   std::span<const Triangle> triangles;
   std::int64_t z;
   PlaneIndex index;
   std::vector<Point2> by;
 };
 
-std::vector<Source> sources_of(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Nm> planes) {
-  std::vector<Source> sources;
+std::vector<SharedMesh> sources_of(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                   std::span<const Nm> planes) {
+  std::vector<SharedMesh> sources;
   std::map<std::pair<std::uint32_t, Nm>, std::size_t> known;
   std::vector<std::int64_t> own_planes(planes.size());
   for (const Instance& instance : instances) {
@@ -35,7 +35,7 @@ std::vector<Source> sources_of(std::span<const Mesh> meshes, std::span<const Ins
     if (is_new) {
       std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return plane - z; });
       const std::span<const Triangle> triangles = meshes[instance.mesh].triangles;
-      sources.push_back({triangles, z, PlaneIndex(triangles, own_planes), {}});
+      sources.push_back({triangles, z, index_crossings(triangles, own_planes), {}});
     }
     sources[found->second].by.push_back({instance.offset.x, instance.offset.y});
   }
@@ -50,12 +50,12 @@ struct Scratch {
   Contours own, open, all;
 };
 
-Result<double> surplus_area(std::span<const Source> sources, std::span<const Nm> planes, std::uint32_t plane,
+Result<double> surplus_area(std::span<const SharedMesh> sources, std::span<const Nm> planes, std::uint32_t plane,
                             Scratch& scratch) {
   scratch.all.clear();
-  for (const Source& source : sources) {
+  for (const SharedMesh& source : sources) {
     scratch.facets.clear(), scratch.own.clear(), scratch.open.clear();
-    source.index.find(plane, scratch.facets);
+    source.index.append(plane, scratch.facets);
     const std::int64_t z = planes[plane] - source.z;
     cut(source.triangles, scratch.facets, z, scratch.cuts);
     chain(scratch.cuts, z, scratch.chain, scratch.own, scratch.open);
@@ -69,7 +69,7 @@ Result<double> surplus_area(std::span<const Source> sources, std::span<const Nm>
   const __int128 wound = doubled_area(scratch.all);
   tidy(scratch.all);
   if (!find_contacts(scratch.all, scratch.contact, scratch.group)) scratch.group.clear();
-  if (const auto united = nest(scratch.all, FillRule::kNonzero, scratch.group); !united) return united.error();
+  if (const auto merged = nest(scratch.all, FillRule::kNonzero, scratch.group); !merged) return merged.error();
   return square_mm(doubled_area(scratch.all) - wound);
 }
 
@@ -77,7 +77,7 @@ Result<double> surplus_area(std::span<const Source> sources, std::span<const Nm>
 
 Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::span<const Instance> instances,
                                           std::span<const Nm> planes) {
-  const std::vector<Source> sources = sources_of(meshes, instances, planes);
+  const std::vector<SharedMesh> sources = sources_of(meshes, instances, planes);
   std::vector<double> areas(planes.size());
   std::vector<Status> status(planes.size());
   tbb::enumerable_thread_specific<Scratch> scratches;

@@ -77,7 +77,7 @@ std::uint64_t fingerprint(const VoxelView& box, const Turn& turn) {
 template <class Change>
 void for_each_change(const VoxelView& box, const Turn& turn, const Change& change) {
   const std::array<std::uint32_t, 3> size = box.size(), to = ordered(size, turn);
-  const auto row_of = [&](const Place& at) {  // at  in the box; its place along the rows does not matter
+  const auto row_of = [&](const CellIndex& at) {  // at  in the box; its place along the rows does not matter
     const std::size_t y = mirrored(at[turn.from[1]], to[1], turn.backwards[1]);
     return y + std::size_t{to[1]} * mirrored(at[turn.from[2]], to[2], turn.backwards[2]);
   };
@@ -97,7 +97,7 @@ void for_each_change(const VoxelView& box, const Turn& turn, const Change& chang
     std::span<const std::uint32_t> last, next;
     std::vector<std::uint32_t> unlike;
     for (std::uint32_t i = 0; i <= to[0]; ++i, last = next) {
-      Place at{};
+      CellIndex at{};
       at[3 - along] = fixed;
       at[along] = i < to[0] ? mirrored(i, to[0], turn.backwards[0]) : 0;
       next = i < to[0] ? box.row(at[1], at[2]) : std::span<const std::uint32_t>();
@@ -121,20 +121,20 @@ Result<VoxelStack> turned(const VoxelView& box, const Turn& turn) {
   if (changes > UINT32_MAX) return Error{Fault::kInput, "more walls than 2^32; take a smaller window or larger voxels"};
   result.row_offset = next;
   result.change.resize(changes);
-  for_each_change(box, turn, [&](std::size_t row, std::uint32_t place) { result.change[next[row]++] = place; });
+  for_each_change(box, turn, [&](std::size_t row, std::uint32_t position) { result.change[next[row]++] = position; });
   return result;
 }
 
 }  // namespace
 
-Place Turn::in_turned(const Place& in_box, const Place& size) const {
-  Place at{};
+CellIndex Turn::in_turned(const CellIndex& in_box, const CellIndex& size) const {
+  CellIndex at{};
   for (std::size_t c = 0; c < 3; ++c) at[c] = mirrored(in_box[from[c]], size[c], backwards[c]);
   return at;
 }
 
-Place Turn::in_box(const Place& in_turned, const Place& size) const {
-  Place at{};
+CellIndex Turn::in_box(const CellIndex& in_turned, const CellIndex& size) const {
+  CellIndex at{};
   for (std::size_t c = 0; c < 3; ++c) at[from[c]] = mirrored(in_turned[c], size[c], backwards[c]);
   return at;
 }
@@ -147,13 +147,13 @@ Result<Canonical> Canonical::of(const VoxelView& box, int axis, bool reversible)
   std::vector<std::uint64_t> prints(turns.size());
   tbb::parallel_for(std::size_t{0}, turns.size(), [&](std::size_t i) { prints[i] = fingerprint(box, turns[i]); });
   const auto rank = [&](std::size_t i) { return std::tuple(key(turns[i]), prints[i]); };
-  std::size_t least = 0;
+  std::size_t minimum = 0;
   for (std::size_t i = 1; i < turns.size(); ++i)
-    if (rank(i) < rank(least)) least = i;
+    if (rank(i) < rank(minimum)) minimum = i;
   Canonical result;
   result.box_ = box;
-  for (std::size_t i = least; i < turns.size(); ++i)
-    if (rank(i) == rank(least)) result.turns_.push_back(turns[i]);
+  for (std::size_t i = minimum; i < turns.size(); ++i)
+    if (rank(i) == rank(minimum)) result.turns_.push_back(turns[i]);
   result.turned_ = result.turn() != Turn();
   if (!result.turned_) return result;
   Result<VoxelStack> stack = turned(box, result.turn());

@@ -18,8 +18,8 @@ struct Turn {
 
   bool operator==(const Turn&) const = default;
   /// Where a voxel of the box lies in the turned box, whose sides are `size`; and back. Voxels of the flow or fine ones.
-  Place in_turned(const Place& in_box, const Place& size) const;
-  Place in_box(const Place& in_turned, const Place& size) const;
+  CellIndex in_turned(const CellIndex& in_box, const CellIndex& size) const;
+  CellIndex in_box(const CellIndex& in_turned, const CellIndex& size) const;
 };
 
 /// A box as it is solved: the axis of the force is kAxis, and of the turns and mirrors that leave that the one whose sides,

@@ -11,7 +11,7 @@
 namespace lamina::stokes {
 namespace {
 
-constexpr double kLeastYield = 0.2;
+constexpr double kMinYield = 0.2;
 
 /// Calls visit(row, begin, end) for all stretches of void.
 template <class Visit>
@@ -28,28 +28,28 @@ void for_each_void(const VoxelView& solid, const Visit& visit) {
 }
 
 /// Stretches of void of all rows, each with the number of its first cell.
-struct Stretches {
-  struct Stretch {
+struct CoveredSpans {
+  struct CellSpan {
     std::uint32_t begin, end, first;
   };
   Buffer<std::uint32_t> row_begin{0};
-  Buffer<Stretch> stretch;
+  Buffer<CellSpan> span;
 
-  explicit Stretches(const VoxelView& solid) {
+  explicit CoveredSpans(const VoxelView& solid) {
     std::uint32_t cells = 0;
     for_each_void(solid, [&](std::size_t r, std::uint32_t begin, std::uint32_t end) {
-      while (row_begin.size() <= r) row_begin.push_back(static_cast<std::uint32_t>(stretch.size()));
-      stretch.push_back({begin, end, cells});
+      while (row_begin.size() <= r) row_begin.push_back(static_cast<std::uint32_t>(span.size()));
+      span.push_back({begin, end, cells});
       cells += end - begin;
     });
-    while (row_begin.size() <= solid.rows()) row_begin.push_back(static_cast<std::uint32_t>(stretch.size()));
+    while (row_begin.size() <= solid.rows()) row_begin.push_back(static_cast<std::uint32_t>(span.size()));
     row_begin.front() = 0;
   }
-  std::span<const Stretch> row(std::size_t r) const { return {stretch.data() + row_begin[r], row_begin[r + 1] - row_begin[r]}; }
+  std::span<const CellSpan> row(std::size_t r) const { return {span.data() + row_begin[r], row_begin[r + 1] - row_begin[r]}; }
 };
 
 /// Joins each cell of one row with the one of another row that has the same x, which lies above it along an axis.
-void join_rows(std::span<const Stretches::Stretch> lower, std::span<const Stretches::Stretch> upper, int axis,
+void join_rows(std::span<const CoveredSpans::CellSpan> lower, std::span<const CoveredSpans::CellSpan> upper, int axis,
                const Buffer<std::uint32_t>& number, Cells& cells) {
   std::size_t u = 0;
   for (const auto& [begin, end, first] : lower) {
@@ -64,8 +64,8 @@ void join_rows(std::span<const Stretches::Stretch> lower, std::span<const Stretc
   }
 }
 
-void join_along_x(std::span<const Stretches::Stretch> row, std::uint32_t nx, bool periodic, const Buffer<std::uint32_t>& number,
-                  Cells& cells) {
+void join_along_x(std::span<const CoveredSpans::CellSpan> row, std::uint32_t nx, bool periodic,
+                  const Buffer<std::uint32_t>& number, Cells& cells) {
   for (const auto& [begin, end, first] : row) {
     for (std::uint32_t i = first; i + 1 < first + (end - begin); ++i) {
       cells.neighbour[number[i]][1] = number[i + 1];
@@ -80,11 +80,11 @@ void join_along_x(std::span<const Stretches::Stretch> row, std::uint32_t nx, boo
 }
 
 /// number  of the cells that stretches count row by row
-void join(const VoxelView& solid, const Stretches& stretches, const Buffer<std::uint32_t>& number, Cells& cells) {
+void join(const VoxelView& solid, const CoveredSpans& intervals, const Buffer<std::uint32_t>& number, Cells& cells) {
   for (std::uint32_t z = 0; z < solid.nz; ++z) {
     for (std::uint32_t y = 0; y < solid.ny; ++y) {
       const auto row_at = [&](std::uint32_t at_y, std::uint32_t at_z) {
-        return stretches.row(at_y % solid.ny + std::size_t{solid.ny} * (at_z % solid.nz));
+        return intervals.row(at_y % solid.ny + std::size_t{solid.ny} * (at_z % solid.nz));
       };
       const auto row = row_at(y, z);
       join_along_x(row, solid.nx, solid.periodic[0], number, cells);
@@ -115,7 +115,7 @@ std::uint32_t gathered(std::uint64_t x) {
 struct Placed {
   std::uint64_t key;
   std::uint32_t row_by_row;
-  Place place() const { return {gathered(key), gathered(key >> 1), gathered(key >> 2)}; }
+  CellIndex position() const { return {gathered(key), gathered(key >> 1), gathered(key >> 2)}; }
 };
 Buffer<Placed> in_order(const VoxelView& solid) {
   Buffer<Placed> cells;
@@ -158,7 +158,7 @@ void hold_by(const Walls& walls, const Buffer<Placed>& order, Cells& cells) {
   for_pieces(cells.size(), [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t i = begin; i < end; ++i) {
       cells.hold[i] = Cells::Hold{};
-      const Place at = order[i].place();
+      const CellIndex at = order[i].position();
       for (int a = 0; a < 3; ++a)
         cells.hold[i][a] =
             walls.open(at, a) ? static_cast<std::uint16_t>(walls.hold(at, a, weight) / Cells::kHold + 0.5) : Cells::kShut;
@@ -182,7 +182,7 @@ void yield_by(Cells& cells) {
         const std::uint32_t below = cells.neighbour[i][static_cast<std::size_t>(2 * a)];
         sum += through(i, a) + (below == cells.size() ? 0 : through(below, a));
       }
-      cells.hold[i][3] = static_cast<std::uint16_t>(std::max(kLeastYield, sum) / Cells::kHold + 0.5);
+      cells.hold[i][3] = static_cast<std::uint16_t>(std::max(kMinYield, sum) / Cells::kHold + 0.5);
     }
   });
 }
@@ -229,7 +229,7 @@ Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_
     const Buffer<Placed> order = in_order(solid);
     Buffer<std::uint32_t> number(count);
     for (std::uint32_t i = 0; i < none; ++i) number[order[i].row_by_row] = i;
-    join(solid, Stretches(solid), number, cells);
+    join(solid, CoveredSpans(solid), number, cells);
     hold_by(walls, order, cells);
     yield_by(cells);
     for (std::uint32_t i = 0; i < none; ++i) keys[i] = order[i].key;
@@ -238,11 +238,11 @@ Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_
   return grid;
 }
 
-Buffer<std::array<std::uint32_t, 3>> places_of(const VoxelView& fine, std::uint32_t factor) {
+Buffer<std::array<std::uint32_t, 3>> cell_positions(const VoxelView& fine, std::uint32_t factor) {
   const Buffer<Placed> order = in_order(where_nothing_passes(Walls(fine, factor), fine));
-  Buffer<Place> places(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) places[i] = order[i].place();
-  return places;
+  Buffer<CellIndex> positions(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) positions[i] = order[i].position();
+  return positions;
 }
 
 }  // namespace lamina::stokes

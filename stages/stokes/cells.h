@@ -59,6 +59,6 @@ Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_
 inline Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels) { return make_grid(solid, 1, levels); }
 
 /// The voxels in which the cells of such a grid lie, in their order. cost  O(cells log cells); 28 bytes a cell
-Buffer<std::array<std::uint32_t, 3>> places_of(const VoxelView& fine, std::uint32_t factor);
+Buffer<std::array<std::uint32_t, 3>> cell_positions(const VoxelView& fine, std::uint32_t factor);
 
 }  // namespace lamina::stokes

@@ -70,12 +70,12 @@ class MinimalResiduals {
     });
     const double alpha2 = s_ * delta + c_before_ * c_ * gamma_, alpha3 = s_before_ * gamma_;
     const auto less_v = static_cast<float>(delta / gamma_), less = static_cast<float>(alpha2 * w_scale_),
-               least = static_cast<float>(alpha3 * w_before_scale_), along = static_cast<float>(along_);
+               minimum = static_cast<float>(alpha3 * w_before_scale_), along = static_cast<float>(along_);
     change_residual([&](std::uint32_t i) {
       before_[i] -= less_v * v_[i];
       const Four w = w_[i];
       u[i] += along * w;
-      w_before_[i] = scale * z_[i] - least * w_before_[i] - less * w;
+      w_before_[i] = scale * z_[i] - minimum * w_before_[i] - less * w;
       return before_[i];
     });
     std::swap(v_, before_);
@@ -204,12 +204,12 @@ Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field
     for (int rounds = 0; rounds < 8; ++rounds) {
       const double before = std::exchange(flow.residual, run.start(field) / whole);
       const bool stuck = rounds > 0 && flow.residual > 0.5 * before;
-      if (flow.residual <= options.tolerance || flow.steps >= options.most_steps || stuck) break;
-      double told = flow.residual;
-      while (told > 0.5 * options.tolerance && flow.steps < options.most_steps) {
-        told = run.step(field) / whole;
+      if (flow.residual <= options.tolerance || flow.steps >= options.max_steps || stuck) break;
+      double reported = flow.residual;
+      while (reported > 0.5 * options.tolerance && flow.steps < options.max_steps) {
+        reported = run.step(field) / whole;
         ++flow.steps;
-        if (options.progress && !options.progress(flow.steps, told))
+        if (options.progress && !options.progress(flow.steps, reported))
           return Error{Fault::kInterrupted, "the flow was not computed to its end"};
       }
       run.finish(field);
@@ -219,7 +219,7 @@ Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field
   return flow;
 }
 
-double least_error(double porosity, double surface, std::uint32_t factor) {
+double error_floor(double porosity, double surface, std::uint32_t factor) {
   if (!(porosity > 0)) return 1;
   const double slit = surface / porosity, ball = porosity < 1 ? surface / (3 * (1 - porosity)) : 0, wall = 0.1 / factor;
   return std::max({0.5 * slit * slit, 3 * wall * slit, wall * ball});

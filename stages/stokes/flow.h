@@ -13,7 +13,7 @@ namespace lamina::stokes {
 
 struct FlowOptions {
   double tolerance = 1e-4;  // of the residual, relative; the permeability is as exact or better
-  std::uint32_t most_steps = 20'000;
+  std::uint32_t max_steps = 20'000;
   std::function<bool(std::uint32_t step, double residual)> progress;  // false ends the work; may be empty
 };
 
@@ -44,7 +44,7 @@ inline constexpr double kBytesMoved = 264;
 /// half of (voxel / radius)^2; and walls that are known to a tenth of a fine voxel at best, of a slit of that radius and of
 /// balls that have as much surface as the solid. surface  of walls, in squared voxels a voxel of the box factor   of
 /// make_grid()
-double least_error(double porosity, double surface, std::uint32_t factor);
+double error_floor(double porosity, double surface, std::uint32_t factor);
 
 /// The bytes that solve() and its grid take.
 std::uint64_t bytes_of_flow(std::uint64_t cells);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "stages/data/status.h"
 #include "stages/stokes/cells.h"
@@ -12,8 +13,8 @@
 namespace lamina::stokes {
 
 struct InertiaOptions {
-  double tolerance = 1e-4;         // of the velocities: what a creeping flow would change, relative
-  std::uint32_t most_rounds = 40;  // where it does not settle, the flow may have no steady state
+  double tolerance = 1e-4;        // of the velocities: what a creeping flow would change, relative
+  std::uint32_t max_rounds = 40;  // where it does not settle, the flow may have no steady state
   std::function<bool(std::uint32_t round, double change)> progress;  // false ends the work; may be empty
 };
 
@@ -41,5 +42,27 @@ Result<InertialFlow> solve_with_inertia(const Grid& grid, int axis, double inert
 
 /// The bytes that solve_with_inertia() and its grid take.
 std::uint64_t bytes_of_inertia(std::uint64_t cells);
+
+// --- how velocity grows with force, where inertia bends it.
+
+/// One flow, in units that make density, viscosity and the shortest edge of a voxel 1: forces per volume count in
+/// viscosity^2 / (density edge^3), velocities in viscosity / (density edge).
+struct SweepPoint {
+  double force = 0, velocity = 0;  // mean velocity over the whole box along the force
+  double excess = 0;               // force / what creeping flow of the same velocity takes, less 1
+  bool settled = false;
+};
+
+/// Flows at about `count` equal steps of velocity up to `most`, each started from the one before.
+/// most     velocity, above 0
+/// returns  fewer points where a flow does not settle: it is the last one then
+/// errors   kInterrupted: by options.progress
+/// cost     of a creeping flow and `count` times solve_with_inertia()
+Result<std::vector<SweepPoint>> sweep(const Grid& grid, int axis, double maximum, std::uint32_t count,
+                                      const InertiaOptions& options);
+
+/// The velocity up to which inertia takes more than velocity^2.5: weak inertia, where the excess force goes with the cube.
+/// source  C. C. Mei, J.-L. Auriault, "The effect of weak inertia on flow through a porous medium", J. Fluid Mech. 222 (1991)
+double weak_up_to(const std::vector<SweepPoint>& points);
 
 }  // namespace lamina::stokes

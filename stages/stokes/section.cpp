@@ -22,26 +22,26 @@ double speed(const Cells& cells, const Field& u, std::uint32_t i) {
 
 /// Voxels that something flows in, around a place of a plane, along its columns or its rows.
 std::uint32_t chord(const Plane& plane, std::uint32_t column, std::uint32_t row, bool along_columns) {
-  const std::uint32_t most = along_columns ? plane.columns : plane.rows, from = along_columns ? column : row;
+  const std::uint32_t maximum = along_columns ? plane.columns : plane.rows, from = along_columns ? column : row;
   const auto flows = [&](std::uint32_t i) {
     const std::uint32_t c = along_columns ? i : column, r = along_columns ? row : i;
     return plane.value[c + std::size_t{plane.columns} * r] != 0;
   };
   std::uint32_t low = from, high = from;
   while (low > 0 && flows(low - 1)) --low;
-  while (high + 1 < most && flows(high + 1)) ++high;
+  while (high + 1 < maximum && flows(high + 1)) ++high;
   return high - low + 1;
 }
 
 /// value(i)  of cell i
 template <class Value>
-Plane plane_of(const Buffer<At>& places, const At& size, const At& through, int normal, const Value& value) {
+Plane plane_of(const Buffer<At>& positions, const At& size, const At& through, int normal, const Value& value) {
   const auto n = static_cast<std::size_t>(normal), c = static_cast<std::size_t>(column_axis(normal)),
              r = static_cast<std::size_t>(row_axis(normal));
   Plane plane{normal, through[n], size[c], size[r], {}};
   plane.value.assign(std::size_t{size[c]} * size[r], 0.0f);
-  for (std::uint32_t i = 0; i < places.size(); ++i) {
-    const At& at = places[i];
+  for (std::uint32_t i = 0; i < positions.size(); ++i) {
+    const At& at = positions[i];
     if (at[n] == through[n] && at[c] < size[c] && at[r] < size[r])
       plane.value[at[c] + std::size_t{size[c]} * at[r]] = static_cast<float>(value(i));
   }
@@ -50,30 +50,30 @@ Plane plane_of(const Buffer<At>& places, const At& size, const At& through, int 
 
 }  // namespace
 
-Section section_of(CellPlaces turned, const Cells& cells, const Field& field, double mean, std::uint32_t ends) {
+Section section_of(CellPositions turned, const Cells& cells, const Field& field, double mean, std::uint32_t ends) {
   const int axis = turned.axis;
   const auto a = static_cast<std::size_t>(axis), lane = static_cast<std::size_t>(turned.lane);
-  Buffer<At>& places = turned.at;
+  Buffer<At>& positions = turned.at;
   At size = turned.size;
   size[a] -= 2 * ends;
   Section section{.size = size, .fastest = {}, .across = {}, .along = {}};
-  double most = -std::numeric_limits<double>::infinity();
-  for (std::uint32_t i = 0; i < places.size(); ++i) {
-    places[i][a] -= ends;  // what lies before the first end becomes larger than any size
-    if (places[i][a] >= size[a]) continue;
+  double maximum = -std::numeric_limits<double>::infinity();
+  for (std::uint32_t i = 0; i < positions.size(); ++i) {
+    positions[i][a] -= ends;  // what lies before the first end becomes larger than any size
+    if (positions[i][a] >= size[a]) continue;
     const double here = velocity(cells, field, i, lane);
-    if (here < most || (here == most && places[i] > section.fastest)) continue;
-    most = here;
-    section.fastest = places[i];
+    if (here < maximum || (here == maximum && positions[i] > section.fastest)) continue;
+    maximum = here;
+    section.fastest = positions[i];
   }
   section.across =
-      plane_of(places, size, section.fastest, axis, [&](std::uint32_t i) { return velocity(cells, field, i, lane) / mean; });
+      plane_of(positions, size, section.fastest, axis, [&](std::uint32_t i) { return velocity(cells, field, i, lane) / mean; });
   const int column = column_axis(axis), row = row_axis(axis);
   const std::uint32_t at_column = section.fastest[static_cast<std::size_t>(column)],
                       at_row = section.fastest[static_cast<std::size_t>(row)];
   const bool narrow_along_row =
       chord(section.across, at_column, at_row, false) < chord(section.across, at_column, at_row, true);
-  section.along = plane_of(places, size, section.fastest, narrow_along_row ? column : row,
+  section.along = plane_of(positions, size, section.fastest, narrow_along_row ? column : row,
                            [&](std::uint32_t i) { return speed(cells, field, i) / mean; });
   return section;
 }

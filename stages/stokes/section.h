@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 
-#include "stages/data/picture/plane.h"
 #include "stages/data/voxels.h"
 #include "stages/stokes/cells.h"
 #include "stages/stokes/operator.h"
@@ -20,8 +19,8 @@ struct Section {
 };
 
 /// How cells of a flow lie in the box that is drawn.
-struct CellPlaces {
-  Buffer<std::array<std::uint32_t, 3>> at;  // of each cell; places_of(), turned back into the box where it was turned
+struct CellPositions {
+  Buffer<std::array<std::uint32_t, 3>> at;  // of each cell; cell_positions(), turned back into the box where it was turned
   std::array<std::uint32_t, 3> size;        // of the box, voxels of the flow
   int axis;                                 // of the box, along which the force is
   int lane;                                 // of the field, with velocities along it
@@ -30,6 +29,6 @@ struct CellPlaces {
 /// mean  velocity that becomes 1
 /// ends  voxels of fluid before both ends of the axis: they are left out, and places count from behind the first ones
 /// cost  O(cells)
-Section section_of(CellPlaces places, const Cells& cells, const Field& field, double mean, std::uint32_t ends);
+Section section_of(CellPositions positions, const Cells& cells, const Field& field, double mean, std::uint32_t ends);
 
 }  // namespace lamina::stokes

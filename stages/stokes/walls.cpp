@@ -42,7 +42,7 @@ Walls::Walls(const VoxelView& fine, std::uint32_t factor)
       for (std::size_t i = 0; i < changes.size(); i += 2) set_bits(row, changes[i], changes[i + 1]);
     }
   });
-  for_each_voxel([&](const Place& at) {
+  for_each_voxel([&](const CellIndex& at) {
     std::uint32_t mask = 0;
     for (int a = 0; a < 3; ++a) {
       const std::array<std::int64_t, 3> below = below_face(at, a);
@@ -51,10 +51,10 @@ Walls::Walls(const VoxelView& fine, std::uint32_t factor)
     open_[index(at)] = static_cast<std::uint8_t>(mask);
   });
   Buffer<std::uint8_t> tight(open_.size());
-  for_each_voxel([&](const Place& at) {
+  for_each_voxel([&](const CellIndex& at) {
     tight[index(at)] = open_[index(at)];
     for (int a = 0; a < 3; ++a) {
-      Place below = at, above = at;
+      CellIndex below = at, above = at;
       const bool shut = open(at, a) && ((step(below, a, false) && film_within(at, a, below)) ||
                                         (step(above, a, true) && film_within(above, a, at)));
       if (shut) tight[index(at)] &= static_cast<std::uint8_t>(~(1u << a));
@@ -67,12 +67,12 @@ template <class Visit>
 void Walls::for_each_voxel(const Visit& visit) const {
   tbb::parallel_for(std::uint32_t{0}, size_[2], [&](std::uint32_t z) {
     for (std::uint32_t y = 0; y < size_[1]; ++y)
-      for (std::uint32_t x = 0; x < size_[0]; ++x) visit(Place{x, y, z});
+      for (std::uint32_t x = 0; x < size_[0]; ++x) visit(CellIndex{x, y, z});
   });
 }
 
 /// The fine voxel right below the middle of an upper face.
-std::array<std::int64_t, 3> Walls::below_face(const Place& at, int face) const {
+std::array<std::int64_t, 3> Walls::below_face(const CellIndex& at, int face) const {
   std::array<std::int64_t, 3> below{};
   for (std::size_t b = 0; b < 3; ++b)
     below[b] = std::int64_t{at[b]} * factor_ + (static_cast<int>(b) == face ? factor_ - 1 : factor_ / 2);
@@ -80,14 +80,14 @@ std::array<std::int64_t, 3> Walls::below_face(const Place& at, int face) const {
 }
 
 /// Whether solid parts the open faces of a voxel along an axis. below  the voxel before it
-bool Walls::film_within(const Place& at, int axis, const Place& below) const {
+bool Walls::film_within(const CellIndex& at, int axis, const CellIndex& below) const {
   return open(at, axis) && open(below, axis) && voids(below_face(at, axis), axis, false) < factor_;
 }
 
-bool Walls::passes(const Place& at) const {
+bool Walls::passes(const CellIndex& at) const {
   if (open_[index(at)] != 0) return true;
   for (int a = 0; a < 3; ++a) {
-    Place below = at;
+    CellIndex below = at;
     if (step(below, a, false) && open(below, a)) return true;
   }
   return false;
@@ -107,7 +107,7 @@ bool Walls::solid(std::array<std::int64_t, 3> at) const {
 }
 
 /// To the next voxel. false  there is none
-bool Walls::step(Place& at, int axis, bool up) const {
+bool Walls::step(CellIndex& at, int axis, bool up) const {
   const auto a = static_cast<std::size_t>(axis);
   const bool leaves = up ? at[a] + 1 == size_[a] : at[a] == 0;
   if (leaves && !periodic_[a]) return false;
@@ -127,20 +127,20 @@ std::uint32_t Walls::voids(std::array<std::int64_t, 3> from, int along, bool up)
 
 /// From the middle of an open face to a wall, in voxels, at most 1. Along the face it is the mean of what the fine voxels on
 /// its two sides see.
-double Walls::distance(const Place& at, int face, int along, bool up) const {
+double Walls::distance(const CellIndex& at, int face, int along, bool up) const {
   const std::array<std::int64_t, 3> below = below_face(at, face), above = moved(below, face, 1);
   if (along == face) return std::min(1.0, static_cast<double>(voids(up ? above : below, along, up)) / factor_);
-  const auto seen = [&](const std::array<std::int64_t, 3>& from) {
+  const auto detected = [&](const std::array<std::int64_t, 3>& from) {
     return (static_cast<double>(voids(from, along, up)) - 0.5) / factor_;
   };
-  return std::min(1.0, 0.5 * (seen(below) + seen(above)));
+  return std::min(1.0, 0.5 * (detected(below) + detected(above)));
 }
 
-double Walls::hold(const Place& at, int face, const std::array<double, 3>& weight) const {
+double Walls::hold(const CellIndex& at, int face, const std::array<double, 3>& weight) const {
   double sum = 0;
   for (int along = 0; along < 3; ++along) {
     for (const bool up : {false, true}) {
-      Place next = at;
+      CellIndex next = at;
       if (step(next, along, up) && open(next, face)) continue;
       sum += weight[static_cast<std::size_t>(along)] * (1 / std::max(kNearest, distance(at, face, along, up)) - 1);
     }

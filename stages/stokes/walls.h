@@ -11,7 +11,7 @@
 namespace lamina::stokes {
 
 /// Where a voxel lies, in voxels of the flow.
-using Place = std::array<std::uint32_t, 3>;
+using CellIndex = std::array<std::uint32_t, 3>;
 
 /// The upper faces of voxels that are `factor` fine ones wide. A face is open if its middle is in the void: neither of the two
 /// fine voxels that touch there is solid. Where solid parts the two open faces of a voxel, thinner than it, both are shut.
@@ -23,22 +23,24 @@ class Walls {
   Walls(const VoxelView& fine, std::uint32_t factor);
 
   std::array<std::uint32_t, 3> size() const { return size_; }
-  bool open(const Place& at, int axis) const { return (open_[index(at)] >> axis & 1) != 0; }
+  bool open(const CellIndex& at, int axis) const { return (open_[index(at)] >> axis & 1) != 0; }
   /// Whether any of a voxel's six faces is open.
-  bool passes(const Place& at) const;
+  bool passes(const CellIndex& at) const;
   /// How much more walls hold the velocity through an open face than its neighbours would: the sum of
   /// weight x (1 / distance - 1) of the sides where the next face of its kind is not open.
-  double hold(const Place& at, int face, const std::array<double, 3>& weight) const;
+  double hold(const CellIndex& at, int face, const std::array<double, 3>& weight) const;
 
  private:
   template <class Visit>
   void for_each_voxel(const Visit& visit) const;
-  std::array<std::int64_t, 3> below_face(const Place& at, int face) const;
-  bool film_within(const Place& at, int axis, const Place& below) const;
-  double distance(const Place& at, int face, int along, bool up) const;
-  std::size_t index(const Place& at) const { return at[0] + std::size_t{size_[0]} * (at[1] + std::size_t{size_[1]} * at[2]); }
+  std::array<std::int64_t, 3> below_face(const CellIndex& at, int face) const;
+  bool film_within(const CellIndex& at, int axis, const CellIndex& below) const;
+  double distance(const CellIndex& at, int face, int along, bool up) const;
+  std::size_t index(const CellIndex& at) const {
+    return at[0] + std::size_t{size_[0]} * (at[1] + std::size_t{size_[1]} * at[2]);
+  }
   bool solid(std::array<std::int64_t, 3> at) const;
-  bool step(Place& at, int axis, bool up) const;
+  bool step(CellIndex& at, int axis, bool up) const;
   std::uint32_t voids(std::array<std::int64_t, 3> from, int along, bool up) const;
 
   std::array<std::uint32_t, 3> size_, fine_;

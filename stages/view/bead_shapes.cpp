@@ -12,6 +12,20 @@
 #include "stages/geometry/clipping.h"
 
 namespace lamina::view {
+
+Ink ink_of(PathKind kind) {
+  constexpr Ink kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}, {127, 140, 141}};
+  return kInks[static_cast<std::size_t>(kind)];
+}
+
+Ink shade(const Ink& ink, std::size_t step, std::size_t steps) {
+  if (steps < 2) return ink;
+  const double paper = 0.6 * static_cast<double>(steps - 1 - step) / static_cast<double>(steps - 1);
+  Ink mixed{};
+  for (std::size_t c = 0; c < mixed.size(); ++c) mixed[c] = static_cast<std::uint8_t>(ink[c] + (255 - ink[c]) * paper);
+  return mixed;
+}
+
 namespace {
 
 constexpr std::array<std::pair<PathKind, std::string_view>, 5> kKinds = {{{PathKind::kOuter, "outer wall"},
@@ -45,7 +59,7 @@ Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
   return all;
 }
 
-constexpr std::size_t kMostShades = 4;
+constexpr std::size_t kMaxShades = 4;
 
 /// The words that slicers use: PrusaSlicer and Slic3r, CuraEngine, Orca.
 PathKind kind_of(const std::string& type) {
@@ -60,15 +74,15 @@ PathKind kind_of(const std::string& type) {
 }
 
 /// The beads of one type, width by width, joined where one begins at the end of another.
-std::map<Nm, Contours> lines_by_width(std::span<const LaidBead> beads, std::uint32_t type) {
+std::map<Nm, Contours> lines_by_width(std::span<const DepositedBead> beads, std::uint32_t type) {
   std::map<Nm, Contours> lines;
-  const LaidBead* last = nullptr;
+  const DepositedBead* last = nullptr;
   const auto end_line = [&] {
     if (last == nullptr) return;
     lines[last->width].close();
     last = nullptr;
   };
-  for (const LaidBead& bead : beads) {
+  for (const DepositedBead& bead : beads) {
     if (bead.type != type) {
       end_line();
       continue;
@@ -90,7 +104,7 @@ struct WidthRange {
 };
 
 /// The ranges of one shade each, from narrow to wide: widths that differ by what rounding does (0.03 mm or 5 % of the
-/// narrowest) are one; equal parts of all where that leaves more than kMostShades.
+/// narrowest) are one; equal parts of all where that leaves more than kMaxShades.
 std::vector<WidthRange> shades_of(const std::map<Nm, Contours>& lines) {
   std::vector<WidthRange> ranges;
   for (const auto& [width, line] : lines) {
@@ -99,19 +113,19 @@ std::vector<WidthRange> shades_of(const std::map<Nm, Contours>& lines) {
     }
     ranges.back().wide = width;
   }
-  if (ranges.size() <= kMostShades) return ranges;
-  const Nm least = lines.begin()->first, most = lines.rbegin()->first;
-  ranges.assign(kMostShades, {INT32_MAX, 0});
+  if (ranges.size() <= kMaxShades) return ranges;
+  const Nm minimum = lines.begin()->first, maximum = lines.rbegin()->first;
+  ranges.assign(kMaxShades, {INT32_MAX, 0});
   for (const auto& [width, line] : lines) {
-    const std::int64_t part = (width - least) * static_cast<std::int64_t>(kMostShades) / (most - least);
-    WidthRange& range = ranges[std::min(kMostShades - 1, static_cast<std::size_t>(part))];
+    const std::int64_t part = (width - minimum) * static_cast<std::int64_t>(kMaxShades) / (maximum - minimum);
+    WidthRange& range = ranges[std::min(kMaxShades - 1, static_cast<std::size_t>(part))];
     range = {std::min(range.narrow, width), width};
   }
   return ranges;
 }
 
-Status add_type(std::span<const LaidBead> laid, std::uint32_t type, const std::string& name, LayerShapes& shapes) {
-  const std::map<Nm, Contours> lines = lines_by_width(laid, type);
+Status add_type(std::span<const DepositedBead> deposited, std::uint32_t type, const std::string& name, LayerShapes& shapes) {
+  const std::map<Nm, Contours> lines = lines_by_width(deposited, type);
   const std::vector<WidthRange> ranges = shades_of(lines);
   auto line = lines.begin();
   for (std::size_t step = 0; step < ranges.size(); ++step) {
@@ -143,9 +157,9 @@ Status add_paths(const ToolpathsView& paths, LayerShapes& shapes) {
   return {};
 }
 
-Status add_beads(std::span<const LaidBead> beads, std::span<const std::string> types, LayerShapes& shapes) {
+Status add_beads(std::span<const DepositedBead> beads, std::span<const std::string> types, LayerShapes& shapes) {
   std::vector<std::uint32_t> order;
-  for (const LaidBead& bead : beads) {
+  for (const DepositedBead& bead : beads) {
     if (std::ranges::find(order, bead.type) == order.end()) order.push_back(bead.type);
   }
   for (const std::uint32_t type : order) {
@@ -154,9 +168,9 @@ Status add_beads(std::span<const LaidBead> beads, std::span<const std::string> t
   return {};
 }
 
-double length_mm(std::span<const LaidBead> beads) {
+double length_mm(std::span<const DepositedBead> beads) {
   double length = 0;
-  for (const LaidBead& bead : beads) {
+  for (const DepositedBead& bead : beads) {
     length += std::hypot(mm(std::int64_t{bead.to.x} - bead.from.x), mm(std::int64_t{bead.to.y} - bead.from.y));
   }
   return length;

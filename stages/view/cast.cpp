@@ -8,27 +8,27 @@
 #include <cmath>
 #include <limits>
 
-#include "stages/data/handles/embree.h"
+#include "stages/support/late/embree.h"
 
 namespace lamina::view {
 namespace {
 
-using Vector = std::array<float, 3>;
+using RayVector = std::array<float, 3>;
 
 /// Which axis of the bed is to the right, up and towards whoever looks, and which way.
-struct Frame {
+struct ViewFrame {
   int right, up, towards;
   float sign;  // of `towards`
 };
-constexpr Frame frame_of(Side side) {
-  if (side == Side::kTop) return {0, 1, 2, 1};
-  if (side == Side::kFront) return {0, 2, 1, -1};
+constexpr ViewFrame frame_of(ViewSide side) {
+  if (side == ViewSide::kTop) return {0, 1, 2, 1};
+  if (side == ViewSide::kFront) return {0, 2, 1, -1};
   return {1, 2, 0, 1};
 }
 
 /// Where the light comes from: left, above, and from behind whoever looks. Unit length; the rest is never quite dark.
-constexpr Vector kLight = {-0.35f, 0.45f, 0.82f};
-constexpr float kLeastLight = 0.15f;
+constexpr RayVector kLight = {-0.35f, 0.45f, 0.82f};
+constexpr float kMinLight = 0.15f;
 constexpr float kDepthShade = 0.4f;
 
 float float_mm(std::int64_t nm) { return static_cast<float>(mm(nm)); }
@@ -65,8 +65,8 @@ struct Caster::State {
   bool add_mesh(const Mesh& mesh) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     const std::size_t count = mesh.triangles.size();
-    auto* corners = static_cast<Vector*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vector), 3 * count));
+    auto* corners = static_cast<RayVector*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(RayVector), 3 * count));
     auto* indices = static_cast<unsigned*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), count));
     if (corners == nullptr || indices == nullptr) {
@@ -84,12 +84,12 @@ struct Caster::State {
   }
 
   /// How light the facet is that a ray meets first; negative if it meets none. The parts lie between the two depths, mm.
-  float light(const Frame& frame, const Vector& origin, float first_depth, float last_depth) const {
+  float light(const ViewFrame& frame, const RayVector& origin, float first_depth, float last_depth) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit ray{};
     ray.ray.org_x = origin[0], ray.ray.org_y = origin[1], ray.ray.org_z = origin[2];
-    Vector way{};
+    RayVector way{};
     way[static_cast<std::size_t>(frame.towards)] = -frame.sign;
     ray.ray.dir_x = way[0], ray.ray.dir_y = way[1], ray.ray.dir_z = way[2];
     ray.ray.tfar = std::numeric_limits<float>::infinity();
@@ -97,10 +97,10 @@ struct Caster::State {
     ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene, &context, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return -1;
-    const Vector normal = {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z};
+    const RayVector normal = {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z};
     const auto of = [&](int axis) { return normal[static_cast<std::size_t>(axis)]; };
     const float length = std::hypot(normal[0], normal[1], normal[2]);
-    if (!(length > 0)) return kLeastLight;
+    if (!(length > 0)) return kMinLight;
     // A facet that is turned over looks like one that is not.
     const float turned = of(frame.towards) * frame.sign < 0 ? -1.0f : 1.0f;
     const float lit =
@@ -108,7 +108,7 @@ struct Caster::State {
     // What lies deeper is darker, so that faces which look the same way can be told apart.
     const float depth = (ray.ray.tfar - first_depth) / std::max(last_depth - first_depth, 1e-6f);
     const float near = 1 - kDepthShade * std::clamp(depth, 0.0f, 1.0f);
-    return (kLeastLight + (1 - kLeastLight) * std::max(0.0f, lit / length)) * near;
+    return (kMinLight + (1 - kMinLight) * std::max(0.0f, lit / length)) * near;
   }
 };
 
@@ -147,15 +147,15 @@ Result<Caster> Caster::build(std::span<const Mesh> meshes, std::span<const Insta
   return caster;
 }
 
-Picture Caster::look(Side side, std::uint32_t most) const {
-  const Frame frame = frame_of(side);
+Picture Caster::render(ViewSide side, std::uint32_t maximum) const {
+  const ViewFrame frame = frame_of(side);
   const Box& box = state_->box;
-  const Vector lo = {float_mm(box.lo.x), float_mm(box.lo.y), float_mm(box.lo.z)};
-  const Vector hi = {float_mm(box.hi.x), float_mm(box.hi.y), float_mm(box.hi.z)};
+  const RayVector lo = {float_mm(box.lo.x), float_mm(box.lo.y), float_mm(box.lo.z)};
+  const RayVector hi = {float_mm(box.hi.x), float_mm(box.hi.y), float_mm(box.hi.z)};
   const auto extent = [&](int axis) { return hi[static_cast<std::size_t>(axis)] - lo[static_cast<std::size_t>(axis)]; };
-  const float longest = std::max({extent(0), extent(1), extent(2), 1e-6f}), pixel = longest / static_cast<float>(most);
+  const float longest = std::max({extent(0), extent(1), extent(2), 1e-6f}), pixel = longest / static_cast<float>(maximum);
   const auto pixels = [&](int axis) {
-    return std::clamp(static_cast<std::uint32_t>(std::ceil(extent(axis) / pixel)), 1u, most);
+    return std::clamp(static_cast<std::uint32_t>(std::ceil(extent(axis) / pixel)), 1u, maximum);
   };
   Picture picture;
   picture.width = pixels(frame.right);
@@ -166,12 +166,12 @@ Picture Caster::look(Side side, std::uint32_t most) const {
   const auto right = static_cast<std::size_t>(frame.right), up = static_cast<std::size_t>(frame.up);
   const auto towards = static_cast<std::size_t>(frame.towards);
   tbb::parallel_for(0u, picture.height, [&](std::uint32_t row) {
-    std::uint8_t* place = picture.light_cover.data() + std::size_t{2} * picture.width * row;
+    std::uint8_t* position = picture.light_cover.data() + std::size_t{2} * picture.width * row;
     for (std::uint32_t column = 0; column < picture.width; ++column) {
       float sum = 0;
       int hits = 0;
       for (const auto& [x, y] : {std::pair{0.25f, 0.25f}, {0.75f, 0.25f}, {0.25f, 0.75f}, {0.75f, 0.75f}}) {
-        Vector origin{};
+        RayVector origin{};
         origin[right] = lo[right] + (static_cast<float>(column) + x) / static_cast<float>(picture.width) * extent(frame.right);
         origin[up] = hi[up] - (static_cast<float>(row) + y) / static_cast<float>(picture.height) * extent(frame.up);
         origin[towards] = (frame.sign > 0 ? hi : lo)[towards] + frame.sign * longest;
@@ -180,8 +180,8 @@ Picture Caster::look(Side side, std::uint32_t most) const {
         sum += light;
         ++hits;
       }
-      *place++ = hits == 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(std::lround(255 * sum / static_cast<float>(hits)));
-      *place++ = static_cast<std::uint8_t>(std::min(255, 64 * hits));
+      *position++ = hits == 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(std::lround(255 * sum / static_cast<float>(hits)));
+      *position++ = static_cast<std::uint8_t>(std::min(255, 64 * hits));
     }
   });
   return picture;

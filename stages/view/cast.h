@@ -15,7 +15,7 @@
 namespace lamina::view {
 
 /// From above with the front of the bed below; from the front; from the right with the front on the left.
-enum class Side : std::uint8_t { kTop, kFront, kRight };
+enum class ViewSide : std::uint8_t { kTop, kFront, kRight };
 
 struct Picture {
   std::uint32_t width = 0, height = 0;    // pixels
@@ -34,7 +34,7 @@ class Caster {
 
   /// The view, with `most` pixels along the longest side of the box around all parts (the same scale for every view).
   /// cost  4 rays per pixel, on all processors
-  Picture look(Side side, std::uint32_t most) const;
+  Picture render(ViewSide side, std::uint32_t maximum) const;
 
  private:
   Caster();

@@ -20,9 +20,9 @@ Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const 
   }
   if (const auto every = choice.every) {
     const std::size_t cells = (layers.size() + *every - 1) / *every;
-    if (cells > kMostCells) {
+    if (cells > kMaxCells) {
       return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more", *every,
-                                              cells, (layers.size() + kMostCells - 1) / kMostCells)};
+                                              cells, (layers.size() + kMaxCells - 1) / kMaxCells)};
     }
     for (std::size_t i = 0; i < layers.size(); i += *every) chosen.push_back(i);
     return chosen;

@@ -9,7 +9,7 @@
 
 namespace lamina::view {
 
-inline constexpr std::uint32_t kMostCells = 400;  // of a picture
+inline constexpr std::uint32_t kMaxCells = 400;  // of a picture
 
 /// One layer, every n-th layer, or a number of layers over the height (default 12); at most one is set.
 struct LayerChoice {

@@ -6,7 +6,7 @@
 namespace lamina::view {
 namespace {
 
-constexpr std::uint32_t kMost = 360;
+constexpr std::uint32_t kMax = 360;
 
 }  // namespace
 
@@ -15,21 +15,21 @@ ThreeViews::ThreeViews(const PixelGrid& grid, const PixelWindow& window, Nm bott
   const double width = window.width() / grid.x.pixels_per_nm(), depth = window.height() / grid.y.pixels_per_nm();
   const double height = static_cast<double>(std::int64_t{top} - bottom), longest = std::max({width, depth, height});
   const auto cells = [&](double side) {
-    return std::clamp(static_cast<std::uint32_t>(std::lround(side / longest * kMost)), 1u, kMost);
+    return std::clamp(static_cast<std::uint32_t>(std::lround(side / longest * kMax)), 1u, kMax);
   };
   columns_ = cells(width);
   rows_ = cells(depth);
   levels_ = cells(height);
-  const auto view = [&](const char* name, std::uint32_t w, std::uint32_t h, std::uint32_t most, double w_nm, double h_nm) {
-    return DepthView{name, w, h, most, w_nm / kNmPerMm, h_nm / kNmPerMm, std::vector<std::uint16_t>(std::size_t{w} * h)};
+  const auto view = [&](const char* name, std::uint32_t w, std::uint32_t h, std::uint32_t maximum, double w_nm, double h_nm) {
+    return DepthView{name, w, h, maximum, w_nm / kNmPerMm, h_nm / kNmPerMm, std::vector<std::uint16_t>(std::size_t{w} * h)};
   };
   views_ = {view("top", columns_, rows_, levels_, width, depth), view("front", columns_, levels_, rows_, width, height),
             view("side", rows_, levels_, columns_, depth, height)};
 }
 
-void ThreeViews::look(const RunsView& runs, std::vector<std::uint8_t>& cells) const {
+void ThreeViews::inspect(const RunsView& runs, std::vector<std::uint8_t>& cells) const {
   cells.resize(std::size_t{columns_} * rows_);
-  coverage(runs, window_, columns_, cells);
+  box_coverage(runs, window_, columns_, cells);
 }
 
 void ThreeViews::add(const Layer& layer, const std::vector<std::uint8_t>& cells) {

@@ -16,7 +16,7 @@ namespace lamina::view {
 /// Nearness of the surface in each pixel of a view; 0 without a surface. Rows from the top.
 struct DepthView {
   std::string name;  // top, front, side
-  std::uint32_t width = 0, height = 0, most = 1;
+  std::uint32_t width = 0, height = 0, maximum = 1;
   double width_mm = 0, height_mm = 0;
   std::vector<std::uint16_t> depth;
 };
@@ -32,7 +32,7 @@ class ThreeViews {
   std::uint32_t rows() const { return rows_; }
 
   /// The coverage of a layer, columns() x rows() values; for any thread.
-  void look(const RunsView& runs, std::vector<std::uint8_t>& cells) const;
+  void inspect(const RunsView& runs, std::vector<std::uint8_t>& cells) const;
   /// Adds a sampled layer; in any order, from one thread at a time.
   void add(const Layer& layer, const std::vector<std::uint8_t>& cells);
 

@@ -4,15 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
-#include "stages/data/picture/ticks.h"
-#include "stages/view/colour_scale.h"
+#include "stages/data/plot.h"
 
 namespace lamina::view {
 namespace {
 
 constexpr int kMargin = 24, kSide = 540, kGap = 40, kFoot = 34, kHead = 22;  // pixels; of a panel: side, below, above
-constexpr int kBarGap = 28, kBarWidth = 18, kBarRoom = 110;
+constexpr int kBarGap = 28, kBarWidth = 18, kBarSpace = 110;
 constexpr int kShades = 200;
 constexpr const char *kInk = "2b2f36", *kPale = "6b7280";
 enum Pixel : std::uint8_t { kDarkGrey, kPaleGrey, kThrough, kClosed, kLine, kFirstShade };
@@ -54,7 +54,7 @@ Panel panel_of(const PorePicture& picture, int normal) {
     panel.shown[k] = length;
     if (!box.periodic[a]) continue;
     panel.shown[k] *= static_cast<double>(alone ? 2 : std::lround(longer / length));
-    panel.from[k] = (picture.place[a] + 0.5) * mm(box.edge[a]) - panel.shown[k] / 2;
+    panel.from[k] = (picture.position[a] + 0.5) * mm(box.edge[a]) - panel.shown[k] / 2;
   }
   panel.scale = std::min(kSide / panel.shown[0], kSide / panel.shown[1]);
   panel.columns = std::max(1, static_cast<int>(std::lround(panel.scale * panel.shown[0])));
@@ -84,13 +84,13 @@ double value_at(const Plane& plane, double column, double row, bool around_colum
   return (1 - r.share) * in_row(r.low) + r.share * in_row(r.high);
 }
 
-struct Range {
+struct ValueRange {
   double low = 0, high = 1;
 };
 
 /// Of both sections; below 0 only if something flows back that the colours can tell.
-Range range_of(const PorePicture& picture) {
-  Range range{0, 0};
+ValueRange range_of(const PorePicture& picture) {
+  ValueRange range{0, 0};
   for (const Plane* plane : {picture.across, picture.along}) {
     for (const float value : plane->value) {
       range.low = std::min<double>(range.low, value);
@@ -111,7 +111,7 @@ struct Point {
 
 Point point_at(const PorePicture& picture, const Panel& panel, int column, int row) {
   Point point;
-  point.voxel = picture.place;
+  point.voxel = picture.position;
   double tiles_of_z = 0, z = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const std::size_t a = panel.axis[k];
@@ -131,7 +131,7 @@ Point point_at(const PorePicture& picture, const Panel& panel, int column, int r
 }
 
 /// plane  none: solid and void, else by its values
-Plot::Image image_of(const PorePicture& picture, const Panel& panel, const Plane* plane, const Range& range) {
+Plot::Image image_of(const PorePicture& picture, const Panel& panel, const Plane* plane, const ValueRange& range) {
   const auto& around = picture.solid.periodic;
   Plot::Image image{panel.left, panel.top, panel.columns, palette(), {}};
   image.pixels.reserve(static_cast<std::size_t>(panel.columns) * static_cast<std::size_t>(panel.rows));
@@ -185,7 +185,7 @@ void draw_lines(const PorePicture& picture, const Panel& panel, Plot::Image& ima
 void mark_cut(const PorePicture& picture, const Panel& panel, int normal, Plot& plot) {
   const auto a = static_cast<std::size_t>(normal);
   const std::size_t k = panel.axis[0] == a ? 0 : 1;
-  const double mm_from = (picture.place[a] + 0.5) * mm(picture.solid.edge[a]) - panel.from[k];
+  const double mm_from = (picture.position[a] + 0.5) * mm(picture.solid.edge[a]) - panel.from[k];
   const double share = mm_from / panel.shown[k], right = panel.left + panel.columns, bottom = panel.top + panel.rows;
   if (k == 0) {
     const double x = panel.left + share * panel.columns;
@@ -198,7 +198,7 @@ void mark_cut(const PorePicture& picture, const Panel& panel, int normal, Plot& 
   }
 }
 
-void add_panel(const PorePicture& picture, const Panel& panel, const Plane* plane, const Range& range,
+void add_panel(const PorePicture& picture, const Panel& panel, const Plane* plane, const ValueRange& range,
                const std::string& caption, Plot& plot) {
   plot.images.push_back(image_of(picture, panel, plane, range));
   if (plane == nullptr && panel.normal == 2) draw_lines(picture, panel, plot.images.back());
@@ -212,7 +212,7 @@ void add_panel(const PorePicture& picture, const Panel& panel, const Plane* plan
                         fmt::format("{} to the right, {} upwards", "xyz"[panel.axis[0]], "xyz"[panel.axis[1]])});
 }
 
-void add_scale(int left, int top, int rows, const Range& range, Plot& plot) {
+void add_scale(int left, int top, int rows, const ValueRange& range, Plot& plot) {
   Plot::Image bar{left, top, kBarWidth, palette(), {}};
   for (int row = 0; row < rows; ++row) {
     const auto shade = std::lround((rows - row - 0.5) / rows * (kShades - 1));
@@ -255,7 +255,7 @@ void add_legend(const PorePicture& picture, int top, Plot& plot) {
 
 Plot draw_pores(const PorePicture& picture) {
   Plot plot;
-  plot.width = kMargin + 2 * kSide + kGap + kBarGap + kBarRoom;
+  plot.width = kMargin + 2 * kSide + kGap + kBarGap + kBarSpace;
   plot.texts.push_back({kMargin, 36, 20, Plot::Anchor::kStart, kInk, picture.title});
   int top = 40;
   for (const std::string& line : picture.captions)
@@ -265,7 +265,7 @@ Plot draw_pores(const PorePicture& picture) {
   const auto where = [&](int normal) {
     const auto a = static_cast<std::size_t>(normal);
     return fmt::format("{} = {:.3f} mm", "xyz"[normal],
-                       picture.corner_mm[a] + (picture.place[a] + 0.5) * mm(picture.solid.edge[a]));
+                       picture.corner_mm[a] + (picture.position[a] + 0.5) * mm(picture.solid.edge[a]));
   };
   across.left = kMargin;
   along.left = kMargin + kSide + kGap;
@@ -276,7 +276,7 @@ Plot draw_pores(const PorePicture& picture) {
   };
   const bool flows = picture.across != nullptr && picture.along != nullptr;
   if (flows) {
-    const Range range = range_of(picture);
+    const ValueRange range = range_of(picture);
     next_row();
     add_panel(picture, across, picture.across, range,
               fmt::format("(a) velocity along {} where it is fastest, {}", axis, where(picture.axis)), plot);
@@ -297,6 +297,31 @@ Plot draw_pores(const PorePicture& picture) {
   add_legend(picture, top + 4, plot);
   plot.height = top + 40;
   return plot;
+}
+
+namespace {
+
+/// Of linear light 0 .. 1, as sRGB has it (IEC 61966-2-1).
+int byte_of(double light) {
+  light = std::clamp(light, 0.0, 1.0);
+  const double value = light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+  return static_cast<int>(std::lround(255 * value));
+}
+
+}  // namespace
+
+std::string scale_colour(double share) {
+  share = std::clamp(share, 0.0, 1.0);
+  const double lightness = 0.22 + 0.74 * share, hue = (270 + 200 * share) * std::numbers::pi / 180;
+  const double chroma = 0.07 + 0.11 * std::sin(std::numbers::pi * std::min(1.0, 0.1 + share));
+  const double a = chroma * std::cos(hue), b = chroma * std::sin(hue);
+  const auto cubed = [](double x) { return x * x * x; };
+  const double l = cubed(lightness + 0.3963377774 * a + 0.2158037573 * b),
+               m = cubed(lightness - 0.1055613458 * a - 0.0638541728 * b),
+               s = cubed(lightness - 0.0894841775 * a - 1.2914855480 * b);
+  return fmt::format("{:02x}{:02x}{:02x}", byte_of(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s),
+                     byte_of(-1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s),
+                     byte_of(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s));
 }
 
 }  // namespace lamina::view

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "stages/data/contours.h"  // points
-#include "stages/data/picture/plane.h"
-#include "stages/data/picture/plot.h"
+#include "stages/data/plot.h"
 #include "stages/data/voxels.h"
 
 namespace lamina::view {
@@ -21,7 +20,7 @@ struct PorePicture {
   std::string solid_name = "solid";
   int axis = 2;                              // of the flow
   int normal = 1;                            // of the section along it
-  std::array<std::uint32_t, 3> place{};      // where sections meet, in voxels of the solid
+  std::array<std::uint32_t, 3> position{};   // where sections meet, in voxels of the solid
   std::array<double, 3> corner_mm{};         // where the box begins
   VoxelView solid, through;                  // of one size; void that leads through along the axis
   const Plane* across = nullptr;             // velocity along the axis / its mean, none: no flow; over the whole box
@@ -33,5 +32,13 @@ struct PorePicture {
 /// About 1280 pixels wide. What repeats is drawn around the place, several times where it is much shorter than the other
 /// side of its section. cost  parallel to nothing; some 2e6 pixels, each looked up in a row of runs
 Plot draw_pores(const PorePicture& picture);
+
+// --- colours for numbers, in which equal steps look equal.
+
+/// "rrggbb" of a share 0 .. 1: from dark blue over violet and orange to light yellow, ever lighter, so that it reads in grey
+/// too. Lightness, hue and chroma go evenly in the colour space OKLab.
+///
+/// source  B. Ottosson, "A perceptual color space for image processing" (2020)
+std::string scale_colour(double share);
 
 }  // namespace lamina::view

@@ -8,50 +8,51 @@
 namespace lamina::arrange {
 namespace {
 
-std::vector<Place> placed(const std::vector<BoxRequest>& boxes, std::int64_t width, std::int64_t depth, std::int64_t gap) {
-  const auto places = place_boxes(boxes, width, depth, gap);
-  EXPECT_TRUE(places.ok()) << places.error().message;
-  return places.ok() ? *places : std::vector<Place>{};
+std::vector<BoxPosition> placed(const std::vector<BoxRequest>& boxes, std::int64_t width, std::int64_t depth,
+                                std::int64_t gap) {
+  const auto positions = arrange_boxes(boxes, width, depth, gap);
+  EXPECT_TRUE(positions.ok()) << positions.error().message;
+  return positions.ok() ? *positions : std::vector<BoxPosition>{};
 }
 
-TEST(Placement, SinglePartStandsInTheMiddleRoundedDown) {
-  const auto places = placed({{.width = 3, .depth = 4}}, 10, 10, 5);
-  ASSERT_EQ(places.size(), 1u);
-  EXPECT_EQ(places[0].x, 3);
-  EXPECT_EQ(places[0].y, 3);
+TEST(Placement, SinglePartIsInTheMiddleRoundedDown) {
+  const auto positions = placed({{.width = 3, .depth = 4}}, 10, 10, 5);
+  ASSERT_EQ(positions.size(), 1u);
+  EXPECT_EQ(positions[0].x, 3);
+  EXPECT_EQ(positions[0].y, 3);
 }
 
 TEST(Placement, PartAsLargeAsTheBedFitsAndOneNanometreMoreDoesNot) {
-  EXPECT_TRUE(place_boxes(std::vector<BoxRequest>{{.width = 10, .depth = 10}}, 10, 10, 5).ok());
+  EXPECT_TRUE(arrange_boxes(std::vector<BoxRequest>{{.width = 10, .depth = 10}}, 10, 10, 5).ok());
   for (const auto& [width, depth] : {std::pair{11, 10}, {10, 11}}) {
-    const auto places = place_boxes(std::vector<BoxRequest>{{.width = width, .depth = depth, .name = "a.stl"}}, 10, 10, 5);
-    ASSERT_FALSE(places.ok());
-    EXPECT_EQ(places.error().fault, Fault::kUsage);
-    EXPECT_NE(places.error().message.find("a.stl"), std::string::npos);
+    const auto positions = arrange_boxes(std::vector<BoxRequest>{{.width = width, .depth = depth, .name = "a.stl"}}, 10, 10, 5);
+    ASSERT_FALSE(positions.ok());
+    EXPECT_EQ(positions.error().fault, Fault::kUsage);
+    EXPECT_NE(positions.error().message.find("a.stl"), std::string::npos);
   }
 }
 
 TEST(Placement, RowsFillFromTheFrontLeftInOrder) {
   // Two fit beside each other with a gap of 1, so three make two rows, and the second row stands behind the deeper box.
-  const auto places = placed({{.width = 4, .depth = 2}, {.width = 4, .depth = 3}, {.width = 2, .depth = 1}}, 9, 9, 1);
-  ASSERT_EQ(places.size(), 3u);
-  EXPECT_EQ(places[0].x, 0);
-  EXPECT_EQ(places[1].x, 5);
-  EXPECT_EQ(places[2].x, 0);
-  EXPECT_EQ(places[0].y, places[1].y);
-  EXPECT_EQ(places[2].y, places[0].y + 3 + 1);
-  EXPECT_EQ(places[0].y, (9 - 5) / 2);
+  const auto positions = placed({{.width = 4, .depth = 2}, {.width = 4, .depth = 3}, {.width = 2, .depth = 1}}, 9, 9, 1);
+  ASSERT_EQ(positions.size(), 3u);
+  EXPECT_EQ(positions[0].x, 0);
+  EXPECT_EQ(positions[1].x, 5);
+  EXPECT_EQ(positions[2].x, 0);
+  EXPECT_EQ(positions[0].y, positions[1].y);
+  EXPECT_EQ(positions[2].y, positions[0].y + 3 + 1);
+  EXPECT_EQ(positions[0].y, (9 - 5) / 2);
 }
 
 TEST(Placement, CopiesOfAPositionFollowAlongX) {
-  const auto places = placed({{.width = 4, .depth = 2, .copies = 3, .at_x = 1, .at_y = 2}}, 17, 9, 2);
-  ASSERT_EQ(places.size(), 3u);
+  const auto positions = placed({{.width = 4, .depth = 2, .copies = 3, .at_x = 1, .at_y = 2}}, 17, 9, 2);
+  ASSERT_EQ(positions.size(), 3u);
   for (std::int64_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(places[i].x, 1 + 6 * i);
-    EXPECT_EQ(places[i].y, 2);
+    EXPECT_EQ(positions[i].x, 1 + 6 * i);
+    EXPECT_EQ(positions[i].y, 2);
   }
   EXPECT_FALSE(
-      place_boxes(std::vector<BoxRequest>{{.width = 4, .depth = 2, .copies = 3, .at_x = 2, .at_y = 2}}, 17, 9, 2).ok());
+      arrange_boxes(std::vector<BoxRequest>{{.width = 4, .depth = 2, .copies = 3, .at_x = 2, .at_y = 2}}, 17, 9, 2).ok());
 }
 
 TEST(Placement, ArrangedBoxesLieWithinTheBedAndAGapApart) {
@@ -64,16 +65,16 @@ TEST(Placement, ArrangedBoxesLieWithinTheBedAndAGapApart) {
       box.copies = 1 + static_cast<std::uint32_t>(random() % 4);
     }
     const std::int64_t gap = random() % 5;
-    const auto places = place_boxes(boxes, 150, 200, gap);
-    if (!places) continue;
+    const auto positions = arrange_boxes(boxes, 150, 200, gap);
+    if (!positions) continue;
     std::vector<std::size_t> count(boxes.size());
-    for (std::size_t i = 0; i < places->size(); ++i) {
-      const Place& a = (*places)[i];
+    for (std::size_t i = 0; i < positions->size(); ++i) {
+      const BoxPosition& a = (*positions)[i];
       const BoxRequest& box = boxes[a.request];
       ++count[a.request];
       EXPECT_TRUE(a.x >= 0 && a.y >= 0 && a.x + box.width <= 150 && a.y + box.depth <= 200);
       for (std::size_t j = 0; j < i; ++j) {
-        const Place& b = (*places)[j];
+        const BoxPosition& b = (*positions)[j];
         const BoxRequest& other = boxes[b.request];
         EXPECT_TRUE(a.x >= b.x + other.width + gap || b.x >= a.x + box.width + gap || a.y >= b.y + other.depth + gap ||
                     b.y >= a.y + box.depth + gap);

@@ -11,7 +11,7 @@
 #include "stages/bead/line.h"
 #include "stages/bead/section.h"
 #include "stages/bead/spread.h"
-#include "stages/bead/stabilisation.h"
+#include "tests/bead/stabilisation.h"
 #include "tests/segment/table.h"
 
 namespace lamina::bead::test {
@@ -40,12 +40,12 @@ inline BeadMachine anet(double area, double acceleration) {
 }
 
 struct Width {
-  double place, width;
+  double position, width;
 };
 
 /// Widths along a line between two places, in order: at the ends of pieces, or of cells after spreading.
-inline std::vector<Width> lay(const BeadMachine& machine, const std::vector<Stretch>& stretches, const Joint& from, double to,
-                              bool spread) {
+inline std::vector<Width> deposit(const BeadMachine& machine, const std::vector<LineSegment>& intervals, const Joint& from,
+                                  double to, bool spread) {
   std::vector<Width> widths;
   BeadLine line(machine, kHeight, 1e-4);
   BeadSpread pen(kHeight);
@@ -56,16 +56,16 @@ inline std::vector<Width> lay(const BeadMachine& machine, const std::vector<Stre
     widths.push_back({p.end_mm, p.end_width_mm});
   };
   line.begin(from);
-  for (const Stretch& s : stretches) line.add(s, take);
+  for (const LineSegment& s : intervals) line.add(s, take);
   line.end(to, take);
   if (spread) pen.end(cell);
   return widths;
 }
 
-inline double width_at(const std::vector<Width>& widths, double place) {
+inline double width_at(const std::vector<Width>& widths, double position) {
   for (std::size_t i = 1; i < widths.size(); ++i) {
-    if (widths[i].place < place || widths[i].place <= widths[i - 1].place) continue;
-    const double share = (place - widths[i - 1].place) / (widths[i].place - widths[i - 1].place);
+    if (widths[i].position < position || widths[i].position <= widths[i - 1].position) continue;
+    const double share = (position - widths[i - 1].position) / (widths[i].position - widths[i - 1].position);
     return widths[i - 1].width + share * (widths[i].width - widths[i - 1].width);
   }
   return 0;
@@ -73,20 +73,21 @@ inline double width_at(const std::vector<Width>& widths, double place) {
 
 inline double mean_width(const std::vector<Width>& widths, double begin, double end) {
   double sum = 0;
-  constexpr int kPlaces = 300;
-  for (int i = 0; i < kPlaces; ++i) sum += width_at(widths, begin + (end - begin) * (i + 0.5) / kPlaces);
-  return sum / kPlaces;
+  constexpr int kPositions = 300;
+  for (int i = 0; i < kPositions; ++i) sum += width_at(widths, begin + (end - begin) * (i + 0.5) / kPositions);
+  return sum / kPositions;
 }
 
 /// Thick and thin stretches of 1.5 mm in turn (Tables 13 to 16) in their steady state: six periods, of which the fourth begins
 /// at 9.
-inline std::vector<Width> lay_repeated(const BeadMachine& machine, double extrusion_percent, double thick_speed, bool spread) {
+inline std::vector<Width> deposit_repeated(const BeadMachine& machine, double extrusion_percent, double thick_speed,
+                                           bool spread) {
   const double area = machine.area_mm2 * extrusion_percent / 100;
-  const std::vector<Stretch> period{{1.5, area, thick_speed}, {1.5, area, 30}};
-  std::vector<Stretch> stretches;
-  for (int i = 0; i < 6; ++i) stretches.insert(stretches.end(), period.begin(), period.end());
+  const std::vector<LineSegment> period{{1.5, area, thick_speed}, {1.5, area, 30}};
+  std::vector<LineSegment> intervals;
+  for (int i = 0; i < 6; ++i) intervals.insert(intervals.end(), period.begin(), period.end());
   const Joint joint = steady_joint(machine, kHeight, period);
-  return lay(machine, stretches, joint, joint.speed_mm_s, spread);
+  return deposit(machine, intervals, joint, joint.speed_mm_s, spread);
 }
 
 struct Repeated {

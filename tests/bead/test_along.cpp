@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/bead/along.h"
+#include "stages/bead/contacts.h"
 #include "stages/bead/section.h"
 
 namespace lamina::bead {
@@ -13,8 +13,8 @@ namespace {
 constexpr double kAlongHeight = 0.3, kAlongSpacing = 0.44;  // mm
 
 /// Three lines of 4 mm beside each other, `thick` wide between 1.8 and 2.2 mm, else 0.40 mm.
-Buffer<LaidPiece> crowded_lines(double thick) {
-  Buffer<LaidPiece> pieces;
+Buffer<DepositedPiece> crowded_lines(double thick) {
+  Buffer<DepositedPiece> pieces;
   for (int line = 0; line < 3; ++line)
     for (int i = 0; i < 200; ++i) {
       const double width = i >= 90 && i < 110 ? thick : 0.40;
@@ -24,15 +24,15 @@ Buffer<LaidPiece> crowded_lines(double thick) {
   return pieces;
 }
 
-double volume_along(const Buffer<LaidPiece>& pieces) {
+double volume_along(const Buffer<DepositedPiece>& pieces) {
   double sum = 0;
-  for (const LaidPiece& p : pieces) sum += p.area_mm2 * (mm(p.to.x) - mm(p.from.x));
+  for (const DepositedPiece& p : pieces) sum += p.area_mm2 * (mm(p.to.x) - mm(p.from.x));
   return sum;
 }
 
-TEST(FlowAlong, WhatHasNoRoomGoesToTheNearestPlacesThatHaveSome) {
-  Buffer<LaidPiece> pieces = crowded_lines(0.56);
-  const Buffer<LaidPiece> before = pieces;
+TEST(FlowAlong, WhatHasNoSpaceGoesToTheNearestPositionsThatHaveSome) {
+  Buffer<DepositedPiece> pieces = crowded_lines(0.56);
+  const Buffer<DepositedPiece> before = pieces;
   Buffer<PieceSides> sides;
   const double over = find_contacts(pieces, kAlongHeight, sides);
   ASSERT_GT(over, 1e-3);
@@ -52,9 +52,9 @@ TEST(FlowAlong, WhatHasNoRoomGoesToTheNearestPlacesThatHaveSome) {
   EXPECT_EQ(pieces[middle + 20].area_mm2, before[middle + 20].area_mm2) << "far away nothing changes";
 }
 
-TEST(FlowAlong, BeadsWithRoomStayAsTheyAre) {
-  Buffer<LaidPiece> pieces = crowded_lines(0.44);
-  const Buffer<LaidPiece> before = pieces;
+TEST(FlowAlong, BeadsWithSpaceStayAsTheyAre) {
+  Buffer<DepositedPiece> pieces = crowded_lines(0.44);
+  const Buffer<DepositedPiece> before = pieces;
   Buffer<PieceSides> sides, alone;
   EXPECT_EQ(flow_along(pieces, kAlongHeight, sides), find_contacts(before, kAlongHeight, alone));
   for (std::size_t i = 0; i < pieces.size(); ++i) {
@@ -64,9 +64,9 @@ TEST(FlowAlong, BeadsWithRoomStayAsTheyAre) {
   }
 }
 
-TEST(FlowAlong, LinesThatAreFullAllAlongKeepTheirVolumeAndTellWhatIsOver) {
-  Buffer<LaidPiece> pieces = crowded_lines(0.56);
-  for (LaidPiece& p : pieces) p.area_mm2 = bead_area(0.56, kAlongHeight), p.width_mm = 0.56;
+TEST(FlowAlong, LinesThatAreFullAllAlongKeepTheirVolumeAndReportWhatIsOver) {
+  Buffer<DepositedPiece> pieces = crowded_lines(0.56);
+  for (DepositedPiece& p : pieces) p.area_mm2 = bead_area(0.56, kAlongHeight), p.width_mm = 0.56;
   const double volume = volume_along(pieces);
   Buffer<PieceSides> sides;
   EXPECT_GT(flow_along(pieces, kAlongHeight, sides), 1e-3);

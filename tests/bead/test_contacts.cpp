@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "stages/bead/contacts.h"
-#include "stages/bead/neighbours.h"
 #include "stages/bead/section.h"
+#include "tests/bead/neighbours.h"
 
 namespace lamina::bead {
 namespace {
@@ -14,8 +14,8 @@ namespace {
 constexpr double kContactHeight = 0.3;  // mm
 
 /// Lines of pieces along a direction, `angle` from x, each with its own phase.
-Buffer<LaidPiece> rows_of_pieces(const std::vector<double>& centres, const std::vector<double>& widths, double angle) {
-  Buffer<LaidPiece> pieces;
+Buffer<DepositedPiece> rows_of_pieces(const std::vector<double>& centres, const std::vector<double>& widths, double angle) {
+  Buffer<DepositedPiece> pieces;
   const double c = std::cos(angle), s = std::sin(angle);
   const auto at = [&](double along, double across) {
     return Point2{static_cast<Nm>(std::lround((along * c - across * s) * 1e6)),
@@ -30,7 +30,7 @@ Buffer<LaidPiece> rows_of_pieces(const std::vector<double>& centres, const std::
 }
 
 /// mm2, by slices
-double half_section_of(const LaidPiece& piece, const PieceSide& side) {
+double half_section_of(const DepositedPiece& piece, const PieceSide& side) {
   constexpr int kSlices = 3000;
   double sum = 0;
   for (int i = 0; i < kSlices; ++i)
@@ -55,7 +55,7 @@ TEST(Contacts, BeadsThatReachEachOtherHoldWhatTheyAreMadeOf) {
 }
 
 TEST(Contacts, FreeSidesAreThoseOfStadiaEllipsesAndCircles) {
-  LaidPiece piece{{0, 0}, {20'000, 0}, 0, 0};
+  DepositedPiece piece{{0, 0}, {20'000, 0}, 0, 0};
   for (const double width : {0.5, 0.3}) {
     piece.width_mm = width;
     piece.area_mm2 = bead_area(width, kContactHeight);
@@ -74,7 +74,7 @@ TEST(Contacts, ARowHasTheSidesOfARow) {
   const auto pieces = rows_of_pieces(centres, widths, 0);
   Buffer<PieceSides> sides;
   find_contacts(pieces, kContactHeight, sides);
-  std::vector<BesideBead> row;
+  std::vector<AdjacentBead> row;
   for (std::size_t i = 0; i < centres.size(); ++i) row.push_back({centres[i], bead_area(widths[i], kContactHeight), widths[i]});
   Buffer<SqueezedBead> squeezed;
   squeeze(row, kContactHeight, 0, squeezed);
@@ -88,7 +88,7 @@ TEST(Contacts, ARowHasTheSidesOfARow) {
   }
 }
 
-TEST(Contacts, WhatHasNoRoomGoesToTheOtherSides) {
+TEST(Contacts, WhatHasNoSpaceGoesToTheOtherSides) {
   const auto pieces = rows_of_pieces({0, 0.3}, {0.45, 0.45}, 0);
   const double area = bead_area(0.45, kContactHeight), over = area - 0.3 * kContactHeight;
   Buffer<PieceSides> sides;
@@ -101,8 +101,8 @@ TEST(Contacts, WhatHasNoRoomGoesToTheOtherSides) {
 }
 
 TEST(Contacts, BeadsThatCrossAndTheOwnLineAreNoNeighbours) {
-  Buffer<LaidPiece> pieces = rows_of_pieces({0}, {0.5}, 0);
-  for (const LaidPiece& piece : rows_of_pieces({-1}, {0.5}, 1.5707963267948966)) pieces.push_back(piece);
+  Buffer<DepositedPiece> pieces = rows_of_pieces({0}, {0.5}, 0);
+  for (const DepositedPiece& piece : rows_of_pieces({-1}, {0.5}, 1.5707963267948966)) pieces.push_back(piece);
   Buffer<PieceSides> sides;
   find_contacts(pieces, kContactHeight, sides);
   for (const PieceSides& side : sides) {

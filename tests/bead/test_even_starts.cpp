@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "stages/bead/deposition.h"
 #include "stages/bead/even_starts.h"
-#include "stages/bead/laid.h"
 #include "stages/geometry/bead_section.h"
 
 namespace lamina::bead {
@@ -29,10 +29,10 @@ BeadMove line_at(double y_mm, double speed, bool jump, double from_mm = 0, doubl
 
 /// What a file of these moves is read as, made even or not.
 struct Commanded {
-  Buffer<LaidBead> beads;
+  Buffer<DepositedBead> beads;
   Buffer<BeadFeed> feeds;
 
-  LaidMove lay(const BeadMove& move) {
+  DepositedMove deposit(const BeadMove& move) {
     const double length = std::hypot(mm(move.to.x - move.from.x), mm(move.to.y - move.from.y));
     beads.push_back({move.from, move.to, move.width, 0});
     feeds.push_back({move.area_mm2 * length, move.speed_mm_s, !move.jump, 0});
@@ -49,23 +49,23 @@ Commanded commanded(const std::vector<BeadMove>& moves, bool even) {
   Commanded file;
   EvenStarts starts(lagging_machine(), kStartHeight);
   for (const BeadMove& move : moves) {
-    const auto lay = [&](const BeadMove& m) -> std::optional<LaidMove> { return file.lay(m); };
-    const std::optional<LaidMove> laid = even ? starts.lay(move, lay) : lay(move);
-    EXPECT_NEAR(laid->length_mm, mm(move.to.x - move.from.x), 1e-9);
+    const auto deposit = [&](const BeadMove& m) -> std::optional<DepositedMove> { return file.deposit(m); };
+    const std::optional<DepositedMove> deposited = even ? starts.deposit(move, deposit) : deposit(move);
+    EXPECT_NEAR(deposited->length_mm, mm(move.to.x - move.from.x), 1e-9);
   }
   return file;
 }
 
 /// The width farthest from that of the even bead, from `from` to `to` along the line at a height y.
 double farthest_width(const Commanded& file, double y_mm, double from_mm, double to_mm) {
-  LayRules rules;
+  DepositionRules rules;
   rules.machine = {0, kStartLag, 1e6};
   rules.corner_mm_s = 1e3;
   rules.height_mm = kStartHeight;
-  Buffer<LaidPiece> pieces;
-  lay(file.beads, file.feeds, rules, pieces);
+  Buffer<DepositedPiece> pieces;
+  deposit(file.beads, file.feeds, rules, pieces);
   double farthest = 0;
-  for (const LaidPiece& piece : pieces)
+  for (const DepositedPiece& piece : pieces)
     if (std::abs(mm(piece.from.y) - y_mm) < 1e-6 && mm(piece.from.x) >= from_mm && mm(piece.to.x) <= to_mm)
       farthest = std::max(farthest, std::abs(piece.width_mm - bead_width(kStartArea, kStartHeight)));
   return farthest;

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "stages/bead/neighbours.h"
 #include "stages/bead/section.h"
+#include "tests/bead/neighbours.h"
 
 namespace lamina::bead {
 namespace {
@@ -15,10 +15,10 @@ namespace {
 constexpr double kLayerHeight = 0.3;                                             // mm, of the layer
 const double kCusps = kLayerHeight * kLayerHeight * (1 - std::numbers::pi / 4);  // of two stadia that touch
 
-BesideBead stadium(double centre, double width) { return {centre, bead_area(width, kLayerHeight), width}; }
+AdjacentBead stadium(double centre, double width) { return {centre, bead_area(width, kLayerHeight), width}; }
 
 /// The material of what was squeezed: the space between the outer centres and, outside of them, halves of the beads alone.
-double material(const std::vector<BesideBead>& beads, const Buffer<SqueezedBead>& out, double period) {
+double material(const std::vector<AdjacentBead>& beads, const Buffer<SqueezedBead>& out, double period) {
   double sum = 0;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const bool from_left = i > 0 ? out[i - 1].touches_right : out.back().touches_right && period > 0;
@@ -37,14 +37,14 @@ TEST(Squeeze, NothingIsLostAndNoTwoOverlap) {
   std::uniform_real_distribution<double> width(0.05, 0.9), distance(0.15, 0.7);
   Buffer<SqueezedBead> out;
   for (int trial = 0; trial < 2000; ++trial) {
-    std::vector<BesideBead> beads;
-    double place = 0, sum = 0;
+    std::vector<AdjacentBead> beads;
+    double position = 0, sum = 0;
     for (int i = 0; i <= trial % 9; ++i) {
-      beads.push_back(stadium(place, width(random)));
-      place += distance(random);
+      beads.push_back(stadium(position, width(random)));
+      position += distance(random);
       sum += beads.back().area_mm2;
     }
-    const double period = trial % 2 == 0 ? 0 : place;
+    const double period = trial % 2 == 0 ? 0 : position;
     squeeze(beads, kLayerHeight, period, out);
     EXPECT_NEAR(material(beads, out, period) / sum, 1, 1e-12);
     for (std::size_t i = 0; i < beads.size(); ++i) {
@@ -57,8 +57,8 @@ TEST(Squeeze, NothingIsLostAndNoTwoOverlap) {
   }
 }
 
-TEST(Squeeze, BeadsWithRoomAreLeftAlone) {
-  const std::vector<BesideBead> beads{stadium(0, 0.4), stadium(0.43, 0.4), stadium(1, 0.2)};
+TEST(Squeeze, BeadsWithSpaceAreLeftAlone) {
+  const std::vector<AdjacentBead> beads{stadium(0, 0.4), stadium(0.43, 0.4), stadium(1, 0.2)};
   Buffer<SqueezedBead> out;
   squeeze(beads, kLayerHeight, 0, out);
   for (std::size_t i = 0; i < beads.size(); ++i) {
@@ -72,7 +72,7 @@ TEST(Squeeze, TwoStadiaFillTheirCuspsAndThenWiden) {
   const double holds = kCusps / kLayerHeight;  // mm of overlap
   EXPECT_NEAR(holds, 0.0644, 1e-4);
   for (const double overlap : {0.0, 0.03, 0.06, 0.1}) {
-    const std::vector<BesideBead> beads{stadium(0, 0.4), stadium(0.4 - overlap, 0.4)};
+    const std::vector<AdjacentBead> beads{stadium(0, 0.4), stadium(0.4 - overlap, 0.4)};
     squeeze(beads, kLayerHeight, 0, out);
     ASSERT_TRUE(out[0].touches_right);
     EXPECT_NEAR(out[0].cusps_mm2, std::max(kCusps - kLayerHeight * overlap, 0.0), 1e-12);
@@ -82,13 +82,13 @@ TEST(Squeeze, TwoStadiaFillTheirCuspsAndThenWiden) {
   }
 }
 
-TEST(Squeeze, AnEndlessRasterThatIsOverfilledStandsAboveTheLayer) {
+TEST(Squeeze, AnEndlessRasterThatIsOverfilledIsAboveTheLayer) {
   Buffer<SqueezedBead> out;
-  const std::vector<BesideBead> beads{stadium(0, 0.5), stadium(0.3, 0.4)};
+  const std::vector<AdjacentBead> beads{stadium(0, 0.5), stadium(0.3, 0.4)};
   squeeze(beads, kLayerHeight, 0.6, out);
   EXPECT_NEAR(out[0].height_mm * 0.6, beads[0].area_mm2 + beads[1].area_mm2, 1e-12);
   EXPECT_NEAR(out[0].width() + out[1].width(), 0.6, 1e-12);
-  const std::vector<BesideBead> one{stadium(0, 0.4)};
+  const std::vector<AdjacentBead> one{stadium(0, 0.4)};
   squeeze(one, kLayerHeight, 0.38, out);
   EXPECT_NEAR(out[0].cusps_mm2, kCusps - kLayerHeight * 0.02, 1e-12);
   EXPECT_EQ(out[0].height_mm, kLayerHeight);
@@ -96,7 +96,7 @@ TEST(Squeeze, AnEndlessRasterThatIsOverfilledStandsAboveTheLayer) {
 
 TEST(Squeeze, WhatIsPushedOutwardsReachesTheNextBead) {
   Buffer<SqueezedBead> out;
-  const std::vector<BesideBead> beads{stadium(0, 0.6), stadium(0.3, 0.6), stadium(0.81, 0.4)};
+  const std::vector<AdjacentBead> beads{stadium(0, 0.6), stadium(0.3, 0.6), stadium(0.81, 0.4)};
   squeeze(beads, kLayerHeight, 0, out);  // the second alone ends at 0.6, the third begins at 0.61
   EXPECT_TRUE(out[1].touches_right);
 }

@@ -1,9 +1,9 @@
 // A pattern in its steady state: the widths told are those of a long line.
 #include <gtest/gtest.h>
 
-#include "stages/bead/pattern.h"
-#include "stages/bead/pore.h"
+#include "stages/bead/predicted_tables.h"
 #include "tests/bead/anet.h"
+#include "tests/bead/pore.h"
 
 namespace lamina::bead {
 namespace {
@@ -15,13 +15,13 @@ TEST(Pattern, WidthsAreThoseOfALongLine) {
     const BeadMachine machine{0.1, 0.05, acceleration};
     for (const bool spread : {false, true}) {
       for (const double extrusion : {60.0, 75.0, 125.0}) {
-        const auto line = lay_repeated(machine, extrusion, 11.25, spread);
+        const auto line = deposit_repeated(machine, extrusion, 11.25, spread);
         const PatternWidths widths = steady_widths(machine, kHeight, {1.5, 1.5, extrusion, 11.25, 30}, spread);
         EXPECT_NEAR(widths.thick.middle, width_at(line, 9.75), 1e-3);
         EXPECT_NEAR(widths.thin.middle, width_at(line, 11.25), 1e-3);
         EXPECT_NEAR(widths.thick.mean, mean_width(line, 9, 10.5), 1e-3);
         EXPECT_NEAR(widths.thin.mean, mean_width(line, 10.5, 12), 1e-3);
-        EXPECT_LE(widths.thin.least, widths.thin.mean);
+        EXPECT_LE(widths.thin.minimum, widths.thin.mean);
         EXPECT_GE(widths.thick.largest, widths.thick.mean);
         EXPECT_NEAR(widths.sums.fed_mm3, 3 * 0.1 * extrusion / 100, 1e-12);
       }
@@ -42,17 +42,17 @@ TEST(Pattern, TimeAndSpeedAreThoseOfTheHead) {
 TEST(Pattern, OneOfOneSpeedIsEven) {
   const PatternWidths widths = steady_widths({0.1, 0.05, kProfile}, kHeight, {0.5, 0.1, 120, 20, 20}, false);
   const double width = width_of(0.12, true, kHeight);
-  for (const StretchWidths& w : {widths.thick, widths.thin}) {
-    for (const double value : {w.middle, w.mean, w.least, w.largest}) EXPECT_NEAR(value, width, 1e-12);
+  for (const IntervalWidths& w : {widths.thick, widths.thin}) {
+    for (const double value : {w.middle, w.mean, w.minimum, w.largest}) EXPECT_NEAR(value, width, 1e-12);
   }
 }
 
 TEST(Pore, ItsWidthAndLengthsAreThoseOfTheGapAlongALine) {
   for (const bool spread : {false, true}) {
     const BeadMachine machine{0.1, 0.05, kProfile};
-    const auto line = lay_repeated(machine, 100, 11.25, spread);
-    const BeadPore pore = pore_beside(machine, kHeight, {1.5, 1.5, 100, 11.25, 30}, 0.43, 0.4, 0.02, spread);
-    const auto gap = [&](double place) { return 0.43 - (width_at(line, place) + 0.4) / 2; };
+    const auto line = deposit_repeated(machine, 100, 11.25, spread);
+    const BeadPore pore = adjacent_pore(machine, kHeight, {1.5, 1.5, 100, 11.25, 30}, 0.43, 0.4, 0.02, spread);
+    const auto gap = [&](double position) { return 0.43 - (width_at(line, position) + 0.4) / 2; };
     EXPECT_NEAR(pore.width, gap(11.25), 1e-3);
     EXPECT_GE(pore.widest, pore.width);
     for (const auto& [length, level] : {std::pair{pore.half_length, pore.width / 2}, {pore.open_length, 0.02}}) {
@@ -68,23 +68,13 @@ TEST(Pore, BeadsThatNeverTouchLeaveASlotAndBeadsTooNearNone) {
   const BeadMachine machine{0.1, 0.05, kProfile};
   const Pattern pattern{1.5, 1.5, 100, 15, 15};  // an even bead
   const double width = width_of(0.1, true, kHeight);
-  const BeadPore slot = pore_beside(machine, kHeight, pattern, 0.5, 0.4, 0.02, false);
+  const BeadPore slot = adjacent_pore(machine, kHeight, pattern, 0.5, 0.4, 0.02, false);
   EXPECT_NEAR(slot.width, 0.5 - (width + 0.4) / 2, 1e-12);
   EXPECT_NEAR(slot.open_length, 3, 1e-12);
   EXPECT_NEAR(slot.half_length, 3, 1e-12);
-  const BeadPore none = pore_beside(machine, kHeight, pattern, 0.35, 0.4, 0.02, false);
+  const BeadPore none = adjacent_pore(machine, kHeight, pattern, 0.35, 0.4, 0.02, false);
   EXPECT_LT(none.width, 0);
   EXPECT_EQ(none.open_length, 0);
-}
-
-TEST(Pattern, OnePeriodOfPiecesHoldsWhatIsFed) {
-  double volume = 0, end = 0;
-  lay_steady({0.1, 0.05, kProfile}, kHeight, {1.5, 2, 100, 15, 30}, [&](const BeadPiece& p) {
-    volume += p.volume_mm3;
-    end = p.end_mm;
-  });
-  EXPECT_NEAR(volume, 0.35, 1e-12);
-  EXPECT_NEAR(end, 3.5, 1e-12);
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "stages/bead/line.h"
 #include "stages/bead/section.h"
-#include "stages/bead/speeds.h"
 
 namespace lamina::bead {
 namespace {
@@ -50,12 +50,12 @@ TEST(BeadMachine, WrongNumbersAreNamedInOneLine) {
 }
 
 /// Speeds at all joints when the whole line is known.
-std::vector<double> whole_plan(const std::vector<Stretch>& line, double begin, double end, double acceleration) {
+std::vector<double> whole_plan(const std::vector<LineSegment>& line, double begin, double end, double acceleration) {
   std::vector<double> speed(line.size() + 1);
   speed[0] = std::min(begin, line[0].speed_mm_s);
   speed[line.size()] = std::min(end, line.back().speed_mm_s);
   for (std::size_t i = 1; i < line.size(); ++i) speed[i] = std::min(line[i - 1].speed_mm_s, line[i].speed_mm_s);
-  const auto reach = [&](double from, const Stretch& s) { return std::sqrt(from * from + 2 * acceleration * s.length_mm); };
+  const auto reach = [&](double from, const LineSegment& s) { return std::sqrt(from * from + 2 * acceleration * s.length_mm); };
   for (std::size_t i = line.size(); i-- > 1;) speed[i] = std::min(speed[i], reach(speed[i + 1], line[i]));
   for (std::size_t i = 1; i <= line.size(); ++i) speed[i] = std::min(speed[i], reach(speed[i - 1], line[i - 1]));
   return speed;
@@ -65,7 +65,7 @@ TEST(SpeedPlan, ItIsThatOfTheWholeLineAndWaitsABrakingDistance) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> length(0.02, 1.5), speed(2, 80);
   for (const double acceleration : {50.0, 400.0, 3000.0}) {
-    std::vector<Stretch> line;
+    std::vector<LineSegment> line;
     for (int i = 0; i < 500; ++i) line.push_back({length(random), 0.1, speed(random)});
     const auto expected = whole_plan(line, 4, 4, acceleration);
     SpeedPlan plan(acceleration);
@@ -74,11 +74,11 @@ TEST(SpeedPlan, ItIsThatOfTheWholeLineAndWaitsABrakingDistance) {
     const auto check = [&](const Planned& p) {
       EXPECT_NEAR(p.begin_mm_s, expected[taken], 1e-9);
       EXPECT_NEAR(p.end_mm_s, expected[taken + 1], 1e-9);
-      EXPECT_LE(p.peak(acceleration), p.stretch.speed_mm_s);
-      EXPECT_EQ(p.stretch.length_mm, line[taken++].length_mm);
+      EXPECT_LE(p.peak(acceleration), p.segment.speed_mm_s);
+      EXPECT_EQ(p.segment.length_mm, line[taken++].length_mm);
     };
     Planned planned{};
-    for (const Stretch& s : line) {
+    for (const LineSegment& s : line) {
       plan.add(s);
       while (plan.take(planned)) check(planned);
       double waits = 0;
@@ -98,7 +98,7 @@ TEST(SpeedPlan, APatternBeginsAsFastAsOneThatIsLongRepeated) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> length(0.02, 1.5), speed(2, 80);
   for (int pattern = 0; pattern < 50; ++pattern) {
-    std::vector<Stretch> period, line;
+    std::vector<LineSegment> period, line;
     for (int i = 0; i <= pattern % 7; ++i) period.push_back({length(random), 0.1, speed(random)});
     for (int i = 0; i < 200; ++i) line.insert(line.end(), period.begin(), period.end());
     EXPECT_NEAR(cyclic_speed(period, 200), whole_plan(line, 1, 1, 200)[100 * period.size()], 1e-9);

@@ -19,11 +19,11 @@ TEST(BeadSpread, VolumeIsConservedAndCellsFollowEachOther) {
     BeadSpread spread(kHeight, cell);
     BeadLine line({0.1, 0.05, 400}, kHeight);
     for (int repeat = 0; repeat < 2; ++repeat) {  // a second line begins as the first did
-      double volume = 0, place = 0;
+      double volume = 0, position = 0;
       std::size_t cells = 0;
       const TakeCell take_cell = [&](const SpreadCell& c) {
-        EXPECT_TRUE(cells++ == 0 || std::abs(c.begin_mm - place) < 1e-9);
-        place = c.end_mm;
+        EXPECT_TRUE(cells++ == 0 || std::abs(c.begin_mm - position) < 1e-9);
+        position = c.end_mm;
         volume += c.volume_mm3;
       };
       const TakePiece take = [&](const BeadPiece& p) { spread.add(p, take_cell); };
@@ -32,7 +32,7 @@ TEST(BeadSpread, VolumeIsConservedAndCellsFollowEachOther) {
       EXPECT_GT(cells, 0U);  // before the line ends
       line.end(15, take);
       spread.end(take_cell);
-      EXPECT_NEAR(volume / line.laid_mm3(), 1, 1e-12);
+      EXPECT_NEAR(volume / line.deposited_mm3(), 1, 1e-12);
     }
   }
 }
@@ -61,26 +61,26 @@ TEST(BeadSpread, ALineEndsAsTheFingerThatTheNozzlePushes) {
   constexpr double kPi = std::numbers::pi;
   const double area = 0.12, width = width_of(area, true, kHeight);
   const double kept = 2 / kPi * std::acos(std::exp(-kPi) / 2);  // within a width behind the nozzle
-  std::size_t seen = 0;
+  std::size_t detected = 0;
   for (const SpreadCell& c : stopped(width, area, 0.002)) {
-    const double place = (c.begin_mm + c.end_mm) / 2 - 5, side = kept * c.area_mm2 / area * width / 2;
-    EXPECT_LT(place, width * std::numbers::ln2 / kPi + 0.002);
-    if (place < -0.9 * width || side < 0.05 * width) continue;
-    EXPECT_NEAR(place, width / kPi * std::log(2 * std::cos(kPi * side / width)), 0.002);
-    if (std::abs(place) < 0.0011) {
+    const double position = (c.begin_mm + c.end_mm) / 2 - 5, side = kept * c.area_mm2 / area * width / 2;
+    EXPECT_LT(position, width * std::numbers::ln2 / kPi + 0.002);
+    if (position < -0.9 * width || side < 0.05 * width) continue;
+    EXPECT_NEAR(position, width / kPi * std::log(2 * std::cos(kPi * side / width)), 0.002);
+    if (std::abs(position) < 0.0011) {
       EXPECT_NEAR(side, width / 3, 0.001) << "two thirds of the bead under the nozzle";
     }
-    ++seen;
+    ++detected;
   }
-  EXPECT_GT(seen, 200U);
+  EXPECT_GT(detected, 200U);
 }
 
 TEST(BeadSpread, ThickReachesIntoThinAheadAndBehind) {
   const double thick = width_of(0.15, true, kHeight), thin = width_of(0.02, false, kHeight);
-  const auto into = lay({0.1, 0, kAtOnce}, {{5, 0.15, 15}, {5, 0.02, 15}}, {15, 2.25}, 15, true);
+  const auto into = deposit({0.1, 0, kAtOnce}, {{5, 0.15, 15}, {5, 0.02, 15}}, {15, 2.25}, 15, true);
   EXPECT_GT(width_at(into, 5 + 0.15 * thick), thin + 0.01);
   EXPECT_NEAR(width_at(into, 5 + 0.25 * thick + 0.03), thin, 2e-3);
-  const auto out = lay({0.1, 0, kAtOnce}, {{5, 0.02, 15}, {5, 0.15, 15}}, {15, 0.3}, 15, true);
+  const auto out = deposit({0.1, 0, kAtOnce}, {{5, 0.02, 15}, {5, 0.15, 15}}, {15, 0.3}, 15, true);
   EXPECT_GT(width_at(out, 5 - 0.3 * thick), thin + 0.01);
   EXPECT_NEAR(width_at(out, 5 - thick - 0.03), thin, 2e-3);
 }

@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <array>
 
-#include "stages/bead/pore.h"
 #include "tests/bead/anet.h"
+#include "tests/bead/pore.h"
 
 namespace lamina::bead {
 namespace {
@@ -26,13 +26,13 @@ struct Extremes {
 };
 
 /// 10 + 30 + 10 mm: least and largest width of the thin stretch and the thick one behind it.
-Extremes lay_long(const BeadMachine& machine, double thin_area, double thin_speed, bool spread) {
+Extremes deposit_long(const BeadMachine& machine, double thin_area, double thin_speed, bool spread) {
   const double area = machine.area_mm2;
-  const auto widths = lay(machine, {{10, area, kReference}, {30, thin_area, thin_speed}, {10, area, kReference}},
-                          {kReference, kReference * area}, kReference, spread);
+  const auto widths = deposit(machine, {{10, area, kReference}, {30, thin_area, thin_speed}, {10, area, kReference}},
+                              {kReference, kReference * area}, kReference, spread);
   Extremes result{9, 0};
   for (const Width& w : widths) {
-    if (w.place < 5 || w.place > 45) continue;
+    if (w.position < 5 || w.position > 45) continue;
     result.thin = std::min(result.thin, w.width);
     result.thick = std::max(result.thick, w.width);
   }
@@ -42,9 +42,9 @@ Extremes lay_long(const BeadMachine& machine, double thin_area, double thin_spee
 Extremes errors_of_table_11(const BeadMachine& machine, bool spread) {
   Rms thin, thick;
   for (const auto& row : table(11)) {
-    const Extremes laid = lay_long(machine, machine.area_mm2, number(row, "thin_speed_mm_s"), spread);
-    thin.add(laid.thin - number(row, "thin_width_min_mm"));
-    thick.add(laid.thick - number(row, "thick_width_max_mm"));
+    const Extremes deposited = deposit_long(machine, machine.area_mm2, number(row, "thin_speed_mm_s"), spread);
+    thin.add(deposited.thin - number(row, "thin_width_min_mm"));
+    thick.add(deposited.thick - number(row, "thick_width_max_mm"));
   }
   return {thin.value(), thick.value()};
 }
@@ -56,11 +56,12 @@ struct Readings {
 Readings errors_of_tables_13_to_15(const BeadMachine& machine, bool spread) {
   Rms mean, middle;
   for (const Repeated& sample : repeated_samples()) {
-    const PatternWidths laid = steady_widths(machine, kHeight, {1.5, 1.5, sample.extrusion, sample.thick_speed, 30}, spread);
-    mean.add(laid.thick.mean - sample.thick);
-    mean.add(laid.thin.mean - sample.thin);
-    middle.add(laid.thick.middle - sample.thick);
-    middle.add(laid.thin.middle - sample.thin);
+    const PatternWidths deposited =
+        steady_widths(machine, kHeight, {1.5, 1.5, sample.extrusion, sample.thick_speed, 30}, spread);
+    mean.add(deposited.thick.mean - sample.thick);
+    mean.add(deposited.thin.mean - sample.thin);
+    middle.add(deposited.thick.middle - sample.thick);
+    middle.add(deposited.thin.middle - sample.thin);
   }
   return {mean.value(), middle.value()};
 }
@@ -78,18 +79,18 @@ TEST(TimeConstant, ItIsThatOfTheStabilisationColumn) {
   }
 }
 
-TEST(TimeConstant, ItComesBackFromALineThatTheModelLays) {
+TEST(TimeConstant, ItComesBackFromALineThatTheModelDeposits) {
   for (const double acceleration : kSpeeds) {
     const BeadMachine machine{0.1, 0.04, acceleration};
-    const auto widths = lay(machine, {{10, 0.1, 15}, {30, 0.1, 45}}, {15, 1.5}, 45, false);
+    const auto widths = deposit(machine, {{10, 0.1, 15}, {30, 0.1, 45}}, {15, 1.5}, 45, false);
     double stable = 0;
-    for (const Width& w : widths) stable = w.width < width_of(0.1, true, kHeight) - 0.01 ? w.place - 10 : stable;
+    for (const Width& w : widths) stable = w.width < width_of(0.1, true, kHeight) - 0.01 ? w.position - 10 : stable;
     const std::vector<StableAfter> rows{{45, stable}};
     EXPECT_NEAR(time_constant({0.1, 0, acceleration}, {kHeight, 15, 0.01}, rows), 0.04, 2e-3);  // pieces have ends
   }
 }
 
-TEST(Tables, WidthsOfThinStretchesBySpeed) {  // Table 11
+TEST(Tables, WidthsOfThinIntervalsBySpeed) {  // Table 11
   EXPECT_LT(errors_of_table_11(anet(set_area(), kAtOnce), false).thin, 0.025);
   EXPECT_LT(errors_of_table_11(anet(kProfileArea, kAtOnce), false).thin, 0.025);
   EXPECT_LT(errors_of_table_11(anet(set_area(), kAtOnce), true).thin, 0.025);
@@ -100,21 +101,22 @@ TEST(Tables, WidthsOfThinStretchesBySpeed) {  // Table 11
   }
 }
 
-TEST(Tables, SwellingOfThickStretchesIsNotMetUnlessTheHeadBrakesAndMeltSpreads) {  // Table 11
+TEST(Tables, SwellingOfThickIntervalsIsNotMetUnlessTheHeadBrakesAndMeltSpreads) {  // Table 11
   EXPECT_GT(errors_of_table_11(anet(set_area(), kAtOnce), false).thick, 0.3);
   EXPECT_GT(errors_of_table_11(anet(set_area(), kAtOnce), true).thick, 0.2);
   EXPECT_GT(errors_of_table_11(anet(set_area(), kProfile), false).thick, 0.07);
   EXPECT_LT(errors_of_table_11(anet(set_area(), kProfile), true).thick, 0.04);
 }
 
-TEST(Tables, WidthsOfThinStretchesByExtrusion) {  // Table 12
+TEST(Tables, WidthsOfThinIntervalsByExtrusion) {  // Table 12
   for (const double area : {set_area(), kProfileArea}) {
     for (const double acceleration : kSpeeds) {
       for (const bool spread : {false, true}) {
         Rms error;
         for (const auto& row : table(12)) {
           const double thin_area = area * number(row, "thin_extrusion_percent") / 100;
-          error.add(lay_long(anet(area, acceleration), thin_area, kReference, spread).thin - number(row, "thin_width_min_mm"));
+          error.add(deposit_long(anet(area, acceleration), thin_area, kReference, spread).thin -
+                    number(row, "thin_width_min_mm"));
         }
         EXPECT_LT(error.value(), 0.025);
       }
@@ -122,7 +124,7 @@ TEST(Tables, WidthsOfThinStretchesByExtrusion) {  // Table 12
   }
 }
 
-TEST(Tables, WidthsOfRepeatedStretches) {  // Tables 13 to 15
+TEST(Tables, WidthsOfRepeatedIntervals) {  // Tables 13 to 15
   // The document does not say where along a stretch it measured. Table 16 tells: its pores are as wide as thin stretches of
   // 0.22 (B100) and 0.20 mm (B75) leave, those of Tables 14 and 13 are 0.31 and 0.28 mm wide: means, not middles.
   for (const bool spread : {false, true}) {
@@ -141,13 +143,13 @@ TEST(Tables, PoresOfTable16) {
   const std::map<std::string, std::array<double, 2>> printed{
       {"B75", {15, 0.40}}, {"B100", {11.25, 0.43}}, {"B125", {7.5, 0.49}}};
   const BeadMachine machine = anet(set_area(), kProfile);
-  const double beside = width_of(machine.area_mm2, true, kHeight);
+  const double neighbour = width_of(machine.area_mm2, true, kHeight);
   for (const bool spread : {false, true}) {
     for (const auto& row : table(16)) {
       const std::string sample = row.at("sample");
       const auto [speed, spacing] = printed.at(sample);  // Table 7
       const BeadPore pore =
-          pore_beside(machine, kHeight, {1.5, 1.5, std::stod(sample.substr(1)), speed, 30}, spacing, beside, 0.02, spread);
+          adjacent_pore(machine, kHeight, {1.5, 1.5, std::stod(sample.substr(1)), speed, 30}, spacing, neighbour, 0.02, spread);
       const double width = number(row, "pore_width_mm"), length = number(row, "pore_length_mm");
       // Within 10 % or one standard deviation, and for B100 with spread one micrometre outside of it: Table 16 has 0.12 +-
       // 0.02.

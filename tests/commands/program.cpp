@@ -78,8 +78,8 @@ void write_one_of_each_kind(const Directory& directory) {
   const fs::path tests = LAMINA_TEST_DIR;
   write_box(directory / "part.stl", {0, 0, 0}, {6, 4, 3});
   fs::copy(tests / "reference/dinisio2022/table_18.tsv", directory / "drops.csv");
-  fs::copy(tests / ".." / "stages/write/machines/hp45.toml", directory / "powder.toml");
-  fs::copy(tests / ".." / "stages/write/machines/extrusion/anet-a8.toml", directory / "printer.toml");
+  fs::copy(tests / ".." / "pipeline/machine/shipped/printers/hp45.toml", directory / "powder.toml");
+  fs::copy(tests / ".." / "pipeline/machine/shipped/extruders/anet-a8.toml", directory / "printer.toml");
   write_text(directory / "job.toml", "[layers]\nthickness_mm = 1\n[[part]]\npath = \"part.stl\"\n");
   write_text(directory / "tops.txt", "1\n2\n3\n");
   write_text(directory / "widths.csv", "test,percent,thin_mm\nextrusion,90,0.3\n");

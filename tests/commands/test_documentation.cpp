@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/terminal/pages.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/data/text/number_text.h"
-#include "stages/terminal/pages.h"
+#include "stages/support/text/number_text.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -45,7 +45,7 @@ TEST(Documentation, PagesOfCommandsAreThoseOfTheirDefinitions) {
   for (const pipeline::Command* command : pipeline::commands()) {
     const std::string name = std::string(command->name) + ".md";
     ASSERT_EQ(pages.erase(name), 1u) << name;
-    EXPECT_EQ(read_text(kRoot / "docs/commands" / name), terminal::markdown_page(pipeline::spec_of(*command))) << name;
+    EXPECT_EQ(read_text(kRoot / "docs/commands" / name), pipeline::markdown_page(pipeline::spec_of(*command))) << name;
     const std::string readme = read_text(kRoot / "README.md");
     EXPECT_NE(readme.find("lamina " + std::string(command->name)), std::string::npos) << command->name;
   }
@@ -87,7 +87,7 @@ TEST(Documentation, EveryOptionThatItNamesExists) {
 TEST(Documentation, EveryKeyOfAMachineIsDocumented) {
   const std::string page = read_text(kRoot / "docs/machines.md");
   std::string section;
-  std::istringstream profile(read::machine_text(Machine()));
+  std::istringstream profile(pipeline::machine_text(Machine()));
   std::size_t checked = 0;
   for (std::string line; std::getline(profile, line);) {
     if (line.starts_with('[')) section = line.substr(1, line.find(']') - 1);

@@ -15,8 +15,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "stages/write/file.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -147,7 +147,7 @@ class EveryOutput : public ::testing::Test {
     const fs::path tests = LAMINA_TEST_DIR;
     write_box(directory_ / "part.stl", {0, 0, 0}, {6, 4, 3});
     fs::copy(tests / "reference/dinisio2022/table_18.tsv", directory_ / "drops.csv");
-    fs::copy(tests / ".." / "stages/write/machines/extrusion/anet-a8.toml", directory_ / "printer.toml");
+    fs::copy(tests / ".." / "pipeline/machine/shipped/extruders/anet-a8.toml", directory_ / "printer.toml");
     write_text(directory_ / "widths.csv", kWidths);
     write_text(directory_ / "list.txt", "info part.stl\n");
     for (const char* line :
@@ -273,7 +273,7 @@ TEST_F(EveryOutput, LinksThatLeadNowhereOrRoundStayLinks) {
   }
 }
 
-TEST_F(EveryOutput, NeitherAPipeNorADirectoryInItsPlaceIsReplaced) {
+TEST_F(EveryOutput, NeitherAPipeNorADirectoryThereInsteadIsReplaced) {
   for (const Row& row : kRows) {
     const std::string target = target_of(row, "x");
     if (!row.directory) {
@@ -335,15 +335,15 @@ TEST_F(EveryOutput, WhileAnotherRunWritesTheCallIsRefused) {
   for (const Row& row : kRows) {
     const std::string target = target_of(row, "x");
     if (row.directory) fs::create_directory(directory_ / target);
-    std::optional<write::Claim> claim;
-    std::optional<write::File> file;
+    std::optional<Claim> claim;
+    std::optional<File> file;
     const std::string locked = directory_ / (target + row.lock);
     if (std::string_view(row.lock) == "/manifest.json") {
-      auto taken = write::Claim::take(locked, locked);
+      auto taken = Claim::take(locked, locked);
       ASSERT_TRUE(taken.ok());
       claim.emplace(std::move(*taken));
     } else if (row.command != "batch") {
-      auto opened = write::File::open(locked);
+      auto opened = File::open(locked);
       ASSERT_TRUE(opened.ok());
       file.emplace(std::move(*opened));
     }

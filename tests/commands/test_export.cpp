@@ -78,16 +78,16 @@ TEST_F(Export, StlKeepsWhatFloatsHold) {
   EXPECT_LT(far["rounding_mm"].get<double>(), 2e-5);
 }
 
-TEST_F(Export, CopiesStandWhereTheyArePlanned) {
+TEST_F(Export, CopiesAreWhereTheyArePlanned) {
   write_box(directory_ / "block.stl", {0, 0, 0}, {20, 10, 5});
   const Json json = done("export block.stl --copies 5 --bed 90x60 -o bed.3mf --json --quiet");
   EXPECT_EQ(json["meshes"], 1);
-  EXPECT_EQ(json["places"], 5);
+  EXPECT_EQ(json["instances"], 5);
   EXPECT_EQ(triangles_of(directory_ / "bed.3mf").size(), 60u);
   EXPECT_TRUE(layers_of("jet block.stl --copies 5", "a") == layers_of("jet bed.3mf", "b"));
 }
 
-TEST_F(Export, RepairsAreWrittenAndTold) {
+TEST_F(Export, RepairsAreWrittenAndReported) {
   write_box(directory_ / "open.stl", {0, 0, 0}, {20, 10, 5});
   std::string bytes = read_text(directory_.path() / "open.stl");
   bytes.resize(bytes.size() - 50);
@@ -101,7 +101,7 @@ TEST_F(Export, RepairsAreWrittenAndTold) {
   EXPECT_EQ(done("export closed.stl -o again.stl --json --quiet")["parts"][0]["notes"].size(), 0u);
 }
 
-TEST_F(Export, NothingIsReplacedUnasked) {
+TEST_F(Export, NothingIsReplacedUnrequested) {
   write_box(directory_ / "part.stl", {0, 0, 0}, {20, 10, 5});
   write_text(directory_ / "mine.stl", "precious\n");
   fs::create_symlink("part.stl", directory_ / "link.stl");

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/manifest/manifest.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -165,12 +165,12 @@ TEST_F(HostileManifests, NestedAndTornHeadsAreRefused) {
   done("jet part.stl --layer 1 --dpi 60 --quiet -o out");
   const fs::path path = directory_ / "out/manifest.json";
   const std::string sound = read_text(path);
-  const std::size_t place = sound.find("\"notes\":[") + 9, name = sound.find("part.stl\",\"copies");
-  ASSERT_GT(place, 9u);
+  const std::size_t position = sound.find("\"notes\":[") + 9, name = sound.find("part.stl\",\"copies");
+  ASSERT_GT(position, 9u);
   ASSERT_NE(name, std::string::npos);
   for (const std::string& text :
-       {sound.substr(0, place) + std::string(200'000, '[') + sound.substr(place),
-        sound.substr(0, name) + "../" + sound.substr(name), sound.substr(0, place - 5), std::string("{\n"), std::string(),
+       {sound.substr(0, position) + std::string(200'000, '[') + sound.substr(position),
+        sound.substr(0, name) + "../" + sound.substr(name), sound.substr(0, position - 5), std::string("{\n"), std::string(),
         std::string(1000, '\0'), sound.substr(0, sound.size() - 3) + std::string(5000, ' ')}) {
     write_text(path, text);
     refused_everywhere("head", {"verify out", "report out -o page.html", "preview out -o page.png", "merge out -o new"});

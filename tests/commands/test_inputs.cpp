@@ -19,12 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kPatienceMs = 60'000;                // hashing 6 GiB on a slow machine is no hang
-constexpr std::uint64_t kMostKilobytes = 700'000;  // resident; the program itself takes some 60,000
+constexpr int kPatienceMs = 60'000;               // hashing 6 GiB on a slow machine is no hang
+constexpr std::uint64_t kMaxKilobytes = 700'000;  // resident; the program itself takes some 60,000
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kMemoryTells = false;
+constexpr bool kMemoryIsMeasurable = false;
 #else
-constexpr bool kMemoryTells = true;
+constexpr bool kMemoryIsMeasurable = true;
 #endif
 
 /// Kills a program that goes on for too long. returns  kB that it held at most
@@ -79,7 +79,7 @@ class Inputs : public ::testing::Test {
   std::uint64_t kilobytes_ = 0;
 };
 
-TEST_F(Inputs, WhateverLiesInPlaceOfAFileEndsInOneLine) {
+TEST_F(Inputs, AnythingInsteadOfAFileEndsInOneLine) {
   for (const char* line : {"jet part.stl --machine hp45 --layer 1 -o out --quiet", "slice part.stl --layer 1 -o cut --quiet",
                            "extrude part.stl --machine anet-a8 --layer 0.3 -o part.gcode --quiet"}) {
     const Outcome outcome = run(line);
@@ -146,8 +146,8 @@ TEST_F(Inputs, WhateverLiesInPlaceOfAFileEndsInOneLine) {
       if (row.one_line) {
         EXPECT_EQ(outcome.error_lines(), outcome.code == 0 ? 0u : 1u) << what;
       }
-      if (kMemoryTells) {
-        EXPECT_LT(kilobytes_, kMostKilobytes) << what;
+      if (kMemoryIsMeasurable) {
+        EXPECT_LT(kilobytes_, kMaxKilobytes) << what;
       }
     }
     fs::remove_all(file);

@@ -76,7 +76,7 @@ class InspectedReports : public ::testing::Test {
   Directory directory_;
 };
 
-TEST_F(InspectedReports, PlacesAreThoseOfThePlantedBoxes) {
+TEST_F(InspectedReports, PositionsAreThoseOfThePlantedBoxes) {
   planted();
   for (const char* mirror : {"none", "x", "xy"}) {
     ASSERT_EQ(lamina(job({"--inspect", "--mirror", mirror, "--overwrite"})).code, 0);
@@ -85,20 +85,20 @@ TEST_F(InspectedReports, PlacesAreThoseOfThePlantedBoxes) {
     for (const char* code : {"islands", "loose", "hollows"}) {
       EXPECT_NE(std::find(warned.begin(), warned.end(), code), warned.end()) << code;
     }
-    ASSERT_EQ(codes(page["places"]), (std::vector<std::string>{"islands", "loose", "hollows"}));
+    ASSERT_EQ(codes(page["locations"]), (std::vector<std::string>{"islands", "loose", "hollows"}));
     const bool x = std::string(mirror) != "none", y = std::string(mirror) == "xy";
     const double middle[3][5] = {{35, 13.5, 1, 10, 10}, {35, 13.5, 1, 10, 19}, {15, 26, 1, 10, 19}};  // x, y, z, layers
     const double size[3][3] = {{2, 3, 6}, {2, 3, 6}, {4, 2, 8}};                                      // and mm2 or mm3
     for (std::size_t i = 0; i < 3; ++i) {
       SCOPED_TRACE(std::string(mirror) + " " + std::to_string(i));
-      const Json& place = page["places"][i];
-      for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(place["mm"][k].get<double>(), middle[i][k], 0.101);
-      EXPECT_EQ(place["layers"], (Json{middle[i][3], middle[i][4]}));
-      EXPECT_NEAR(place["box_mm"][0].get<double>(), x ? 40 - middle[i][0] : middle[i][0], 0.101);
-      EXPECT_NEAR(place["box_mm"][1].get<double>(), y ? middle[i][1] : 60 - middle[i][1], 0.101);
-      EXPECT_NEAR(place["box_mm"][2].get<double>(), size[i][0], 0.101);
-      EXPECT_NEAR(place["box_mm"][3].get<double>(), size[i][1], 0.101);
-      EXPECT_NEAR(place["amount"].get<double>(), size[i][2], 0.05);
+      const Json& position = page["locations"][i];
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(position["mm"][k].get<double>(), middle[i][k], 0.101);
+      EXPECT_EQ(position["layers"], (Json{middle[i][3], middle[i][4]}));
+      EXPECT_NEAR(position["box_mm"][0].get<double>(), x ? 40 - middle[i][0] : middle[i][0], 0.101);
+      EXPECT_NEAR(position["box_mm"][1].get<double>(), y ? middle[i][1] : 60 - middle[i][1], 0.101);
+      EXPECT_NEAR(position["box_mm"][2].get<double>(), size[i][0], 0.101);
+      EXPECT_NEAR(position["box_mm"][3].get<double>(), size[i][1], 0.101);
+      EXPECT_NEAR(position["amount"].get<double>(), size[i][2], 0.05);
     }
   }
 }
@@ -114,13 +114,13 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
   ASSERT_EQ(lamina(job({"--overwrite"})).code, 0);
   EXPECT_EQ(read_text(directory_ / "out/manifest.json"), manifest);
   EXPECT_EQ(read_text(directory_ / "out/inspection.json"), found) << "its layers are the same, looked at or not";
-  EXPECT_FALSE(head()["places"].empty());
+  EXPECT_FALSE(head()["locations"].empty());
   ASSERT_EQ(lamina(job({"--overwrite", "--layer", "0.2"})).code, 0);
   EXPECT_FALSE(fs::exists(directory_ / "out/inspection.json")) << "another job";
-  EXPECT_TRUE(head()["places"].empty());
+  EXPECT_TRUE(head()["locations"].empty());
   // A file of another job, or no file of lamina's form, tells nothing or is told.
   write_text(directory_ / "out/inspection.json", found);
-  EXPECT_TRUE(head()["places"].empty());
+  EXPECT_TRUE(head()["locations"].empty());
   ASSERT_EQ(lamina(job({"--overwrite", "--inspect"})).code, 0);
   std::string other = read_text(directory_ / "out/inspection.json");
   other.replace(other.find("\"islands\""), 9, "\"Islands\"");
@@ -132,11 +132,11 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
     ASSERT_EQ(lamina(job({"--overwrite", "--inspect"})).code, 0);
     write_text(directory_ / "out/inspection.json", other);
     EXPECT_EQ(codes(head()["warnings"]).back(), "inspection") << beyond;
-    EXPECT_TRUE(head()["places"].empty());
+    EXPECT_TRUE(head()["locations"].empty());
   }
   for (const char* text : {"", "{", "{\"kind\":\"inspection\"}", "[1]"}) {
     write_text(directory_ / "out/inspection.json", text);
-    EXPECT_TRUE(head()["places"].empty()) << text;
+    EXPECT_TRUE(head()["locations"].empty()) << text;
   }
   write_text(directory_ / "out/inspection.json", "notes of mine");
   const Outcome refused = lamina(job({"--overwrite", "--inspect"}));
@@ -149,7 +149,7 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
 }
 
 // The hollow of 13 to 17 and 25 to 27 mm: 130 to 170 and, from the back, 330 to 350 pixels, with a frame around it.
-TEST_F(InspectedReports, InABrowserAButtonLeadsToTheFrameOfAPlace) {
+TEST_F(InspectedReports, InABrowserAButtonLeadsToTheFrameOfAPosition) {
   planted();
   ASSERT_EQ(lamina(job({"--inspect"})).code, 0);
   ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
@@ -165,28 +165,28 @@ TEST_F(InspectedReports, InABrowserAButtonLeadsToTheFrameOfAPlace) {
   ASSERT_EQ(status, 0);
   const Json said = Json::parse(text);
   EXPECT_EQ(said["console"], Json::array());
-  ASSERT_EQ(said["places"].size(), 3u);
-  EXPECT_EQ(said["places"][2], "hollows of 8 mm³ at x 14.95, y 26.05, z 1 mm, layer 10 to 19");
-  EXPECT_EQ(said["steps"]["place"]["layer"], 10);
-  EXPECT_NEAR(said["steps"]["place"]["x"].get<double>(), 150, 1);
-  EXPECT_NEAR(said["steps"]["place"]["y"].get<double>(), 340, 1);
+  ASSERT_EQ(said["locations"].size(), 3u);
+  EXPECT_EQ(said["locations"][2], "hollows of 8 mm³ at x 14.95, y 26.05, z 1 mm, layer 10 to 19");
+  EXPECT_EQ(said["steps"]["position"]["layer"], 10);
+  EXPECT_NEAR(said["steps"]["position"]["x"].get<double>(), 150, 1);
+  EXPECT_NEAR(said["steps"]["position"]["y"].get<double>(), 340, 1);
   const Json& frame = said["frames"][2];
-  const double least[] = {120, 320, 170, 350}, most[] = {130, 330, 180, 360};
+  const double minimum[] = {120, 320, 170, 350}, maximum[] = {130, 330, 180, 360};
   for (std::size_t side = 0; side < 4; ++side) {
-    EXPECT_GE(frame[side].get<double>(), least[side]) << side;
-    EXPECT_LE(frame[side].get<double>(), most[side]) << side;
+    EXPECT_GE(frame[side].get<double>(), minimum[side]) << side;
+    EXPECT_LE(frame[side].get<double>(), maximum[side]) << side;
   }
 }
 
 // A thin wall is thin in all its layers, and one place.
-TEST_F(InspectedReports, AThinWallIsOnePlace) {
+TEST_F(InspectedReports, AThinWallIsOnePosition) {
   write_text(directory_ / "hollow.obj", boxes({{10, 10, 0, 20, 20, 3}, {19, 14, 0, 30, 14.4, 2}}, {}));
-  ASSERT_EQ(lamina(job({"--inspect", "--least-wall", "0.8"})).code, 0);
-  const Json places = head()["places"];
-  ASSERT_EQ(places.size(), 1u) << places.dump();
-  EXPECT_EQ(places[0]["code"], "thin");
-  EXPECT_EQ(places[0]["layers"], (Json{0, 19}));
-  EXPECT_NEAR(places[0]["mm"][0].get<double>(), 25, 0.5);
+  ASSERT_EQ(lamina(job({"--inspect", "--min-wall", "0.8"})).code, 0);
+  const Json locations = head()["locations"];
+  ASSERT_EQ(locations.size(), 1u) << locations.dump();
+  EXPECT_EQ(locations[0]["code"], "thin");
+  EXPECT_EQ(locations[0]["layers"], (Json{0, 19}));
+  EXPECT_NEAR(locations[0]["mm"][0].get<double>(), 25, 0.5);
 }
 
 }  // namespace

@@ -277,7 +277,7 @@ TEST_F(Jobs, VerifyFindsEveryKindOfDamage) {
   EXPECT_EQ(lamina({"verify", "--quick", "out"}).code, 0);
 }
 
-TEST_F(Jobs, VerifyTellsTheFirstTwentyFaultsInLayerOrderAndCountsTheRest) {
+TEST_F(Jobs, VerifyReportsTheFirstTwentyFaultsInLayerOrderAndCountsTheRest) {
   ASSERT_EQ(jet("out").code, 0);
   for (const std::string& name : files_below(directory_ / "out/layers"))
     fs::remove(directory_ / "out/layers/" / fs::path(name));

@@ -104,8 +104,8 @@ TEST_F(NamedFiles, WithoutAnEndingStayPaths) {
   for (const auto& [folder, job] : {std::pair{"jobs", "plain.toml"}, {"jobs", "./plain.toml"}, {"", "jobs/plain.toml"}}) {
     done_in(folder, std::string("jet --quiet --dry-run --job ") + job + " --save-job " + folder_ / "jobs/saved.toml");
     EXPECT_EQ(line_of("jobs/saved.toml", "profile = "), "profile = \"./nuferbj\"");
-    const Outcome told = in(folder, std::string("jet --quiet --json --dry-run --job ") + job);
-    EXPECT_NE(told.out.find("\"mine\""), std::string::npos) << told.out;
+    const Outcome reported = in(folder, std::string("jet --quiet --json --dry-run --job ") + job);
+    EXPECT_NE(reported.out.find("\"mine\""), std::string::npos) << reported.out;
   }
 }
 
@@ -119,7 +119,7 @@ TEST_F(NamedFiles, OfPrintersOfFilamentDoSoToo) {
   EXPECT_EQ(read_text(folder_ / "three.gcode"), read_text(folder_ / "one.gcode"));
 }
 
-TEST_F(NamedFiles, ThatAreNotThereAreToldWithWhereTheyWereLookedFor) {
+TEST_F(NamedFiles, ThatAreNotThereAreReportedWithWhereTheyWereSearched) {
   const std::string corrected = "no such machine profile; correct it (a relative path begins beside the job file";
   fs::rename(folder_ / "jobs/mine.toml", folder_ / "mine.toml");
   expect_refused(

@@ -85,14 +85,14 @@ TEST_F(OneMeaning, AJobFileACommandLineAndASavedJobAgreeInEveryCommand) {
   }
 }
 
-TEST_F(OneMeaning, ASavedJobOfHeightsIsTheOneAskedFor) {
+TEST_F(OneMeaning, ASavedJobOfHeightsIsTheOneRequested) {
   done("heights part.stl --compare --thickness 0.5,1 --quiet -o table --save-job saved.toml");
   const std::string saved = read_text(folder / "saved.toml");
   EXPECT_NE(saved.find("size_mm = [490, 380]"), std::string::npos) << saved;
   EXPECT_NE(saved.find("mode = \"uniform\""), std::string::npos) << saved;
 }
 
-TEST_F(OneMeaning, AFillingOfTheCommandLineTakesThePlaceOfSegmentedLinesOfAFile) {
+TEST_F(OneMeaning, AFillingOfTheCommandLineReplacesSegmentedLinesOfAFile) {
   write_text(folder / "job.toml", "[machine]\nprofile = 'anet-a8'\n[segment]\non = true\n[[part]]\npath = 'part.stl'\n");
   const auto summary = [&](const std::string& words) {
     return done("extrude --job job.toml --layer 0.3 --dry-run " + words).err;
@@ -115,12 +115,12 @@ TEST_F(OneMeaning, KeysOfContoursDoNotMoveFilledImages) {
   done(call + "plain");
   const Outcome moved = done(call + "moved --set slice.offset_mm=0.5");
   EXPECT_EQ(tree_text(folder.path() / "plain"), tree_text(folder.path() / "moved"));
-  const Outcome told = done("jet part.stl --layer 1 --dry-run --set slice.offset_mm=0.5");
-  EXPECT_NE(told.err.find("note: --set slice.offset_mm=0.5: slice.offset_mm decides nothing here"), std::string::npos)
-      << told.err;
+  const Outcome reported = done("jet part.stl --layer 1 --dry-run --set slice.offset_mm=0.5");
+  EXPECT_NE(reported.err.find("note: --set slice.offset_mm=0.5: slice.offset_mm decides nothing here"), std::string::npos)
+      << reported.err;
 }
 
-TEST_F(OneMeaning, FillIsWhatIsLaidInside) {
+TEST_F(OneMeaning, FillIsWhatIsDepositedInside) {
   for (const std::string command : {"jet", "slice", "extrude"}) {
     const std::string call = command + " part.stl --layer 0.3 --dry-run --quiet ";
     done(call + "--fill raster");
@@ -226,7 +226,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
   EXPECT_EQ(done("jet part.stl --layer 1 --dry-run --walls 3 --fill none").err.find("note:"), std::string::npos);
 }
 
-TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsTold) {
+TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsReported) {
   const std::string fitted = "jet part.stl --dry-run --heights cusp --thickness 0.5,1";
   EXPECT_NE(done(fitted + " --layer 1").err.find("note: --layer does nothing here"), std::string::npos);
   EXPECT_EQ(done(fitted).err.find("note:"), std::string::npos);
@@ -247,7 +247,7 @@ TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsTold) {
   EXPECT_EQ(done("slice part.stl --layer 1 --overwrite -o out --format 3mf").err.find("contours only"), std::string::npos);
 }
 
-TEST_F(OneMeaning, WhatWasAskedForIsAnsweredOnStdout) {
+TEST_F(OneMeaning, WhatWasRequestedIsAnsweredOnStdout) {
   done("jet part.stl --bed 60x60 --dpi 100 --layer 1 --quiet -o out");
   done("extrude part.stl --quiet -o part.gcode");
   const struct {

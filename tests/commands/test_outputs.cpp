@@ -44,7 +44,7 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
   // A toolpath file of SML has its layer table beside it, under its own name but for the ending.
   fs::create_directory(directory_ / "sml");
   fs::copy(directory_ / "part.stl", directory_ / "sml/part.rp3");
-  fs::copy(fs::path(LAMINA_TEST_DIR) / "../stages/write/machines/extrusion/fdm-2000.toml", directory_ / "sml/printer.rp3");
+  fs::copy(fs::path(LAMINA_TEST_DIR) / "../pipeline/machine/shipped/extruders/fdm-2000.toml", directory_ / "sml/printer.rp3");
   write_text(directory_ / "sml/job.rp3", "[layers]\nthickness_mm = 0.254\n[[part]]\npath = \"../part.stl\"\n");
   write_text(directory_ / "sml/named.toml", "[machine]\nprofile = \"printer.rp3\"\n[[part]]\npath = \"../part.stl\"\n");
   fs::create_directory(directory_ / "farm");
@@ -169,22 +169,23 @@ TEST_F(Outputs, WhatLaminaWroteIsWrittenAgain) {
 }
 
 TEST_F(Outputs, DevicesAndPipesStayWhatTheyAre) {
-  std::vector<std::string> places = {"pipe", "link"};
+  std::vector<std::string> positions = {"pipe", "link"};
   ASSERT_EQ(::mkfifo((directory_ / "pipe").c_str(), 0600), 0);
   fs::create_symlink("pipe", directory_ / "link");
   const bool devices = ::mknod((directory_ / "null").c_str(), S_IFCHR | 0600, makedev(1, 3)) == 0;
-  if (devices) places.push_back("null");
-  for (const std::string& place : places) {
+  if (devices) positions.push_back("null");
+  for (const std::string& position : positions) {
     for (const std::string ending : {".svg", ".png", ".html"}) {
-      fs::create_symlink(place, directory_ / (place + ending));
+      fs::create_symlink(position, directory_ / (position + ending));
     }
   }
-  for (const std::string& place : places) {
+  for (const std::string& position : positions) {
     for (const std::string& line :
-         {"heights part.stl --layer 1 --plot " + place + ".svg", "heights part.stl --layer 1 --plot " + place + ".png",
-          "permeability drops.csv --convention dinisio2022 --plot " + place,
-          "jet part.stl --layer 1 --dry-run --overwrite --save-job " + place, "machines --target " + place,
-          "calibrate --machine anet-a8 --measured widths.csv -o " + place, "report out --overwrite -o " + place + ".html"}) {
+         {"heights part.stl --layer 1 --plot " + position + ".svg", "heights part.stl --layer 1 --plot " + position + ".png",
+          "permeability drops.csv --convention dinisio2022 --plot " + position,
+          "jet part.stl --layer 1 --dry-run --overwrite --save-job " + position, "machines --target " + position,
+          "calibrate --machine anet-a8 --measured widths.csv -o " + position,
+          "report out --overwrite -o " + position + ".html"}) {
       refused(line, 4, "is a device or a pipe, not a file; name another one");
     }
   }

@@ -10,8 +10,9 @@
 #include <numbers>
 #include <random>
 
-#include "stages/read/image.h"
-#include "stages/write/report/run_code.h"
+#include "stages/formats/images/image.h"
+#include "stages/support/text/escape.h"
+#include "stages/view/report/run_code.h"
 #include "tests/commands/program.h"
 #include "tests/commands/unpack_runs.h"
 
@@ -53,7 +54,7 @@ TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
   for (int i = 0; i < 60; ++i) {
     const auto columns = static_cast<std::uint32_t>(1 + random() % 3000), rows = static_cast<std::uint32_t>(1 + random() % 60);
     const Runs runs = random_runs(random, columns, rows);
-    Buffer<std::byte> packed = write::report::pack_runs(runs);
+    Buffer<std::byte> packed = view::report::pack_runs(runs);
     const Result<Runs> back = unpack_runs(packed, columns, rows);
     ASSERT_TRUE(back.ok());
     ASSERT_TRUE(equal(runs, *back));
@@ -62,17 +63,17 @@ TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
     for (int k = 0; k < 20; ++k) {
       Buffer<std::byte> code(1 + random() % 40);  // any code, within a whole zlib stream
       for (std::byte& byte : code) byte = static_cast<std::byte>(random() % (k < 10 ? 256 : 5));
-      const Result<Runs> any = unpack_runs(write::report::deflate_bytes(code), columns, rows);
+      const Result<Runs> any = unpack_runs(view::report::deflate_bytes(code), columns, rows);
       if (!any) continue;
       for (const std::uint32_t change : any->change) EXPECT_LE(change, columns);
     }
   }
   const Runs empty = {9, {0, 0, 0}, {}};
-  EXPECT_TRUE(equal(empty, *unpack_runs(write::report::pack_runs(empty), 9, 2)));
+  EXPECT_TRUE(equal(empty, *unpack_runs(view::report::pack_runs(empty), 9, 2)));
 }
 
 TEST(RunCode, Base64IsThatOfRfc4648) {
-  const auto text = [](std::string_view bytes) { return write::report::base64(std::as_bytes(std::span(bytes))); };
+  const auto text = [](std::string_view bytes) { return lamina::base64(std::as_bytes(std::span(bytes))); };
   EXPECT_EQ(text(""), "");
   EXPECT_EQ(text("f"), "Zg==");
   EXPECT_EQ(text("fo"), "Zm8=");
@@ -109,7 +110,7 @@ class JobsReported : public ::testing::Test {
   Runs layer(int index) {
     char name[32];
     std::snprintf(name, sizeof name, "out/layers/%06d.tif", index);
-    const auto image = read::image(directory_ / name);
+    const auto image = formats::image(directory_ / name);
     EXPECT_TRUE(image.ok());
     return image->runs;
   }
@@ -133,13 +134,13 @@ TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
   const double pixel_mm2 = head["pixel_mm"][0].get<double>() * head["pixel_mm"][1].get<double>();
   // Beads 0.4 mm wide and 0.3 mm high have round sides; seen from above they cover their width.
   const double section = 0.4 * 0.3, rounded = section - (1 - std::numbers::pi / 4) * 0.3 * 0.3;
-  double all_covered = 0, all_laid = 0;
+  double all_covered = 0, all_deposited = 0;
   for (std::size_t i = 0; i < layers; ++i) {
     const double covered =
         head["layers"]["set"][i].get<double>() * pixel_mm2 * head["layers"]["thickness"][i].get<double>() * 1e-6;
     const double volume = head["layers"]["volume"][i];
     all_covered += covered;
-    all_laid += volume;
+    all_deposited += volume;
     if (volume == 0) {
       EXPECT_EQ(covered, 0) << i;  // nothing fits into the highest layer
       continue;
@@ -147,7 +148,7 @@ TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
     EXPECT_NEAR(covered / volume, section / rounded, 0.08) << i;  // ends of beads are round, too
     EXPECT_GT(head["layers"]["seconds"][i], 0) << i;
   }
-  EXPECT_NEAR(all_covered / all_laid, section / rounded, 0.03);
+  EXPECT_NEAR(all_covered / all_deposited, section / rounded, 0.03);
   const auto drawn = unpack_runs(piece(page, "r3"), head["columns"], head["rows"]);
   ASSERT_TRUE(drawn.ok());
   EXPECT_GT(drawn->change.size(), 100u);
@@ -175,7 +176,7 @@ TEST_F(JobsReported, EveryLayerOfThePageIsItsFile) {
   ASSERT_EQ(lamina({"report", "out", "-o", "again.html", "--quiet"}).code, 0);
   EXPECT_EQ(page, read_text(directory_ / "again.html"));
 
-  ASSERT_EQ(lamina({"report", "out", "-o", "small.html", "--most-bytes", "165K"}).code, 0);
+  ASSERT_EQ(lamina({"report", "out", "-o", "small.html", "--max-bytes", "165K"}).code, 0);
   const std::string small = read_text(directory_ / "small.html");
   EXPECT_LT(small.size(), 165u << 10);
   EXPECT_NE(small, page);
@@ -296,14 +297,14 @@ TEST_F(JobsReported, TimesOfLayersAddUpToThatOfTheReplayedProgram) {
   EXPECT_EQ(seconds.size(), 10u);
   EXPECT_NEAR(sum, Json::parse(verified.out)["replay"]["seconds"].get<double>(), 1e-9 * sum);
   const std::vector<std::string> words = {"jet", "part.stl", "--machine", "nuferbj", "--layer", "0.1", "--dry-run"};
-  const auto told = [&](const std::vector<std::string>& more) {
+  const auto reported = [&](const std::vector<std::string>& more) {
     std::vector<std::string> call = words;
     call.insert(call.end(), more.begin(), more.end());
     return lamina(call);
   };
-  EXPECT_NEAR(sum, Json::parse(told({"--json", "--quiet"}).out)["print_seconds"].get<double>(), 1e-9 * sum);
+  EXPECT_NEAR(sum, Json::parse(reported({"--json", "--quiet"}).out)["print_seconds"].get<double>(), 1e-9 * sum);
   const std::string text = fmt::format("({:.1f} s) on nuferbj", sum);
-  for (const Outcome& outcome : {told({}), lamina({"verify", "out"})}) {
+  for (const Outcome& outcome : {reported({}), lamina({"verify", "out"})}) {
     EXPECT_NE((outcome.out + outcome.err).find(text), std::string::npos) << outcome.out << outcome.err;
   }
   EXPECT_GT(sum, 1);
@@ -369,7 +370,7 @@ TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
   EXPECT_GT(step["wheel"]["scale"], step["drag"]["scale"]);
   EXPECT_NEAR(step["plot"]["layer"].get<int>(), layers / 2, 3);
   EXPECT_EQ(said["file_rows"], layers + 1);
-  for (const Json& stretched : said["stretched"]) EXPECT_NEAR(stretched.get<double>(), 1, 0.02) << said["stretched"];
+  for (const Json& scaled : said["scaled"]) EXPECT_NEAR(scaled.get<double>(), 1, 0.02) << said["scaled"];
   for (const char* label : {"the parts from above", "the parts from the front", "the parts from the right",
                             "area against height", "thickness against height"}) {
     EXPECT_NE(std::ranges::find(said["labels"], Json(label)), said["labels"].end()) << label;

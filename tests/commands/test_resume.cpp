@@ -176,7 +176,7 @@ TEST_F(Resume, ImagesOfAnOlderJobDoNotMixWithThoseOfTheNewOne) {
   EXPECT_EQ(tree("out"), tree("whole"));
 }
 
-TEST_F(Resume, ToolpathsThatNoRecordTellsOfAreKept) {
+TEST_F(Resume, ToolpathsThatNoRecordReportsAreKept) {
   const std::string job = "extrude part.stl --walls 1 --quiet --resume ";
   for (const char* head : {"absent", "torn"}) {
     if (std::string_view(head) == "torn") {
@@ -191,7 +191,7 @@ TEST_F(Resume, ToolpathsThatNoRecordTellsOfAreKept) {
   done(job + "--machine anet-a8 --layer 0.3 -o u.gcode");  // killed before its head
 }
 
-TEST_F(Resume, ContoursThatNoRecordTellsOfAreKept) {
+TEST_F(Resume, ContoursThatNoRecordReportsAreKept) {
   for (const char* format : {"svg", "3mf"}) {
     const std::string job = std::string("slice part.stl --layer 0.5 --quiet -o out --format ") + format;
     done(job);
@@ -226,7 +226,7 @@ TEST_F(Resume, ContoursThatNoRecordTellsOfAreKept) {
   }
 }
 
-TEST_F(Resume, FilesALayerThatNoRecordTellsOfAreKept) {
+TEST_F(Resume, FilesALayerThatNoRecordReportsAreKept) {
   const std::string job = "slice part.stl --layer 0.5 --file-a-layer --quiet -o out";
   done(job);
   const std::string manifest = read_text(directory_ / "out/manifest.json");
@@ -242,7 +242,7 @@ TEST_F(Resume, FilesALayerThatNoRecordTellsOfAreKept) {
   refused(job + " --resume", 2, "out/layers: holds layers");
 }
 
-TEST_F(Resume, ImagesThatNoRecordTellsOfAreKept) {
+TEST_F(Resume, ImagesThatNoRecordReportsAreKept) {
   fs::create_directories(directory_ / "out/layers");
   write_text(directory_ / "out/layers/000000.tif", "precious");
   for (const bool torn : {false, true}) {
@@ -253,7 +253,7 @@ TEST_F(Resume, ImagesThatNoRecordTellsOfAreKept) {
   EXPECT_EQ(planned("jet part.stl --layer 1 --dpi 60 --quiet -o out"), 3);  // killed before its head
 }
 
-TEST_F(Resume, AFileInPlaceOfTheFolderOfLayersIsToldBeforeTheyAreMade) {
+TEST_F(Resume, AFileInsteadOfTheFolderOfLayersIsReportedBeforeTheyAreMade) {
   fs::create_directory(directory_ / "out");
   write_text(directory_ / "out/layers", "");
   const Outcome outcome = run("slice part.stl --layer 1 --file-a-layer --quiet -o out");
@@ -264,7 +264,7 @@ TEST_F(Resume, AFileInPlaceOfTheFolderOfLayersIsToldBeforeTheyAreMade) {
   done("slice part.stl --layer 1 --file-a-layer --quiet -o out");
 }
 
-TEST_F(Resume, APipeInPlaceOfALayerIsToldWithWhatHelps) {
+TEST_F(Resume, APipeInsteadOfALayerIsReportedWithWhatHelps) {
   const std::string job = "jet part.stl --layer 1 --dpi 60 --quiet -o out";
   done(job);
   const std::string whole = tree("out");

@@ -57,13 +57,13 @@ TEST(SameBytes, ForAnyThreadsEngineInstructionsAndMemory) {
   }
 }
 
-TEST(SameBytes, CopiesAreThePartStandingWhereTheyStand) {
+TEST(SameBytes, CopiesAreThePartAtTheirPositions) {
   // Three copies side by side, each an instance, against three parts with positions of their own.
   const Directory directory;
   const std::string part = corpus_file("parameter_quality_nut.stl");
   const Words bed = {"--bed", "80x40", "--dpi", "600", "--layer", "1"};
   const std::string copies = bytes_of(directory, Words{part, "--copies", "3", "--at", "1.25,2.5", "--gap", "3"} + bed, "c");
-  std::string job = "[place]\ngap_mm = 3\n";
+  std::string job = "[placement]\ngap_mm = 3\n";
   for (int i = 0; i < 3; ++i) {
     job += "[[part]]\npath = \"" + part + "\"\nat_mm = [" + std::to_string(1.25 + i * (12.7 + 3.0)) + ", 2.5]\n";
   }
@@ -132,7 +132,7 @@ void write_tower(const std::string& path, int storeys, int posts) {
   write_text(path, file);
 }
 
-TEST(BoundedMemory, PeakIsMeshIndexAndBudgetWhateverLayersNeed) {
+TEST(BoundedMemory, PeakIsMeshIndexAndBudgetRegardlessOfLayers) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer needs memory of its own: peaks were NOT compared";
 #endif
@@ -188,7 +188,7 @@ std::vector<Expected> outcome_table() {
 }
 
 /// Plans every file of the table that lies in the folder, with both engines compared; refused ones must leave nothing.
-void check_outcomes(const std::string& folder, std::size_t least) {
+void check_outcomes(const std::string& folder, std::size_t minimum) {
   const Directory directory;
   std::map<std::string, std::string> images;
   std::size_t checked = 0;
@@ -210,7 +210,7 @@ void check_outcomes(const std::string& folder, std::size_t least) {
     }
     fs::remove_all(directory.path() / output);
   }
-  EXPECT_GE(checked, least) << "too few of the table's files lie in " << folder;
+  EXPECT_GE(checked, minimum) << "too few of the table's files lie in " << folder;
   for (const Expected& row : rows) {
     if (row.same_as == "-" || !images.contains(row.file) || !images.contains(row.same_as)) continue;
     EXPECT_TRUE(images[row.file] == images[row.same_as]) << row.file << " and " << row.same_as;

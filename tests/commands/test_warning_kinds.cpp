@@ -47,15 +47,15 @@ const std::vector<WarningKind> kKinds = {
     {"islands", "jet islands.obj" + kInspected},
     {"loose", "jet islands.obj" + kInspected},
     {"hollows", "jet hollow.obj" + kInspected},
-    {"thin", "jet rib.obj --least-wall 1" + kInspected},
+    {"thin", "jet rib.obj --min-wall 1" + kInspected},
     {"touching", "jet --job touching.toml" + kInspected},
     {"bed-edge", "jet part.stl --at 0,5" + kInspected},
     {"not-inspected", "jet --job noise.toml --memory 2M" + kInspected},
     {"lost-pixels", "jet part.stl --machine nuferbj --layer 0.1 --blocked 70"},
     {"cover-top", "jet odd.stl --dpi 254 --heights angle --cover-top --containment inside --thickness 0.2"},
     {"mixed-powders", "jet part.stl pin.stl --machine two.toml --material steel,bronze --vat-rule majority --layer 0.1"},
-    {"care", "jet part.stl --machine idle.toml --layer 0.1"},
-    {"joints", "jet part.stl --machine joints.toml --layer 0.1"},
+    {"maintenance", "jet part.stl --machine idle.toml --layer 0.1"},
+    {"stitching", "jet part.stl --machine stitching.toml --layer 0.1"},
     {"vanished", "jet rib.obj --bleed 300" + kBed},
     {"build-steps", "jet part.stl --machine nuferbj --layer 0.201"},
     {"no-drop", "jet --job dry.toml"},
@@ -113,8 +113,8 @@ class WarningKinds : public ::testing::Test {
          "[run]\nallow_unbound = true\n[[part]]\npath = \"part.stl\"\n[[part]]\npath = \"thin.stl\"\nsaturation_percent = 1\n");
     const std::string machine = "inherits = \"nuferbj\"\n[machine]\nname = \"odd\"\n";
     file("two.toml", machine + "[powder]\nmaterials = [\"steel\", \"bronze\"]\n");
-    file("idle.toml", machine + "[care]\nspit_mm = [-40, 5]\n");
-    file("joints.toml", machine + "[mounting]\njoint_shift_lines = 128\n");
+    file("idle.toml", machine + "[maintenance]\nspit_mm = [-40, 5]\n");
+    file("stitching.toml", machine + "[mounting]\njoint_shift_lines = 128\n");
     fs::create_directories(in_ / "noise");
     std::uint32_t state = 1;
     for (const char* name : {"noise/0.pbm", "noise/1.pbm"}) {
@@ -133,7 +133,7 @@ class WarningKinds : public ::testing::Test {
   static std::string output_of(const WarningKind& kind) {
     return "out-" + kind.code + (kind.job.starts_with("extrude") ? ".gcode" : "");
   }
-  KindSet told_by(const WarningKind& kind) const {
+  KindSet predicted_lines(const WarningKind& kind) const {
     const Outcome outcome = run_lamina(words_of(kind.job + " --json --quiet -o " + output_of(kind)), in_.path());
     EXPECT_EQ(outcome.code, 0) << kind.job << "\n" << outcome.err;
     const KindJson json = KindJson::parse(outcome.out, nullptr, false);
@@ -152,11 +152,11 @@ class WarningKinds : public ::testing::Test {
   Directory in_;
 };
 
-TEST_F(WarningKinds, AreToldByTheirJobsAndOnThePage) {
+TEST_F(WarningKinds, AreReportedByTheirJobsAndOnThePage) {
   for (const WarningKind& kind : kKinds) {
     SCOPED_TRACE(kind.code + ": lamina " + kind.job);
-    const KindSet told = told_by(kind);
-    EXPECT_TRUE(told.contains(kind.code)) << ::testing::PrintToString(told);
+    const KindSet reported = predicted_lines(kind);
+    EXPECT_TRUE(reported.contains(kind.code)) << ::testing::PrintToString(reported);
     if (kind.page == Page::kNone) continue;
     const KindSet page = on_page(kind);
     EXPECT_EQ(page.contains(kind.code), kind.page == Page::kHasIt) << ::testing::PrintToString(page);

@@ -22,7 +22,7 @@ class Warnings : public ::testing::Test {
 
   Outcome run(const std::string& line) { return run_lamina(words_of(line), directory_.path()); }
   /// The codes of a job that is done.
-  Codes told(const std::string& line) {
+  Codes reported(const std::string& line) {
     const Outcome outcome = run(line + " --json");
     EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
     summary_ = Json::parse(outcome.out, nullptr, false);
@@ -48,22 +48,22 @@ class Warnings : public ::testing::Test {
 };
 
 TEST_F(Warnings, SoundJobsHaveNone) {
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 -o a"), Codes());
-  EXPECT_EQ(told("jet part.stl part.stl --copies 3 --layer 0.5 --dpi 100 --bleed 100 --mirror x -o b"), Codes());
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 --fill raster --bead 0.5 --bead-gap 1 -o c"), Codes());
-  EXPECT_EQ(told("slice part.stl --layer 0.5 --tolerance 20 -o d"), Codes());
-  EXPECT_EQ(told("extrude part.stl --machine anet-a8 --layer 0.25 -o e.gcode"), Codes());
-  EXPECT_EQ(told("jet part.stl --layer 0.4 --dpi 100 -o f"), Codes()) << "the top ends amid a layer";
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 -o a"), Codes());
+  EXPECT_EQ(reported("jet part.stl part.stl --copies 3 --layer 0.5 --dpi 100 --bleed 100 --mirror x -o b"), Codes());
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 --fill raster --bead 0.5 --bead-gap 1 -o c"), Codes());
+  EXPECT_EQ(reported("slice part.stl --layer 0.5 --tolerance 20 -o d"), Codes());
+  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --layer 0.25 -o e.gcode"), Codes());
+  EXPECT_EQ(reported("jet part.stl --layer 0.4 --dpi 100 -o f"), Codes()) << "the top ends amid a layer";
 }
 
-TEST_F(Warnings, OddJobsHaveACodeAndAPlace) {
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 1 -o a"), Codes{"volume"});
+TEST_F(Warnings, OddJobsHaveACodeAndAPosition) {
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 1 -o a"), Codes{"volume"});
   EXPECT_EQ(summary_["warnings"][0]["part"], "part.stl");
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 1 --layers 0: -o a1"), Codes()) << "some layers only";
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 --bleed 2000 -o b"), Codes{"bleed"});
-  EXPECT_EQ(told("slice part.stl --layer 0.5 --tolerance 900 -o c"), Codes{"tolerance"});
-  EXPECT_EQ(told("slice part.stl --layer 0.5 --pattern raster --bead 50 -o d"), Codes{"no-bead"});
-  EXPECT_EQ(told("extrude part.stl --machine anet-a8 --layer 0.25 --bottom 5 -o e.gcode"), Codes{"above-bed"});
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 1 --layers 0: -o a1"), Codes()) << "some layers only";
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 --bleed 2000 -o b"), Codes{"bleed"});
+  EXPECT_EQ(reported("slice part.stl --layer 0.5 --tolerance 900 -o c"), Codes{"tolerance"});
+  EXPECT_EQ(reported("slice part.stl --layer 0.5 --pattern raster --bead 50 -o d"), Codes{"no-bead"});
+  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --layer 0.25 --bottom 5 -o e.gcode"), Codes{"above-bed"});
   EXPECT_EQ(summary_["warnings"][0]["z_mm"], 5.0);
 }
 
@@ -71,7 +71,7 @@ TEST_F(Warnings, APartAmongOthersThatIsLost) {
   write_text(directory_ / "job.toml",
              "[layers]\nthickness_mm = 0.5\n[bed]\ndpi = 20\n[[part]]\npath = \"part.stl\"\nat_mm = [1, 1]\n"
              "[[part]]\npath = \"pin.stl\"\nat_mm = [30.5, 1.28]\n");
-  EXPECT_EQ(told("jet --job job.toml -o a"), Codes{"part-lost"});
+  EXPECT_EQ(reported("jet --job job.toml -o a"), Codes{"part-lost"});
   EXPECT_TRUE(summary_["warnings"][0]["part"].get<std::string>().ends_with("pin.stl"));
 }
 
@@ -83,13 +83,13 @@ TEST_F(Warnings, EmptyJobsAreRefusedUnlessAllowed) {
   refused("extrude part.stl --machine anet-a8 --walls 0 -o a.gcode", 3, {"not one bead", "--walls"});
   refused("extrude part.stl --machine anet-a8 --bead 15 -o a.gcode", 3, {"no bead fits"});
   refused("slice part.stl --layer 1 --offset -9 -o a", 3, {"not one contour", "--offset -9"});
-  EXPECT_EQ(told("jet part.stl --layer 100 --dpi 60 --allow-empty -o a"), Codes{"empty"});
-  EXPECT_EQ(told("extrude part.stl --machine anet-a8 --walls 0 --allow-empty -o a.gcode"), (Codes{"no-bead", "empty"}));
-  EXPECT_EQ(told("jet part.stl --layer 100 --dpi 60 --shard 1/1 -o s"), Codes()) << "shards may be empty";
-  EXPECT_EQ(told("jet part.stl --layer 100 --dpi 60 --layers 0: -o l"), Codes()) << "and some layers";
+  EXPECT_EQ(reported("jet part.stl --layer 100 --dpi 60 --allow-empty -o a"), Codes{"empty"});
+  EXPECT_EQ(reported("extrude part.stl --machine anet-a8 --walls 0 --allow-empty -o a.gcode"), (Codes{"no-bead", "empty"}));
+  EXPECT_EQ(reported("jet part.stl --layer 100 --dpi 60 --shard 1/1 -o s"), Codes()) << "shards may be empty";
+  EXPECT_EQ(reported("jet part.stl --layer 100 --dpi 60 --layers 0: -o l"), Codes()) << "and some layers";
   write_text(directory_ / "empty.toml",
              "[run]\nallow_empty = true\n[layers]\nthickness_mm = 100\n[[part]]\npath = \"part.stl\"\n");
-  EXPECT_EQ(told("jet --job empty.toml --dpi 60 -o j"), Codes{"empty"});
+  EXPECT_EQ(reported("jet --job empty.toml --dpi 60 -o j"), Codes{"empty"});
 }
 
 TEST_F(Warnings, StrictJobsEndAtAWarning) {
@@ -97,7 +97,7 @@ TEST_F(Warnings, StrictJobsEndAtAWarning) {
   refused("slice part.stl --layer 0.5 --tolerance 900 --strict -o a", 5, {"[tolerance]"});
   refused("extrude part.stl --machine anet-a8 --bottom 5 --strict -o a.gcode", 5, {"[above-bed]"});
   refused("extrude part.stl --machine anet-a8 --walls 0 --dry-run --strict", 5, {"[no-bead]"});
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 --strict -o b"), Codes());
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 --strict -o b"), Codes());
 }
 
 TEST_F(Warnings, NoFolderOfARefusedJobStays) {
@@ -110,17 +110,17 @@ TEST_F(Warnings, NoFolderOfARefusedJobStays) {
   EXPECT_TRUE(fs::is_empty(directory_ / "mine")) << "it was there before";
 }
 
-TEST_F(Warnings, AMergedJobIsJudgedAsAWhole) {
+TEST_F(Warnings, AMergedJobIsCheckedAsAWhole) {
   const auto shards = [&](const std::string& job, const std::string& out) {
-    for (const char* one : {" --shard 1/2 -o ", " --shard 2/2 -o "}) EXPECT_EQ(told(job + one + out), Codes());
+    for (const char* one : {" --shard 1/2 -o ", " --shard 2/2 -o "}) EXPECT_EQ(reported(job + one + out), Codes());
   };
   shards("jet part.stl --layer 2.5 --dpi 60 --bleed 9000", "none");
   refused("merge none -o none", 3, {"not one pixel in 2 layers", "--allow-empty"});
   refused("merge none -o other", 3, {"not one pixel"});
   EXPECT_FALSE(fs::exists(directory_ / "other"));
   refused("merge none -o other --allow-empty --strict", 5, {"--strict: 1 warning; [empty]"});
-  EXPECT_EQ(told("merge none -o none --allow-empty"), Codes{"empty"});
-  EXPECT_EQ(told("merge none -o none"), Codes{"empty"}) << "whole already";
+  EXPECT_EQ(reported("merge none -o none --allow-empty"), Codes{"empty"});
+  EXPECT_EQ(reported("merge none -o none"), Codes{"empty"}) << "whole already";
 
   // The pin stands between two blocks, and is thinner than a pixel.
   write_text(directory_ / "job.toml",
@@ -146,19 +146,19 @@ TEST_F(Warnings, AMergedJobIsJudgedAsAWhole) {
   block(5, 5, 7);
   write_text(directory_ / "neck.obj", text);
   EXPECT_EQ(run("jet --job job.toml -o whole").code, 0);
-  EXPECT_EQ(told("jet --job job.toml --engine rays -o neck_rays"), Codes{"layers-empty"});
-  EXPECT_EQ(told("jet --job job.toml --engine contours -o neck_contours"), Codes{"layers-empty"});
+  EXPECT_EQ(reported("jet --job job.toml --engine rays -o neck_rays"), Codes{"layers-empty"});
+  EXPECT_EQ(reported("jet --job job.toml --engine contours -o neck_contours"), Codes{"layers-empty"});
   shards("jet --job job.toml", "neck");
   refused("merge neck -o neck --strict", 5, {"[layers-empty]"});
-  EXPECT_EQ(told("merge neck -o neck"), Codes{"layers-empty"});
+  EXPECT_EQ(reported("merge neck -o neck"), Codes{"layers-empty"});
   EXPECT_EQ(summary_["warnings"][0]["layer"], 2);
   EXPECT_EQ(summary_["warnings"][0]["z_mm"], 2.5);
   EXPECT_EQ(tree_text(directory_ / "neck"), tree_text(directory_ / "whole"));
 }
 
 TEST_F(Warnings, NeitherKeyMakesAnotherJob) {
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 -o a"), Codes());
-  EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 --strict --allow-empty -o b"), Codes());
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 -o a"), Codes());
+  EXPECT_EQ(reported("jet part.stl --layer 0.5 --dpi 100 --strict --allow-empty -o b"), Codes());
   EXPECT_EQ(read_text(directory_.path() / "a/manifest.json"), read_text(directory_.path() / "b/manifest.json"));
   EXPECT_EQ(run("jet part.stl --layer 0.5 --dpi 100 --strict -o a --resume").code, 0);
 }

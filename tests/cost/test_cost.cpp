@@ -69,7 +69,7 @@ TEST(Cost, AKilogramAndItsDensityAreAPrice) {
   EXPECT_EQ(tally.quote().job.powder_cents, 135);  // 0.0075 l x 180
 }
 
-TEST(Cost, APartPaysForTheLayersInWhichItStands) {
+TEST(Cost, APartPaysForTheLayersInWhichItIs) {
   const Machine machine = printer();
   Tally tally(machine, grid(), 2);
   const std::uint64_t both[] = {3'000, 1'000}, high[] = {0, 2'000};

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/report/cost_report.h"
 #include "stages/cost/cost.h"
-#include "stages/cost/quote_table.h"
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "tests/commands/program.h"
@@ -59,7 +59,7 @@ size_mm = [100, 50]
 build_height_mm = 50
 [head]
 drop_pl = 80
-most_drop_sweeps = 8
+max_drop_sweeps = 8
 [mounting]
 dpi = 254
 [powder]
@@ -200,7 +200,7 @@ TEST_F(Quotes, PartsAreNamedAlikeAndApart) {
 // What is spat by the program is in its drops; what the host spits is added: 4 layers x 20,000.
 TEST_F(Quotes, ThePageHasTheRowsOfTheFiles) {
   test::write_text(directory_ / "spits.toml",
-                   std::string(kPrinter) + kPrices + "[care]\nspit_layers = 1\nspit_drops = 50\nspit_mm = [-40, 5]\n");
+                   std::string(kPrinter) + kPrices + "[maintenance]\nspit_layers = 1\nspit_drops = 50\nspit_mm = [-40, 5]\n");
   ASSERT_EQ(run("jet a.stl b.stl --machine spits.toml --layer 1 --quiet --quote q.csv -o out").code, 0);
   const test::Outcome verified = run("verify out --quote v.csv");
   ASSERT_EQ(verified.code, 0) << verified.err;

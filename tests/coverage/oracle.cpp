@@ -167,9 +167,9 @@ std::uint8_t oracle_level(const VoxelFacts& voxel, FillRule rule, std::uint32_t 
   const bool exact = voxel.samples.begin()->first >= 0 && voxel.samples.rbegin()->first <= 1;
   mpq_class share(solid, 512);
   share.canonicalize();
-  const mpq_class place = (exact ? voxel.share : share) * n + mpq_class(1, 2);
+  const mpq_class position = (exact ? voxel.share : share) * n + mpq_class(1, 2);
   mpz_class level;
-  mpz_fdiv_q(level.get_mpz_t(), place.get_num_mpz_t(), place.get_den_mpz_t());
+  mpz_fdiv_q(level.get_mpz_t(), position.get_num_mpz_t(), position.get_den_mpz_t());
   return static_cast<std::uint8_t>(std::clamp<long>(level.get_si(), 0, n));
 }
 

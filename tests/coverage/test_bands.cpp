@@ -16,15 +16,15 @@ const PixelGrid kWide{{254, 103'700'000}, {254, 1'900'000}};  // 1037 x 19 voxel
 
 struct BandLayer {
   Levels image;
-  cover::LayerReport report;
+  coverage::CoverageReport report;
 };
 
 BandLayer band_layer(const Triangles& triangles, std::uint32_t levels, Isa isa = Isa::kAuto) {
   Mesh mesh = make_mesh(triangles);
   const Instance instance{0, {0, 0, 0}};
-  auto coverage = cover::Coverage::build({&mesh, 1}, {&instance, 1}, kWide, FillRule::kNonzero, levels, isa);
+  auto coverage = coverage::Coverage::build({&mesh, 1}, {&instance, 1}, kWide, FillRule::kNonzero, levels, isa);
   EXPECT_TRUE(coverage.ok());
-  cover::LayerScratch scratch;
+  coverage::CoverageScratch scratch;
   BandLayer made;
   // A layer before it: what it leaves behind must not show.
   coverage->layer({0, -40'000, 100'000}, scratch, made.image);
@@ -89,7 +89,7 @@ TEST(CoverageBands, AHollowOfThreeNanometresBreaksATie) {
   EXPECT_EQ(level_of(made.image, 501, 8), 1);
 }
 
-TEST(CoverageBands, AnyInstructionsTellTheSame) {
+TEST(CoverageBands, AnyInstructionsGiveTheSame) {
   std::mt19937 random(5);
   const auto anywhere = [&](Nm from, Nm to) { return from + static_cast<Nm>(random() % static_cast<unsigned>(to - from)); };
   for (int turn = 0; turn < 8; ++turn) {
@@ -117,7 +117,7 @@ TEST(CoverageBands, AnyInstructionsTellTheSame) {
 }
 
 TEST(CoverageBands, TrapezoidsTileAFacetFromItsHighestCornerDown) {
-  const cover::Edges rows(kWide.y);
+  const coverage::Edges rows(kWide.y);
   std::mt19937 random(7);
   const auto pick = [&] {
     const auto at = [&](unsigned to) { return static_cast<Nm>(random() % to); };
@@ -125,23 +125,23 @@ TEST(CoverageBands, TrapezoidsTileAFacetFromItsHighestCornerDown) {
   };
   int taken = 0;
   for (int i = 0; i < 2000; ++i) {
-    cover::SlabFacet facet;
-    if (!cover::take_facet({pick(), pick(), pick()}, false, 100'000, 200'000, rows, facet)) continue;
+    coverage::SlabFacet facet;
+    if (!coverage::take_facet({pick(), pick(), pick()}, false, 100'000, 200'000, rows, facet)) continue;
     ++taken;
-    Buffer<cover::Trapezoid> pieces;
-    cover::cut_trapezoids(facet, 0, rows, pieces);
+    Buffer<coverage::Trapezoid> pieces;
+    coverage::cut_trapezoids(facet, 0, rows, pieces);
     ASSERT_GE(pieces.size(), 1u);
     ASSERT_LT(pieces.size(), facet.corners);
     double area = 0, low = pieces.front().high;
-    for (const cover::Trapezoid& piece : pieces) {
+    for (const coverage::Trapezoid& piece : pieces) {
       EXPECT_EQ(piece.high, low);
       low = piece.low;
       const auto height = [&](double y) {
         return piece.back.z + (y - piece.back.y) * piece.back.dz - piece.on.z - (y - piece.on.y) * piece.on.dz;
       };
       area += (height(piece.low) + height(piece.high)) / 2 * (piece.high - piece.low);
-      EXPECT_LE(cover::edge(kWide.y, piece.first_row), piece.from_y + piece.low);
-      EXPECT_GE(cover::edge(kWide.y, piece.last_row + 1), piece.from_y + piece.high);
+      EXPECT_LE(coverage::edge(kWide.y, piece.first_row), piece.from_y + piece.low);
+      EXPECT_GE(coverage::edge(kWide.y, piece.last_row + 1), piece.from_y + piece.high);
     }
     double of_corners = 0;
     for (std::uint32_t k = 1; k + 1 < facet.corners; ++k) {

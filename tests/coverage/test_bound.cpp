@@ -17,39 +17,39 @@ namespace {
 
 struct BoundSums {
   std::uint64_t layers = 0;
-  double facets = 0, told_facets = 0, runs = 0, told_runs = 0, bytes = 0, told_bytes = 0;
+  double facets = 0, reported_facets = 0, runs = 0, reported_runs = 0, bytes = 0, reported_bytes = 0;
 };
 
-void expect_layer_within(const cover::Coverage& coverage, const Layer& layer, std::uint32_t levels, BoundSums& sums) {
-  cover::LayerScratch scratch;  // of this layer alone
+void expect_layer_within(const coverage::Coverage& coverage, const Layer& layer, std::uint32_t levels, BoundSums& sums) {
+  coverage::CoverageScratch scratch;  // of this layer alone
   Levels image;
-  const cover::LayerReport report = coverage.layer(layer, scratch, image);
-  const cover::LayerBound bound = coverage.bound(layer);
+  const coverage::CoverageReport report = coverage.layer(layer, scratch, image);
+  const coverage::LayerBound bound = coverage.bound(layer);
   SCOPED_TRACE(testing::Message() << "layer " << layer.index << " of " << layer.thickness << " nm, " << levels << " levels");
   EXPECT_LE(report.facets, bound.facets);
   EXPECT_LE(report.held_voxels, bound.voxels);
   EXPECT_LE(image.level.size(), bound.runs);
   Runs plane;
-  for (std::uint32_t least = 1; least < levels; ++least) {
-    at_least(image, static_cast<std::uint8_t>(least), plane);
-    EXPECT_LE(plane.change.size(), bound.edges) << "of level " << least << " and more";
+  for (std::uint32_t minimum = 1; minimum < levels; ++minimum) {
+    threshold_levels(image, static_cast<std::uint8_t>(minimum), plane);
+    EXPECT_LE(plane.change.size(), bound.edges) << "of level " << minimum << " and more";
   }
-  if (report.looked_at == 0) {
+  if (report.inspected == 0) {
     EXPECT_LE(report.scratch_bytes, bound.scratch_bytes);
   }
   ++sums.layers;
-  sums.facets += report.facets, sums.told_facets += static_cast<double>(bound.facets);
-  sums.runs += static_cast<double>(image.level.size()), sums.told_runs += static_cast<double>(bound.runs);
-  sums.bytes += static_cast<double>(report.scratch_bytes), sums.told_bytes += static_cast<double>(bound.scratch_bytes);
+  sums.facets += report.facets, sums.reported_facets += static_cast<double>(bound.facets);
+  sums.runs += static_cast<double>(image.level.size()), sums.reported_runs += static_cast<double>(bound.runs);
+  sums.bytes += static_cast<double>(report.scratch_bytes), sums.reported_bytes += static_cast<double>(bound.scratch_bytes);
 }
 
 void expect_layers_within(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid, Nm height,
-                          Nm thickness, std::uint32_t most_layers, BoundSums& sums) {
+                          Nm thickness, std::uint32_t max_layers, BoundSums& sums) {
   for (const std::uint32_t levels : {2u, 4u, 16u}) {
-    auto coverage = cover::Coverage::build(meshes, instances, grid, FillRule::kNonzero, levels);
+    auto coverage = coverage::Coverage::build(meshes, instances, grid, FillRule::kNonzero, levels);
     ASSERT_TRUE(coverage.ok()) << coverage.error().message;
     const auto layers = static_cast<std::uint32_t>(height / thickness + 2);
-    const std::uint32_t step = std::max(1u, layers / most_layers);
+    const std::uint32_t step = std::max(1u, layers / max_layers);
     for (std::uint32_t i = 0; i < layers && !testing::Test::HasFailure(); i += step) {
       expect_layer_within(*coverage, {i, static_cast<Nm>(i) * thickness, thickness}, levels, sums);
     }
@@ -94,7 +94,7 @@ TEST(LayerBound, HoldsForNoise) {
   for (int turn = 0; turn < 6; ++turn) {
     const Nm reach = turn % 3 == 0 ? 300'000 : turn % 3 == 1 ? 2'000'000 : 6'000'000;
     const Triangles tetrahedra = random_tetrahedra(turn % 2 == 0 ? 6 : 24, [&, from = Point3{2'000'000, 2'000'000, 0}] {
-      const auto draw = [&](Nm most) { return static_cast<Nm>(random() % static_cast<std::uint32_t>(most)); };
+      const auto draw = [&](Nm maximum) { return static_cast<Nm>(random() % static_cast<std::uint32_t>(maximum)); };
       return Point3{from.x + draw(reach), from.y + draw(reach), draw(2'000'000)};
     });
     expect_within(tetrahedra, kTenths, 2'000'000, sums);
@@ -156,11 +156,11 @@ TEST(LayerBound, HoldsForRealPartsAndIsNear) {
     }
   }
   EXPECT_GT(sums.layers, 300u);
-  EXPECT_LT(sums.told_facets, 1.2 * sums.facets);
-  EXPECT_LT(sums.told_runs, 12 * sums.runs);  // 3 where facets are some voxels large
-  EXPECT_LT(sums.told_bytes, 5 * sums.bytes);
-  std::cout << sums.layers << " layers: facets told " << sums.told_facets / sums.facets << " times, runs "
-            << sums.told_runs / sums.runs << ", scratch " << sums.told_bytes / sums.bytes << '\n';
+  EXPECT_LT(sums.reported_facets, 1.2 * sums.facets);
+  EXPECT_LT(sums.reported_runs, 12 * sums.runs);  // 3 where facets are some voxels large
+  EXPECT_LT(sums.reported_bytes, 5 * sums.bytes);
+  std::cout << sums.layers << " layers: facets told " << sums.reported_facets / sums.facets << " times, runs "
+            << sums.reported_runs / sums.runs << ", scratch " << sums.reported_bytes / sums.bytes << '\n';
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 #include "stages/geometry/isa.h"
 #include "tests/program/machines.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 struct Vector {
@@ -74,26 +74,26 @@ bool meet_beyond(const Triangle& f, const Triangle& g) {
 
 using EdgePair = std::tuple<int, int, int, int>;
 using Pair = std::pair<int, int>;
-struct Told {
+struct Reported {
   std::set<EdgePair> edges;
-  std::set<Pair> doubtful, alike;
-  bool operator==(const Told&) const = default;
+  std::set<Pair> uncertain, alike;
+  bool operator==(const Reported&) const = default;
 };
-Told told_by(const PairKernels& kernels, const FacetGroup& a, const FacetGroup& b, const Box& around_b) {
+Reported predicted_lines(const PairKernels& kernels, const FacetGroup& a, const FacetGroup& b, const Box& around_b) {
   const auto found = std::make_unique<FoundPairs>();
   kernels.pairs(a, b, around_b, *found);
-  Told told;
+  Reported reported;
   for (std::uint32_t i = 0; i < found->edges; ++i) {
     const auto& edge = found->edge[i];
-    EXPECT_TRUE(told.edges.insert({edge.a, edge.b, edge.edge_a, edge.edge_b}).second);
+    EXPECT_TRUE(reported.edges.insert({edge.a, edge.b, edge.edge_a, edge.edge_b}).second);
   }
-  for (std::uint32_t i = 0; i < found->doubts; ++i) told.doubtful.insert({found->doubtful[i].a, found->doubtful[i].b});
-  for (std::uint32_t i = 0; i < found->alikes; ++i) told.alike.insert({found->alike[i].a, found->alike[i].b});
-  return told;
+  for (std::uint32_t i = 0; i < found->uncertain_count; ++i) reported.uncertain.insert({found->uncertain[i].a, found->uncertain[i].b});
+  for (std::uint32_t i = 0; i < found->alikes; ++i) reported.alike.insert({found->alike[i].a, found->alike[i].b});
+  return reported;
 }
 
 /// What is told of two facets is true. returns  whether planes parted them
-bool check_pair(const Triangle& f, const Triangle& g, const Pair& pair, const Told& told) {
+bool check_pair(const Triangle& f, const Triangle& g, const Pair& pair, const Reported& reported) {
   const std::array<Point3, 3> p{f.a, f.b, f.c}, q{g.a, g.b, g.c};
   int shared = 0;
   bool alike = false;
@@ -102,11 +102,11 @@ bool check_pair(const Triangle& f, const Triangle& g, const Pair& pair, const To
       shared += p[i] == q[k] ? 1 : 0;
       alike |= p[i] == q[k] && p[(i + 1) % 3] == q[(k + 1) % 3];
       const bool opposite = p[i] == q[(k + 1) % 3] && p[(i + 1) % 3] == q[k];
-      EXPECT_EQ(told.edges.contains({pair.first, pair.second, i, k}), opposite);
+      EXPECT_EQ(reported.edges.contains({pair.first, pair.second, i, k}), opposite);
     }
   }
-  EXPECT_EQ(told.alike.contains(pair), alike);
-  if (told.doubtful.contains(pair)) return false;
+  EXPECT_EQ(reported.alike.contains(pair), alike);
+  if (reported.uncertain.contains(pair)) return false;
   if (shared < 2) {
     EXPECT_FALSE(meet_beyond(f, g));
   }
@@ -140,9 +140,9 @@ TEST(Meet, KernelsPartOnlyFacetsThatDoNotMeetBeyondWhatTheyShare) {
       }
     }
     for (const int other : {0, 1}) {
-      const Told plain = told_by(pair_kernels_for(Isa::kPlain), group[0], group[other], around[other]);
+      const Reported plain = predicted_lines(pair_kernels_for(Isa::kPlain), group[0], group[other], around[other]);
       for (const Isa isa : {Isa::kAvx2, Isa::kAvx512}) {
-        EXPECT_EQ(told_by(pair_kernels_for(isa_at_most(isa)), group[0], group[other], around[other]), plain);
+        EXPECT_EQ(predicted_lines(pair_kernels_for(limited_isa(isa)), group[0], group[other], around[other]), plain);
       }
       shared += plain.edges.size();
       for (std::uint32_t i = 0; i < facets[0].size(); ++i) {
@@ -157,4 +157,4 @@ TEST(Meet, KernelsPartOnlyFacetsThatDoNotMeetBeyondWhatTheyShare) {
 }
 
 }  // namespace
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

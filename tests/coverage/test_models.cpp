@@ -114,25 +114,25 @@ TEST(CoverageModels, RealPartsHaveTheLevelsOfTheContract) {
     if (model.grid.columns() > 4000 || model.grid.rows() > 4000) continue;
     SCOPED_TRACE(file.string());
     const auto begun = std::chrono::steady_clock::now();
-    auto coverage = cover::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 16);
+    auto coverage = coverage::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 16);
     ASSERT_TRUE(coverage.ok());
     const std::chrono::duration<double> built = std::chrono::steady_clock::now() - begun;
-    cover::LayerScratch scratch;
+    coverage::CoverageScratch scratch;
     Levels image;
     std::mt19937 random(5);
     const Nm thickness = 100'000;
-    std::uint64_t held = 0, sampled = 0, looked_at = 0, exact = 0;
+    std::uint64_t held = 0, sampled = 0, inspected = 0, exact = 0;
     for (int i = 0; i < kLayersOfModel; ++i) {
       const auto number = static_cast<std::uint32_t>(std::int64_t{model.height} * i / kLayersOfModel / thickness);
       const Layer layer{number, static_cast<Nm>(number) * thickness, thickness};
       const auto report = coverage->layer(layer, scratch, image);
       held += report.held_voxels, sampled += report.sampled_voxels;
-      looked_at += report.looked_at, exact += report.exact_voxels;
+      inspected += report.inspected, exact += report.exact_voxels;
       compare_layer(model, layer, image, 16, random, sum);
     }
     ++parts;
     std::cout << file.filename().string() << ": " << model.facets.size() << " facets, " << coverage->suspects()
-              << " suspect, built in " << built.count() << " s; voxels with facets " << held << ", looked at " << looked_at
+              << " suspect, built in " << built.count() << " s; voxels with facets " << held << ", looked at " << inspected
               << ", sampled " << sampled << ", by rationals " << exact << '\n';
     EXPECT_EQ(sum.wrong, 0u);
     if (HasFailure()) return;
@@ -150,9 +150,9 @@ TEST(CoverageModels, SharesOfAllLayersAddUpToTheVolumeOfThePart) {
     ASSERT_TRUE(load_model(std::string(folder) + "/" + name, 200, model)) << name;
     double whole = 0, sum = 0;
     for (const Mesh& mesh : model.meshes) whole += mesh.volume_mm3;
-    auto coverage = cover::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 4);
+    auto coverage = coverage::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 4);
     ASSERT_TRUE(coverage.ok());
-    cover::LayerScratch scratch;
+    coverage::CoverageScratch scratch;
     Levels image;
     const Nm thickness = 178'000;
     for (std::uint32_t i = 0; static_cast<Nm>(i) * thickness < model.height; ++i) {

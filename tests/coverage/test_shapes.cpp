@@ -22,23 +22,23 @@ std::uint8_t level_in(const LevelsView& image, std::uint32_t column, std::uint32
   return 0;
 }
 
-struct Told {
+struct Reported {
   std::uint64_t voxels = 0, exact = 0, sampled = 0, partly = 0;
   double volume_mm3 = 0;
 };
 
 /// Compares layers with the oracle under all rules and three numbers of levels.
-Told expect_levels(const Triangles& triangles, const PixelGrid& grid, const std::vector<Layer>& layers) {
-  Told told;
+Reported expect_levels(const Triangles& triangles, const PixelGrid& grid, const std::vector<Layer>& layers) {
+  Reported reported;
   std::vector<std::vector<VoxelFacts>> facts;
   for (const Layer& layer : layers) facts.push_back(oracle_voxels(triangles, grid, layer, {0, grid.columns(), 0, grid.rows()}));
   for (const FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
     for (const std::uint32_t levels : {2u, 4u, 16u}) {
       Mesh mesh = make_mesh(triangles);
       const Instance instance{0, {0, 0, 0}};
-      auto coverage = cover::Coverage::build({&mesh, 1}, {&instance, 1}, grid, rule, levels);
+      auto coverage = coverage::Coverage::build({&mesh, 1}, {&instance, 1}, grid, rule, levels);
       EXPECT_TRUE(coverage.ok());
-      cover::LayerScratch scratch;
+      coverage::CoverageScratch scratch;
       Levels image;
       for (std::size_t l = 0; l < layers.size(); ++l) {
         const Layer& layer = layers[l];
@@ -48,7 +48,7 @@ Told expect_levels(const Triangles& triangles, const PixelGrid& grid, const std:
         for (std::uint32_t j = 0; j < grid.rows(); ++j) {
           for (std::uint32_t i = 0; i < grid.columns(); ++i, ++at) {
             const std::uint8_t level = level_in(image, i, j), expected = oracle_level(facts[l][at], rule, levels);
-            told.partly += level > 0 && level < levels - 1 ? 1 : 0;
+            reported.partly += level > 0 && level < levels - 1 ? 1 : 0;
             if (level == expected) continue;
             if (wrong++ < 3) {
               ADD_FAILURE() << "voxel " << i << ", " << j << " of layer at " << layer.bottom << " nm has level " << int{level}
@@ -56,15 +56,15 @@ Told expect_levels(const Triangles& triangles, const PixelGrid& grid, const std:
             }
           }
         }
-        told.voxels += at;
-        told.exact += report.exact_voxels;
-        told.sampled += report.sampled_voxels;
-        if (rule == FillRule::kNonzero && levels == 2) told.volume_mm3 += report.volume_mm3;
-        if (wrong > 0) return told;
+        reported.voxels += at;
+        reported.exact += report.exact_voxels;
+        reported.sampled += report.sampled_voxels;
+        if (rule == FillRule::kNonzero && levels == 2) reported.volume_mm3 += report.volume_mm3;
+        if (wrong > 0) return reported;
       }
     }
   }
-  return told;
+  return reported;
 }
 
 Triangles joined(std::initializer_list<Triangles> all) {
@@ -123,24 +123,24 @@ std::vector<Layer> layers_of(Nm thickness, int count, Nm bottom = 0) {
 
 TEST(CoverageShapes, ABoxThatEndsInTheMiddleOfVoxelsIsATieThatGoesUp) {
   const Triangles part = box({150'000, 125'000, 0}, {1'250'000, 575'000, 150'000});
-  const Told told = expect_levels(part, kSmall, layers_of(100'000, 2));
-  EXPECT_GT(told.exact, 0u);
-  EXPECT_NEAR(told.volume_mm3, 1.1 * 0.45 * 0.15, 1e-9);
+  const Reported reported = expect_levels(part, kSmall, layers_of(100'000, 2));
+  EXPECT_GT(reported.exact, 0u);
+  EXPECT_NEAR(reported.volume_mm3, 1.1 * 0.45 * 0.15, 1e-9);
 }
 
 TEST(CoverageShapes, ABoxOnVoxelEdgesIsWholeVoxels) {
   const Triangles part = box({100'000, 100'000, 0}, {1'200'000, 550'000, 200'000});
-  const Told told = expect_levels(part, kSmall, layers_of(100'000, 3));
-  EXPECT_EQ(told.partly, 0u);
-  EXPECT_NEAR(told.volume_mm3, 1.1 * 0.45 * 0.2, 1e-9);
+  const Reported reported = expect_levels(part, kSmall, layers_of(100'000, 3));
+  EXPECT_EQ(reported.partly, 0u);
+  EXPECT_NEAR(reported.volume_mm3, 1.1 * 0.45 * 0.2, 1e-9);
 }
 
 TEST(CoverageShapes, TiltedBoxesHaveTheLevelsOfTheContract) {
   for (int i = 0; i < 4; ++i) {
     const Triangles part = turned(box({-280'000, -120'000, -150'000}, {280'000, 120'000, 150'000}), 0.3 + 0.7 * i, 0.2 * i,
                                   {800'000, 350'000, 300'000});
-    const Told told = expect_levels(part, kSmall, layers_of(100'001, 6));
-    EXPECT_NEAR(told.volume_mm3, volume_of(part), 1e-9 * volume_of(part));
+    const Reported reported = expect_levels(part, kSmall, layers_of(100'001, 6));
+    EXPECT_NEAR(reported.volume_mm3, volume_of(part), 1e-9 * volume_of(part));
     if (HasFailure()) FAIL() << "box " << i;
   }
 }
@@ -156,9 +156,9 @@ TEST(CoverageShapes, FacetsOverManyVoxelsStepWhereTheirPlanesDo) {
       leaning.push_back({lean(t.a), lean(t.b), lean(t.c)});
     }
     const Triangles all(leaning.begin(), leaning.end());
-    const Told told = expect_levels(all, kSmall, layers_of(70'000, 7));
-    EXPECT_EQ(told.exact + told.sampled, 0u);
-    EXPECT_NEAR(told.volume_mm3, volume_of(all), 1e-9 * volume_of(all));
+    const Reported reported = expect_levels(all, kSmall, layers_of(70'000, 7));
+    EXPECT_EQ(reported.exact + reported.sampled, 0u);
+    EXPECT_NEAR(reported.volume_mm3, volume_of(all), 1e-9 * volume_of(all));
     if (HasFailure()) FAIL() << "box " << i;
   }
 }
@@ -185,47 +185,48 @@ Triangles vault(Point3 corner, double radius, Nm depth, int around) {
 TEST(CoverageShapes, FacetsAlongARowHoldAllColumnsThatTheyReach) {
   for (const Nm y : {125'000, 137'001, 150'000}) {
     const Triangles part = reversed(vault({150'000, y, 30'000}, 610'000, 310'000, 9));
-    const Told told = expect_levels(part, kSmall, layers_of(100'000, 4));
-    EXPECT_NEAR(told.volume_mm3, volume_of(part), 1e-9 * volume_of(part));
+    const Reported reported = expect_levels(part, kSmall, layers_of(100'000, 4));
+    EXPECT_NEAR(reported.volume_mm3, volume_of(part), 1e-9 * volume_of(part));
     if (HasFailure()) FAIL() << "at " << y;
   }
 }
 
 TEST(CoverageShapes, ABallHasTheLevelsOfTheContract) {
-  const Told told = expect_levels(ball({800'000, 350'000, 300'000}, 290'000, 24), kSmall, layers_of(100'000, 6));
-  EXPECT_GT(told.partly, 100u);
+  const Reported reported = expect_levels(ball({800'000, 350'000, 300'000}, 290'000, 24), kSmall, layers_of(100'000, 6));
+  EXPECT_GT(reported.partly, 100u);
   const double whole = volume_of(ball({800'000, 350'000, 300'000}, 290'000, 24));
-  EXPECT_NEAR(told.volume_mm3, whole, 1e-9 * whole);
+  EXPECT_NEAR(reported.volume_mm3, whole, 1e-9 * whole);
 }
 
-TEST(CoverageShapes, ShellsThatOverlapAreSampledAndUnited) {
+TEST(CoverageShapes, ShellsThatOverlapAreSampledAndMerged) {
   const Triangles part =
       joined({box({150'000, 125'000, 0}, {850'000, 475'000, 150'000}),
               turned(box({-300'000, -150'000, -100'000}, {300'000, 150'000, 100'000}), 0.5, 0.3, {900'000, 350'000, 150'000})});
-  const Told told = expect_levels(part, kSmall, layers_of(100'000, 3));
-  EXPECT_GT(told.sampled, 0u);
+  const Reported reported = expect_levels(part, kSmall, layers_of(100'000, 3));
+  EXPECT_GT(reported.sampled, 0u);
 }
 
 TEST(CoverageShapes, FacesOnSamplesCountAsTheBitmapCountsThem) {
   const Triangles part = joined({box({106'250, 103'125, 6'250}, {506'250, 303'125, 156'250}),
                                  box({406'250, 153'125, 56'250}, {893'750, 403'125, 256'250}),
                                  box({793'750, 121'875, 18'750}, {1'118'750, 328'125, 131'250})});
-  const Told told = expect_levels(part, kSmall, layers_of(100'000, 3));
-  EXPECT_GT(told.sampled, 0u);
+  const Reported reported = expect_levels(part, kSmall, layers_of(100'000, 3));
+  EXPECT_GT(reported.sampled, 0u);
 }
 
 TEST(CoverageShapes, CavitiesAndWhatLiesInThemAreExact) {
   const Triangles part =
       joined({ball({800'000, 350'000, 300'000}, 290'000, 16), reversed(ball({810'000, 350'000, 300'000}, 180'000, 12)),
               ball({800'000, 360'000, 300'000}, 90'000, 8)});
-  const Told told = expect_levels(part, kSmall, layers_of(150'000, 4));
-  EXPECT_EQ(told.sampled, 0u);
-  EXPECT_NEAR(told.volume_mm3, volume_of(part), 1e-9);
+  const Reported reported = expect_levels(part, kSmall, layers_of(150'000, 4));
+  EXPECT_EQ(reported.sampled, 0u);
+  EXPECT_NEAR(reported.volume_mm3, volume_of(part), 1e-9);
 }
 
 TEST(CoverageShapes, AShellInsideOutIsSampled) {
-  const Told told = expect_levels(reversed(ball({800'000, 350'000, 300'000}, 250'000, 12)), kSmall, layers_of(200'000, 3));
-  EXPECT_GT(told.sampled, 0u);
+  const Reported reported =
+      expect_levels(reversed(ball({800'000, 350'000, 300'000}, 250'000, 12)), kSmall, layers_of(200'000, 3));
+  EXPECT_GT(reported.sampled, 0u);
 }
 
 TEST(CoverageShapes, BoxesThatTouchAreOneSolid) {
@@ -253,37 +254,37 @@ TEST(CoverageShapes, RandomTetrahedraOnEdgesOnSamplesAndOffThemHaveTheLevelsOfTh
 TEST(CoverageShapes, CopiesThatOverlapAreSampledOnlyWhereTheirBoxesMeet) {
   const PixelGrid grid{{254, 4'000'000}, {254, 4'000'000}};
   const Triangles part = turned(box({-600'000, -600'000, -250'000}, {600'000, 600'000, 250'000}), 0.2, 0.1, {0, 0, 0});
-  const std::vector<Point3> places{
+  const std::vector<Point3> positions{
       {1'000'000, 1'000'000, 400'000}, {2'060'000, 1'270'000, 430'000}, {2'900'000, 3'100'000, 400'000}};
   std::vector<Instance> instances;
   Triangles all;
-  for (const Point3& place : places) {
-    instances.push_back({0, place});
-    const Triangles copy = turned(part, 0, 0, place);
+  for (const Point3& position : positions) {
+    instances.push_back({0, position});
+    const Triangles copy = turned(part, 0, 0, position);
     all.insert(all.end(), copy.begin(), copy.end());
   }
   Mesh mesh = make_mesh(part), joined_mesh = make_mesh(all);
   const Instance only{0, {0, 0, 0}};
   for (const FillRule rule : {FillRule::kNonzero, FillRule::kEvenOdd}) {
-    auto copies = cover::Coverage::build({&mesh, 1}, instances, grid, rule, 16);
-    auto together = cover::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, rule, 16);
-    cover::LayerScratch scratch;
+    auto copies = coverage::Coverage::build({&mesh, 1}, instances, grid, rule, 16);
+    auto together = coverage::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, rule, 16);
+    coverage::CoverageScratch scratch;
     Levels of_copies, of_all;
-    std::uint64_t held = 0, looked_at = 0, sampled = 0;
+    std::uint64_t held = 0, inspected = 0, sampled = 0;
     for (const Layer& layer : layers_of(90'000, 8, 20'000)) {
       const auto report = copies->layer(layer, scratch, of_copies);
       together->layer(layer, scratch, of_all);
       EXPECT_TRUE(of_copies.row_offset == of_all.row_offset && of_copies.change == of_all.change &&
                   of_copies.level == of_all.level);
-      held += report.held_voxels, looked_at += report.looked_at, sampled += report.sampled_voxels;
+      held += report.held_voxels, inspected += report.inspected, sampled += report.sampled_voxels;
     }
     EXPECT_GT(sampled, 0u);
-    EXPECT_LT(10 * looked_at, 6 * held);  // two of three copies as a whole would be more
+    EXPECT_LT(10 * inspected, 6 * held);  // two of three copies as a whole would be more
   }
 }
 
 /// Whether a pixel or one of its eight neighbours differs from it.
-bool is_beside_a_change(const std::vector<std::vector<bool>>& set, int row, int column) {
+bool is_next_to_a_change(const std::vector<std::vector<bool>>& set, int row, int column) {
   for (int r = row - 1; r <= row + 1; ++r) {
     for (int c = column - 1; c <= column + 1; ++c) {
       if (set[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)] !=
@@ -304,14 +305,14 @@ std::vector<std::vector<bool>> bits_of(const RunsView& runs) {
   return set;
 }
 
-TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyBesideItsBoundary) {
+TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyNextToItsBoundary) {
   const PixelGrid grid{{600, 8'000'000}, {600, 8'000'000}};
   const Triangles part = ball({4'000'000, 4'000'000, 3'000'000}, 2'900'000, 60);
   Mesh of_voxels = make_mesh(part);
   const Instance instance{0, {0, 0, 0}};
-  auto coverage = cover::Coverage::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, 2);
+  auto coverage = coverage::Coverage::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, 2);
   auto rasterizer = raster::Rasterizer::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, false, true);
-  cover::LayerScratch scratch;
+  coverage::CoverageScratch scratch;
   raster::LayerScratch of_pixels;
   Levels levels;
   Runs pixels, full;
@@ -319,7 +320,7 @@ TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyBesideItsBoundary) {
   for (const Layer& layer : layers_of(100'000, 59, 50'000)) {
     coverage->layer(layer, scratch, levels);
     rasterizer->layer(raster::Engine::kContours, layer.plane(), of_pixels, pixels);
-    at_least(levels, 1, full);
+    threshold_levels(levels, 1, full);
     const auto of_bitmap = bits_of(pixels), of_shares = bits_of(full);
     for (int r = 1; r + 1 < static_cast<int>(grid.rows()); ++r) {
       for (int c = 1; c + 1 < static_cast<int>(grid.columns()); ++c) {
@@ -327,7 +328,7 @@ TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyBesideItsBoundary) {
         solid += of_bitmap[row][column] ? 1 : 0;
         if (of_bitmap[row][column] == of_shares[row][column]) continue;
         ++differ;
-        far += is_beside_a_change(of_bitmap, r, c) ? 0 : 1;
+        far += is_next_to_a_change(of_bitmap, r, c) ? 0 : 1;
       }
     }
   }
@@ -341,7 +342,7 @@ TEST(CoverageShapes, AnOpenMeshIsRefused) {
   Mesh mesh = make_mesh(box({100'000, 100'000, 0}, {200'000, 200'000, 200'000}));
   mesh.closed = false;
   const Instance instance{0, {0, 0, 0}};
-  auto coverage = cover::Coverage::build({&mesh, 1}, {&instance, 1}, kSmall, FillRule::kNonzero, 4);
+  auto coverage = coverage::Coverage::build({&mesh, 1}, {&instance, 1}, kSmall, FillRule::kNonzero, 4);
   ASSERT_FALSE(coverage.ok());
   EXPECT_EQ(coverage.error().fault, Fault::kInput);
 }

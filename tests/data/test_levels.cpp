@@ -33,7 +33,7 @@ TEST(Levels, PlanesOfAllDropsHoldAsManyPixelsAsTheLevelsSumTo) {
   std::uint64_t pixels = 0;
   Runs plane;
   for (std::uint8_t drop = 1; drop <= 3; ++drop) {
-    at_least(image, drop, plane);
+    threshold_levels(image, drop, plane);
     ASSERT_EQ(plane.view().rows(), 5u);
     for (std::uint32_t r = 0; r < 5; ++r) {
       const auto row = plane.view().row(r);
@@ -43,7 +43,7 @@ TEST(Levels, PlanesOfAllDropsHoldAsManyPixelsAsTheLevelsSumTo) {
   }
   EXPECT_EQ(pixels, sum_of_levels(image));
   Levels again;
-  at_least(image, 1, plane);
+  threshold_levels(image, 1, plane);
   levels_of(plane, 2, again);
   EXPECT_EQ(sum_of_levels(again), 2 * set_pixels(plane));
 }

@@ -8,13 +8,12 @@
 #include <utility>
 
 #include "stages/coverage/coverage.h"
-#include "stages/coverage/scratch.h"
 #include "stages/data/layer.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
-#include "stages/dose/wish.h"
 #include "stages/raster/raster.h"
 #include "tests/raster/shapes.h"
 
@@ -45,15 +44,16 @@ DropStack::DropStack(const std::vector<Triangle>& part, const DropWay& way, doub
   const Instance instance{0, {0, 0, 0}};
   const auto rasterizer =
       raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kNonzero, false, true, Isa::kPlain);
-  const auto coverage = cover::Coverage::build({&other, 1}, {&instance, 1}, grid, FillRule::kNonzero, std::max(2u, way.levels));
+  const auto coverage =
+      coverage::Coverage::build({&other, 1}, {&instance, 1}, grid, FillRule::kNonzero, std::max(2u, way.levels));
   if (!rasterizer.ok() || !coverage.ok()) std::abort();
   raster::LayerScratch of_pixels;
-  cover::LayerScratch of_voxels;
+  coverage::CoverageScratch of_voxels;
   Runs image, second;
   dose::DropWork work;
   const std::uint32_t full = way.levels > 0 && !way.dithered ? way.levels - 1 : 1;  // drops of a full voxel
   dose::LayerDose dose = dose::one_drop();
-  dose.shell = dose.core = dose.asked_shell = dose.asked_inside = full * dose::kOneDrop;
+  dose.shell = dose.core = dose.requested_shell = dose.requested_inside = full * dose::kOneDrop;
   for (std::uint32_t l = 0; l < count_[2]; ++l) {
     const Layer layer{l, static_cast<Nm>(l) * way.thickness, way.thickness};
     rasterizer->layer(raster::Engine::kContours, layer.plane(), of_pixels, image);
@@ -76,13 +76,13 @@ float DropStack::share(std::int64_t column, std::int64_t row, std::int64_t layer
   return share_[static_cast<std::size_t>((layer * count_[1] + row) * count_[0] + column)];
 }
 
-bool DropStack::filled(const Place& at) const {
+bool DropStack::filled(const Position& at) const {
   std::array<std::int64_t, 3> voxel{};
   std::array<double, 3> within{};
   for (std::size_t a = 0; a < 3; ++a) {
-    const double place = at[a] / pitch_mm_[a];
-    voxel[a] = static_cast<std::int64_t>(std::floor(place));
-    within[a] = place - std::floor(place);
+    const double position = at[a] / pitch_mm_[a];
+    voxel[a] = static_cast<std::int64_t>(std::floor(position));
+    within[a] = position - std::floor(position);
   }
   const auto [i, j, k] = voxel;
   const float own = share(i, j, k);
@@ -95,26 +95,26 @@ bool DropStack::filled(const Place& at) const {
   return depth < own;
 }
 
-double DropStack::blurred(const Place& at) const {
+double DropStack::blurred(const Position& at) const {
   // The weights of each axis: drops lie in the middles of voxels; sigma is 1 or 1/3 of them.
-  constexpr std::int64_t kMost = 5;
+  constexpr std::int64_t kMax = 5;
   constexpr double kSigma[3] = {1, 1, 1.0 / 3};
   std::array<std::int64_t, 3> first{};
-  double weight[3][2 * kMost + 1] = {};
+  double weight[3][2 * kMax + 1] = {};
   for (std::size_t a = 0; a < 3; ++a) {
-    const double place = at[a] / pitch_mm_[a] - 0.5;
-    const std::int64_t reach = a < 2 ? kMost : 2;
-    first[a] = std::llround(place) - reach;
+    const double position = at[a] / pitch_mm_[a] - 0.5;
+    const std::int64_t reach = a < 2 ? kMax : 2;
+    first[a] = std::llround(position) - reach;
     for (std::int64_t n = 0; n <= 2 * reach; ++n) {
-      const double far = (static_cast<double>(first[a] + n) - place) / kSigma[a];
+      const double far = (static_cast<double>(first[a] + n) - position) / kSigma[a];
       weight[a][n] = std::exp(-0.5 * far * far) / (kSigma[a] * std::sqrt(2 * std::numbers::pi));
     }
   }
   double sum = 0;
   for (std::int64_t k = 0; k <= 4; ++k) {
-    for (std::int64_t j = 0; j <= 2 * kMost; ++j) {
+    for (std::int64_t j = 0; j <= 2 * kMax; ++j) {
       double row = 0;
-      for (std::int64_t i = 0; i <= 2 * kMost; ++i) row += weight[0][i] * share(first[0] + i, first[1] + j, first[2] + k);
+      for (std::int64_t i = 0; i <= 2 * kMax; ++i) row += weight[0][i] * share(first[0] + i, first[1] + j, first[2] + k);
       sum += row * weight[1][j] * weight[2][k];
     }
   }
@@ -129,8 +129,8 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
   double sum = 0;
   for (const SurfacePoint& point : points) {
     const auto is_solid = [&](double by) {
-      return solid(
-          Place{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1], point.at[2] + by * point.normal[2]});
+      return solid(Position{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1],
+                               point.at[2] + by * point.normal[2]});
     };
     const bool here = is_solid(0);
     bool outwards = here, inwards = here, lost = true;
@@ -154,10 +154,10 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
 }  // namespace
 
 SurfaceDistance distance_of_filled(const DropStack& stack, const std::vector<SurfacePoint>& points) {
-  return distance(points, [&](const Place& at) { return stack.filled(at); });
+  return distance(points, [&](const Position& at) { return stack.filled(at); });
 }
 SurfaceDistance distance_of_blurred(const DropStack& stack, const std::vector<SurfacePoint>& points) {
-  return distance(points, [&](const Place& at) { return stack.blurred(at) >= 0.5; });
+  return distance(points, [&](const Position& at) { return stack.blurred(at) >= 0.5; });
 }
 
 RebuiltShape rebuilt_sphere(std::uint32_t points) {
@@ -180,7 +180,7 @@ RebuiltShape rebuilt_sphere(std::uint32_t points) {
   for (std::uint32_t i = 0; i < points; ++i) {
     const auto [u, v] = spread(i, points);
     const double z = 2 * u - 1, turn = 2 * std::numbers::pi * v, flat = std::sqrt(1 - z * z);
-    const Place normal{flat * std::cos(turn), flat * std::sin(turn), z};
+    const Position normal{flat * std::cos(turn), flat * std::sin(turn), z};
     shape.points.push_back(
         {{kMiddle + kRadius * normal[0], kMiddle + kRadius * normal[1], kHigh + kRadius * normal[2]}, normal});
   }

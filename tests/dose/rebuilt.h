@@ -10,7 +10,7 @@
 
 namespace lamina::test {
 
-using Place = std::array<double, 3>;  // mm
+using Position = std::array<double, 3>;  // mm
 
 /// How a part becomes drops.
 struct DropWay {
@@ -27,10 +27,10 @@ class DropStack {
 
   /// Whether a point is solid if each voxel is filled from the side of its fullest neighbour: of those below, above, left,
   /// right, in front and behind the first of the fullest.
-  bool filled(const Place& at) const;
+  bool filled(const Position& at) const;
   /// Saturation at a point over that of a solid, if drops are Gaussians of sigma a pixel in the plane and a third of a layer in
   /// height; solid where it is half or more.
-  double blurred(const Place& at) const;
+  double blurred(const Position& at) const;
 
  private:
   float share(std::int64_t column, std::int64_t row, std::int64_t layer) const;
@@ -41,7 +41,7 @@ class DropStack {
 
 /// Points of a true surface with their outward normals.
 struct SurfacePoint {
-  Place at, normal;
+  Position at, normal;
 };
 
 /// From each point along its normal to the nearest change from solid to empty within 0.4 mm.

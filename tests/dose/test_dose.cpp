@@ -75,7 +75,7 @@ TEST(Erode, RadiiOfWholePixelsTakeThePixelsAtExactlyThatDistance) {
   EXPECT_EQ(reach_of(grid, 0, 2000).half_width, (std::vector<std::uint32_t>{0, 0, 0}));
 }
 
-TEST(Saturate, TheShareOfSetPixelsIsTheAskedOneWithinATenthOfAPercent) {
+TEST(Saturate, TheShareOfSetPixelsIsTheRequestedOneWithinATenthOfAPercent) {
   const std::uint32_t side = 1500;
   Runs full;
   full.columns = side;
@@ -97,14 +97,14 @@ TEST(Saturate, NoPixelColumnIsAStreakInAnyDirection) {
     // Along each axis, from many starts: the share holds over 1000 pixels, and no stretch is longer than a few drops need.
     for (int axis = 0; axis < 3; ++axis) {
       for (std::uint32_t start = 0; start < 200; ++start) {
-        std::uint32_t set = 0, stretch = 0, longest = 0;
+        std::uint32_t set = 0, span = 0, longest = 0;
         for (std::uint32_t k = 0; k < 1000; ++k) {
           const bool now = axis == 0   ? core_pixel(k, start, start * 7, threshold)
                            : axis == 1 ? core_pixel(start, k, start * 7, threshold)
                                        : core_pixel(start, start * 3, k, threshold);
           set += now;
-          stretch = now ? stretch + 1 : 0;
-          longest = std::max(longest, stretch);
+          span = now ? span + 1 : 0;
+          longest = std::max(longest, span);
         }
         EXPECT_NEAR(set / 1000.0, share, 0.01);
         EXPECT_LE(longest, 8u) << "axis " << axis << " share " << share;

@@ -76,7 +76,7 @@ Image grown_slowly(const Image& image, const Reach& reach) {
   return grown;
 }
 
-TEST(Dilate, SetsWhatHasASetPixelWithinReachAndTellsWhatWouldLeaveTheImage) {
+TEST(Dilate, SetsWhatHasASetPixelWithinReachAndReportsWhatWouldLeaveTheImage) {
   for (std::uint32_t seed = 0; seed < 80; ++seed) {
     Random random(seed);
     const PixelGrid grid{PixelAxis(seed % 2 ? 600 : 1200, 2'000'000), PixelAxis(600, 2'000'000)};

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "stages/dose/budget.h"
+#include "stages/dose/covered_spans.h"
 #include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/pour.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/stretches.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -80,7 +80,7 @@ TEST(Field, RampAlongXIsItsIntegral) {
   for (std::uint32_t layer = 0; layer < 16; ++layer) {
     const Poured of = poured(sheet_of(layer), everywhere(), "10*x");
     EXPECT_EQ(of.sums.full_voxels, 40'000u);
-    EXPECT_EQ(of.sums.asked_drops, 400'000u);
+    EXPECT_EQ(of.sums.requested_drops, 400'000u);
     EXPECT_NEAR(static_cast<double>(drops_between(of.drops, 0, 50)), 50 * 200 * 2.5, 0.01 * 50 * 200 * 2.5);
     drops += sum_of_levels(of.drops);
   }
@@ -90,28 +90,28 @@ TEST(Field, RampAlongXIsItsIntegral) {
 // Integral of 40 + 60 exp(-z / 5) over 20 mm: 800 + 300 (1 - exp(-4)) per cent mm, a tenth of a drop each.
 TEST(Field, DecayAlongZIsItsIntegral) {
   const Levels image = levels_where([](double x, double y) { return x < 3 && y < 4; });
-  std::uint64_t asked = 0, drops = 0;
+  std::uint64_t requested = 0, drops = 0;
   for (std::uint32_t layer = 0; layer < 200; ++layer) {
     const Poured of = poured(sheet_of(layer), image, "40+60*exp(-z/5)");
-    asked += of.sums.asked_drops;
+    requested += of.sums.requested_drops;
     drops += sum_of_levels(of.drops);
   }
   const double integral = 1200 * (800 + 300 * (1 - std::exp(-4))) / 0.1 / 10;
-  EXPECT_NEAR(static_cast<double>(asked), integral, 1e-4 * integral);
+  EXPECT_NEAR(static_cast<double>(requested), integral, 1e-4 * integral);
   EXPECT_NEAR(static_cast<double>(drops), integral, 1e-3 * integral);
 }
 
 // Over a disc of radius R: 50 pi R^2 + 2 (2 pi R^3 / 3) per cent mm2.
 TEST(Field, RadialOneIsItsIntegral) {
   const Levels disc = levels_where([](double x, double y) { return std::hypot(x - 10, y - 10) < 8; });
-  std::uint64_t asked = 0, drops = 0;
+  std::uint64_t requested = 0, drops = 0;
   for (std::uint32_t layer = 0; layer < 16; ++layer) {
     const Poured of = poured(sheet_of(layer), disc, "50+2*sqrt((x-10)^2+(y-10)^2)");
-    asked += of.sums.asked_drops;
+    requested += of.sums.requested_drops;
     drops += sum_of_levels(of.drops);
   }
   const double integral = 16 * std::numbers::pi * (50 * 64 + 4.0 / 3 * 512) / 0.01 / 10;
-  EXPECT_NEAR(static_cast<double>(asked), integral, 1e-3 * integral);
+  EXPECT_NEAR(static_cast<double>(requested), integral, 1e-3 * integral);
   EXPECT_NEAR(static_cast<double>(drops), integral, 1e-3 * integral);
 }
 
@@ -133,7 +133,7 @@ TEST(Field, ConstantOneIsTheNumber) {
   }
 }
 
-TEST(Field, ScaleIsThatOfOneWish) {
+TEST(Field, ScaleIsThatOfOneTarget) {
   for (const double drop : {0.5, 12.0, 80.0}) {
     for (const std::int64_t thickness : {30'000, 178'000, 500'000}) {
       const Binder binder{drop, 0.07, 0.55};
@@ -208,7 +208,7 @@ std::string fault_of(const std::string& formula, Sheet sheet) {
   return sums ? "" : sums.error().message;
 }
 
-TEST(Field, FaultsAreToldWhereAPartLies) {
+TEST(Field, FaultsAreReportedWhereAPartLies) {
   Sheet sheet = sheet_of(2);
   EXPECT_EQ(fault_of("max(0,x-12)", sheet), "");  // below 0 elsewhere, were it not for max
   EXPECT_EQ(fault_of("x-12", sheet), "");
@@ -219,8 +219,8 @@ TEST(Field, FaultsAreToldWhereAPartLies) {
   EXPECT_NE(fault_of("1/(x-x)", sheet).find("is inf %"), std::string::npos);
   EXPECT_NE(fault_of("40+*x", sheet).find("variables are x, y and z"), std::string::npos);
   EXPECT_NE(fault_of("x=3", sheet).find("write == to compare"), std::string::npos);
-  sheet.least = sheet.scale.drops(30);
-  sheet.least_percent = 30;
+  sheet.minimum = sheet.scale.drops(30);
+  sheet.min_percent = 30;
   EXPECT_EQ(fault_of("31+0*x", sheet), "");
   EXPECT_NE(fault_of("2*x", sheet).find("is 24.4 % in layer 2"), std::string::npos) << fault_of("2*x", sheet);
   EXPECT_NE(fault_of("2*x", sheet).find("binds from 30 % on"), std::string::npos);
@@ -234,28 +234,28 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
                core = levels_where([](double x, double) { return x > 4 && x < 6; }, 25);
   PourScratch scratch;
   Levels drops, levels;
-  const Drops24 ask = 3 * kOneDrop / 2;
-  const std::array parts{Dosed{left, {ask}, {ask}}, Dosed{right, {2 * ask}, {2 * ask}}};
+  const Drops24 request = 3 * kOneDrop / 2;
+  const std::array parts{Dosed{left, {request}, {request}}, Dosed{right, {2 * request}, {2 * request}}};
   const auto sums = pour(parts, 15, sheet, scratch, drops, levels);
   ASSERT_TRUE(sums.ok());
   // 90 columns at 10, 130 at 5, of 15; 20 of them have both.
   EXPECT_EQ(sums->full_voxels, 200u * (90 * 10 + 130 * 5) / 15 + 1);
-  EXPECT_EQ(sums->asked_drops, 200u * (90 * 10 * 15 + 130 * 5 * 30) / 150);
-  EXPECT_NEAR(static_cast<double>(sum_of_levels(drops)), static_cast<double>(sums->asked_drops), 60);
+  EXPECT_EQ(sums->requested_drops, 200u * (90 * 10 * 15 + 130 * 5 * 30) / 150);
+  EXPECT_NEAR(static_cast<double>(sum_of_levels(drops)), static_cast<double>(sums->requested_drops), 60);
   EXPECT_EQ(sum_of_levels(levels), 200u * (90 * 10 + 130 * 5));
   // Between 7 and 9 mm a voxel is full: 1 drop of the left one and 1 of the right one.
   EXPECT_EQ(drops_between(drops, 70, 90), 200u * 20 * 2);
   const std::vector<int> pixels = pixels_of(drops);
   EXPECT_EQ(std::accumulate(pixels.begin(), pixels.end(), std::uint64_t{0}), sum_of_levels(drops));  // no run lies on another
   EXPECT_EQ(std::count(pixels.begin() + 70, pixels.begin() + 90, 2), 20);
-  const Dosed inside{core, {ask}, {4 * kOneDrop}};
+  const Dosed inside{core, {request}, {4 * kOneDrop}};
   ASSERT_TRUE(pour({&inside, 1}, 15, sheet, scratch, drops, levels).ok());
   EXPECT_NEAR(static_cast<double>(sum_of_levels(drops)), 200 * 20 * 4 * 10 / 15.0, 40);
   const Levels rest = levels_where([](double x, double) { return x > 9; }, 10);
-  const std::array halves{Dosed{left, {ask}, {ask}}, Dosed{rest, {ask}, {ask}}};
+  const std::array halves{Dosed{left, {request}, {request}}, Dosed{rest, {request}, {request}}};
   Levels whole_drops, whole;
   const Levels all = levels_where([](double, double) { return true; }, 10);
-  const Dosed together{all, {ask}, {ask}};
+  const Dosed together{all, {request}, {request}};
   ASSERT_TRUE(pour(halves, 15, sheet, scratch, drops, levels).ok());
   ASSERT_TRUE(pour({&together, 1}, 15, sheet, scratch, whole_drops, whole).ok());
   EXPECT_TRUE(std::ranges::equal(drops.change, whole_drops.change) && std::ranges::equal(drops.level, whole_drops.level));
@@ -293,12 +293,12 @@ TEST(ShareOut, NoVoxelIsFilledTwice) {
     owner.push_back(pixels_of(owned));
   }
   for (std::size_t p = 0; p < sum.size(); ++p) {
-    int left = 15, most = 0, whose = -1;
+    int left = 15, maximum = 0, whose = -1;
     for (int i = kParts - 1; i >= 0; --i) {
       const int own = std::min(left, before[i][p]);
       ASSERT_EQ(after[i][p], own) << p;
       left -= own;
-      if (own > most) most = own, whose = i;
+      if (own > maximum) maximum = own, whose = i;
     }
     ASSERT_EQ(sum[p], 15 - left) << p;
     for (int i = 0; i < static_cast<int>(kParts); ++i) ASSERT_EQ(owner[i][p], 15 - left >= 8 && i == whose ? 1 : 0) << p;
@@ -308,25 +308,25 @@ TEST(ShareOut, NoVoxelIsFilledTwice) {
 TEST(Budget, ForeseesFormulasInTheBoxesOfParts) {
   const ZoneBox box{0, {2'000'000, 2'000'000, 0}, {6'000'000, 3'000'000, 400'000}, {2'000'000, 2'000'000, 0}};
   std::vector<Warning> warnings;
-  const auto budget_of = [&](const std::string& formula, double least) {
-    Budget budget(kForty, kBed, Wishes{{Percent::of(formula), {}}, {}}, 8, least, {true, true, 1},
-                  Stretches({&box, 1}, 1, 0, 100'000));
+  const auto budget_of = [&](const std::string& formula, double minimum) {
+    Budget budget(kForty, kBed, DoseTargets{{Saturation::of(formula), {}}, {}}, 8, minimum, {true, true, 1},
+                  CoveredSpans({&box, 1}, 1, 0, 100'000));
     budget.survey({box}, 6);
     for (std::uint32_t i = 0; i < 6; ++i) budget.foresee(tenth_of(i));
     return budget;
   };
-  EXPECT_EQ(budget_of("10*x", 0).most_drops(), 7u);   // up to 6.2 mm, the middle of the last block
-  EXPECT_EQ(budget_of("100*z", 0).most_drops(), 4u);  // 35 % in the last layer with the part
-  EXPECT_EQ(budget_of("x-20", 0).most_drops(), 0u);   // none is a number of per cent
+  EXPECT_EQ(budget_of("10*x", 0).max_drops(), 7u);   // up to 6.2 mm, the middle of the last block
+  EXPECT_EQ(budget_of("100*z", 0).max_drops(), 4u);  // 35 % in the last layer with the part
+  EXPECT_EQ(budget_of("x-20", 0).max_drops(), 0u);   // none is a number of per cent
   Budget cut = budget_of("20*x", 0);
-  EXPECT_TRUE(cut.judge(false, warnings).ok());
+  EXPECT_TRUE(cut.check(false, warnings).ok());
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].text.find("needs more than the 8 drops"), std::string::npos) << warnings[0].text;
   warnings.clear();
-  EXPECT_FALSE(budget_of("10*x", 70).judge(false, warnings).ok());  // nowhere enough
-  EXPECT_TRUE(budget_of("10*x", 40).judge(false, warnings).ok());   // enough somewhere: judged where parts lie
+  EXPECT_FALSE(budget_of("10*x", 70).check(false, warnings).ok());  // nowhere enough
+  EXPECT_TRUE(budget_of("10*x", 40).check(false, warnings).ok());   // enough somewhere: judged where parts lie
   EXPECT_TRUE(warnings.empty());
-  EXPECT_TRUE(budget_of("10*x", 40).judge(true, warnings).ok());
+  EXPECT_TRUE(budget_of("10*x", 40).check(true, warnings).ok());
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].text.find("as little as 22.0 %"), std::string::npos) << warnings[0].text;
 }

@@ -54,11 +54,11 @@ TEST(Rebuilt, FollowsItsTwoRulesByHand) {
 // The table of docs/coverage.md: bench/rebuilt.py sets the variable.
 TEST(Rebuilt, Table) {
   if (std::getenv("LAMINA_REBUILT") == nullptr) GTEST_SKIP() << "LAMINA_REBUILT is not set: the table was NOT made";
-  const DropWay ways[] = {{300, 300'000, 0}, {300, 100'000, 0},  {300, 50'000, 0},         {300, 300'000, 2},
-                          {300, 300'000, 4}, {300, 300'000, 16}, {300, 300'000, 16, true}, {600, 300'000, 0},
-                          {600, 50'000, 0},  {600, 300'000, 4},  {600, 300'000, 16},       {600, 300'000, 16, true}};
+  const DropWay paths[] = {{300, 300'000, 0}, {300, 100'000, 0},  {300, 50'000, 0},         {300, 300'000, 2},
+                           {300, 300'000, 4}, {300, 300'000, 16}, {300, 300'000, 16, true}, {600, 300'000, 0},
+                           {600, 50'000, 0},  {600, 300'000, 4},  {600, 300'000, 16},       {600, 300'000, 16, true}};
   for (const RebuiltShape& shape : rebuilt_shapes(1500)) {
-    for (const DropWay& way : ways) {
+    for (const DropWay& way : paths) {
       const DropStack stack(shape.part, way, shape.bed_mm, shape.height_mm);
       const SurfaceDistance filled = distance_of_filled(stack, shape.points),
                             blurred = distance_of_blurred(stack, shape.points);

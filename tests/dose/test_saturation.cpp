@@ -8,14 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "stages/data/input/hash.h"
+#include "pipeline/report/image_text.h"
 #include "stages/dose/blue_noise.h"
 #include "stages/dose/budget.h"
+#include "stages/dose/covered_spans.h"
 #include "stages/dose/dither.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/stretches.h"
-#include "stages/dose/wish.h"
+#include "stages/support/hash/hash.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -63,7 +64,7 @@ void expect_one_drop(const Levels& shares, std::span<const Drops24> drops, std::
   Levels levels;
   Runs plane, image{7, {0, 1}, {3}};
   dither(shares, drops, layer, scratch, levels);
-  at_least(levels, 1, plane);
+  threshold_levels(levels, 1, plane);
   EXPECT_EQ(set_pixels(plane), sum_of_levels(levels));
   dither_one(shares, drops, layer, scratch, image);
   EXPECT_EQ(image.columns, plane.columns);
@@ -259,18 +260,18 @@ TEST(Dither, MarksShellAndCore) {
 
 Layer tenth(std::uint32_t index) { return {index, static_cast<Nm>(index * 100'000), 100'000, LayerReason::kUniform}; }
 
-TEST(Budget, TellsWishesByHeightThoseThatAreCutAndThoseThatDoNotBind) {
-  Wishes wishes{{50, 30.0}, {{0.2, 0.4, {5, {}}}, {0.6, 0.7, {200, {}}}}};
-  EXPECT_EQ(wishes.of(tenth(1)).percent, 50);
-  EXPECT_EQ(wishes.of(tenth(2)).percent, 5);
-  EXPECT_EQ(wishes.of(tenth(4)).percent, 50);
-  EXPECT_TRUE(wishes.has_core());
+TEST(Budget, ReportsTargetsByHeightThoseThatAreCutAndThoseThatDoNotBind) {
+  DoseTargets targets{{50, 30.0}, {{0.2, 0.4, {5, {}}}, {0.6, 0.7, {200, {}}}}};
+  EXPECT_EQ(targets.of(tenth(1)).percent, 50);
+  EXPECT_EQ(targets.of(tenth(2)).percent, 5);
+  EXPECT_EQ(targets.of(tenth(4)).percent, 50);
+  EXPECT_TRUE(targets.has_core());
   const Binder binder{40, 0, 0.6};  // 10 % a drop
-  Budget budget(binder, kTenths, wishes, 10, 20);
+  Budget budget(binder, kTenths, targets, 10, 20);
   for (std::uint32_t i = 0; i < 10; ++i) budget.foresee(tenth(i));
-  EXPECT_EQ(budget.most_drops(), 10u);
+  EXPECT_EQ(budget.max_drops(), 10u);
   std::vector<Warning> warnings;
-  const Status refused = budget.judge(false, warnings);
+  const Status refused = budget.check(false, warnings);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().fault, Fault::kUsage);
   EXPECT_NE(refused.error().message.find("layers 2:4 (z 0.200 to 0.400 mm) get 5.0 %"), std::string::npos)
@@ -278,45 +279,45 @@ TEST(Budget, TellsWishesByHeightThoseThatAreCutAndThoseThatDoNotBind) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].text.find("layers 6:7"), std::string::npos) << warnings[0].text;
   warnings.clear();
-  EXPECT_TRUE(budget.judge(true, warnings).ok());
+  EXPECT_TRUE(budget.check(true, warnings).ok());
   EXPECT_EQ(warnings.size(), 2u);
   Levels zones;
   zones.start(110);
   zones.append(0, 100, 1);
   zones.append(100, 110, 2);
   zones.end_row();
-  EXPECT_EQ(sums_of(zones, 1, dose_of(tenth(0), wishes, binder, kTenths, 10)).asked_drops, 530u);
+  EXPECT_EQ(sums_of(zones, 1, dose_of(tenth(0), targets, binder, kTenths, 10)).requested_drops, 530u);
   zones.start(110);
   zones.append(0, 100, 1);
   zones.end_row();
-  EXPECT_EQ(sums_of(zones, 1, dose_of(tenth(6), wishes, binder, kTenths, 10)).asked_drops, 2000u);
+  EXPECT_EQ(sums_of(zones, 1, dose_of(tenth(6), targets, binder, kTenths, 10)).requested_drops, 2000u);
   BinderCount count;
   count.add(budget, tenth(0), 110, 530, 530, 0);
   EXPECT_NEAR(count.reached_percent(budget), 100 * 530 * 40 / (110 * 400.0), 1e-9);
   EXPECT_NEAR(count.binder_ml(budget), 530 * 40e-9, 1e-15);
 }
 
-TEST(Budget, WithoutAWishTellsWhatOneDropGives) {
+TEST(Budget, WithoutATargetReportsWhatOneDropGives) {
   Budget budget({40, 0, 0.6}, kTenths, std::nullopt, 64, 0);
   budget.foresee(tenth(0));
   std::vector<Warning> warnings;
-  EXPECT_TRUE(budget.judge(false, warnings).ok());
-  EXPECT_EQ(told(budget, {}), "one drop of 40 pl a pixel fills 10.0 % of the voids");
+  EXPECT_TRUE(budget.check(false, warnings).ok());
+  EXPECT_EQ(pipeline::binder_text(budget, {}), "one drop of 40 pl a pixel fills 10.0 % of the voids");
 }
 
 std::string refusal(const Budget& budget, std::vector<Warning>& warnings) {
-  const Status status = budget.judge(false, warnings);
+  const Status status = budget.check(false, warnings);
   return status.ok() ? "" : status.error().message;
 }
 
 // 10 % a drop: 14 % is 1.4 drops, one of which is jetted; of the core's 4 % none is.
-TEST(Budget, JudgesAndTellsDropsAsTheyAreRounded) {
+TEST(Budget, ChecksAndReportsDropsAsTheyAreRounded) {
   const Binder binder{40, 0, 0.6};
-  Budget dithered(binder, kTenths, Wishes{{14, 4.0}, {}}, 10, 0),
-      whole(binder, kTenths, Wishes{{14, 4.0}, {}}, 10, 0, {false, true, 1});
+  Budget dithered(binder, kTenths, DoseTargets{{14, 4.0}, {}}, 10, 0),
+      whole(binder, kTenths, DoseTargets{{14, 4.0}, {}}, 10, 0, {false, true, 1});
   for (Budget* budget : {&dithered, &whole}) budget->foresee(tenth(0));
-  EXPECT_EQ(dithered.most_drops(), 2u);
-  EXPECT_EQ(whole.most_drops(), 1u);
+  EXPECT_EQ(dithered.max_drops(), 2u);
+  EXPECT_EQ(whole.max_drops(), 1u);
   EXPECT_NEAR(whole.gets().second, 10, 1e-9);
   EXPECT_EQ(whole.gets().first, 0);
   std::vector<Warning> warnings;
@@ -326,12 +327,12 @@ TEST(Budget, JudgesAndTellsDropsAsTheyAreRounded) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].text.find("--core-saturation: 4 % is 0.40 drops a pixel, which rounds to none in layers 0:1"), 0u)
       << warnings[0].text;
-  Budget bound(binder, kTenths, Wishes{{14, {}}, {}}, 10, 12, {false, true, 1});
+  Budget bound(binder, kTenths, DoseTargets{{14, {}}, {}}, 10, 12, {false, true, 1});
   bound.foresee(tenth(0));
   EXPECT_NE(refusal(bound, warnings).find("get 10.0 %"), std::string::npos) << refusal(bound, warnings);
 }
 
-TEST(Budget, JudgesTheShareOfACore) {
+TEST(Budget, ChecksTheShareOfACore) {
   const Binder binder{40, 0, 0.6};
   std::vector<Warning> warnings;
   Budget core(binder, kTenths, std::nullopt, 64, 1, {true, false, 0.05}),
@@ -339,14 +340,14 @@ TEST(Budget, JudgesTheShareOfACore) {
   for (Budget* budget : {&core, &shell}) budget->foresee(tenth(0));
   EXPECT_NE(refusal(core, warnings).find("get 0.5 %"), std::string::npos) << refusal(core, warnings);
   EXPECT_NE(refusal(shell, warnings).find("get 0.5 %"), std::string::npos) << refusal(shell, warnings);
-  EXPECT_EQ(told(core, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 % of the voids");
-  EXPECT_EQ(told(shell, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 to 10.0 % of the voids");
+  EXPECT_EQ(pipeline::binder_text(core, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 % of the voids");
+  EXPECT_EQ(pipeline::binder_text(shell, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 to 10.0 % of the voids");
 }
 
 TEST(Budget, NamesTheWorstDose) {
   const Binder binder{40, 0, 0.6};
   std::vector<Warning> warnings;
-  Budget budget(binder, kTenths, Wishes{{15, {}}, {{0.2, 0.3, {5, {}}}}, {Wish{8, {}}}}, 64, 20);
+  Budget budget(binder, kTenths, DoseTargets{{15, {}}, {{0.2, 0.3, {5, {}}}}, {DoseTarget{8, {}}}}, 64, 20);
   for (std::uint32_t i = 0; i < 4; ++i) budget.foresee(tenth(i));
   const std::string text = refusal(budget, warnings);
   EXPECT_NE(text.find("layers 0:4 (z 0.000 to 0.400 mm) get as little as 5.0 % of their voids filled where 5 % is asked"),
@@ -354,9 +355,9 @@ TEST(Budget, NamesTheWorstDose) {
       << text;
 }
 
-TEST(Budget, TellsOfAPartWithoutADrop) {
+TEST(Budget, ReportsAPartWithoutADrop) {
   std::vector<Warning> warnings;
-  Budget budget({40, 0, 0.6}, kTenths, Wishes{{100, {}}, {}, {Wish{0, {}}, Wish{50, {}}}}, 64, 0);
+  Budget budget({40, 0, 0.6}, kTenths, DoseTargets{{100, {}}, {}, {DoseTarget{0, {}}, DoseTarget{50, {}}}}, 64, 0);
   budget.foresee(tenth(0));
   EXPECT_EQ(refusal(budget, warnings), "");
   ASSERT_EQ(warnings.size(), 1u);
@@ -364,32 +365,31 @@ TEST(Budget, TellsOfAPartWithoutADrop) {
 }
 
 // Zone 0 has no part; that of zone 1 stands at 0.2 to 0.35 mm and is too narrow for a core.
-TEST(Budget, LooksAtWhatIsThere) {
-  const Wishes wishes{{5000, {}}, {{0, 0.2, {1, {}}}}, {Wish{70, 5.0}}};
+TEST(Budget, InspectsWhatIsThere) {
+  const DoseTargets targets{{5000, {}}, {{0, 0.2, {1, {}}}}, {DoseTarget{70, 5.0}}};
   const ZoneBox box{1, {0, 0, 200'000}, {5'000'000, 30'000'000, 350'000}};
-  Budget budget({40, 0, 0.6}, kTenths, wishes, 64, 30, {true, true, 1}, Stretches({&box, 1}, 2, 9'000'000, 100'000));
+  Budget budget({40, 0, 0.6}, kTenths, targets, 64, 30, {true, true, 1}, CoveredSpans({&box, 1}, 2, 9'000'000, 100'000));
   for (std::uint32_t i = 0; i < 6; ++i) budget.foresee(tenth(i));
   std::vector<Warning> warnings;
   EXPECT_EQ(refusal(budget, warnings), "");
   EXPECT_TRUE(warnings.empty());
-  EXPECT_EQ(budget.most_drops(), 7u);
+  EXPECT_EQ(budget.max_drops(), 7u);
   EXPECT_NEAR(budget.gets().first, 70, 1e-4);
 }
 
-TEST(Stretches, AreThoseOfBoxesAndOfCoresOfPartsThatTouch) {
+TEST(CoveredSpans, AreThoseOfBoxesAndOfCoresOfPartsThatTouch) {
   // Two boxes of 6 mm side by side, one of 12 mm above and apart.
   const std::vector<ZoneBox> boxes{{0, {0, 0, 0}, {6'000'000, 12'000'000, 200'000}},
                                    {1, {6'000'000, 0, 0}, {12'000'000, 12'000'000, 150'000}},
                                    {1, {40'000'000, 0, 300'000}, {46'000'000, 12'000'000, 500'000}}};
-  const Stretches stretches(boxes, 2, 5'000'000, 30'000);
-  const auto seen = [&](std::uint32_t zone) {
+  const CoveredSpans spans(boxes, 2, 5'000'000, 30'000);
+  const auto detected = [&](std::uint32_t zone) {
     std::string text;
-    for (std::uint32_t i = 0; i < 6; ++i)
-      text += stretches.core(zone, tenth(i)) ? 'c' : stretches.any(zone, tenth(i)) ? 's' : '.';
+    for (std::uint32_t i = 0; i < 6; ++i) text += spans.core(zone, tenth(i)) ? 'c' : spans.any(zone, tenth(i)) ? 's' : '.';
     return text;
   };
-  EXPECT_EQ(seen(0), "cc....");
-  EXPECT_EQ(seen(1), "cc.ss.");
+  EXPECT_EQ(detected(0), "cc....");
+  EXPECT_EQ(detected(1), "cc.ss.");
 }
 
 }  // namespace

@@ -6,15 +6,16 @@
 #include <cstdint>
 #include <vector>
 
+#include "pipeline/report/image_text.h"
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/dose/dose_target.h"
 #include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/share_count.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/wish.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -57,7 +58,7 @@ Levels random_shares(std::uint32_t seed, std::uint32_t full) {
 
 Runs random_mask(std::uint32_t seed) {
   Runs mask;
-  at_least(random_shares(seed, 2), 1, mask);
+  threshold_levels(random_shares(seed, 2), 1, mask);
   return mask;
 }
 
@@ -86,7 +87,7 @@ TEST(Shares, AreTurnedMaskedAndMarkedPixelByPixel) {
   }
 }
 
-TEST(Shares, DifferencesAreCountedAndThoseWithoutABoundaryBesideThem) {
+TEST(Shares, DifferencesAreCountedAndThoseWithoutABoundaryNextToThem) {
   for (std::uint32_t seed = 1; seed < 20; ++seed) {
     const Runs a = random_mask(seed), b = random_mask(seed + 50);
     const std::vector<int> one = share_pixels(a.view()), other = share_pixels(b.view());
@@ -116,7 +117,7 @@ TEST(Shares, DifferencesAreCountedAndThoseWithoutABoundaryBesideThem) {
 // Levels 0 to 3 of a full voxel's 3.5 drops are 0, 1.1667, 2.3333 and 3.5: rounded 0, 1, 2, 4.
 TEST(Shares, BecomeDropsInProportionOrRounded) {
   LayerDose dose = one_drop();
-  dose.shell = dose.core = dose.asked_shell = dose.asked_inside = 7 * kOneDrop / 2;
+  dose.shell = dose.core = dose.requested_shell = dose.requested_inside = 7 * kOneDrop / 2;
   const std::vector<int> rounded{0, 1, 2, 4};
   for (const bool dithered : {true, false}) {
     DropWork work;
@@ -133,15 +134,15 @@ TEST(Shares, BecomeDropsInProportionOrRounded) {
       sum += static_cast<std::uint64_t>(levels[i]);
       ASSERT_EQ(half[i], levels[i] >= 2 ? 1 : 0);
       ASSERT_EQ(first[i], drops[i] > 0 ? 1 : 0);
-      const double wished = 3.5 * levels[i] / 3;
+      const double requested_range = 3.5 * levels[i] / 3;
       if (dithered) {
-        ASSERT_TRUE(drops[i] == static_cast<int>(wished) || drops[i] == static_cast<int>(wished) + 1);
+        ASSERT_TRUE(drops[i] == static_cast<int>(requested_range) || drops[i] == static_cast<int>(requested_range) + 1);
       } else {
         ASSERT_EQ(drops[i], rounded[static_cast<std::size_t>(levels[i])]);
       }
     }
     EXPECT_EQ(sums.full_voxels, (2 * sum + 3) / 6);
-    EXPECT_EQ(sums.asked_drops, (7 * sum + 3) / 6);
+    EXPECT_EQ(sums.requested_drops, (7 * sum + 3) / 6);
   }
 }
 
@@ -169,9 +170,9 @@ TEST(Shares, SurplusAndMaskAreThoseOfEachPixel) {
 }
 
 /// Random parts of three materials that share voxels, and what a full voxel of each asks for.
-void lay_random_parts(std::uint32_t seed, std::uint8_t full, DropWork& work) {
-  work.laid.clear();
-  for (std::uint32_t i = 0; i < 5; ++i) work.laid.push_back({random_shares(100 * seed + i, full), {}, i % 2, (i * 2) % 3});
+void add_random_parts(std::uint32_t seed, std::uint8_t full, DropWork& work) {
+  work.deposited.clear();
+  for (std::uint32_t i = 0; i < 5; ++i) work.deposited.push_back({random_shares(100 * seed + i, full), {}, i % 2, (i * 2) % 3});
   share_out(full, kWide, kHigh, work);
 }
 
@@ -181,7 +182,7 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     for (const bool dithered : {true, false}) {
       DropWork work;
-      lay_random_parts(seed, kFull, work);
+      add_random_parts(seed, kFull, work);
       const Sheet sheet{
           PixelGrid{PixelAxis(254, kWide * 100'000), PixelAxis(254, kHigh * 100'000)}, false, false, {seed, 0, 100'000}};
       ASSERT_EQ(sheet.grid.columns(), kWide);
@@ -189,10 +190,10 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
       Sheet limited = sheet;
       limited.dithered = dithered;
       limited.limit = Drops24{4} << kDropBits;
-      const std::vector<std::array<Ask, 2>> asks{{Ask{kOneDrop * 7 / 2}, Ask{kOneDrop * 7 / 2}},
-                                                 {Ask{kOneDrop * 2}, Ask{kOneDrop * 2}}};
+      const std::vector<std::array<DropRequest, 2>> requests{{DropRequest{kOneDrop * 7 / 2}, DropRequest{kOneDrop * 7 / 2}},
+                                                             {DropRequest{kOneDrop * 2}, DropRequest{kOneDrop * 2}}};
       Runs image, second;
-      ASSERT_TRUE(drops_of_laid(rules, limited, asks, 3, image, second, work).ok());
+      ASSERT_TRUE(drops_of_deposited(rules, limited, requests, 3, image, second, work).ok());
       std::vector<Runs> own(3);
       drops_of_materials(4, true, own, work);
       std::vector<int> sum(std::size_t{kWide} * kHigh, 0);
@@ -214,7 +215,7 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
 }
 
 // What lies over others takes from them; laid one by one it is as laid at once.
-TEST(Shares, LaidOneByOneAreThoseLaidAtOnce) {
+TEST(Shares, DepositedOneByOneAreThoseDepositedAtOnce) {
   for (std::uint32_t seed = 1; seed <= 30; ++seed) {
     DropWork at_once, one_by_one;
     std::vector<Levels> parts;
@@ -222,23 +223,23 @@ TEST(Shares, LaidOneByOneAreThoseLaidAtOnce) {
     share_out(15, kWide, kHigh, one_by_one);
     EXPECT_EQ(one_by_one.shares.level.size(), 0u);
     for (const Levels& part : parts) {
-      at_once.laid.push_back({part, {}, 0, 0});
-      one_by_one.laid.push_back({part, {}, 0, 0});
+      at_once.deposited.push_back({part, {}, 0, 0});
+      one_by_one.deposited.push_back({part, {}, 0, 0});
       share_out(15, kWide, kHigh, one_by_one);
     }
     share_out(15, kWide, kHigh, at_once);
     EXPECT_EQ(share_pixels(at_once.shares.view()), share_pixels(one_by_one.shares.view()));
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      EXPECT_EQ(share_pixels(at_once.laid[i].shares.view()), share_pixels(one_by_one.laid[i].shares.view())) << seed;
+      EXPECT_EQ(share_pixels(at_once.deposited[i].shares.view()), share_pixels(one_by_one.deposited[i].shares.view())) << seed;
     }
   }
 }
 
-TEST(Shares, AreToldInOneLine) {
+TEST(Shares, AreReportedInOneLine) {
   ShareCount count;
   count.add(150, 2, 0);
   count.add(50, 1, 1);
-  EXPECT_EQ(count.told(16, "grey"),
+  EXPECT_EQ(pipeline::voxels_text(count, 16, "grey"),
             "16 levels come to 200 full voxels, as grey; 3 (1.500 %) half full or more are not as their centre, 1 away from "
             "any boundary");
 }

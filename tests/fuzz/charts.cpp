@@ -1,5 +1,5 @@
 // Charts of powder printers, as lamina calibrate writes them.
-#include "stages/data/picture/chart.h"
+#include "stages/formats/chart/chart.h"
 
 #include <algorithm>
 
@@ -29,8 +29,8 @@ bool read_one(std::string_view text) {
     check_box(wedge.box, *chart);
     law(wedge.percent > 0 && wedge.percent <= 100, "a wedge of no share");
   }
-  law(chart->joints.size() < chart->swaths, "more joints than swaths");
-  for (const ChartBox& box : chart->joints) check_box(box, *chart);
+  law(chart->stitches.size() < chart->swaths, "more joints than swaths");
+  for (const ChartBox& box : chart->stitches) check_box(box, *chart);
   for (const ChartVernier& vernier : chart->verniers) {
     law(vernier.swath > 0 && vernier.swath < chart->swaths && vernier.before.size() == vernier.after.size() &&
             !vernier.before.empty(),
@@ -69,14 +69,15 @@ std::vector<std::string> chart_seeds() {
     for (std::uint32_t i = 0; i < 16; ++i) chart.dashes.push_back({i / 8, i % 8, i % 3, {i * 20, 40 + i, i * 20 + 12, 41 + i}});
     chart.bars = {{true, {1, 2, 3, 4}}, {false, {10, 100, 60, 110}}};
     chart.wedges = {{12.5, {200, 100, 230, 130}}, {100, {240, 100, 270, 130}}};
-    chart.joints = {{300, 90, 310, 110}};
+    chart.stitches = {{300, 90, 310, 110}};
     if (along_x) chart.verniers = {{1, {{320, 90, 322, 99}, {330, 90, 332, 99}}, {{320, 101, 322, 110}, {329, 101, 331, 110}}}};
     seeds.push_back(chart_text(chart));
   }
   return seeds;
 }
 
-const Registered kChart({"chart", read_one, chart_seeds, "stages/data/picture/chart stages/data/text", "", "chart.dict", 4096});
+const Registered kChart({"chart", read_one, chart_seeds, "stages/formats/chart/chart stages/support/text", "", "chart.dict",
+                         4096});
 
 }  // namespace
 }  // namespace lamina::fuzz

@@ -1,5 +1,5 @@
 // G-code of extrusion printers, by whatever slicer.
-#include "stages/read/gcode.h"
+#include "stages/formats/gcode/read_gcode.h"
 
 #include "tests/fuzz/laws.h"
 
@@ -9,18 +9,18 @@ namespace {
 bool read_gcode(std::string_view text) {
   static MemoryFile memory("part.gcode");
   Dice dice(text);
-  read::GcodeOptions options;
-  options.most_beads = 200'000;
+  formats::GcodeOptions options;
+  options.max_beads = 200'000;
   if (dice.below(2) == 0) options.filament_mm = 2.85;
   if (dice.below(3) == 0) options.layer_height_mm = 0.25;
-  const auto file = read::GcodeFile::open(memory.hold(text), options);
+  const auto file = formats::GcodeFile::open(memory.hold(text), options);
   if (!file) return check_error(file.error()), false;
   law(file->count() > 0 && !file->box().empty(), "no layer");
   for (std::uint32_t i = 0; i < std::min(file->count(), 6u); ++i) {
     const auto layer = file->layer(i);
     law(layer.ok(), layer.ok() ? "" : layer.error().message.c_str());
-    law(layer->beads.size() <= options.most_beads, "more beads than allowed");
-    for (const read::GcodeBead& bead : layer->beads) {
+    law(layer->beads.size() <= options.max_beads, "more beads than allowed");
+    for (const formats::GcodeBead& bead : layer->beads) {
       law(bead.type < file->types().size(), "a bead of no type");
       law(bead.width > 0, "a bead without width");
       for (const Point2 end : {bead.from, bead.to}) {
@@ -47,7 +47,8 @@ std::vector<std::string> gcode_seeds() {
       "G3 X9 Y9 I5 J5 E3\n;CURA_PROFILE_STRING:eJzLSaxMLYrPSM1MzyixNdAz5ChPzMmJL8nITM7OSy0uBgpZcOTll8SnZeYk5qbmlcSnZALpktQiW0sOTDEjPQtTTGEjWwOexBwgIy+xJLMsFQB98Sn4\n"};
 }
 
-const Registered kGcode({"gcode", read_gcode, gcode_seeds, "stages/read/gcode stages/data/text", ".gcode", "gcode.dict", 2048});
+const Registered kGcode({"gcode", read_gcode, gcode_seeds, "stages/formats/gcode/read_gcode stages/support/text", ".gcode",
+                         "gcode.dict", 2048});
 
 }  // namespace
 }  // namespace lamina::fuzz

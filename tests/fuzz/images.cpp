@@ -1,5 +1,5 @@
 // Layer images: TIFF, PNG, BMP, PBM, PGM, of 1 bit and grey, and Group 4 alone.
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 
 #include <unistd.h>
 #include <zlib.h>
@@ -8,12 +8,11 @@
 #include <cstdio>
 #include <cstring>
 
-#include "stages/data/handles/tiff.h"
+#include "stages/formats/g4/decode.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/stack_info.h"
 #include "stages/geometry/bits.h"
-#include "stages/read/g4.h"
-#include "stages/read/stack_info.h"
-#include "stages/write/image_format.h"
-#include "stages/write/levels/level_format.h"
+#include "stages/support/late/tiff.h"
 #include "tests/fuzz/laws.h"
 #include "tests/program/machines.h"
 
@@ -21,8 +20,8 @@ namespace lamina::fuzz {
 namespace {
 
 std::string encoded(std::string_view format, const RunsView& runs, double dpi_x, double dpi_y) {
-  write::Bytes bytes;
-  const auto encoder = write::find_image_format(format)->make_encoder();
+  formats::Bytes bytes;
+  const auto encoder = formats::find_image_format(format)->make_encoder();
   const Status done = encoder->encode(runs, dpi_x, dpi_y, bytes);
   law(done.ok(), done.ok() ? "" : done.error().message.c_str());
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -34,7 +33,7 @@ bool same(const RunsView& a, const RunsView& b) {
 
 bool read_image(std::string_view bytes) {
   static MemoryFile file("000000.tif");
-  const auto image = read::image(file.hold(bytes));
+  const auto image = formats::image(file.hold(bytes));
   if (!image) return check_error(image.error()), false;
   check_runs(image->runs);
   // Whatever was read is written and read as the same image, unless it is so large that this takes long.
@@ -42,7 +41,7 @@ bool read_image(std::string_view bytes) {
   if (pixels > 1 << 16) return true;
   constexpr std::string_view kFormats[] = {"tiff-g4", "tiff-packbits", "png", "pbm", "bmp"};
   Dice dice(bytes);
-  const auto again = read::image(file.hold(encoded(kFormats[dice.below(5)], image->runs, 600, 300)));
+  const auto again = formats::image(file.hold(encoded(kFormats[dice.below(5)], image->runs, 600, 300)));
   law(again.ok(), again.ok() ? "" : again.error().message.c_str());
   law(same(again->runs, image->runs), "an image that was written reads back as another one");
   return true;
@@ -75,16 +74,16 @@ bool read_grey(std::string_view bytes) {
   static MemoryFile file("000000.tif");
   const std::string& path = file.hold(bytes);
   Dice dice(bytes);
-  const auto pages = read::pages_of(path);
+  const auto pages = formats::pages_of(path);
   if (!pages) return check_error(pages.error()), false;
   law(!pages->empty(), "a file without pages");
   const std::uint64_t page = (*pages)[dice.below(static_cast<std::uint32_t>(pages->size()))];
   constexpr std::uint8_t kFull[] = {1, 3, 15, 255};
   const std::uint8_t full = kFull[dice.below(4)];
-  const auto dark = read::dark_pixels(path, 128, page);
+  const auto dark = formats::dark_pixels(path, 128, page);
   Levels half, levels, exact;
-  const auto of_half = read::nearest_levels(path, {1, false, page}, half);
-  const auto of_levels = read::nearest_levels(path, {full, dice.below(2) == 0, page}, levels);
+  const auto of_half = formats::nearest_levels(path, {1, false, page}, half);
+  const auto of_levels = formats::nearest_levels(path, {full, dice.below(2) == 0, page}, levels);
   law(dark.ok() == of_half.ok() && dark.ok() == of_levels.ok(),
       "read in levels, and not as dark pixels, or the other way round");
   if (!dark) return check_error(dark.error()), false;
@@ -92,21 +91,21 @@ bool read_grey(std::string_view bytes) {
   check_levels(half, 1);
   check_levels(levels, full);
   Runs set;
-  at_least(half, 1, set);
+  threshold_levels(half, 1, set);
   law(same(set, dark->runs), "half and more is not what is below 128");
-  const auto kind = read::kind_of(path, page);
+  const auto kind = formats::kind_of(path, page);
   law(kind.ok() && kind->bits >= 1 && kind->bits <= 16, "an image that is read is of no kind");
-  if (read::levels(path, full, exact)) {
+  if (formats::levels(path, full, exact)) {
     check_levels(exact, full);
     Levels nearest;
-    law(read::nearest_levels(path, {full}, nearest).ok() && same(exact, nearest), "exact levels are not the nearest ones");
+    law(formats::nearest_levels(path, {full}, nearest).ok() && same(exact, nearest), "exact levels are not the nearest ones");
   }
   if (std::uint64_t{levels.columns} * levels.view().rows() > 1 << 16) return true;
-  write::Bytes out;
+  formats::Bytes out;
   const Status done =
-      write::find_level_format(dice.below(2) == 0 ? "tiff-8" : "png-8")->make_encoder()->encode(levels, full, 600, 300, out);
+      formats::find_level_format(dice.below(2) == 0 ? "tiff-8" : "png-8")->make_encoder()->encode(levels, full, 600, 300, out);
   law(done.ok(), done.ok() ? "" : done.error().message.c_str());
-  const auto again = read::levels(file.hold({reinterpret_cast<const char*>(out.data()), out.size()}), full, exact);
+  const auto again = formats::levels(file.hold({reinterpret_cast<const char*>(out.data()), out.size()}), full, exact);
   law(again.ok() && same(exact, levels), "levels that were written read back as others");
   return true;
 }
@@ -116,7 +115,7 @@ void put(std::string& out, std::uint32_t value, int bytes) {
 }
 
 /// One strip of Group 4 as a TIFF.
-std::string tiff_of(std::string_view coded, const read::G4Strip& strip) {
+std::string tiff_of(std::string_view coded, const formats::G4Strip& strip) {
   const std::uint32_t tags[][2] = {{256, strip.columns},
                                    {257, strip.rows},
                                    {258, 1},
@@ -139,11 +138,11 @@ std::string tiff_of(std::string_view coded, const read::G4Strip& strip) {
 bool read_g4(std::string_view bytes) {
   if (bytes.size() < 5) return false;
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(bytes[i]); };
-  const read::G4Strip strip{1u + (byte(0) | (byte(1) & 15u) << 8), 1u + byte(2) % 64u, (byte(3) & 1) != 0, false};
+  const formats::G4Strip strip{1u + (byte(0) | (byte(1) & 15u) << 8), 1u + byte(2) % 64u, (byte(3) & 1) != 0, false};
   const std::string_view coded = bytes.substr(4);
   Buffer<std::byte> buffer(coded.size());
   std::memcpy(buffer.data(), coded.data(), coded.size());
-  static read::G4Decoder decoder;
+  static formats::G4Decoder decoder;
   Runs runs;
   runs.columns = strip.columns;
   runs.row_offset.assign(1, 0);
@@ -221,8 +220,8 @@ std::vector<std::string> grey_seeds() {
     for (std::uint32_t c = 0; c < 9; ++c) levels.append(c, c + 1, static_cast<std::uint8_t>(random() % 4));
     levels.end_row();
   }
-  for (const auto& format : write::level_formats()) {
-    write::Bytes bytes;
+  for (const auto& format : formats::level_formats()) {
+    formats::Bytes bytes;
     law(format.make_encoder()->encode(levels, 3, 600, 300, bytes).ok(), "a seed is not written");
     seeds.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
@@ -249,13 +248,13 @@ std::size_t mutate_png(std::uint8_t* bytes, std::size_t size, std::size_t, std::
 }
 
 constexpr std::string_view kImageSources =
-    "stages/read/image stages/read/tiff stages/read/g4 stages/read/png stages/read/pbm stages/read/bmp stages/geometry/bits";
+    "stages/formats/images/image stages/formats/tiff/read_tiff stages/formats/g4/decode stages/formats/png/read_png stages/formats/pbm/read_pbm stages/formats/bmp/read_bmp stages/geometry/bits";
 constexpr std::string_view kGreySources =
-    "stages/read/image stages/read/grey stages/read/tiff stages/read/png stages/read/pbm stages/read/bmp stages/geometry/bits";
+    "stages/formats/images/image stages/formats/images/grey stages/formats/tiff/read_tiff stages/formats/png/read_png stages/formats/pbm/read_pbm stages/formats/bmp/read_bmp stages/geometry/bits";
 const Registered kTiff({"image_tiff", read_image, tiff_seeds, kImageSources, ".tif", "tiff.dict", 1024});
 const Registered kPng({"image_png", read_image, png_seeds, kImageSources, ".png", "png.dict", 1024, mutate_png});
 const Registered kGrey({"image_grey", read_grey, grey_seeds, kGreySources, ".tif .png .bmp .pgm", "tiff.dict", 1024});
-const Registered kG4({"image_g4", read_g4, g4_seeds, "stages/read/g4 stages/geometry/t6", {}, {}, 512});
+const Registered kG4({"image_g4", read_g4, g4_seeds, "stages/formats/g4/decode stages/geometry/t6", {}, {}, 512});
 const Registered kBmp({"image_bmp", read_image, bmp_seeds, kImageSources, ".bmp", {}, 512});
 const Registered kPbm({"image_pbm", read_image, pbm_seeds, kImageSources, ".pbm", {}, 512});
 

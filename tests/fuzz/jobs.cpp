@@ -24,7 +24,6 @@ bool read_job(std::string_view text) {
   Job job;
   const Status read = pipeline::read_job_text(text, "/jobs/job.toml", job);
   if (!read) return check_error(read.error()), false;
-  for (const std::string& note : job.notes) check_line(note);
   check_round_trip(job);
   if (const Status checked = pipeline::check_job(job); !checked) check_error(checked.error());
   return true;
@@ -45,12 +44,12 @@ bool set_keys(std::string_view lines) {
     at = end + 1;
   }
   if (!any || Dice(lines).below(8) != 0) return all;  // a hundred times as long as setting a key
-  const auto place = [](std::string& path) {          // a job file means paths from its folder
+  const auto position = [](std::string& path) {       // a job file means paths from its folder
     if (!path.empty()) path = "/parts/" + path;
   };
-  for (pipeline::PartRequest& part : job.parts) place(part.path);
-  for (std::string& preset : job.machine.presets) place(preset);
-  place(job.machine.profile), place(job.output);
+  for (pipeline::PartRequest& part : job.parts) position(part.path);
+  for (std::string& preset : job.machine.presets) position(preset);
+  position(job.machine.profile), position(job.output);
   check_round_trip(job);
   return all;
 }
@@ -81,7 +80,7 @@ std::vector<std::string> key_seeds() {
       "heights.thickness_mm=0.05..0.3:0.01\nrun.memory=1.5G\nrun.layers=2:10"};
 }
 
-constexpr std::string_view kJobSources = "pipeline/job stages/data/text stages/read/profiles";
+constexpr std::string_view kJobSources = "pipeline/job stages/support/text pipeline/job/profiles";
 const Registered kJob({"job", read_job, job_seeds, kJobSources, ".toml", "toml.dict", 4096});
 const Registered kKeys({"keys", set_keys, key_seeds, kJobSources, "", "toml.dict", 1024});
 

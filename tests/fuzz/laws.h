@@ -8,7 +8,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 #include "tests/fuzz/target.h"
 
 namespace lamina::fuzz {

@@ -17,7 +17,7 @@ const lamina::fuzz::Target* chosen = nullptr;
 
 void list() {
   for (const auto& target : lamina::fuzz::targets()) {
-    fmt::print("{}\t{}\t{}\t{}\t{}\n", target.name, target.most_bytes, target.dictionary.empty() ? "-" : target.dictionary,
+    fmt::print("{}\t{}\t{}\t{}\t{}\n", target.name, target.max_bytes, target.dictionary.empty() ? "-" : target.dictionary,
                target.files.empty() ? "-" : target.files, target.sources);
   }
 }
@@ -34,7 +34,7 @@ void write_seeds(const std::string& folder) {
 
 extern "C" {
 
-std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
+std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t maximum);
 
 int LLVMFuzzerInitialize(int* count, char*** words) {
   using lamina::fuzz::targets;
@@ -63,10 +63,10 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   return 0;
 }
 
-std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {
-  if (chosen->mutate == nullptr) return LLVMFuzzerMutate(data, size, most);
+std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t maximum, unsigned seed) {
+  if (chosen->mutate == nullptr) return LLVMFuzzerMutate(data, size, maximum);
   // Most mutations know the format; the others are those that know nothing.
-  if (seed % 8 != 0) return chosen->mutate(data, LLVMFuzzerMutate(data, size, most), most, seed / 8);
-  return LLVMFuzzerMutate(data, size, most);
+  if (seed % 8 != 0) return chosen->mutate(data, LLVMFuzzerMutate(data, size, maximum), maximum, seed / 8);
+  return LLVMFuzzerMutate(data, size, maximum);
 }
 }

@@ -1,7 +1,7 @@
 // Lists of batches, and their words.
-#include "stages/data/text/shell_words.h"
+#include "pipeline/job/lists/batch_list.h"
 #include "stages/load/load.h"
-#include "stages/read/jobs/batch_list.h"
+#include "stages/support/text/shell_words.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -9,10 +9,10 @@ namespace {
 
 bool read_list(std::string_view text) {
   static MemoryFile file("jobs.txt");
-  const auto entries = read::read_batch({file.hold(text)}, {"jet"}, load::is_part_name);
+  const auto entries = pipeline::read_batch({file.hold(text)}, {"jet"}, load::is_part_name);
   if (!entries) return check_error(entries.error()), false;
   law(!entries->empty(), "a batch without jobs");
-  for (const read::BatchEntry& entry : *entries) {
+  for (const pipeline::BatchEntry& entry : *entries) {
     law(!entry.words.empty(), "a job without a command");
     law(entry.source.find(":") != std::string::npos, "a job of no line");
     // Quoted again, the words are the same.
@@ -33,7 +33,8 @@ std::vector<std::string> list_seeds() {
       "# parts\njet bracket.stl --dpi 600 -o bracket\nlamina extrude 'a part.stl' -o \"out \\\"1\\\".gcode\"\n\nslice x.3mf\r\n"};
 }
 
-const Registered kList({"batch_list", read_list, list_seeds, "stages/read/jobs/batch_list stages/data/text", ".txt", {}, 1024});
+const Registered kList(
+    {"batch_list", read_list, list_seeds, "pipeline/job/lists/batch_list stages/support/text", ".txt", {}, 1024});
 
 }  // namespace
 }  // namespace lamina::fuzz

@@ -1,9 +1,9 @@
 // Manifests: finished ones, and what an interrupted run left.
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/manifest/manifest.h"
 
-#include "stages/write/manifest/manifest_head.h"
-#include "stages/write/manifest/manifest_line.h"
-#include "stages/write/program/dialect.h"
+#include "pipeline/manifest/manifest_head.h"
+#include "pipeline/manifest/manifest_line.h"
+#include "stages/program/dialect.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -82,7 +82,7 @@ std::vector<std::string> seeds_of(bool ended) {
     if (kind >= 3) {
       head.machine = "nuferbj";
       head.dialect = "nuferbj";
-      head.program_extension = write::find_dialect("nuferbj")->extension;
+      head.program_extension = program::find_dialect("nuferbj")->extension;
     }
     if (kind == 4) {
       head.materials.resize(2);
@@ -104,7 +104,7 @@ std::vector<std::string> seeds_of(bool ended) {
 std::vector<std::string> whole_seeds() { return seeds_of(true); }
 std::vector<std::string> partial_seeds() { return seeds_of(false); }
 
-constexpr std::string_view kManifestSources = "stages/write/manifest stages/data/text stages/data/hash stages/data/layer";
+constexpr std::string_view kManifestSources = "pipeline/manifest stages/support/text stages/data/hash stages/data/layer";
 const Registered kWhole({"manifest", read_finished, whole_seeds, kManifestSources, "", "manifest.dict", 6000});
 const Registered kPartial({"manifest_part", read_partial, partial_seeds, kManifestSources, "", "manifest.dict", 6000});
 

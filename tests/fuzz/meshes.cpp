@@ -3,8 +3,8 @@
 
 #include <cstring>
 
+#include "stages/formats/stl/mesh_stl.h"
 #include "stages/load/load.h"
-#include "stages/write/stl/block.h"
 #include "tests/fuzz/laws.h"
 #include "tests/load/archives.h"
 
@@ -50,7 +50,7 @@ constexpr int kBlock[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1
 std::string corner(int i) { return std::string(i & 1 ? "10" : "0") + (i & 2 ? " 20" : " 0") + (i & 4 ? " 5.5" : " 0"); }
 
 std::vector<std::string> binary_seeds() {
-  const std::string block = write::stl::block({10, 20, 5}), other = write::stl::block({3, 3, 30});
+  const std::string block = formats::stl::block({10, 20, 5}), other = formats::stl::block({3, 3, 30});
   std::string open = block.substr(0, 84 + 50 * 11), two = block + other.substr(84);
   open[80] = 11;
   two[80] = 24;
@@ -82,8 +82,8 @@ std::vector<std::string> obj_seeds() {
 std::vector<std::string> gzip_seeds() { return {test::gzip(binary_seeds()[0]), test::gzip(ascii_seeds()[0])}; }
 
 /// Whole facets and their count, corners that meet, and coordinates that people use.
-std::size_t mutate_binary(std::uint8_t* bytes, std::size_t size, std::size_t most, std::uint32_t seed) {
-  const std::size_t facets = size < 134 ? 0 : (std::min(size, most) - 84) / 50;
+std::size_t mutate_binary(std::uint8_t* bytes, std::size_t size, std::size_t maximum, std::uint32_t seed) {
+  const std::size_t facets = size < 134 ? 0 : (std::min(size, maximum) - 84) / 50;
   if (facets == 0) return size;
   Dice dice({reinterpret_cast<const char*>(bytes), size});
   dice.below(seed | 1);

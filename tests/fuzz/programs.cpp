@@ -1,11 +1,10 @@
 // Print programs, replayed: each dialect by a shipped machine with a small bed.
 #include <map>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/replay/machine.h"
-#include "stages/write/program/dialect.h"
 #include "tests/fuzz/laws.h"
 #include "tests/program/machines.h"
 
@@ -28,11 +27,11 @@ Bench make_bench(std::string_view dialect) {
     // A bed of so many of its own pixels.
     const PixelGrid grid = pipeline::resolve_profile(machine)->grid.image;
     machine.bed.size_mm = {60 / grid.x.pixels_per_nm() / 1e6, 50 / grid.y.pixels_per_nm() / 1e6};
-    if (!write::find_dialect(dialect)->has_motion) {  // records of care are bytes too
-      machine.care.spit_layers = machine.care.wipe_layers = 7;
-      machine.care.spit_mm = {{-200, -200}};
-      machine.care.wipe_mm = {{-200, -300, -200, -250}};
-      machine.care.wipe_lines = {"M42 P4 S1"};
+    if (!program::find_dialect(dialect)->has_motion) {  // records of care are bytes too
+      machine.maintenance.spit_layers = machine.maintenance.wipe_layers = 7;
+      machine.maintenance.spit_mm = {{-200, -200}};
+      machine.maintenance.wipe_mm = {{-200, -300, -200, -250}};
+      machine.maintenance.wipe_lines = {"M42 P4 S1"};
       machine.powder.dry_s = 1;
       machine.powder.roller_rpm = 99;
     }
@@ -73,24 +72,24 @@ bool replay_program(std::string_view dialect, std::string_view text) {
 
 std::vector<std::string> program_seeds(std::string_view dialect) {
   const Bench& bench = bench_of(dialect);
-  const auto writer = write::find_dialect(dialect)->make_writer(bench.resolved.machine, bench.resolved.grid);
+  const auto writer = program::find_dialect(dialect)->make_writer(bench.resolved.machine, bench.resolved.grid);
   LayerCycle cycle;
   cycle.layer = kLayer.index;
   cycle.layers = 9;
   cycle.bottom_nm = kLayer.bottom;
   cycle.thickness_nm = kLayer.thickness;
-  write::ProgramBytes bytes;
+  program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
-  writer->care_of_layer(cycle, bytes);
+  writer->maintenance_of_layer(cycle, bytes);
   program::CompileScratch scratch;
   const auto count = program::compile(bench.resolved.grid, bench.image, scratch,
                                       [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-                                        writer->care_before(sweep, vectors, bytes);
+                                        writer->maintenance_before(sweep, vectors, bytes);
                                         writer->sweep(sweep, vectors, bytes);
                                         return {};
                                       });
   if (!count) throw std::logic_error(count.error().message);
-  writer->care_behind(bytes);
+  writer->maintenance_after(bytes);
   writer->end_layer(cycle, bytes);
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())};
 }

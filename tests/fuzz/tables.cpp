@@ -1,6 +1,7 @@
 // Tables that people write: tops of layers, measured widths, flows and pressure drops.
 #include <cmath>
 
+#include "pipeline/calibrate/pieces_text.h"
 #include "stages/heights/study/study.h"
 #include "stages/segment/flows.h"
 #include "stages/segment/measured.h"
@@ -81,7 +82,7 @@ std::vector<std::string> height_seeds() { return {"# tops\n0\n0.1\n0.25 # thick\
 std::vector<std::string> width_seeds() {
   segment::PieceRequest request;
   return {
-      segment::widths_text(request),
+      pipeline::widths_text(request),
       "test;percent;thick_speed_percent;region;wall_mm;thick_mm;thin_mm;continuous_mm;stable_mm\nflow;;;;0.41;;;;\n"
       "speed;150;;;;0.6;0.35;;2\nspeed;200;;;;0.6;0.3;;1.5\nextrusion;80;;;;0.5;0.3;;\n"
       "repeated;100;100;initial;;0.55;0.3;0.4;\nrepeated;100;100;central;;0.56;0.31;0.4;\nrepeated;100;100;final;;0.55;0.3;0.4;\n"};
@@ -92,11 +93,13 @@ std::vector<std::string> flow_seeds() {
           "velocity_m_s\tdrop_kpa\n0.1\t1\n0.2\t2.5\n0.3\t4.5\n"};
 }
 
-const Registered kHeights({"table_heights", read_heights, height_seeds, "stages/heights/study stages/data/text", "", {}, 512});
+const Registered kHeights(
+    {"table_heights", read_heights, height_seeds, "stages/heights/study stages/support/text", "", {}, 512});
 const Registered kWidths({"table_widths", read_widths, width_seeds,
-                          "stages/segment/widths_table stages/segment/measured stages/data/text", ".csv", "tables.dict", 1024});
+                          "stages/segment/widths_table stages/segment/measured stages/support/text", ".csv", "tables.dict",
+                          1024});
 const Registered kFlows({"table_flows", read_flows, flow_seeds,
-                         "stages/segment/flows stages/segment/permeability stages/segment/samples stages/data/text", ".csv",
+                         "stages/segment/flows stages/segment/permeability stages/segment/samples stages/support/text", ".csv",
                          "tables.dict", 1024});
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace lamina::fuzz {
 
 /// A mutation of `size` bytes in place, at most `most` of them. returns the new size
-using Mutate = std::size_t (*)(std::uint8_t* bytes, std::size_t size, std::size_t most, std::uint32_t seed);
+using Mutate = std::size_t (*)(std::uint8_t* bytes, std::size_t size, std::size_t maximum, std::uint32_t seed);
 
 struct Target {
   std::string_view name;                // of the reader, and of its folder in tests/corpus/fuzz
@@ -20,7 +20,7 @@ struct Target {
   std::string_view sources;             // prefixes of paths, with blanks between: a change there asks for a new campaign
   std::string_view files;               // endings of files that are good seeds, with blanks between
   std::string_view dictionary = {};     // in tests/fuzz/dictionaries
-  std::size_t most_bytes = 4096;
+  std::size_t max_bytes = 4096;
   Mutate mutate = nullptr;
 };
 
@@ -46,7 +46,7 @@ class Dice {
   explicit Dice(std::string_view bytes);
   std::uint64_t operator()();
   /// 0 .. most - 1
-  std::uint32_t below(std::uint32_t most) { return static_cast<std::uint32_t>((*this)() % most); }
+  std::uint32_t below(std::uint32_t maximum) { return static_cast<std::uint32_t>((*this)() % maximum); }
 
  private:
   std::uint64_t state_ = 1469598103934665603u;

@@ -41,7 +41,7 @@ TEST_P(Fuzz, AcceptsItsSeedsAndKeepsItsLawsForTheStoredCorpus) {
   EXPECT_FALSE(seeds.empty());
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     EXPECT_TRUE(accepts(seeds[i])) << "seed " << i << ":\n" << seeds[i].substr(0, 2000);
-    EXPECT_LE(seeds[i].size(), target().most_bytes) << "seed " << i;
+    EXPECT_LE(seeds[i].size(), target().max_bytes) << "seed " << i;
   }
   const char* const own = std::getenv("LAMINA_FUZZ_INPUTS");  // a file or a folder instead, to look into a finding
   const fs::path inputs = own != nullptr ? fs::path(own) : fs::path(LAMINA_TEST_DIR) / "corpus/fuzz" / target().name;

@@ -2,13 +2,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/shell_words.h"
-#include "stages/data/text/toml.h"
-#include "stages/heights/thickness_set.h"
-#include "stages/infill/expression.h"
+#include "stages/heights/candidate_heights.h"
+#include "stages/infill/spacing.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/shell_words.h"
+#include "stages/support/text/toml.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -48,10 +48,9 @@ void read_numbers(std::string_view text) {
 
 bool read_texts(std::string_view text) {
   read_numbers(text);
-  heights::ThicknessSet set;
-  if (heights::read_thicknesses(text, set).empty()) {
-    law(set.size() > 0 && set.least() > 0, "no thickness");
-    law(std::ranges::adjacent_find(set.values, std::greater_equal{}) == set.values.end(), "thicknesses do not rise");
+  if (const auto set = heights::read_thicknesses(text)) {
+    law(set->size() > 0 && set->minimum() > 0, "no thickness");
+    law(std::ranges::adjacent_find(set->values, std::greater_equal{}) == set->values.end(), "thicknesses do not rise");
   }
   if (const auto words = split_words(text)) {
     std::string line;
@@ -93,8 +92,8 @@ std::vector<std::string> tree_seeds() {
 }
 
 const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/expression", "", "formula.dict", 256});
-const Registered kTexts({"texts", read_texts, text_seeds, "stages/data/text stages/heights/thickness_set", "", {}, 256});
-const Registered kTree({"toml", read_tree, tree_seeds, "stages/data/text/toml", ".toml", "toml.dict", 2048});
+const Registered kTexts({"texts", read_texts, text_seeds, "stages/support/text stages/heights/thickness_set", "", {}, 256});
+const Registered kTree({"toml", read_tree, tree_seeds, "stages/support/text/toml", ".toml", "toml.dict", 2048});
 
 }  // namespace
 }  // namespace lamina::fuzz

@@ -60,11 +60,11 @@ Mesh mesh_of_list(const std::vector<Triangle>& triangles, std::uint32_t repaired
 /// The triangles of clusters [begin, end), read in both ways; lanes beyond `count` have to be points within the cluster's box.
 std::vector<Triangle> triangles_in(const MeshBlocks& blocks, std::uint32_t begin, std::uint32_t end, std::uint32_t count) {
   std::vector<Triangle> all;
-  Cluster room;
+  Cluster capacity;
   for (std::uint32_t c = begin; c < end; ++c) {
     Box box;
     for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
-      const Triangle t = blocks.cluster(c, room).triangle(lane);
+      const Triangle t = blocks.cluster(c, capacity).triangle(lane);
       EXPECT_EQ(t, blocks.triangle(c, lane)) << c << " " << lane;
       for (const Point3& corner : {t.a, t.b, t.c}) box.add(corner);
       if (all.size() < count) {
@@ -234,7 +234,7 @@ TEST(Blocks, AreTheSameWithEveryInstructionSet) {
   }
 }
 
-TEST(Blocks, AreRightWhateverHashesAreEqual) {
+TEST(Blocks, AreRightRegardlessOfEqualHashes) {
   const std::vector<Triangle> list = grid_of_facets(900);
   for (const unsigned mask : {0u, 1u, 0x3fu}) {
     for (const Isa isa : {Isa::kPlain, Isa::kAvx2, Isa::kAvx512}) {
@@ -315,14 +315,14 @@ TEST(Blocks, PassOverNoFacetThatAPlaneCutsAndOverNearlyAllOthers) {
 
 TEST(Blocks, NameEveryVertex) {
   for (const std::vector<Triangle>& list : {grid_of_facets(5000), facets_apart(5000)}) {
-    Box expected, seen;
+    Box expected, detected;
     for (const Triangle& t : list) expected.add(t.a), expected.add(t.b), expected.add(t.c);
     Mesh mesh = mesh_of_list(list);
     mesh.blocks = take_blocks(mesh);
     std::size_t vertices = 0;
-    each_vertex(mesh, [&](const Point3& p) { seen.add(p), ++vertices; });
-    EXPECT_EQ(seen.lo, expected.lo);
-    EXPECT_EQ(seen.hi, expected.hi);
+    each_vertex(mesh, [&](const Point3& p) { detected.add(p), ++vertices; });
+    EXPECT_EQ(detected.lo, expected.lo);
+    EXPECT_EQ(detected.hi, expected.hi);
     EXPECT_LE(vertices, 3 * list.size());
   }
 }

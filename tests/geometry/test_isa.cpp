@@ -16,14 +16,14 @@ TEST(Isa, WhatTheProcessorHasIsUsedAndWhatItLacksIsRefusedInALine) {
       EXPECT_EQ(*usable, isa);
     } else {
       EXPECT_EQ(usable.error().fault, Fault::kUsage);
-      const std::string& told = usable.error().message;
-      EXPECT_TRUE(told.starts_with("run.isa: " + std::string(isa_name(isa)) + " is more than ")) << told;
-      EXPECT_TRUE(told.ends_with("use auto, or " + std::string(isa_name(widest)) + " at most")) << told;
+      const std::string& reported = usable.error().message;
+      EXPECT_TRUE(reported.starts_with("run.isa: " + std::string(isa_name(isa)) + " is more than ")) << reported;
+      EXPECT_TRUE(reported.ends_with("use auto, or " + std::string(isa_name(widest)) + " at most")) << reported;
     }
   }
 }
 
-TEST(Isa, WhoeverIsInTheWayIsNamed) {
+TEST(Isa, WhatIsInTheWayIsNamed) {
   EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx2, nullptr).error().message,
             "run.isa: avx512 is more than this processor has; use auto, or avx2 at most");
   EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx2, "plain").error().message,

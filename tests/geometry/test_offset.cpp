@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/order.h"
+#include "stages/geometry/contours/nest.h"
 
 namespace lamina {
 namespace {
@@ -52,7 +52,7 @@ TEST(OffsetContours, RegionIsThatOfClippersOffsetToWithinItsRounding) {
     const double noise = round % 3 == 0 ? 0.0 : round % 3 == 1 ? 0.02 : 0.3;
     add_curve(random, {5'000'000, -3'000'000}, 4'000'000, noise, 10 + round % 200, false, raw);
     if (round % 2 == 0) add_curve(random, {5'300'000, -3'200'000}, 1'500'000, noise, 8 + round % 90, true, raw);
-    const auto contours = unite_contours(raw, FillRule::kPositive);
+    const auto contours = contour_union(raw, FillRule::kPositive);
     ASSERT_TRUE(contours.ok());
     for (const std::int64_t distance : {-150'000, -450'000, -1'300'000, 200'000, 900'000}) {
       const auto own = offset_contours(*contours, distance);
@@ -146,32 +146,32 @@ double clippers_area_mm2(const Contours& contours, double distance) {
 }
 
 // Where boxes share edges, boolean operations leave spikes and put holes behind outer contours beside theirs.
-TEST(OffsetContours, HolesCountWhereverTheyStandInTheList) {
+TEST(OffsetContours, HolesCountAnywhereInTheList) {
   const std::vector<std::vector<BoxMm>> known = {
       {{0, 6, 1, 12}, {6, 1, 8, 6}, {1, 2, 7, 8}, {3, 3, 5, 7, true}, {5, 1, 9, 6, true}},
       {{2, 5, 4, 8}, {2, 5, 6, 8}, {3, 5, 5, 9}, {1, 4, 3, 5}},
       {{3, 1, 8, 7}, {5, 4, 11, 8}, {7, 4, 10, 8}},
   };
   std::mt19937 random(5);
-  const auto at_most = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most)); };
+  const auto not_above = [&](int maximum) { return static_cast<int>(random() % static_cast<unsigned>(maximum)); };
   int unordered = 0;
   for (std::size_t round = 0; round < 600; ++round) {
     std::vector<BoxMm> set;
     if (round < known.size()) {
       set = known[round];
     } else {
-      for (int n = 3 + at_most(6); n > 0; --n) {
-        const int x = at_most(9), y = at_most(9);
-        set.push_back({x, y, x + 1 + at_most(6), y + 1 + at_most(6), at_most(3) == 0});
+      for (int n = 3 + not_above(6); n > 0; --n) {
+        const int x = not_above(9), y = not_above(9);
+        set.push_back({x, y, x + 1 + not_above(6), y + 1 + not_above(6), not_above(3) == 0});
       }
     }
     for (const FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
-      const auto united = unite_contours(boxes(set), rule);
-      ASSERT_TRUE(united.ok());
-      unordered += is_ordered_by_outer(*united) ? 0 : 1;
-      const auto moved = offset_contours(*united, -200'000);
+      const auto merged = contour_union(boxes(set), rule);
+      ASSERT_TRUE(merged.ok());
+      unordered += is_ordered_by_outer(*merged) ? 0 : 1;
+      const auto moved = offset_contours(*merged, -200'000);
       ASSERT_TRUE(moved.ok());
-      EXPECT_NEAR(square_mm(doubled_area(*moved)), clippers_area_mm2(*united, -200'000), 1e-3) << "round " << round;
+      EXPECT_NEAR(square_mm(doubled_area(*moved)), clippers_area_mm2(*merged, -200'000), 1e-3) << "round " << round;
     }
   }
   EXPECT_GE(unordered, 2);

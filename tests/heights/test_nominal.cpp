@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/report/heights_study.h"
 #include "tests/heights/surfaces.h"
 
 namespace lamina::heights {
@@ -14,10 +15,10 @@ using test::nm;
 using test::set_of;
 using Profile = std::vector<std::pair<double, double>>;
 
-constexpr Stretch kLima{1.007, 1.007, 1};
+constexpr ScaleFactors kLima{1.007, 1.007, 1};
 
 /// A strip stretched in x and z about the origin, as it is loaded with --shrink.
-SurfaceIndex stretched(Profile profile, const Stretch& by, const SurfaceOptions& options = {}) {
+SurfaceIndex scaled(Profile profile, const ScaleFactors& by, const SurfaceOptions& options = {}) {
   for (auto& [x, z] : profile) x *= by[0], z *= by[2];
   const Instance instance{0, {0, 0, 0}};
   const std::uint32_t part = 0;
@@ -35,20 +36,20 @@ Options by_angle(std::initializer_list<double> set) {
 /// A slope whose normal rises by this angle, 5 mm high.
 Profile wedge(double degrees) { return {{0, 0}, {5 * std::tan(degrees * std::numbers::pi / 180), 5}}; }
 
-TEST(NominalSlopes, AWedgeJustBelowTheLimitKeepsItsThickLayersWhenItIsStretched) {
+TEST(NominalSlopes, AWedgeJustBelowTheLimitKeepsItsThickLayersWhenItIsScaled) {
   const Options options = by_angle({0.178, 0.254});
-  for (const Stretch& by : {Stretch{1, 1, 1}, kLima}) {
-    const Result<Plan> plan = plan_heights(stretched(wedge(44.85), by), options);
+  for (const ScaleFactors& by : {ScaleFactors{1, 1, 1}, kLima}) {
+    const Result<Plan> plan = plan_heights(scaled(wedge(44.85), by), options);
     ASSERT_TRUE(plan.ok());
     EXPECT_EQ(plan->table.size(), 19u);  // 5 mm / 0.254; as printed the slope is 45.05 degrees: 28 layers of 0.178
-    for (const Steepness slope : plan->looked_at) EXPECT_NEAR(angle_of(slope), 44.85, 1e-4);
+    for (const Steepness slope : plan->inspected) EXPECT_NEAR(angle_of(slope), 44.85, 1e-4);
   }
-  EXPECT_EQ(plan_heights(stretched(wedge(45.05), kLima), options)->table.size(), 28u);
+  EXPECT_EQ(plan_heights(scaled(wedge(45.05), kLima), options)->table.size(), 28u);
 }
 
 TEST(NominalSlopes, HeightsAndFlatsAreThoseOfThePlacedPart) {
-  const Stretch by{1, 1, 1.02};
-  const SurfaceIndex index = stretched({{0, 0}, {5, 0}, {5, 1}, {3, 1}, {3, 2}, {0, 2}}, by);
+  const ScaleFactors by{1, 1, 1.02};
+  const SurfaceIndex index = scaled({{0, 0}, {5, 0}, {5, 1}, {3, 1}, {3, 2}, {0, 2}}, by);
   EXPECT_EQ(index.top, nm(2.04));
   const std::vector<Flat> flats = find_flats(index, 1000, 1);
   ASSERT_EQ(flats.size(), 2u);
@@ -59,12 +60,12 @@ TEST(NominalSlopes, HeightsAndFlatsAreThoseOfThePlacedPart) {
   SurfaceOptions options;
   options.peak_angle_deg = 60;
   options.flat_tolerance = nm(0.5);
-  EXPECT_TRUE(stretched({{0, 0}, {0.5, 0.295}}, {1.1, 1, 1}, options).meshes[0].flats.empty());
-  EXPECT_FALSE(stretched({{0, 0}, {0.5, 0.28}}, {0.9, 1, 1}, options).meshes[0].flats.empty());
+  EXPECT_TRUE(scaled({{0, 0}, {0.5, 0.295}}, {1.1, 1, 1}, options).meshes[0].flats.empty());
+  EXPECT_FALSE(scaled({{0, 0}, {0.5, 0.28}}, {0.9, 1, 1}, options).meshes[0].flats.empty());
 }
 
 TEST(NominalSlopes, StepsAreThoseThatArePrintedOrThoseThatAreLeft) {
-  const Stretch by{1.1, 1, 1.25};
+  const ScaleFactors by{1.1, 1, 1.25};
   const Profile profile{{0, 0}, {3, 4}};
   const std::int64_t boundaries[] = {0, nm(1), nm(3), nm(5)};
   Options options = by_angle({0.1});
@@ -72,7 +73,7 @@ TEST(NominalSlopes, StepsAreThoseThatArePrintedOrThoseThatAreLeft) {
   const double printed = 3.3 / std::hypot(3.3, 5), nominal = 0.6 / 1.25;
   for (const bool of_nominal : {false, true}) {
     options.surface.nominal_cusps = of_nominal;
-    const SurfaceIndex index = stretched(profile, by, options.surface);
+    const SurfaceIndex index = scaled(profile, by, options.surface);
     const Evaluation found = evaluate(index, boundaries, options);
     const double step = of_nominal ? nominal : printed;
     EXPECT_NEAR(static_cast<double>(found.layers[0].cusp), 1e6 * step, 1);
@@ -86,13 +87,13 @@ TEST(NominalSlopes, StepsAreThoseThatArePrintedOrThoseThatAreLeft) {
   options.set = test::range_of(0.05, 0.5, 0.001);
   for (const bool of_nominal : {false, true}) {
     options.surface.nominal_cusps = of_nominal;
-    const SurfaceIndex index = stretched(profile, by, options.surface);
+    const SurfaceIndex index = scaled(profile, by, options.surface);
     const Result<Plan> plan = plan_heights(index, options);
     EXPECT_EQ(plan->table[0].thickness, nm(std::floor(0.1 / (of_nominal ? nominal : printed) * 1000) / 1000));
   }
 }
 
-TEST(NominalSlopes, AppendixBOfAPartThatIsStretchedByItsFactors) {
+TEST(NominalSlopes, AppendixBOfAPartThatIsScaledByItsFactors) {
   // The document's job had the factors 1.007, 1.007 and 1; 30.00 degrees printed there are those of the STL file.
   load::LoadOptions load;
   load.transform = load::make_transform({1, 1, 1}, {0, 0, 0}, kLima);
@@ -103,7 +104,7 @@ TEST(NominalSlopes, AppendixBOfAPartThatIsStretchedByItsFactors) {
   std::vector<Instance> instances = part->instances;
   for (Instance& instance : instances) instance.offset.z -= part->bounds.lo.z;
   const std::vector<std::uint32_t> parts(instances.size(), 0);
-  const std::vector<Stretch> by(part->meshes.size(), kLima);
+  const std::vector<ScaleFactors> by(part->meshes.size(), kLima);
   Options options = by_angle({0.178, 0.254});
   options.facets = Facets::kPlane;
   const SurfaceIndex index = index_surface(part->meshes, instances, parts, 1, options.surface, by);
@@ -112,7 +113,7 @@ TEST(NominalSlopes, AppendixBOfAPartThatIsStretchedByItsFactors) {
   ASSERT_EQ(found->table.size(), 58u);
   for (std::uint32_t i = 0; i < 58; ++i) {
     EXPECT_EQ(found->table[i].thickness, expected->table[i].thickness) << i;
-    EXPECT_NEAR(angle_of(found->looked_at[i]), angle_of(expected->looked_at[i]), 2e-4) << i;
+    EXPECT_NEAR(angle_of(found->inspected[i]), angle_of(expected->inspected[i]), 2e-4) << i;
   }
 }
 
@@ -123,14 +124,14 @@ void expect_covered(const SurfaceIndex& index, const Options& options) {
   const Result<Plan> plain = plan_heights(index, options), covered = plan_heights(index, covering);
   EXPECT_LT(plain->table.top() + options.surface.flat_tolerance, index.top);
   EXPECT_GE(covered->table.top() + options.surface.flat_tolerance, index.top);
-  EXPECT_LT(covered->table.top() - index.top, options.set.most());
+  EXPECT_LT(covered->table.top() - index.top, options.set.maximum());
   EXPECT_LT(covered->table[covered->table.size() - 1].plane(), index.top);
   if (options.mode != Mode::kAngle) return;
-  ASSERT_EQ(covered->looked_at.size(), covered->table.size());
+  ASSERT_EQ(covered->inspected.size(), covered->table.size());
   for (std::uint32_t i = 0; i + 1 < plain->table.size(); ++i) EXPECT_EQ(covered->table[i].thickness, plain->table[i].thickness);
 }
 
-TEST(CoverTop, LayersOnFlatSlopesKeepTheLeastThickness) {
+TEST(CoverTop, LayersOnFlatSlopesKeepTheMinThickness) {
   Options covering = by_angle({0.178, 0.254});
   covering.cover_top = true;
   int covered = 0;
@@ -142,7 +143,7 @@ TEST(CoverTop, LayersOnFlatSlopesKeepTheLeastThickness) {
     EXPECT_GE(plan->table.top() + covering.surface.flat_tolerance, index.top);
     covered += plan->table.top() > index.top ? 1 : 0;
     for (std::uint32_t k = 0; k < plan->table.size(); ++k) {
-      if (angle_of(plan->looked_at[k]) < 45) continue;
+      if (angle_of(plan->inspected[k]) < 45) continue;
       EXPECT_EQ(plan->table[k].thickness, 178'000) << height << " mm, layer " << k;
     }
   }
@@ -187,7 +188,7 @@ TEST(CoverTop, AFaceAtTheEndOfTheLastLayerStaysItsEnd) {
   EXPECT_GE(plan->table.top(), nm(top));
 }
 
-TEST(CoverTop, SlopesAtTheTopKeepTheLeastThickness) {
+TEST(CoverTop, SlopesAtTheTopKeepTheMinThickness) {
   const SurfaceIndex index = test::index_of(test::strip({{0, 0}, {20, 1.0}}));  // 87 degrees
   Options options = by_angle({0.178, 0.254});
   options.cover_top = true;
@@ -202,12 +203,12 @@ TEST(SmallPeaks, AreNoPeaksUnlessEveryFacetIs) {
   const Result<Plan> plain = plan_heights(index, options);
   EXPECT_EQ(test::thicknesses(plain->table), std::vector<double>(4, 0.254));
   EXPECT_EQ(plain->small_peaks, 1u);
-  EXPECT_NE(small_peaks_text(*plain, 1).find("--peaks facets"), std::string::npos);
+  EXPECT_NE(pipeline::small_peaks_text(*plain, 1).find("--peaks facets"), std::string::npos);
   options.peaks = Peaks::kFacets;
   const Result<Plan> document = plan_heights(index, options);
   EXPECT_EQ(test::thicknesses(document->table), (std::vector<double>{0.254, 0.178, 0.254, 0.254}));
   EXPECT_EQ(document->small_peaks, 0u);
-  EXPECT_EQ(small_peaks_text(*document, 1), "");
+  EXPECT_EQ(pipeline::small_peaks_text(*document, 1), "");
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ class Enumeration {
       });
     }
     if (options.flats) {
-      for (const Flat& flat : find_flats(index, options.surface.flat_tolerance, options.least_flat_mm2)) {
+      for (const Flat& flat : find_flats(index, options.surface.flat_tolerance, options.min_flat_mm2)) {
         flats_.push_back(flat.height);
       }
     }
@@ -48,16 +48,16 @@ class Enumeration {
   Verdict best() const { return best_; }
   std::uint64_t tables() const { return tables_; }
   /// nm, of the best tables; of none if they are not measured
-  double least_mean_cusp() const { return least_mean_cusp_; }
+  double min_mean_cusp() const { return min_mean_cusp_; }
 
  private:
   bool allowed(std::int64_t bottom, Nm thickness) const {
-    if (thickness == options_.set.least()) return true;
+    if (thickness == options_.set.minimum()) return true;
     return std::ranges::none_of(facets_, [&](const Facet& facet) {
       return facet.lo < bottom + thickness && facet.hi > bottom && cusp_of(thickness, facet.steepness) > options_.cusp;
     });
   }
-  void judge() {
+  void check() {
     ++tables_;
     Verdict verdict;
     verdict.cost = static_cast<double>(stack_.size()) - 1;
@@ -73,14 +73,14 @@ class Enumeration {
     if (measure_ && (!found_ || std::tie(verdict, end) <= std::tie(best_, best_end_))) {
       const double mean = evaluate(index_, stack_, options_).mean_cusp;
       const bool as_good = found_ && std::tie(verdict, end) == std::tie(best_, best_end_);
-      least_mean_cusp_ = as_good ? std::min(least_mean_cusp_, mean) : mean;
+      min_mean_cusp_ = as_good ? std::min(min_mean_cusp_, mean) : mean;
       best_end_ = end;
     }
     best_ = found_ ? std::min(best_, verdict) : verdict;
     found_ = true;
   }
   void grow() {
-    if (stack_.size() > 1) judge();
+    if (stack_.size() > 1) check();
     if (stack_.back() >= top_) return;
     for (const Nm thickness : options_.set.values) {
       if (!allowed(stack_.back(), thickness)) break;
@@ -94,7 +94,7 @@ class Enumeration {
   const Options& options_;
   std::int64_t top_, hit_;
   bool measure_;
-  double least_mean_cusp_ = 0;
+  double min_mean_cusp_ = 0;
   std::pair<std::int64_t, std::int64_t> best_end_;
   std::vector<Facet> facets_;
   std::vector<std::int64_t> flats_, stack_{0};
@@ -108,7 +108,7 @@ Verdict verdict_of(const SurfaceIndex& index, const Plan& plan, const Options& o
   Verdict verdict;
   verdict.cost = plan.table.size();
   if (!options.flats) return verdict;
-  for (const Flat& flat : find_flats(index, options.surface.flat_tolerance, options.least_flat_mm2)) {
+  for (const Flat& flat : find_flats(index, options.surface.flat_tolerance, options.min_flat_mm2)) {
     const std::int64_t miss =
         flat.height == index.top ? std::abs(boundaries.back() - index.top) : distance_to_nearest(boundaries, flat.height);
     if (miss <= hit) continue;
@@ -168,7 +168,7 @@ TEST(OptimalHeights, NoTableIsBetterThanTheOneFound) {
     options.set = random.set(grain);
     options.cusp = random.whole(60, 400) * 1000;
     options.flats = random.whole(0, 4) > 0;
-    options.least_flat_mm2 = random.whole(0, 1) == 0 ? 1 : 15;
+    options.min_flat_mm2 = random.whole(0, 1) == 0 ? 1 : 15;
     const SurfaceIndex index = test::index_of(mesh);
     const std::int64_t hit = std::min<std::int64_t>(options.surface.flat_tolerance, options.set.step() / 2);
     const Enumeration all(index, options, hit);
@@ -216,7 +216,7 @@ TEST(OptimalHeights, ThicknessesWithoutACommonStepAreTriedAtEveryHeightTheyReach
   EXPECT_EQ(plan->table.size(), 120u);                        // 40 nm short
 }
 
-TEST(OptimalHeights, LeastTimeWeighsLayersByTheirSection) {
+TEST(OptimalHeights, MinTimeWeighsLayersByTheirSection) {
   // A wide foot and a thin mast: a layer of the foot takes far longer.
   const Mesh mesh = test::strip({{0, 0}, {40, 0}, {40, 1}, {2, 1}, {2, 2}, {0, 2}, {0, 0}});
   Options options;
@@ -236,7 +236,7 @@ TEST(OptimalHeights, LeastTimeWeighsLayersByTheirSection) {
   EXPECT_LE(evaluate(index, boundaries_of(free->table), options).seconds, evaluation.seconds);
 }
 
-TEST(OptimalHeights, NeverMoreLayersThanTheOtherWaysAtTheSameLimit) {
+TEST(OptimalHeights, NeverMoreLayersThanTheOtherModesAtTheSameLimit) {
   RandomParts random(99);
   for (int round = 0; round < 300; ++round) {
     const SurfaceIndex index = test::index_of(random.part(1));
@@ -252,7 +252,7 @@ TEST(OptimalHeights, NeverMoreLayersThanTheOtherWaysAtTheSameLimit) {
       layers[mode == Mode::kOptimal ? 0 : mode == Mode::kCusp ? 1 : 2] = plan->table.size();
       const Evaluation evaluation = evaluate(index, boundaries_of(plan->table), options);
       for (std::uint32_t i = 0; i < plan->table.size(); ++i) {
-        if (plan->table[i].thickness > options.set.least()) {
+        if (plan->table[i].thickness > options.set.minimum()) {
           ASSERT_LE(evaluation.layers[i].cusp, options.cusp) << "way " << int(mode) << ", layer " << i;
         }
       }
@@ -295,7 +295,7 @@ TEST(OptimalHeights, FlatsThatWobbleAreHitOnce) {
   EXPECT_EQ(plan->table.size(), 18u);  // 3 + 5 + 10
 }
 
-TEST(OptimalHeights, AmongTheFewestLayersTheMeanStepIsLeast) {
+TEST(OptimalHeights, AmongTheFewestLayersTheMeanStepIsMinimal) {
   // 1 mm of wall, then 0.5 mm of slope that allows 0.3: thin layers belong on the slope.
   Options options;
   options.mode = Mode::kOptimal;
@@ -305,15 +305,15 @@ TEST(OptimalHeights, AmongTheFewestLayersTheMeanStepIsLeast) {
   EXPECT_EQ(test::thicknesses(plan_heights(index, options)->table), (std::vector<double>{0.3, 0.3, 0.3, 0.3, 0.2, 0.2}));
 }
 
-TEST(OptimalHeights, OfAllTablesOfTheFewestLayersTheOneFoundHasTheLeastMeanStep) {
+TEST(OptimalHeights, OfAllTablesOfTheFewestLayersTheOneFoundHasTheMinimalMeanStep) {
   RandomParts random(5);
   int choices = 0;
   for (int round = 0; round < 250; ++round) {
     const SurfaceIndex index = test::index_of(random.part(round % 2 == 0 ? 10 : 1));
     Options options;
     options.mode = Mode::kOptimal;
-    const Nm least = random.whole(18, 26) * 10'000, step = random.whole(1, 3) * 10'000;
-    for (Nm value = least; value <= least + 5 * step; value += step) options.set.values.push_back(value);
+    const Nm minimum = random.whole(18, 26) * 10'000, step = random.whole(1, 3) * 10'000;
+    for (Nm value = minimum; value <= minimum + 5 * step; value += step) options.set.values.push_back(value);
     options.cusp = random.whole(60, 400) * 1000;
     options.flats = random.whole(0, 2) > 0;
     const std::int64_t hit = std::min<std::int64_t>(options.surface.flat_tolerance, options.set.step() / 2);
@@ -322,8 +322,7 @@ TEST(OptimalHeights, OfAllTablesOfTheFewestLayersTheOneFoundHasTheLeastMeanStep)
     ASSERT_TRUE(plan.ok());
     ASSERT_EQ(verdict_of(index, *plan, options, hit), all.best()) << "round " << round;
     choices += all.best().largest_miss == 0 && options.set.size() > 1;
-    EXPECT_NEAR(evaluate(index, boundaries_of(plan->table), options).mean_cusp, all.least_mean_cusp(),
-                1e-6 * all.least_mean_cusp())
+    EXPECT_NEAR(evaluate(index, boundaries_of(plan->table), options).mean_cusp, all.min_mean_cusp(), 1e-6 * all.min_mean_cusp())
         << "round " << round;
   }
   EXPECT_GT(choices, 40);
@@ -359,7 +358,7 @@ TEST(OptimalHeights, RealPartsKeepTheStepAndHitEveryFlat) {
     const SurfaceIndex index = test::index_of_file(path + name);
     Options options;
     options.set = range_of(0.05, 0.3, 0.001);
-    options.least_flat_mm2 = 5;
+    options.min_flat_mm2 = 5;
     std::array<Evaluation, 2> evaluations;
     std::array<std::uint32_t, 2> layers{};
     for (const Mode mode : {Mode::kOptimal, Mode::kCusp}) {
@@ -370,7 +369,7 @@ TEST(OptimalHeights, RealPartsKeepTheStepAndHitEveryFlat) {
       layers[i] = plan->table.size();
       evaluations[i] = evaluate(index, boundaries_of(plan->table), options);
       for (std::uint32_t layer = 0; layer < plan->table.size(); ++layer) {
-        if (plan->table[layer].thickness == options.set.least()) continue;
+        if (plan->table[layer].thickness == options.set.minimum()) continue;
         EXPECT_LE(evaluations[i].layers[layer].cusp, options.cusp) << name << ", layer " << layer;
       }
     }

@@ -35,7 +35,7 @@ Options document() {
   options.mode = Mode::kAngle;
   options.set = set_of({0.178, 0.254});
   options.facets = Facets::kPlane;
-  options.least_flat_mm2 = 0;
+  options.min_flat_mm2 = 0;
   return options;
 }
 
@@ -49,7 +49,7 @@ void expect_published(const std::string& part, const std::string& list, Facets f
   for (std::uint32_t i = 0; i < rows.size(); ++i) {
     EXPECT_EQ(plan->table[i].thickness, test::nm(rows[i].thickness)) << part << ", layer " << i + 1;
     if (!angles || rows[i].angle < 0) continue;
-    EXPECT_NEAR(angle_of(plan->looked_at[i]), rows[i].angle, 0.00501) << part << ", layer " << i + 1;
+    EXPECT_NEAR(angle_of(plan->inspected[i]), rows[i].angle, 0.00501) << part << ", layer " << i + 1;
   }
 }
 

@@ -7,10 +7,10 @@
 #include <random>
 #include <sstream>
 
-#include "stages/heights/ladder.h"
+#include "stages/formats/rp3/rp3.h"
+#include "stages/heights/candidate_heights.h"
 #include "stages/heights/per_part.h"
 #include "stages/heights/steepest.h"
-#include "stages/write/rp3/rp3.h"
 #include "tests/heights/surfaces.h"
 
 namespace lamina::heights {
@@ -75,11 +75,12 @@ TEST(HeightSurface, EveryLayerSeesExactlyTheFacetsThatReachIntoIt) {
 
 TEST(HeightSurface, PlanesCutWhatBeginsBelowThemAndReachesThem) {
   const SurfaceIndex index = test::index_of(test::strip({{0, 0}, {0.5, 1}, {0.5, 2}, {3, 3}}));
-  const Result<Ladder> ladder = Ladder::reachable(set_of({0.5}), 3'000'000);
-  const Buffer<Steepness> at = steepest_at_rungs(index, index.parts, *ladder);
+  const Result<CandidateHeights> candidate_heights = CandidateHeights::reachable(set_of({0.5}), 3'000'000);
+  const Buffer<Steepness> at = steepest_at_candidates(index, index.parts, *candidate_heights);
   const double low = 0.5 / std::hypot(0.5, 1.0), high = 2.5 / std::hypot(2.5, 1.0);
   const double expected[] = {0, low, low, 0, 0, high, high};
-  for (std::size_t rung = 0; rung < 7; ++rung) EXPECT_NEAR(at[rung], expected[rung] * kHorizontal, 1.5) << rung;
+  for (std::size_t candidate = 0; candidate < 7; ++candidate)
+    EXPECT_NEAR(at[candidate], expected[candidate] * kHorizontal, 1.5) << candidate;
 }
 
 TEST(HeightSurface, AnglesComeFromTheCornersAndDownwardFacesCountAsUpwardOnes) {
@@ -95,22 +96,22 @@ TEST(HeightSurface, AnglesComeFromTheCornersAndDownwardFacesCountAsUpwardOnes) {
   }
 }
 
-TEST(HeightSurface, SmallFacetsAskForNothing) {
+TEST(HeightSurface, SmallFacetsRequestNothing) {
   Mesh mesh = test::strip({{0, 0}, {0, 3}});
   mesh.triangles.push_back({{0, 0, 1'000'000}, {100'000, 0, 1'010'000}, {0, 100'000, 1'000'000}});  // 0.005 mm2, nearly level
   Options options;
   options.mode = Mode::kCusp;
   options.set = set_of({0.1, 0.3});
-  const auto layers = [&](double least) {
+  const auto layers = [&](double minimum) {
     SurfaceOptions surface;
-    surface.least_facet_mm2 = least;
+    surface.min_facet_mm2 = minimum;
     return plan_heights(test::index_of(mesh, surface), options)->table.size();
   };
   EXPECT_GT(layers(0), 10u);
   EXPECT_EQ(layers(0.01), 10u);
 }
 
-TEST(HeightSurface, PartThatIsThinnerThanTheLeastThicknessIsOneLayer) {
+TEST(HeightSurface, PartThatIsThinnerThanTheMinThicknessIsOneLayer) {
   const SurfaceIndex index = test::index_of(test::strip({{0, 0}, {1, 0}, {1, 0.05}, {0, 0.05}}));
   for (const Mode mode : {Mode::kUniform, Mode::kAngle, Mode::kCusp, Mode::kStepwise, Mode::kOptimal}) {
     Options options;
@@ -154,13 +155,13 @@ TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
   options.set = set_of({0.178, 0.254});
   options.facets = Facets::kPlane;
   const Result<Plan> plan = plan_heights(test::index_of_file(test::reference("case1_plane.stl")), options);
-  std::vector<write::rp3::Layer> layers;
+  std::vector<formats::rp3::LayerSetting> layers;
   for (std::uint32_t i = 0; i < plan->table.size(); ++i) {
-    layers.push_back({mm(plan->table[i].thickness), angle_of(plan->looked_at[i])});
+    layers.push_back({mm(plan->table[i].thickness), angle_of(plan->inspected[i])});
   }
-  write::rp3::Settings settings;
+  formats::rp3::Settings settings;
   settings.shrink = {1.007, 1.007, 1};
-  const std::string text = write::rp3::text_of(layers, settings);
+  const std::string text = formats::rp3::text_of(layers, settings);
   // The printed file: its head, its summary, its rows; but for -0.00, which the document prints for walls.
   std::ifstream rows(test::reference("appendix_b.rp3.tsv")), head(test::reference("appendix_b.header.txt"));
   std::string expected, line;
@@ -179,9 +180,8 @@ TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
 
 TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
   const auto read = [](std::string_view text) {
-    ThicknessSet set;
-    const std::string wrong = read_thicknesses(text, set);
-    return wrong.empty() ? set.values : std::vector<Nm>{};
+    const auto set = read_thicknesses(text);
+    return set ? set->values : std::vector<Nm>{};
   };
   EXPECT_EQ(read("0.254,0.178"), (std::vector<Nm>{178'000, 254'000}));
   EXPECT_EQ(read("0.05..0.2:0.05"), (std::vector<Nm>{50'000, 100'000, 150'000, 200'000}));
@@ -195,7 +195,7 @@ TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
   }
 }
 
-TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetAsksFor) {
+TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetRequests) {
   std::mt19937 random(11);
   Mesh mesh;
   for (int i = 0; i < 40'000; ++i) {
@@ -207,24 +207,26 @@ TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetAsksFor) {
     for (const Point3& p : {t.a, t.b, t.c}) mesh.bounds.add(p);
   }
   const SurfaceIndex index = test::index_of(mesh);
-  const Result<Ladder> ladder = Ladder::reachable(test::set_of({0.05, 0.06}), index.top);
-  ASSERT_TRUE(ladder.ok());
-  ASSERT_GT(worthwhile_shares(index, index.parts, 8 * ladder->rungs()), 1u);
-  Buffer<Steepness> cells(ladder->cells(), 0), rungs(ladder->rungs(), 0);
-  std::vector<double> below(ladder->rungs(), 0);
+  const Result<CandidateHeights> candidate_heights = CandidateHeights::reachable(test::set_of({0.05, 0.06}), index.top);
+  ASSERT_TRUE(candidate_heights.ok());
+  ASSERT_GT(worthwhile_shares(index, index.parts, 8 * candidate_heights->candidates()), 1u);
+  Buffer<Steepness> cells(candidate_heights->cells(), 0), candidates(candidate_heights->candidates(), 0);
+  std::vector<double> below(candidate_heights->candidates(), 0);
   for_each_slope(index, index.parts[0], 0, 1, [&](Nm lo, Nm hi, Steepness steepness, double projected) {
-    for (std::uint32_t i = 0; i < ladder->rungs(); ++i) {
-      const std::int64_t bottom = (*ladder)[i];
-      if (i < ladder->cells() && lo < (*ladder)[i + 1] && hi > bottom) cells[i] = std::max(cells[i], steepness);
-      if (lo < bottom && hi >= bottom) rungs[i] = std::max(rungs[i], steepness);
+    for (std::uint32_t i = 0; i < candidate_heights->candidates(); ++i) {
+      const std::int64_t bottom = (*candidate_heights)[i];
+      if (i < candidate_heights->cells() && lo < (*candidate_heights)[i + 1] && hi > bottom)
+        cells[i] = std::max(cells[i], steepness);
+      if (lo < bottom && hi >= bottom) candidates[i] = std::max(candidates[i], steepness);
       const double share = std::clamp((static_cast<double>(bottom) - lo) / (static_cast<double>(hi) - lo), 0.0, 1.0);
       below[i] += std::abs(projected) * share;
     }
   });
-  EXPECT_EQ(steepest_in_cells(index, index.parts, *ladder), cells);
-  EXPECT_EQ(steepest_at_rungs(index, index.parts, *ladder), rungs);
-  const Buffer<double> found = projected_below(index, index.parts, *ladder, Sign::kBoth);
-  for (std::uint32_t i = 0; i < ladder->rungs(); ++i) EXPECT_NEAR(found[i], below[i], 1e-9 * (1 + below[i])) << i;
+  EXPECT_EQ(steepest_in_cells(index, index.parts, *candidate_heights), cells);
+  EXPECT_EQ(steepest_at_candidates(index, index.parts, *candidate_heights), candidates);
+  const Buffer<double> found = projected_below(index, index.parts, *candidate_heights, Sign::kBoth);
+  for (std::uint32_t i = 0; i < candidate_heights->candidates(); ++i)
+    EXPECT_NEAR(found[i], below[i], 1e-9 * (1 + below[i])) << i;
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ Contours layer_of(const char* file, double share) {
   const std::vector<std::uint32_t> body(instances.size(), 0);
   const std::vector<Nm> planes{static_cast<Nm>(part->bounds.lo.z + share * static_cast<double>(part->bounds.height()))};
   const auto slicer = slice::Slicer::build(part->meshes, instances, body, planes, {});
-  slice::LayerScratch scratch;
+  slice::SectionScratch scratch;
   slice::LayerContours layer;
   EXPECT_TRUE(slicer->layer(0, scratch, layer).ok());
   EXPECT_GT(layer.contours.size(), 0u) << file;
@@ -114,21 +114,21 @@ Sums sums_of(const Toolpaths& paths) {
   return sums;
 }
 
-std::vector<Nm> places_of(const infill::FillParameters& parameters, std::uint32_t layer) {
+std::vector<Nm> positions_of(const infill::FillParameters& parameters, std::uint32_t layer) {
   const Contours& square = outline("square");
   infill::FillParameters own = parameters;
   own.angle_base = own.angle_step = 0;
   const Toolpaths paths = filled(square, context_of(square, layer), own);
-  std::set<Nm> places;
+  std::set<Nm> positions;
   for (std::size_t i = 0; i < paths.point.size(); ++i) {
-    if (paths.line[i] != kNoLine) places.insert(paths.point[i].y);
+    if (paths.line[i] != kNoLine) positions.insert(paths.point[i].y);
   }
-  return {places.begin(), places.end()};
+  return {positions.begin(), positions.end()};
 }
 
-std::vector<Nm> distances_of(const std::vector<Nm>& places) {
+std::vector<Nm> distances_of(const std::vector<Nm>& positions) {
   std::vector<Nm> distances;
-  for (std::size_t i = 1; i < places.size(); ++i) distances.push_back(places[i] - places[i - 1]);
+  for (std::size_t i = 1; i < positions.size(); ++i) distances.push_back(positions[i] - positions[i - 1]);
   return distances;
 }
 

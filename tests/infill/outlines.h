@@ -43,7 +43,7 @@ struct Sums {
 Sums sums_of(const Toolpaths& paths);
 
 /// Places of the lines on the square at angle 0, nm from its side.
-std::vector<Nm> places_of(const infill::FillParameters& parameters, std::uint32_t layer = 0);
-std::vector<Nm> distances_of(const std::vector<Nm>& places);
+std::vector<Nm> positions_of(const infill::FillParameters& parameters, std::uint32_t layer = 0);
+std::vector<Nm> distances_of(const std::vector<Nm>& positions);
 
 }  // namespace lamina::test

@@ -52,7 +52,7 @@ std::map<std::int32_t, Nm> troughs_of(FillParameters parameters, std::uint32_t l
 }
 
 /// Groups, gaps in turn, centre distances, tables, formulas and staggers of any kind mean the same for all patterns.
-TEST(CurvesAndWaves, OneListOfDistancesPlacesLinesWavesAndCurves) {
+TEST(CurvesAndWaves, OneListOfDistancesPositionsLinesWavesAndCurves) {
   std::mt19937 random(4);
   const auto pick = [&](Nm low, Nm high) { return std::uniform_int_distribution<Nm>(low, high)(random); };
   for (int turn = 0; turn < 60; ++turn) {
@@ -64,7 +64,7 @@ TEST(CurvesAndWaves, OneListOfDistancesPlacesLinesWavesAndCurves) {
     if (turn % 5 == 2) parameters.gap_expression = "0.3 + 0.2 * sin(i) + 0.01 * n - 0.02 * z";
     if (turn % 5 == 3) parameters.distances = {pick(100'000, 900'000), pick(100'000, 900'000), pick(100'000, 900'000)};
     const auto layer = static_cast<std::uint32_t>(pick(0, 40));
-    const auto of_lines = distances_of(places_of(parameters, layer)), of_curves = distances_of(depths_of(parameters, layer));
+    const auto of_lines = distances_of(positions_of(parameters, layer)), of_curves = distances_of(depths_of(parameters, layer));
     ASSERT_GT(of_curves.size(), 5u);
     ASSERT_GE(of_lines.size(), of_curves.size());
     for (std::size_t i = 0; i < of_curves.size(); ++i)
@@ -165,9 +165,9 @@ TEST(CurvesAndWaves, ClosedCurvesAreNumberedFromTheSurfaceInwardsAndThoseOfOneDe
       parameters.stagger_every_layer = true;
       const FillContext context = context_of(outline.contours, layer);
       const Toolpaths paths = filled(outline.contours, context, parameters);
-      const auto places =
-          infill::place_inwards(*infill::fill_region(outline.contours, context, parameters), context, parameters);
-      ASSERT_TRUE(places.ok());
+      const auto positions =
+          infill::positions_inwards(infill::outlines_of(outline.contours, context, parameters)->region, context, parameters);
+      ASSERT_TRUE(positions.ok());
       std::int32_t before = INT32_MIN;
       for (std::uint32_t p = 0; p < paths.size(); ++p) {
         const std::int32_t number = paths.line[paths.offset[p]];
@@ -177,7 +177,7 @@ TEST(CurvesAndWaves, ClosedCurvesAreNumberedFromTheSurfaceInwardsAndThoseOfOneDe
         }
         ASSERT_GE(number, before) << outline.name;
         before = number;
-        const auto depth = static_cast<double>(places->at[static_cast<std::size_t>(number - places->first_number)]);
+        const auto depth = static_cast<double>(positions->at[static_cast<std::size_t>(number - positions->first_number)]);
         double nearest = 1e300;
         const auto points = paths.view()[p];
         for (std::size_t i = 0; i + 1 < points.size(); ++i) {

@@ -27,8 +27,8 @@ bool stays_inside(const ContoursView& region, Point2 a, Point2 b, double slack) 
   return true;
 }
 
-TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
-  std::size_t stretches = 0;
+TEST(Fill, NoBeadCentreLeavesItsRegionForAnyOutlinePatternAngleAndGap) {
+  std::size_t intervals = 0;
   for (const Outline& outline : outlines()) {
     for (const Pattern pattern :
          {Pattern::kRaster, Pattern::kContour, Pattern::kContourRaster, Pattern::kHoneycomb, Pattern::kQuatrefoil}) {
@@ -42,10 +42,11 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
           if (gap == 300'000) parameters.stagger = {170'000};
           if (gap == -100'000 && pattern != Pattern::kQuatrefoil) parameters.group = 3;
           const FillContext context = context_of(outline.contours);
-          const auto region = infill::fill_region(outline.contours, context, parameters);
-          ASSERT_TRUE(region.ok());
+          const auto outlines = infill::outlines_of(outline.contours, context, parameters);
+          ASSERT_TRUE(outlines.ok());
+          const Contours& region = outlines->region;
           const Toolpaths paths = filled(outline.contours, context, parameters);
-          const auto bound = infill::bound_fill(outline.contours, *region, context, parameters);
+          const auto bound = infill::bound_fill(outline.contours, region, context, parameters);
           ASSERT_TRUE(bound.ok());
           ASSERT_LE(paths.point.size(), bound->points) << outline.name << ", pattern " << static_cast<int>(pattern);
           ASSERT_EQ(paths.kind.size(), paths.point.size());
@@ -54,12 +55,12 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
           for (std::uint32_t p = 0; p < paths.size(); ++p) {
             ASSERT_GE(paths.view()[p].size(), 2u);
             const bool wall = paths.kind[paths.offset[p]] == PathKind::kOuter;
-            const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(*region);
+            const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(region);
             // Looking is slow: some hundred stretches of each filling, others each time.
             const auto step = static_cast<std::uint32_t>(1 + paths.point.size() * within.point.size() / 10'000);
-            for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(stretches % step); i + 1 < paths.offset[p + 1];
+            for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(intervals % step); i + 1 < paths.offset[p + 1];
                  i += step) {
-              ++stretches;
+              ++intervals;
               ASSERT_TRUE(stays_inside(within, paths.point[i], paths.point[i + 1], 3))
                   << outline.name << ", pattern " << static_cast<int>(pattern) << ", angle " << angle << ", gap " << gap
                   << ", path " << p << ", stretch " << i - paths.offset[p];
@@ -69,8 +70,8 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
       }
     }
   }
-  EXPECT_GT(stretches, 20'000u);
-  std::cout << stretches << " stretches looked at\n";
+  EXPECT_GT(intervals, 20'000u);
+  std::cout << intervals << " stretches looked at\n";
 }
 
 TEST(Fill, LengthTimesDistanceTendsToTheArea) {
@@ -137,7 +138,7 @@ TEST(Fill, AFormulaHasToHoldWithinThePartOnly) {
   EXPECT_EQ(paths.point[0].y - context_of(square).part.lo.y, parameters.width / 2 + 300'000);
 }
 
-TEST(Fill, WhatCannotBeLaidIsOneClearLine) {
+TEST(Fill, WhatCannotBeDepositedIsOneClearLine) {
   const Contours& square = outline("square");
   const auto message = [&](const FillParameters& parameters) {
     Toolpaths paths;

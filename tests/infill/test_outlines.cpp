@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "stages/geometry/clipping.h"
-#include "stages/geometry/contours/merge.h"
 #include "stages/geometry/contours/simplify.h"
 #include "tests/infill/outlines.h"
 #include "tests/slice/contour_laws.h"
@@ -17,7 +16,7 @@ using infill::FillParameters;
 
 /// Calls act(x, y) for the corners of contours and points between them.
 template <class Act>
-void for_each_place(const ContoursView& contours, Act&& act) {
+void for_each_point(const ContoursView& contours, Act&& act) {
   constexpr int kParts = 2;
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     Point2 a = contours[c].back();
@@ -32,9 +31,9 @@ void for_each_place(const ContoursView& contours, Act&& act) {
 
 /// How far places of one set of contours lie from another one at most.
 double furthest(const ContoursView& contours, const ContoursView& from) {
-  double most = 0;
-  for_each_place(contours, [&](double x, double y) { most = std::max(most, distance_to(from, x, y)); });
-  return most;
+  double maximum = 0;
+  for_each_point(contours, [&](double x, double y) { maximum = std::max(maximum, distance_to(from, x, y)); });
+  return maximum;
 }
 
 double area_nm2(const ContoursView& contours) { return static_cast<double>(doubled_area(contours)) / 2; }
@@ -58,17 +57,17 @@ void expect_within(const Outline& surface, Nm tolerance) {
     expect_clean(wall, where);
     const auto exact = offset_contours(surface.contours, -depth);
     ASSERT_TRUE(exact.ok());
-    double least = 1e300;
-    for_each_place(wall, [&](double x, double y) { least = std::min(least, distance_to(surface.contours, x, y)); });
+    double minimum = 1e300;
+    for_each_point(wall, [&](double x, double y) { minimum = std::min(minimum, distance_to(surface.contours, x, y)); });
     const double slack = static_cast<double>(tolerance) + 5;
-    EXPECT_GE(least, static_cast<double>(depth) - slack) << where;
+    EXPECT_GE(minimum, static_cast<double>(depth) - slack) << where;
     EXPECT_LE(furthest(wall, *exact), slack) << where;
     EXPECT_LE(std::abs(area_nm2(wall) - area_nm2(*exact)), slack * perimeter(*exact)) << where;
     depth += 450'000;
   }
 }
 
-TEST(Outlines, NoWallIsFurtherFromTheTrueOffsetOfTheTrueSurfaceThanTheToleranceTold) {
+TEST(Outlines, NoWallIsFurtherFromTheTrueOffsetOfTheTrueSurfaceThanTheToleranceReported) {
   for (const char* name : {"square", "touching holes", "islands in holes", "nist", "crown", "knot", "nut"}) {
     expect_within({name, outline(name)}, 10'000);
     expect_within({name, outline(name)}, 0);
@@ -108,11 +107,12 @@ TEST(MergeShortEdges, ContoursThatWouldTouchKeepTheirPoints) {
   Contours close = round({0, 0}, 200'000, 40);
   // A triangle whose tip is 1 nm outside of the middle of an edge that moves out by half a micrometre.
   const double turn = 2 * std::numbers::pi * 8.5 / 40, at = 200'000 * std::cos(std::numbers::pi / 40);
-  const auto place = [&](double radius, double by) {
+  const auto position = [&](double radius, double by) {
     return Point2{static_cast<Nm>(std::lround(radius * std::cos(turn + by))),
                   static_cast<Nm>(std::lround(radius * std::sin(turn + by)))};
   };
-  for (const Point2 p : {place(at + 100, 0), place(at + 900'000, 0.2), place(at + 900'000, -0.2)}) close.point.push_back(p);
+  for (const Point2 p : {position(at + 100, 0), position(at + 900'000, 0.2), position(at + 900'000, -0.2)})
+    close.point.push_back(p);
   if (doubled_area(std::span(close.point).subspan(40)) < 0) std::swap(close.point[41], close.point[42]);
   close.close();
   Contours merged = close;

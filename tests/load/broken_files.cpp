@@ -37,16 +37,16 @@ struct Way {
   std::function<Facets(const Facets&, Random&)> break_it;
 };
 
-const std::vector<Way>& ways() {
+const std::vector<Way>& paths() {
   const auto jitter = [](double um) { return [um](const Facets& f, Random& r) { return jittered(f, r, um); }; };
   const auto missing = [](double share) { return [share](const Facets& f, Random& r) { return without(f, r, share); }; };
   static const std::vector<Way> all{
       {"jitter 1 um", Ends::kSolid, jitter(1)},
       {"jitter 4 um", Ends::kSolid, jitter(4)},
       {"jitter 20 um", Ends::kSolid, jitter(20)},
-      {"1 % missing", Ends::kToldOr, missing(0.01)},
-      {"10 % missing", Ends::kToldOr, missing(0.1)},
-      {"a hole of 3 mm", Ends::kToldOr, [](const Facets& f, Random& r) { return with_hole(f, r, 3); }},
+      {"1 % missing", Ends::kReportedOr, missing(0.01)},
+      {"10 % missing", Ends::kReportedOr, missing(0.1)},
+      {"a hole of 3 mm", Ends::kReportedOr, [](const Facets& f, Random& r) { return with_hole(f, r, 3); }},
       {"20 % flipped", Ends::kSolid, [](const Facets& f, Random& r) { return flipped(f, r, 0.2); }},
       {"15 % twice", Ends::kSolid, [](const Facets& f, Random& r) { return duplicated(f, r, 0.15); }},
       {"T-junctions", Ends::kSolid, [](const Facets& f, Random& r) { return split_sides(f, r, 0.1); }},
@@ -71,8 +71,8 @@ void add_counts(std::vector<BrokenFile>& files) {
   files.push_back({"count all ones.stl", binary_stl(nut, "", 0xffffffff), nut, Ends::kSolid});
   files.push_back({"count of the first of two bodies.stl", binary_stl(joined(box, moved(nut, 40, 0, 0)), "", 12),
                    joined(box, moved(nut, 40, 0, 0)), Ends::kSolid});
-  files.push_back(
-      {"count half, a facet missing.stl", binary_stl(Facets(nut.begin() + 1, nut.end()), "", count / 2), nut, Ends::kToldOr});
+  files.push_back({"count half, a facet missing.stl", binary_stl(Facets(nut.begin() + 1, nut.end()), "", count / 2), nut,
+                   Ends::kReportedOr});
   files.push_back({"count half, jitter 4 um.stl", binary_stl(jittered(nut, random, 4), "", count / 2), nut, Ends::kSolid});
   files.push_back({"zeros behind.stl", plain + std::string(50000, '\0'), nut, Ends::kSolid});
   files.push_back({"rubbish behind.stl", plain + std::string(5000, '\x41'), nut, Ends::kSolid});
@@ -107,7 +107,7 @@ void add_texts(std::vector<BrokenFile>& files) {
   add("cut in the text.stl", plain.substr(0, plain.size() / 2), Ends::kRefused);
 }
 
-void add_foreign(std::vector<BrokenFile>& files) {
+void add_unsupported(std::vector<BrokenFile>& files) {
   const auto add = [&](const char* name, const std::string& bytes) { files.push_back({name, bytes, {}, Ends::kRefused}); };
   add("step.stl", "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n");
   add("iges.stl", std::string(72, ' ') + "S      1\n");
@@ -132,7 +132,7 @@ void add_shells(std::vector<BrokenFile>& files) {
   };
   Random random(11);
   add("inverted twins.stl", joined(box, inside_out(box)), {}, Ends::kRefused);
-  add("inverted twins, jitter 4 um.stl", jittered(joined(fine, inside_out(fine)), random, 4), fine, Ends::kToldOr);
+  add("inverted twins, jitter 4 um.stl", jittered(joined(fine, inside_out(fine)), random, 4), fine, Ends::kReportedOr);
   add("a body, and inverted twins beside it.stl", joined(moved(fine, 50, 0, 0), joined(box, inside_out(box))),
       moved(fine, 50, 0, 0), Ends::kNamed);
   add("inside out.stl", inside_out(fine), fine, Ends::kSolid);
@@ -145,19 +145,19 @@ void add_shells(std::vector<BrokenFile>& files) {
   add("three within each other, the middle inside out.stl", joined(joined(ball(9, 16), inside_out(fine)), ball(4, 16)),
       joined(joined(ball(9, 16), inside_out(fine)), ball(4, 16)), Ends::kSolid);
   add("twins.stl", joined(box, box), box, Ends::kSolid);
-  add("twins, jitter 4 um.stl", jittered(joined(fine, fine), random, 4), fine, Ends::kToldOr);
+  add("twins, jitter 4 um.stl", jittered(joined(fine, fine), random, 4), fine, Ends::kReportedOr);
   add("touching boxes.stl", joined(box, moved(box, 10, 0, 0)), joined(box, moved(box, 10, 0, 0)), Ends::kSolid);
   add("touching boxes, jitter 4 um.stl", jittered(subdivided(joined(box, moved(box, 10, 0, 0)), 1), random, 4),
       joined(box, moved(box, 10, 0, 0)), Ends::kSolid);
   add("boxes 30 um apart, jitter 4 um.stl", jittered(subdivided(joined(box, moved(box, 10.03f, 0, 0)), 2), random, 4),
       joined(box, moved(box, 10.03f, 0, 0)), Ends::kSolid);
-  add("wall of 50 um, jitter 4 um.stl", jittered(cup(10, 0.05f, 15, 32), random, 4), cup(10, 0.05f, 15, 32), Ends::kToldOr);
+  add("wall of 50 um, jitter 4 um.stl", jittered(cup(10, 0.05f, 15, 32), random, 4), cup(10, 0.05f, 15, 32), Ends::kReportedOr);
   add("wall of 50 um.stl", cup(10, 0.05f, 15, 32), cup(10, 0.05f, 15, 32), Ends::kSolid);
   add("zero thickness.stl", scaled(joined(Facets{{0, 0, 0, 9, 0, 4, 0, 9, 2}}, Facets{{0, 0, 0, 0, 9, 2, 9, 0, 4}}), 1), {},
       Ends::kRefused);
   add("a sheet.stl", Facets{{0, 0, 0, 9, 0, 4, 0, 9, 2}}, {}, Ends::kRefused);
   add("a sheet of many facets.stl", subdivided(Facets{{0, 0, 0, 9, 0, 4, 0, 9, 2}}, 3), {}, Ends::kRefused);
-  add("five faces of a box.stl", Facets(box.begin(), box.begin() + 10), box, Ends::kToldOr);
+  add("five faces of a box.stl", Facets(box.begin(), box.begin() + 10), box, Ends::kReportedOr);
   add("two faces of a box.stl", Facets(box.begin(), box.begin() + 4), {}, Ends::kRefused);
 }
 
@@ -170,26 +170,26 @@ void add_gaps(std::vector<BrokenFile>& files) {
     // Facets moved outward are those of a larger solid.
     const float d = static_cast<float>(um) / 1000;
     add(fmt::format("box, facets {} um apart.stl", um), apart(box, um), box_facets({-d, -d, -d}, {10 + d, 20 + d, 30 + d}),
-        Ends::kToldOr);
+        Ends::kReportedOr);
     add(fmt::format("ball, facets {} um apart.stl", um), apart(fine, um), ball(8 + d, 16), Ends::kSolid);
   }
   Random random(13);
-  add("nut, jitter 80 um.stl", jittered(nut, random, 80), nut, Ends::kToldOr);
-  add("nut, jitter 300 um.stl", jittered(nut, random, 300), nut, Ends::kToldOr);
+  add("nut, jitter 80 um.stl", jittered(nut, random, 80), nut, Ends::kReportedOr);
+  add("nut, jitter 300 um.stl", jittered(nut, random, 300), nut, Ends::kReportedOr);
   add("nut, jitter 20 um, 10 % flipped.stl", flipped(jittered(nut, random, 20), random, 0.1), nut, Ends::kSolid);
-  add("nut, jitter 20 um, 1 % missing.stl", without(jittered(nut, random, 20), random, 0.01), nut, Ends::kToldOr);
-  add("nut, jitter 20 um, T-junctions.stl", jittered(split_sides(nut, random, 0.1), random, 20), nut, Ends::kToldOr);
-  add("nut, 15 % twice, jitter 4 um.stl", jittered(duplicated(nut, random, 0.15), random, 4), nut, Ends::kToldOr);
+  add("nut, jitter 20 um, 1 % missing.stl", without(jittered(nut, random, 20), random, 0.01), nut, Ends::kReportedOr);
+  add("nut, jitter 20 um, T-junctions.stl", jittered(split_sides(nut, random, 0.1), random, 20), nut, Ends::kReportedOr);
+  add("nut, 15 % twice, jitter 4 um.stl", jittered(duplicated(nut, random, 0.15), random, 4), nut, Ends::kReportedOr);
   add("ball of 1 mm, jitter 1 um.stl", jittered(scaled(fine, 1.f / 16), random, 1), scaled(fine, 1.f / 16), Ends::kSolid);
   add("box far away.stl", moved(box, 1500, 1500, 0), moved(box, 1500, 1500, 0), Ends::kSolid);
   add("ball far away.stl", moved(fine, 2000, 2000, 0), moved(fine, 2000, 2000, 0), Ends::kSolid);
   add("box beyond reach.stl", moved(box, 1e6f, 0, 0), {}, Ends::kRefused);
   add("slivers.stl", with_slivers(nut, random, 0.3), nut, Ends::kSolid);
-  add("nut, 30 % missing.stl", without(nut, random, 0.3), nut, Ends::kToldOr);
-  add("ball, 60 % missing.stl", without(fine, random, 0.6), fine, Ends::kToldOr);
+  add("nut, 30 % missing.stl", without(nut, random, 0.3), nut, Ends::kReportedOr);
+  add("ball, 60 % missing.stl", without(fine, random, 0.6), fine, Ends::kReportedOr);
   const Facets plate = scaled(box_facets({0, 0, 0}, {200, 200, 1}), 0.5f);
   add("plate of 0.5 mm, jitter 4 um.stl", jittered(plate, random, 4), plate, Ends::kSolid);
-  add("plate of 0.5 mm, jitter 80 um.stl", jittered(plate, random, 80), plate, Ends::kToldOr);
+  add("plate of 0.5 mm, jitter 80 um.stl", jittered(plate, random, 80), plate, Ends::kReportedOr);
 }
 
 }  // namespace
@@ -229,7 +229,7 @@ std::vector<BrokenFile> broken_files() {
   std::vector<BrokenFile> files;
   std::uint32_t seed = 1;
   for (const Solid& solid : solids()) {
-    for (const Way& way : ways()) {
+    for (const Way& way : paths()) {
       Random random(++seed);
       files.push_back(
           {solid.name + ", " + way.name + ".stl", binary_stl(way.break_it(solid.facets, random)), solid.facets, way.ends});
@@ -237,7 +237,7 @@ std::vector<BrokenFile> broken_files() {
   }
   add_counts(files);
   add_texts(files);
-  add_foreign(files);
+  add_unsupported(files);
   add_shells(files);
   add_gaps(files);
   return files;
@@ -282,7 +282,7 @@ BrokenFile random_broken_file(std::uint32_t seed) {
                             : form == 2 ? one_line_ascii(facets)
                             : form == 3 ? binary_stl(facets, "", static_cast<std::int64_t>(random() % facets.size()))
                                         : binary_stl(facets);
-  return {name + (form == 1 ? ".obj" : ".stl"), bytes, sound, Ends::kToldOr};
+  return {name + (form == 1 ? ".obj" : ".stl"), bytes, sound, Ends::kReportedOr};
 }
 
 }  // namespace lamina::test

@@ -56,10 +56,10 @@ double volume_by_rays(const std::vector<const Buffer<Triangle>*>& meshes, const 
 // --- the files
 
 enum class Ends {
-  kSolid,    // planned, within 3 % of the volume
-  kToldOr,   // that, or the share on caps is told and a note says so, or it is refused
-  kNamed,    // planned, and a note says what is lost
-  kRefused,  // exit 3
+  kSolid,       // planned, within 3 % of the volume
+  kReportedOr,  // that, or the share on caps is told and a note says so, or it is refused
+  kNamed,       // planned, and a note says what is lost
+  kRefused,     // exit 3
 };
 
 struct BrokenFile {

@@ -72,8 +72,8 @@ Outcome outcome_of(const BrokenFile& file, const std::string& path) {
   if (sound.empty()) return outcome;
   outcome.share = outcome.volume / volume_by_rays({&sound}, box, kRows);
   const bool right = std::abs(outcome.share - 1) <= 0.03;
-  const bool told = mesh.capped_share > 0 && repaired;
-  if (!right && !(file.ends == Ends::kToldOr && told)) outcome.wrong = "is another solid";
+  const bool reported = mesh.capped_share > 0 && repaired;
+  if (!right && !(file.ends == Ends::kReportedOr && reported)) outcome.wrong = "is another solid";
   if (file.ends == Ends::kNamed && outcome.said.find("cancel") == std::string::npos)
     outcome.wrong = "does not say what is lost";
   return outcome;

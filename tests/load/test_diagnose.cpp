@@ -16,16 +16,16 @@ namespace lamina {
 namespace {
 
 using Walk = std::pair<std::uint32_t, bool>;  // a facet, and whether it goes from the lower point to the higher
-using Places = std::vector<std::pair<std::uint32_t, Point3>>;
+using Positions = std::vector<std::pair<std::uint32_t, Point3>>;
 
 struct SlowKind {
   std::vector<std::tuple<std::uint32_t, Point3, Point3>> all;
-  Places first(std::size_t most) {
+  Positions first(std::size_t maximum) {
     std::sort(all.begin(), all.end());
-    Places places;
+    Positions positions;
     for (const auto& [triangle, p, q] : all)
-      if (places.size() < most) places.push_back({triangle, {(p.x + q.x) / 2, (p.y + q.y) / 2, (p.z + q.z) / 2}});
-    return places;
+      if (positions.size() < maximum) positions.push_back({triangle, {(p.x + q.x) / 2, (p.y + q.y) / 2, (p.z + q.z) / 2}});
+    return positions;
   }
 };
 
@@ -51,14 +51,14 @@ std::array<Point3, 3> turned(const Triangle& t) {
 SlowDiagnosis slow(const std::vector<Triangle>& triangles, bool with_shells = true) {
   SlowDiagnosis result;
   std::set<Point3> points;
-  std::set<std::array<Point3, 3>> seen;
+  std::set<std::array<Point3, 3>> detected;
   std::map<std::pair<Point3, Point3>, std::vector<Walk>> edges;
   std::vector<std::uint32_t> shell(triangles.size());
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
     const Triangle& t = triangles[i];
     shell[i] = i;
     points.insert({t.a, t.b, t.c});
-    if (!seen.insert(turned(t)).second) result.duplicate.all.push_back({i, t.a, t.a});
+    if (!detected.insert(turned(t)).second) result.duplicate.all.push_back({i, t.a, t.a});
     if (uses_a_point_twice(t)) continue;
     for (const auto& [p, q] : {std::pair{t.a, t.b}, {t.b, t.c}, {t.c, t.a}}) edges[std::minmax(p, q)].push_back({i, p < q});
   }
@@ -67,10 +67,10 @@ SlowDiagnosis slow(const std::vector<Triangle>& triangles, bool with_shells = tr
     int surplus = 0;
     for (const Walk& walk : walks) surplus += walk.second ? 1 : -1;
     result.balanced = result.balanced && surplus == 0;
-    const std::tuple place{walks[0].first, edge.first, edge.second};
-    if (walks.size() == 1) result.open.all.push_back(place);
-    if (walks.size() > 2) result.non_manifold.all.push_back(place);
-    if (walks.size() == 2 && surplus != 0) result.misoriented.all.push_back(place);
+    const std::tuple position{walks[0].first, edge.first, edge.second};
+    if (walks.size() == 1) result.open.all.push_back(position);
+    if (walks.size() > 2) result.non_manifold.all.push_back(position);
+    if (walks.size() == 2 && surplus != 0) result.misoriented.all.push_back(position);
     for (const Walk& walk : walks) {
       if (!with_shells) break;
       const std::uint32_t from = shell[walk.first], to = shell[walks[0].first];
@@ -84,10 +84,10 @@ SlowDiagnosis slow(const std::vector<Triangle>& triangles, bool with_shells = tr
   return result;
 }
 
-Places places_of(const load::Diagnosis::Finding& finding) {
-  Places places;
-  for (const auto& place : finding.first) places.push_back({place.triangle, place.at});
-  return places;
+Positions positions_of(const load::Diagnosis::Finding& finding) {
+  Positions positions;
+  for (const auto& position : finding.first) positions.push_back({position.triangle, position.at});
+  return positions;
 }
 
 /// Facets between points of a small lattice, so that everything that may be wrong with a mesh is.
@@ -117,11 +117,11 @@ TEST(Diagnose, FindsInFacetsAtRandomWhatOrderedMapsFind) {
                                  {&found.misoriented_edges, &expected.misoriented},
                                  {&found.duplicate_facets, &expected.duplicate}}) {
       EXPECT_EQ(finding->count, kind->all.size()) << round;
-      EXPECT_EQ(places_of(*finding), kind->first(4)) << round;
+      EXPECT_EQ(positions_of(*finding), kind->first(4)) << round;
     }
     const load::Diagnosis alone = load::diagnose_alone(mesh, 4);
-    EXPECT_EQ(places_of(alone.open_edges), places_of(found.open_edges));
-    EXPECT_EQ(places_of(alone.duplicate_facets), places_of(found.duplicate_facets));
+    EXPECT_EQ(positions_of(alone.open_edges), positions_of(found.open_edges));
+    EXPECT_EQ(positions_of(alone.duplicate_facets), positions_of(found.duplicate_facets));
     EXPECT_EQ(alone.volume_mm3, found.volume_mm3);
     EXPECT_EQ(alone.shells_apart, found.shells_apart);
     if (alone.shells_apart) triangles.clear();
@@ -201,12 +201,12 @@ void expect_same_counts(const load::Diagnosis& one, const load::Diagnosis& other
 }
 
 /// The first of what is wrong, in the order of the list.
-void expect_places(const load::Diagnosis& found, const std::vector<Triangle>& list) {
+void expect_positions(const load::Diagnosis& found, const std::vector<Triangle>& list) {
   SlowDiagnosis expected = slow(list, false);
-  EXPECT_EQ(places_of(found.open_edges), expected.open.first(50));
-  EXPECT_EQ(places_of(found.non_manifold_edges), expected.non_manifold.first(50));
-  EXPECT_EQ(places_of(found.misoriented_edges), expected.misoriented.first(50));
-  EXPECT_EQ(places_of(found.duplicate_facets), expected.duplicate.first(50));
+  EXPECT_EQ(positions_of(found.open_edges), expected.open.first(50));
+  EXPECT_EQ(positions_of(found.non_manifold_edges), expected.non_manifold.first(50));
+  EXPECT_EQ(positions_of(found.misoriented_edges), expected.misoriented.first(50));
+  EXPECT_EQ(positions_of(found.duplicate_facets), expected.duplicate.first(50));
 }
 
 /// Facets of a list in no order are looked at in a spatial one; blocks bring vertices of their own.
@@ -230,8 +230,8 @@ TEST(Diagnose, ListsInAnyOrderAndBlocksFindTheSame) {
     std::vector<Triangle> shuffled = triangles;
     std::shuffle(shuffled.begin(), shuffled.end(), random);
     expect_same_counts(in_order, diagnosis_of(shuffled));
-    expect_places(in_order, triangles);
-    expect_places(diagnosis_of(shuffled), shuffled);
+    expect_positions(in_order, triangles);
+    expect_positions(diagnosis_of(shuffled), shuffled);
     for (const std::vector<Triangle>& list : {triangles, shuffled}) {
       Mesh mesh;
       mesh.triangles.assign(list.begin(), list.end());

@@ -1,5 +1,5 @@
 // tests/load/test_info.cpp: the report of `lamina info`.
-#include "stages/load/info/info.h"
+#include "pipeline/report/part_info.h"
 
 #include <algorithm>
 #include <array>
@@ -15,13 +15,13 @@ namespace lamina::test {
 namespace {
 
 std::string text_of(const std::string& path, const load::LoadOptions& options = {}) {
-  const Result<std::string> text = load::describe_part_text(path, options, slice::surplus_areas);
+  const Result<std::string> text = pipeline::describe_part_text(path, options, slice::surplus_areas);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? *text : "";
 }
 
 nlohmann::json json_of(const std::string& path) {
-  const Result<std::string> text = load::describe_part_json(path, {}, slice::surplus_areas);
+  const Result<std::string> text = pipeline::describe_part_json(path, {}, slice::surplus_areas);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? nlohmann::json::parse(*text) : nlohmann::json();
 }
@@ -49,7 +49,7 @@ TEST(Info, ABrokenPartSaysWhereAndWhatWillBeDone) {
   EXPECT_CONTAINS(text_of(corpus("broken/cube_missing_corner.stl"), options), "since repair is off");
 }
 
-TEST(Info, TellsTheVolumeThatIsPlannedAndWhatHangsOnCaps) {
+TEST(Info, ReportsTheVolumeThatIsPlannedAndWhatHangsOnCaps) {
   EXPECT_CONTAINS(text_of(corpus("nist_am_test_artifact_v3b.stl")), "planned volume       100981 mm3\n");
   std::vector<FloatTriangle> open = unit_box();
   open.resize(10);  // without the face at x = 10, 600 of 2200 mm2
@@ -99,7 +99,7 @@ TEST(Info, ObjectsThatOverlapArePlannedOnce) {
   EXPECT_NEAR(json["planned_volume_mm3"].get<double>(), 12000 - 750, 0.01);
   EXPECT_NEAR(json["meshes"][0]["planned_volume_mm3"].get<double>(), 6000, 1e-6);
   EXPECT_CONTAINS(text_of(path), "planned volume       about 11250 mm3\n");
-  const Result<std::string> unsliced = load::describe_part_text(path, {});
+  const Result<std::string> unsliced = pipeline::describe_part_text(path, {});
   ASSERT_TRUE(unsliced.ok());
   EXPECT_CONTAINS(*unsliced, "planned volume       12000 mm3 (what overlaps counts as often as it does)\n");
 }
@@ -156,7 +156,7 @@ TEST(Info, ManyShellsThatOverlapTakeBoundedWork) {
           load::planned_volumes(std::span(&mesh, 1), std::span(&alone, 1), std::span(&found, 1), counting, effort);
       ASSERT_TRUE(volumes.ok());
       EXPECT_EQ(volumes->all.known, load::Known::kAbout);
-      EXPECT_LE(crossed, effort.most_crossed);
+      EXPECT_LE(crossed, effort.max_crossed);
       EXPECT_GE(static_cast<double>(count), effort.fewest_planes);
       const double height_mm = 20 + (boxes - 1) * 1e-3;
       EXPECT_NEAR(volumes->all.mm3, boxes * 8000.0 - 400 * height_mm, 1e-3) << "the weights add up to the height";
@@ -187,10 +187,10 @@ TEST(Info, JsonHasTheSameNumbers) {
 }
 
 TEST(Info, AFileThatCannotBePlannedIsAnError) {
-  const Result<std::string> text = load::describe_part_text(corpus("broken/plane_flat.stl"), {});
+  const Result<std::string> text = pipeline::describe_part_text(corpus("broken/plane_flat.stl"), {});
   ASSERT_FALSE(text.ok());
   EXPECT_EQ(text.error().fault, Fault::kInput);
-  EXPECT_FALSE(load::describe_part_json(corpus("broken/empty_file.stl"), {}).ok());
+  EXPECT_FALSE(pipeline::describe_part_json(corpus("broken/empty_file.stl"), {}).ok());
 }
 
 TEST(Info, EveryPartOfTheCorpusIsDescribed) {

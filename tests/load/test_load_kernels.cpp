@@ -95,7 +95,7 @@ std::unique_ptr<SortedBlock> sorted_block_of(const std::vector<Triangle>& list) 
   return block;
 }
 
-TEST(LoadKernels, TakeTheCensusOfTheListAndHashesThatTellVerticesApart) {
+TEST(LoadKernels, TakeTheCensusOfTheListAndHashesThatDistinguishVertices) {
   for (const std::size_t count : {1u, 4u, 7u, 8u, 16u, 17u, 333u, 4096u}) {
     const std::vector<Triangle> list = random_facets(count);
     const auto block = sorted_block_of(list);
@@ -125,7 +125,7 @@ TEST(LoadKernels, TakeTheCensusOfTheListAndHashesThatTellVerticesApart) {
   }
 }
 
-TEST(LoadKernels, TheBoundaryIsNothingOnlyWhereEveryEdgeIsWalkedBothWays) {
+TEST(LoadKernels, TheBoundaryIsNothingOnlyWhereEveryEdgeIsWalkedBothDirections) {
   std::mt19937 random(4);
   const auto any = [&] {
     return Point3{static_cast<Nm>(random() % 1000), static_cast<Nm>(random() % 1000), static_cast<Nm>(random() % 1000)};

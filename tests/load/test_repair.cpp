@@ -41,7 +41,7 @@ Buffer<Triangle> soup(std::mt19937& random, std::size_t count, Nm span) {
   return triangles;
 }
 
-TEST(Census, TellsClosedFromOpen) {
+TEST(Census, DistinguishesClosedFromOpen) {
   Mesh mesh = mesh_of(unit_box());
   EXPECT_TRUE(load::census(mesh.triangles).balanced);
   mesh.triangles.pop_back();
@@ -71,7 +71,7 @@ TEST(Census, FingerprintIgnoresOrderAndFirstCornerButNotOrientation) {
   EXPECT_NE(load::census(mesh.triangles).fingerprint, fingerprint);
 }
 
-TEST(Census, FingerprintTellsASingleNanometre) {
+TEST(Census, FingerprintDistinguishesASingleNanometre) {
   Mesh mesh = mesh_of(unit_box());
   const std::uint64_t fingerprint = load::census(mesh.triangles).fingerprint;
   for (Triangle& t : mesh.triangles) {
@@ -97,7 +97,7 @@ TEST(Diagnose, ACleanBoxHasNothingToSay) {
             0u);
 }
 
-TEST(Diagnose, FindsEachKindOfFaultAndItsPlace) {
+TEST(Diagnose, FindsEachKindOfFaultAndItsPosition) {
   std::vector<FloatTriangle> facets = unit_box();
   facets.pop_back();
   load::Diagnosis found = load::diagnose(mesh_of(facets));
@@ -272,7 +272,7 @@ TEST(Repair, WeldingDoesNotTouchFineEdges) {
   EXPECT_EQ(canonical(mesh.triangles), canonical(clean.triangles));
 }
 
-TEST(Repair, AFinOnASolidIsDroppedAndAnOpenBoxBesideItIsCapped) {
+TEST(Repair, AFinOnASolidIsDroppedAndAnOpenBoxNextToItIsCapped) {
   std::vector<FloatTriangle> facets = unit_box();
   const FloatTriangle fin{0, 0, 30, 10, 0, 30, 5, -5, 40};  // on the upper front edge
   facets.push_back(fin);
@@ -332,7 +332,7 @@ TEST(Repair, IsTheSameForOneAndEightThreads) {
   }
 }
 
-TEST(Repair, AWeldThatMayChangeTheVolumeIsToldOrAskedFor) {
+TEST(Repair, AWeldThatMayChangeTheVolumeIsReportedOrRequested) {
   // Of a plate of 100 x 100 mm and 12 facets, corners off by up to 80 um move four facets of half a side each.
   const std::vector<FloatTriangle> thin = box_facets({0, 0, 0}, {100, 100, 0.5f}), thick = box_facets({0, 0, 0}, {100, 100, 3});
   std::mt19937 random(1);

@@ -82,8 +82,8 @@ TEST(ReadSoundStl, WhatIsNotSoundIsReadAgainForItsList) {
   open.pop_back();
   for (FloatTriangle& f : reversed) std::swap_ranges(f.begin(), f.begin() + 3, f.begin() + 3);
   twice.insert(twice.end(), reversed.begin(), reversed.end());
-  std::vector<FloatTriangle> beside = box_facets({50, 0, 0}, {60, 10, 10});
-  beside.insert(beside.end(), twice.begin(), twice.end());
+  std::vector<FloatTriangle> neighbour = box_facets({50, 0, 0}, {60, 10, 10});
+  neighbour.insert(neighbour.end(), twice.begin(), twice.end());
   for (FloatTriangle& f : flat) f[2] = f[5] = f[8] = 1;
   bad[7][3] = NAN;
   load::LoadOptions drop;
@@ -94,10 +94,10 @@ TEST(ReadSoundStl, WhatIsNotSoundIsReadAgainForItsList) {
     return write_file("part.stl", binary_stl(facets, "", count));
   };
   for (const load::LoadOptions& options : {load::LoadOptions(), drop, as_is}) {
-    for (const auto& facets : {open, reversed, twice, beside, flat, bad})
+    for (const auto& facets : {open, reversed, twice, neighbour, flat, bad})
       EXPECT_FALSE(expect_same_either_way(file(facets), options));
     EXPECT_FALSE(expect_same_either_way(file(unit_box(), 20), options)) << "the header says more";
-    EXPECT_FALSE(expect_same_either_way(file(beside, 12), options)) << "the header says less";
+    EXPECT_FALSE(expect_same_either_way(file(neighbour, 12), options)) << "the header says less";
     EXPECT_FALSE(expect_same_either_way(file({}), options));
     EXPECT_FALSE(expect_same_either_way(write_file("rest.stl", binary_stl(unit_box()) + std::string(777, 'x')), options));
     EXPECT_FALSE(expect_same_either_way(write_file("short.stl", binary_stl(unit_box()).substr(0, 300)), options));

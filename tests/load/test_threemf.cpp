@@ -74,7 +74,7 @@ TEST(Read3mf, MirroredItemsKeepTheirInsideInside) {
               1e-6);
 }
 
-TEST(Read3mf, CopiesShareAMeshAndStandWhereTheyShould) {
+TEST(Read3mf, CopiesShareAMeshAndAreWhereTheyShould) {
   const Part part = loaded(write_3mf(box_object(1, 10, 20, 30),
                                      item(1) + item(1, "1 0 0 0 1 0 0 0 1 40 0 0") + item(1, "0 1 0 -1 0 0 0 0 1 0 50 0")));
   EXPECT_EQ(part.meshes.size(), 2u) << "the turned one has its own";
@@ -83,7 +83,7 @@ TEST(Read3mf, CopiesShareAMeshAndStandWhereTheyShould) {
   EXPECT_EQ(placed(part).size(), 36u);
 }
 
-TEST(Read3mf, SharedMeshesEqualSnappingEachVertexWhereItStands) {
+TEST(Read3mf, SharedMeshesEqualSnappingEachVertexWhereItIs) {
   // Translations that are no whole nanometres: sharing only where nothing differs.
   const Part part = loaded(write_3mf(box_object(1, 10, 20, 30), item(1) + item(1, "1 0 0 0 1 0 0 0 1 0.33333333 0 0") +
                                                                     item(1, "1 0 0 0 1 0 0 0 1 100.7 50.1 0")));

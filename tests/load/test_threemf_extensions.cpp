@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "stages/load/threemf/archive.h"
+#include "stages/support/text/part_name.h"
 #include "tests/load/archives.h"
 #include "tests/load/files.h"
 
@@ -48,7 +49,7 @@ TEST(Read3mfExtensions, WhatIsRequiredAndNotReadIsRefusedByName) {
       << "required, and not used";
 }
 
-TEST(Read3mfExtensions, BeamsAreRefusedWhereRequiredAndToldWhereNot) {
+TEST(Read3mfExtensions, BeamsAreRefusedWhereRequiredAndReportedWhereNot) {
   EXPECT_CONTAINS(refusal(written(with("requiredextensions=\"b\"", box_with(kLattice), item(1)))),
                   "object 1 has 2 beams of the extension beam lattice");
   const Part part = loaded(written(with("", box_with(kLattice), item(1))));
@@ -73,7 +74,7 @@ TEST(Read3mfExtensions, SlicesAreNeverReplacedInSilence) {
   EXPECT_CONTAINS(notes_of(loaded(written(with("", stack + solid, item(1))))), "its mesh is planned, not its slices");
 }
 
-TEST(Read3mfExtensions, WhatIsOnlyUsedIsTold) {
+TEST(Read3mfExtensions, WhatIsOnlyUsedIsReported) {
   const Part part = loaded(written(with("", "<v:image3d id=\"9\"/>" + box_object(1, 1, 1, 1), item(1))));
   EXPECT_CONTAINS(notes_of(part), "holds elements of the extension volumetric");
   const std::string strange = "<object id=\"1\"><v:levelset/></object>";
@@ -118,7 +119,7 @@ TEST(Read3mfExtensions, OnePackageHasOneModel) {
   EXPECT_CONTAINS(refusal(write_file("two.3mf", zip(entries))), "more than one 3D model");
   entries[1].second = "<Relationships/>";
   EXPECT_CONTAINS(refusal(write_file("none.3mf", zip(entries))), "is a zip file, but no 3MF: it names no 3D model");
-  EXPECT_EQ(load::part_name("../A%2fb\\./c.Model", "/3d/x/"), "/3d/a/b/c.model");
+  EXPECT_EQ(part_name("../A%2fb\\./c.Model", "/3d/x/"), "/3d/a/b/c.model");
 }
 
 TEST(Read3mfExtensions, WhatDoesNotFitTogetherIsRefusedWithItsLine) {
@@ -147,7 +148,7 @@ TEST(Read3mfExtensions, WhatDoesNotFitTogetherIsRefusedWithItsLine) {
   EXPECT_CONTAINS(refusal(written(model(names, ""))), "more than 4096 different names");
 }
 
-TEST(Read3mfExtensions, ObjectsBehindTheirUseAreReadAndTold) {
+TEST(Read3mfExtensions, ObjectsBehindTheirUseAreReadAndReported) {
   const Part part = loaded(written(model(components(1, component(2)) + box_object(2, 1, 1, 1), item(1))));
   EXPECT_EQ(placed(part).size(), 12u);
   EXPECT_CONTAINS(notes_of(part), "names objects before it holds them");
@@ -172,8 +173,8 @@ TEST(Read3mfExtensions, AnObjectInsideOutIsTurnedOverAndNamed) {
   EXPECT_EQ(placed(part), placed(expected));
   EXPECT_CONTAINS(notes_of(part), "object 7 \"cube\" is inside out and is turned over");
   EXPECT_TRUE(expected.notes.empty()) << "mirrored items are not inside out";
-  const std::string told = notes_of(loaded(written(model(box, item(7) + item(7, "0 1 0 -1 0 0 0 0 1 0 50 0")))));
-  EXPECT_EQ(told.find("inside out"), told.rfind("inside out")) << "once, whichever way it stands: " << told;
+  const std::string reported = notes_of(loaded(written(model(box, item(7) + item(7, "0 1 0 -1 0 0 0 0 1 0 50 0")))));
+  EXPECT_EQ(reported.find("inside out"), reported.rfind("inside out")) << "once, whichever way it stands: " << reported;
   load::LoadOptions as_it_is;
   as_it_is.repair = false;
   const Part unturned = loaded(written(model(box, item(7))), as_it_is);

@@ -24,27 +24,27 @@ std::string packed_as(const Entries& entries, Packing how) {
         static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
     const std::string in = little(static_cast<std::uint32_t>(data.size()), 4),
                       out = little(static_cast<std::uint32_t>(bytes.size()), 4);
-    const auto head = [&](bool known, const std::string& place) {
+    const auto head = [&](bool known, const std::string& position) {
       std::string extra =
-          large ? little(1, 2) + little(place.empty() ? 16 : 24, 2) + out + little(0, 4) + in + little(0, 4) : "";
-      if (large && !place.empty()) extra += place + little(0, 4);
+          large ? little(1, 2) + little(position.empty() ? 16 : 24, 2) + out + little(0, 4) + in + little(0, 4) : "";
+      if (large && !position.empty()) extra += position + little(0, 4);
       const std::string sizes = little(crc, 4) + (large ? std::string(8, '\xff') : in + out);
       return little(large ? 45 : 20, 2) + little(behind ? 8 : 0, 2) + little(how == Packing::kStored ? 0 : 8, 2) +
              little(0x210000, 4) + (known ? sizes : std::string(12, '\0')) +
              little(static_cast<std::uint32_t>(name.size()), 2) + little(static_cast<std::uint32_t>(extra.size()), 2) +
-             (place.empty() ? "" : std::string(10, '\0') + (large ? std::string(4, '\xff') : place)) + name + extra;
+             (position.empty() ? "" : std::string(10, '\0') + (large ? std::string(4, '\xff') : position)) + name + extra;
     };
     directory += "PK\x01\x02" + little(45, 2) + head(true, little(static_cast<std::uint32_t>(file.size()), 4));
     file += "PK\x03\x04" + head(!behind, "") + data + (behind ? "PK\x07\x08" + little(crc, 4) + in + out : "");
   }
   const auto count = static_cast<std::uint32_t>(entries.size()), size = static_cast<std::uint32_t>(directory.size()),
-             place = static_cast<std::uint32_t>(file.size());
+             position = static_cast<std::uint32_t>(file.size());
   const auto wide = [](std::uint32_t number) { return little(number, 4) + little(0, 4); };
   if (large)
     directory += "PK\x06\x06" + wide(44) + little(45, 2) + little(45, 2) + little(0, 4) + little(0, 4) + wide(count) +
-                 wide(count) + wide(size) + wide(place) + "PK\x06\x07" + little(0, 4) + wide(place + size) + little(1, 4);
+                 wide(count) + wide(size) + wide(position) + "PK\x06\x07" + little(0, 4) + wide(position + size) + little(1, 4);
   return file + directory + "PK\x05\x06" + little(0, 4) + little(count, 2) + little(count, 2) + little(size, 4) +
-         (large ? std::string(4, '\xff') : little(place, 4)) + little(0, 2);
+         (large ? std::string(4, '\xff') : little(position, 4)) + little(0, 2);
 }
 
 TEST(Read3mfPackages, HowEntriesArePackedDoesNotMatter) {
@@ -90,7 +90,7 @@ TEST(Read3mfPackages, TextOfOtherEncodingsIsReadOrNamed) {
   EXPECT_CONTAINS(refusal(write_file("text.3mf", zip(package(wide(true).substr(0, 300))))), "is not well-formed XML");
 }
 
-TEST(Read3mfPackages, EntitiesAreRefusedWhereverTheyStand) {
+TEST(Read3mfPackages, EntitiesAreRefusedWhereverTheyAre) {
   const std::string laugh = "<!DOCTYPE x [<!ENTITY a \"aaaa\">]>";
   for (const std::size_t part : {std::size_t{1}, std::size_t{2}}) {
     Entries entries = box_package();

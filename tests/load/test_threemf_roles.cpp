@@ -146,15 +146,16 @@ std::int64_t cubic_mm(const Part& part) {
 
 TEST(Read3mfRoles, InsideOutWithinAnotherObjectIsAVoid) {
   const std::string inner = turned_inside_out(box_object(2, 4, 4, 4, "name=\"pore\"")), outer = box_object(1, 10, 10, 10);
-  const auto assembled = [&](const std::string& place, const std::string& mirror = "") {
-    return loaded(roles_file(model(outer + inner + components(3, component(1) + component(2, place)), item(3, mirror))));
+  const auto assembled = [&](const std::string& position, const std::string& mirror = "") {
+    return loaded(roles_file(model(outer + inner + components(3, component(1) + component(2, position)), item(3, mirror))));
   };
-  const std::string within = "1 0 0 0 1 0 0 0 1 3 3 3", beside = "1 0 0 0 1 0 0 0 1 20 3 3", across = "1 0 0 0 1 0 0 0 1 8 3 3";
+  const std::string within = "1 0 0 0 1 0 0 0 1 3 3 3", neighbour = "1 0 0 0 1 0 0 0 1 20 3 3",
+                    across = "1 0 0 0 1 0 0 0 1 8 3 3";
   const Part part = assembled(within);
   EXPECT_EQ(cubic_mm(part), 1000 - 64);
   EXPECT_CONTAINS(notes_of(part), "object 2 \"pore\" is inside out within another object of its build item: it is a void");
   EXPECT_EQ(cubic_mm(assembled(within, "-1 0 0 0 1 0 0 0 1 0 0 0")), 1000 - 64) << "mirrored";
-  EXPECT_EQ(cubic_mm(assembled(beside)), 1000 + 64);
+  EXPECT_EQ(cubic_mm(assembled(neighbour)), 1000 + 64);
   EXPECT_EQ(cubic_mm(assembled(across)), 1000 + 64) << "it leaves the solid";
   // Items are united after each of them is filled.
   const Part items = loaded(roles_file(model(outer + inner, item(1) + item(2, within))));
@@ -191,14 +192,14 @@ TEST(Read3mfRoles, AVoidStaysAVoidWhereItsContainerHasAnOpening) {
 
 TEST(Read3mfRoles, AVoidIsFoundInTurnedScaledAndMirroredCopies) {
   const std::string inner = turned_inside_out(box_object(2, 4, 4, 4)), outer = box_object(1, 10, 10, 10);
-  for (const auto& [place, hole, volume] : std::vector<std::tuple<std::string, std::string, int>>{
+  for (const auto& [position, hole, volume] : std::vector<std::tuple<std::string, std::string, int>>{
            {"0 1 0 -1 0 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 3 3 3", 1000 - 64},
            {"-1 0 0 0 1 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 3 3 3", 1000 - 64},
            {"20 0 0 0 2 0 0 0 1 50 0 0", "1 0 0 0 1 0 0 0 1 53 3 3", 40'000 - 64},
            {"0.6 0.8 0 -0.8 0.6 0 0 0 1 0 0 0", "0.5 0 0 0 0.5 0 0 0 1 -2 6 3", 1000 - 16}}) {
     const Part part =
-        loaded(roles_file(model(outer + inner + components(3, component(1, place) + component(2, hole)), item(3))));
-    EXPECT_EQ(cubic_mm(part), volume) << place;
+        loaded(roles_file(model(outer + inner + components(3, component(1, position) + component(2, hole)), item(3))));
+    EXPECT_EQ(cubic_mm(part), volume) << position;
     EXPECT_CONTAINS(notes_of(part), "it is a void");
   }
 }

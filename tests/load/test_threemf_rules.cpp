@@ -82,8 +82,8 @@ TEST(Read3mfRules, WhatThe3dPayloadNamesIsInThePackage) {
   EXPECT_EQ(placed(loaded(with_relationship("https://example.org/", "http://example.org/link"))).size(), 12u);
 }
 
-TEST(Read3mfRules, WhatProgramsOftenDoIsTold) {
-  const auto told = [](const std::string& before_resources, const std::string& in_mesh = "") {
+TEST(Read3mfRules, WhatProgramsOftenDoIsReported) {
+  const auto reported = [](const std::string& before_resources, const std::string& in_mesh = "") {
     std::string text = box_among("");
     if (!in_mesh.empty()) text.insert(text.find("</triangles>"), in_mesh);
     const Part part = loaded(zipped_model(text.insert(text.find("<resources>"), before_resources)));
@@ -91,16 +91,16 @@ TEST(Read3mfRules, WhatProgramsOftenDoIsTold) {
     return notes_of(part);
   };
   const std::string title = "<metadata name=\"Title\">a</metadata>";
-  EXPECT_EQ(told(title + "<metadata name=\"m:own\"/>"), "");
-  EXPECT_CONTAINS(told("<metadata name=\"Origin\"/><metadata name=\"CopyRight\"/>"),
+  EXPECT_EQ(reported(title + "<metadata name=\"m:own\"/>"), "");
+  EXPECT_CONTAINS(reported("<metadata name=\"Origin\"/><metadata name=\"CopyRight\"/>"),
                   "does not follow the 3MF specification, which does not change its geometry: metadata of a name that is "
                   "neither of 3MF nor of a namespace (core 3.4.1): 'Origin' and 1 more");
-  EXPECT_CONTAINS(told(title + title), "metadata of one name twice (core 3.4.1): 'Title'");
-  EXPECT_CONTAINS(told("<metadata name=\"vendor:x\"/>"), "a prefix that is not declared");
-  EXPECT_CONTAINS(told("", "<UNKNOWN v1=\"3\"/>"), "elements that it does not have, which are passed over: 'UNKNOWN'");
-  std::string foreign = box_among("");
-  foreign.replace(foreign.find("<vertices>"), 10, "<vertices xmlns:v2=\"http://example.org/v2\" v2:new=\"1\">");
-  EXPECT_CONTAINS(notes_of(loaded(zipped_model(foreign))), "holds attributes of http://example.org/v2");
+  EXPECT_CONTAINS(reported(title + title), "metadata of one name twice (core 3.4.1): 'Title'");
+  EXPECT_CONTAINS(reported("<metadata name=\"vendor:x\"/>"), "a prefix that is not declared");
+  EXPECT_CONTAINS(reported("", "<UNKNOWN v1=\"3\"/>"), "elements that it does not have, which are passed over: 'UNKNOWN'");
+  std::string unsupported = box_among("");
+  unsupported.replace(unsupported.find("<vertices>"), 10, "<vertices xmlns:v2=\"http://example.org/v2\" v2:new=\"1\">");
+  EXPECT_CONTAINS(notes_of(loaded(zipped_model(unsupported))), "holds attributes of http://example.org/v2");
   std::string nameless = box_among("");
   EXPECT_CONTAINS(refusal(zipped_model(nameless.insert(nameless.find("<resources>"), "<metadata>x</metadata>"))),
                   "<metadata> without a name");

@@ -103,7 +103,7 @@ TEST(Snapper, RoundsLikeLlroundUpToTheReach) {
   EXPECT_EQ(snap(NAN, out), load::Snapped::kNotFinite);
 }
 
-TEST(Hint, SmallPartsAskForTheirUnit) {
+TEST(Hint, SmallPartsNeedTheirUnit) {
   const auto hint = [](float size) {
     return notes_of(loaded(write_file("small.stl", binary_stl(box_facets({0, 0, 0}, {size, size, size})))));
   };

@@ -94,7 +94,7 @@ class DropPictures : public ::testing::Test {
   /// Drops of every pixel of a layer, from the images of its drops.
   std::vector<int> drops_in_files(const std::string& of) {
     std::vector<int> drops;
-    for (int drop = 1; drop <= kMost; ++drop) {
+    for (int drop = 1; drop <= kMax; ++drop) {
       const Picture plane =
           read_picture(in_ / (of + "/layers/0000" + std::to_string(kLayer) + "-drop" + std::to_string(drop) + ".tif"));
       drops.resize(plane.pixel.size());
@@ -103,15 +103,15 @@ class DropPictures : public ::testing::Test {
     return drops;
   }
 
-  static constexpr int kMost = 8;
+  static constexpr int kMax = 8;
   const std::string several_ = "--saturation 200 --shell 1 --core-saturation 20";  // 7 or 8 drops, and 0 or 1
   Directory in_;
 };
 
-TEST_F(DropPictures, APixelIsAsDarkAsItsShareOfTheMostDrops) {
+TEST_F(DropPictures, APixelIsAsDarkAsItsShareOfTheMaxDrops) {
   plan(several_, "out");
   const std::vector<int> drops = drops_in_files("out");
-  ASSERT_EQ(*std::ranges::max_element(drops), kMost);
+  ASSERT_EQ(*std::ranges::max_element(drops), kMax);
   const std::vector<Picture> cells = draw("out", "--layer 10 --whole-bed --width 2000");
   ASSERT_EQ(cells.size(), 1u);
   ASSERT_GE(cells[0].pixel.size(), drops.size());
@@ -123,8 +123,8 @@ TEST_F(DropPictures, APixelIsAsDarkAsItsShareOfTheMostDrops) {
     for (int c = 0; c < side; ++c) {
       const double scale = static_cast<double>(cells[0].height) / side;
       const auto middle = [&](int of) { return static_cast<int>((of + 0.5) * scale); };
-      const double seen = tone(cells[0].at(left + middle(c), middle(r)), kDark);
-      ASSERT_NEAR(seen, static_cast<double>(drops[static_cast<std::size_t>(r) * side + c]) / kMost, 0.01) << c << ", " << r;
+      const double detected = tone(cells[0].at(left + middle(c), middle(r)), kDark);
+      ASSERT_NEAR(detected, static_cast<double>(drops[static_cast<std::size_t>(r) * side + c]) / kMax, 0.01) << c << ", " << r;
     }
   }
 }
@@ -133,55 +133,59 @@ TEST_F(DropPictures, ASmallPictureHasTheMeanAndGreyImagesThePictureOfTheirDrops)
   plan(several_, "out");
   plan(several_ + " --format tiff-8", "grey");
   double wanted = 0;
-  for (const int drops : drops_in_files("out")) wanted += static_cast<double>(drops) / kMost;
+  for (const int drops : drops_in_files("out")) wanted += static_cast<double>(drops) / kMax;
   for (const int width : {200, 431, 900}) {
     const std::string options = "--layer 10 --whole-bed --width " + std::to_string(width);
     const std::vector<Picture> cells = draw("out", options);
     ASSERT_EQ(cells.size(), 1u);
-    double seen = 0;
-    for (const Rgb& pixel : cells[0].pixel) seen += tone(pixel, kDark);
-    EXPECT_NEAR(seen * 1011 * 1011 / cells[0].height / cells[0].height, wanted, wanted / 100) << width;
+    double detected = 0;
+    for (const Rgb& pixel : cells[0].pixel) detected += tone(pixel, kDark);
+    EXPECT_NEAR(detected * 1011 * 1011 / cells[0].height / cells[0].height, wanted, wanted / 100) << width;
     draw("grey", options);
     EXPECT_TRUE(read_text(in_ / "out.png") == read_text(in_ / "grey.png")) << width;
   }
 }
 
 // A picture pixel a pixel of the bed; the head's nozzles lie over some.
-TEST_F(DropPictures, ASwathShowsThoseAskedForAndThoseThatFell) {
+TEST_F(DropPictures, ASwathShowsThoseRequestedAndThoseThatFell) {
   plan(several_, "out");
   const std::vector<int> drops = drops_in_files("out");
   draw("out", "--layer 10 --swath middle --width 1059");
   const Picture picture = read_picture(in_ / "out.png");
-  constexpr Rgb kGrounds[] = {{247, 247, 244}, {236, 240, 245}, {255, 240, 214}, {176, 182, 190}}, kAsked{150, 160, 175},
+  constexpr Rgb kGrounds[] = {{247, 247, 244}, {236, 240, 245}, {255, 240, 214}, {176, 182, 190}}, kRequested{150, 160, 175},
                 kFallen{24, 44, 92}, kNozzles[] = {{150, 95, 20}, {225, 20, 20}};
   const auto over = [](const Rgb& ground, const Rgb& ink, int of) {
     Rgb mixed;
     for (std::size_t c = 0; c < 3; ++c)
-      mixed[c] = static_cast<int>(std::lround(ground[c] + (ink[c] - ground[c]) * static_cast<double>(of) / kMost));
+      mixed[c] = static_cast<int>(std::lround(ground[c] + (ink[c] - ground[c]) * static_cast<double>(of) / kMax));
     return mixed;
   };
   const auto alike = [](const Rgb& a, const Rgb& b) {
     return std::abs(a[0] - b[0]) <= 2 && std::abs(a[1] - b[1]) <= 2 && std::abs(a[2] - b[2]) <= 2;
   };
-  std::array<std::array<int, kMost + 1>, kMost + 1> seen{};  // pixels by drops asked for and fallen
+  std::array<std::array<int, kMax + 1>, kMax + 1> detected{};  // pixels by drops asked for and fallen
   for (int r = 0; r < 1011; ++r) {
     for (int c = 0; c < 1011; ++c) {
-      const int asked = drops[static_cast<std::size_t>(r) * 1011 + static_cast<std::size_t>(c)];
+      const int requested = drops[static_cast<std::size_t>(r) * 1011 + static_cast<std::size_t>(c)];
       const Rgb& pixel = picture.at(24 + c, 58 + r);
-      if (asked == 0 || std::ranges::find(kNozzles, pixel) != std::end(kNozzles)) continue;
-      int fallen = asked;
-      const auto is = [&](const Rgb& ground) { return alike(pixel, over(over(ground, kAsked, asked), kFallen, fallen)); };
+      if (requested == 0 || std::ranges::find(kNozzles, pixel) != std::end(kNozzles)) continue;
+      int fallen = requested;
+      const auto is = [&](const Rgb& ground) {
+        return alike(pixel, over(over(ground, kRequested, requested), kFallen, fallen));
+      };
       while (fallen >= 0 && std::ranges::none_of(kGrounds, is)) --fallen;
-      ASSERT_GE(fallen, 0) << c << ", " << r << ": " << asked << " drops, " << pixel[0] << ' ' << pixel[1] << ' ' << pixel[2];
-      ++seen[static_cast<std::size_t>(asked)][static_cast<std::size_t>(fallen)];
+      ASSERT_GE(fallen, 0) << c << ", " << r << ": " << requested << " drops, " << pixel[0] << ' ' << pixel[1] << ' '
+                           << pixel[2];
+      ++detected[static_cast<std::size_t>(requested)][static_cast<std::size_t>(fallen)];
     }
   }
-  for (const auto& [asked, fallen] : {std::pair{1, 0}, {1, 1}, {kMost, 0}, {kMost, kMost}})
-    EXPECT_GT(seen[static_cast<std::size_t>(asked)][static_cast<std::size_t>(fallen)], 20) << asked << " " << fallen;
+  for (const auto& [requested, fallen] : {std::pair{1, 0}, {1, 1}, {kMax, 0}, {kMax, kMax}})
+    EXPECT_GT(detected[static_cast<std::size_t>(requested)][static_cast<std::size_t>(fallen)], 20)
+        << requested << " " << fallen;
   EXPECT_TRUE(std::ranges::find(picture.pixel, kGrounds[2]) != picture.pixel.end()) << "where the head passes now";
 }
 
-TEST_F(DropPictures, OneDropIsDrawnAsSetWhateverTheFormat) {
+TEST_F(DropPictures, OneDropIsDrawnAsSetRegardlessOfTheFormat) {
   plan("--saturation 20", "out");
   plan("--saturation 20 --format png-8", "grey");
   const std::vector<Picture> cells = draw("out", "--layer 10 --width 300");

@@ -7,10 +7,10 @@
 #include <random>
 
 #include "stages/data/levels.h"
-#include "stages/write/levels/level_format.h"
-#include "tests/write/images.h"
+#include "stages/formats/image_format.h"
+#include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::formats {
 namespace {
 
 /// One grey byte a pixel, black 0; the file's resolution in dpi goes to `dpi`.
@@ -85,7 +85,7 @@ TEST(OpenImageIO, SeesLevelsAsGreyInEveryFormatThatCarriesThem) {
       levels.end_row();
     }
     Runs size;
-    at_least(levels, 1, size);
+    threshold_levels(levels, 1, size);
     for (const LevelFormat& format : level_formats()) {
       SCOPED_TRACE(std::string(format.id) + ", " + std::to_string(columns) + " columns");
       const std::string path = folder / ("grey" + std::string(format.extension));
@@ -101,4 +101,4 @@ TEST(OpenImageIO, SeesLevelsAsGreyInEveryFormatThatCarriesThem) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::formats

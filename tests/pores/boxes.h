@@ -71,10 +71,10 @@ inline Voxels turned(const Voxels& box, std::array<int, 3> order, std::array<boo
 }
 
 /// Blobs of a few voxels rather than noise, so that parts have some size.
-inline Voxels random_box(std::uint32_t seed, std::uint32_t most = 9) {
+inline Voxels random_box(std::uint32_t seed, std::uint32_t maximum = 9) {
   std::mt19937 random(seed);
   const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
-  Voxels box(1 + below(most), 1 + below(most), 1 + below(most));
+  Voxels box(1 + below(maximum), 1 + below(maximum), 1 + below(maximum));
   const std::uint32_t percent = 20 + below(70);
   box.fill([&](auto, auto, auto) { return below(100) < percent; });
   return box;

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "stages/pores/bonds.h"
-#include "stages/pores/closing.h"
 #include "stages/pores/porosity.h"
 #include "tests/pores/boxes.h"
 
@@ -23,12 +22,12 @@ using Cell = std::array<int, 3>;
 std::uint64_t slow_unbonded(const Voxels& box, std::array<bool, 3> periodic, std::uint32_t contact) {
   const std::array<std::int64_t, 3> size{box.nx, box.ny, box.nz};
   std::vector<Cell> cell(box.solid.size());
-  std::vector<std::uint8_t> seen(box.solid.size(), 0);
+  std::vector<std::uint8_t> detected(box.solid.size(), 0);
   std::uint64_t reached = 0;
   for (std::size_t start = 0; start < box.solid.size(); ++start) {
-    if (box.solid[start] != 0 || seen[start] != 0) continue;
+    if (box.solid[start] != 0 || detected[start] != 0) continue;
     std::vector<std::size_t> group{start};
-    seen[start] = 1;
+    detected[start] = 1;
     cell[start] = {};
     bool open = false;
     for (std::size_t done = 0; done < group.size(); ++done) {
@@ -49,8 +48,8 @@ std::uint64_t slow_unbonded(const Voxels& box, std::array<bool, 3> periodic, std
           const std::size_t next = box.index(static_cast<std::uint32_t>(to[0]), static_cast<std::uint32_t>(to[1]),
                                              static_cast<std::uint32_t>(to[2]));
           if (box.solid[next] != 0) continue;
-          if (seen[next] == 0) {
-            seen[next] = 1;
+          if (detected[next] == 0) {
+            detected[next] = 1;
             cell[next] = there;
             group.push_back(next);
           } else if (cell[next][2] != there[2]) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stages/pores/closing.h"
+#include "stages/pores/bonds.h"
 #include "stages/pores/porosity.h"
 #include "tests/pores/boxes.h"
 
@@ -50,7 +50,7 @@ TEST(CloseGaps, FillsWhatLiesBetweenTwoSolidVoxels) {
 }
 
 // Beads along x with cusps of two voxels between every second pair: bonded, only the wide gaps are left.
-TEST(CloseGaps, TellsBothPorositiesOfBeadsThatMayBond) {
+TEST(CloseGaps, ReportsBothPorositiesOfBeadsThatMayBond) {
   const Voxels beads = Voxels(8, 20, 3).fill([](auto, auto y, auto) { return !(y % 20 < 4 || (y >= 10 && y < 12)); });
   const VoxelStack solid = stack_of(beads, {true, true, true}, kEdge);
   EXPECT_DOUBLE_EQ(porosity(solid).total(), 6 / 20.0);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "stages/pores/porosity.h"
-#include "stages/pores/voids.h"
+#include "stages/pores/rows.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina::pores {
@@ -36,7 +36,7 @@ TEST(VoxelStack, SlicesThatAreAppendedAreTheBox) {
 struct Flooded {
   std::vector<int> part;  // -1: none
   std::vector<std::uint64_t> voxels;
-  std::vector<std::uint8_t> faces, wraps, beside;
+  std::vector<std::uint8_t> faces, wraps, neighbour;
 };
 
 Flooded flood(const Voxels& box, const Voxels& body, std::array<bool, 3> periodic) {
@@ -53,7 +53,7 @@ Flooded flood(const Voxels& box, const Voxels& body, std::array<bool, 3> periodi
         if (box.solid[start] != 0 || body.solid[start] == 0 || result.part[start] >= 0) continue;
         const int part = static_cast<int>(result.voxels.size());
         std::uint64_t voxels = 0;
-        std::uint8_t faces = 0, wraps = 0, beside = 0;
+        std::uint8_t faces = 0, wraps = 0, neighbour = 0;
         std::vector<At> waiting{{x, y, z}};
         result.part[start] = part;
         cell[start] = {0, 0, 0};
@@ -69,7 +69,7 @@ Flooded flood(const Voxels& box, const Voxels& body, std::array<bool, 3> periodi
           testing::for_each_neighbour(box, periodic, at, [&](const At& to, int axis, int step) {
             if (box.solid[index(to)] != 0) return;
             if (body.solid[index(to)] == 0) {
-              beside = 1;
+              neighbour = 1;
               return;
             }
             std::array<int, 3> expected = cell[index(at)];
@@ -88,7 +88,7 @@ Flooded flood(const Voxels& box, const Voxels& body, std::array<bool, 3> periodi
         result.voxels.push_back(voxels);
         result.faces.push_back(faces);
         result.wraps.push_back(wraps);
-        result.beside.push_back(beside);
+        result.neighbour.push_back(neighbour);
       }
     }
   }
@@ -116,7 +116,7 @@ TEST(Parts, AreThoseOfAFloodOfEveryVoxel) {
     EXPECT_TRUE(std::ranges::equal(parts.voxels, expected.voxels)) << seed;
     EXPECT_TRUE(std::ranges::equal(parts.faces, expected.faces)) << seed;
     EXPECT_TRUE(std::ranges::equal(parts.wraps, expected.wraps)) << seed;
-    EXPECT_TRUE(std::ranges::equal(parts_beside(empty, parts, without(void_of(solid), inside)), expected.beside)) << seed;
+    EXPECT_TRUE(std::ranges::equal(adjacent_parts(empty, parts, without(void_of(solid), inside)), expected.neighbour)) << seed;
     std::size_t run = 0;
     for (std::uint32_t z = 0; z < box.nz; ++z) {
       for (std::uint32_t y = 0; y < box.ny; ++y) {
@@ -160,7 +160,7 @@ Voxels with_holes() {
   });
 }
 
-TEST(Porosity, HolesBlindHolesAndCavitiesAreToldApart) {
+TEST(Porosity, HolesBlindHolesAndCavitiesAreDistinguished) {
   const VoxelStack solid = stack_of(with_holes());
   const Porosity p = porosity(solid);
   EXPECT_DOUBLE_EQ(p.total(), (60 + 5 + 8) / 1000.0);
@@ -169,7 +169,7 @@ TEST(Porosity, HolesBlindHolesAndCavitiesAreToldApart) {
   EXPECT_DOUBLE_EQ(p.percolating(0), 0);
   EXPECT_EQ(p.cavities, 1u);
   EXPECT_EQ(p.parts, 3u);
-  EXPECT_DOUBLE_EQ(p.cavities_mm3(), 8e-9);
+  EXPECT_DOUBLE_EQ(static_cast<double>(p.empty - p.open) * p.voxel_mm3, 8e-9);
   EXPECT_EQ(porosity(solid, nullptr, kFacesX).open, 0u);
   EXPECT_EQ(porosity(solid, nullptr, kFacesX | 16).open, 60u);  // the lower z face: not the blind hole
 }

@@ -56,8 +56,8 @@ TEST(Registration, CountsWhatDiffersVoxelByVoxel) {
     for (std::uint32_t z = 0; z < box.nz; ++z)
       for (std::uint32_t y = 0; y < box.ny; ++y)
         for (std::uint32_t x = 0; x < box.nx; ++x) {
-          const auto at = [&](std::uint32_t place, std::size_t a) {
-            return static_cast<std::uint32_t>(static_cast<int>(place) + 2 + match.shift[a]);
+          const auto at = [&](std::uint32_t position, std::size_t a) {
+            return static_cast<std::uint32_t>(static_cast<int>(position) + 2 + match.shift[a]);
           };
           const bool a = box.at(x, y, z) != 0, b = large.at(at(x, 0), at(y, 1), at(z, 2)) != 0;
           only_small += a && !b;

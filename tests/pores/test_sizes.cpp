@@ -5,7 +5,6 @@
 #include <numbers>
 #include <vector>
 
-#include "stages/pores/least_box.h"
 #include "stages/pores/sizes.h"
 #include "tests/pores/boxes.h"
 
@@ -73,16 +72,16 @@ TEST(PoreSizes, APoreWithCuspsIsMeasuredFromTipToTip) {
 
 TEST(PoreSizes, OnePixelAndDiagonalsOfPixels) {
   std::vector<Pixel> one{{5, 7}, {5, 7}};
-  EXPECT_EQ(least_box(one, {10, 20}).length, 20);
-  EXPECT_EQ(least_box(one, {10, 20}).width, 10);
+  EXPECT_EQ(smallest_box(one, {10, 20}).length, 20);
+  EXPECT_EQ(smallest_box(one, {10, 20}).width, 10);
   std::vector<Pixel> diagonal{{0, 0}, {1, 1}, {2, 2}, {3, 3}};
-  EXPECT_NEAR(least_box(diagonal, {10, 10}).length, 40 * std::numbers::sqrt2,
+  EXPECT_NEAR(smallest_box(diagonal, {10, 10}).length, 40 * std::numbers::sqrt2,
               1e-9 + 40 * std::numbers::sqrt2 - 49.497474683058);
-  EXPECT_NEAR(least_box(diagonal, {10, 10}).width, 7.0710678118655, 1e-9);
+  EXPECT_NEAR(smallest_box(diagonal, {10, 10}).width, 7.0710678118655, 1e-9);
 }
 
 // No direction of 3,600 has a smaller box than the one found, other than by what pixels add.
-TEST(LeastBox, IsNoLargerThanThatOfAnyDirection) {
+TEST(SmallestBox, IsNoLargerThanThatOfAnyDirection) {
   std::mt19937 random(5);
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<Pixel> pixels(1 + random() % 30);
@@ -91,8 +90,8 @@ TEST(LeastBox, IsNoLargerThanThatOfAnyDirection) {
       p = {static_cast<std::int32_t>(random() % wide), static_cast<std::int32_t>(random() % high)};
     }
     const std::vector<Pixel> all = pixels;
-    const BoxSides box = least_box(pixels, {1000, 1000});
-    double least = 1e300;
+    const BoxSides box = smallest_box(pixels, {1000, 1000});
+    double minimum = 1e300;
     for (int i = 0; i < 3600; ++i) {
       const double c = std::cos(i * std::numbers::pi / 3600), s = std::sin(i * std::numbers::pi / 3600);
       double low = 1e9, high_along = -1e9, left = 1e9, right = -1e9;
@@ -101,11 +100,11 @@ TEST(LeastBox, IsNoLargerThanThatOfAnyDirection) {
         left = std::min(left, c * p.y - s * p.x), right = std::max(right, c * p.y - s * p.x);
       }
       const double pixel = std::max(std::abs(c), std::abs(s));
-      least = std::min(least, (high_along - low + pixel) * (right - left + pixel));
+      minimum = std::min(minimum, (high_along - low + pixel) * (right - left + pixel));
     }
     // Between directions of hull edges the pixel's own share may be less: at most half of a pixel's 0.3 on each side.
-    EXPECT_LE(box.length * box.width * 1e-6, least * 1.0001 + 0.3 * (box.length + box.width) * 1e-3 + 1e-9) << trial;
-    EXPECT_GE(box.length * box.width * 1e-6, least * 0.99) << trial;
+    EXPECT_LE(box.length * box.width * 1e-6, minimum * 1.0001 + 0.3 * (box.length + box.width) * 1e-3 + 1e-9) << trial;
+    EXPECT_GE(box.length * box.width * 1e-6, minimum * 0.99) << trial;
   }
 }
 
@@ -154,7 +153,7 @@ TEST(PoreSizes, APoreIsTheSameWhereverThePeriodBegins) {
   }
 }
 
-TEST(PoreSizes, PoresBesideVoidOutsideOfTheBodyAreCut) {
+TEST(PoreSizes, PoresNextToVoidOutsideOfTheBodyAreCut) {
   Voxels solid(12, 12, 1), body(12, 12, 1);
   body.fill([](auto x, auto y, auto) { return x >= 2 && x < 10 && y >= 2 && y < 10; });
   solid = body;

@@ -62,11 +62,11 @@ double slow_throat(const Voxels& box, const std::vector<double>& squared) {
   for (const double level : levels) {
     if (level == 0) break;
     std::vector<std::array<std::uint32_t, 3>> waiting;
-    std::vector<bool> seen(box.solid.size());
+    std::vector<bool> detected(box.solid.size());
     const auto enter = [&](const std::array<std::uint32_t, 3>& at) {
       const std::size_t index = box.index(at[0], at[1], at[2]);
-      if (seen[index] || squared[index] < level) return;
-      seen[index] = true;
+      if (detected[index] || squared[index] < level) return;
+      detected[index] = true;
       waiting.push_back(at);
     };
     for (std::uint32_t y = 0; y < box.ny; ++y) {

@@ -23,7 +23,7 @@ TEST(Tortuosity, OfAStraightSlotIsOne) {
   const Voxels slot = Voxels(9, 9, 30).fill([](auto x, auto, auto) { return x < 3 || x >= 5; });
   const Tortuosity t = of(slot);
   EXPECT_EQ(t.mean, 1);
-  EXPECT_EQ(t.most, 1);
+  EXPECT_EQ(t.maximum, 1);
   EXPECT_EQ(t.reached, 18u);
   EXPECT_EQ(of(slot, 1).mean, 1);
   EXPECT_EQ(of(slot, 0).reached, 0u);
@@ -33,8 +33,8 @@ TEST(Tortuosity, OfAStraightSlotIsOne) {
 TEST(Tortuosity, OfASlotAt45DegreesIsRootTwo) {
   // Of one way only, so that no way is cut short by the width of the slot; and of three.
   const Voxels narrow = Voxels(60, 3, 50).fill([](auto x, auto, auto z) { return !(x == z + 3 || x == z + 4); });
-  EXPECT_NEAR(of(narrow).least, std::numbers::sqrt2 - (std::numbers::sqrt2 - 1) / 49, 1e-4);
-  EXPECT_NEAR(of(narrow).most, std::numbers::sqrt2, 1e-4);
+  EXPECT_NEAR(of(narrow).minimum, std::numbers::sqrt2 - (std::numbers::sqrt2 - 1) / 49, 1e-4);
+  EXPECT_NEAR(of(narrow).maximum, std::numbers::sqrt2, 1e-4);
   const Voxels wide = Voxels(220, 3, 200).fill([](auto x, auto, auto z) { return x < z + 3 || x >= z + 9; });
   EXPECT_NEAR(of(wide).mean, std::numbers::sqrt2, 0.02);
   const Voxels around = Voxels(20, 3, 200).fill([](auto x, auto, auto z) { return (x + 400 - z) % 20 >= 6; });
@@ -49,7 +49,7 @@ TEST(Tortuosity, OfASlotAt22DegreesIsTooLongAsTheHeaderSays) {
   EXPECT_NEAR(of(slot).mean / length, length, 0.01);  // 1.082, which is by how much it is too long as well
 }
 
-TEST(Tortuosity, WaysDoNotLeaveByTheFacesThemselves) {
+TEST(Tortuosity, PathsDoNotLeaveByTheFacesThemselves) {
   // A solid lid in the middle: around a box that repeats along z one could reach the far face at once.
   const Voxels box = Voxels(4, 4, 9).fill([](auto, auto, auto z) { return z == 4; });
   EXPECT_EQ(of(box, 2, {true, true, true}).reached, 0u);
@@ -73,15 +73,15 @@ TEST(Tortuosity, AStepAslantNeedsAWayAroundItsCorner) {
   box.at(1, 0, 1) = 0;
   const Tortuosity t = of(box);
   EXPECT_EQ(t.reached, 2u);
-  EXPECT_NEAR(t.most, std::numbers::sqrt2, 1e-4);  // from the second voxel of the face
+  EXPECT_NEAR(t.maximum, std::numbers::sqrt2, 1e-4);  // from the second voxel of the face
 }
 
 TEST(Tortuosity, FollowsTheEdgesOfVoxelsThatAreNoCubes) {
   const Voxels slot = Voxels(60, 3, 50).fill([](auto x, auto, auto z) { return !(x == z + 3 || x == z + 4); });
-  EXPECT_NEAR(of(slot, 2, {}, {3000, 1000, 4000}).most, 5.0 / 4, 1e-4);
+  EXPECT_NEAR(of(slot, 2, {}, {3000, 1000, 4000}).maximum, 5.0 / 4, 1e-4);
 }
 
-TEST(Tortuosity, WaysReachJustThePartsThatLeadThrough) {
+TEST(Tortuosity, PathsReachJustThePartsThatLeadThrough) {
   for (std::uint32_t seed = 0; seed < 200; ++seed) {
     const Voxels box = testing::random_box(seed);
     const VoxelStack solid = stack_of(box, {seed % 2 == 0, seed % 3 == 0, false});
@@ -90,9 +90,9 @@ TEST(Tortuosity, WaysReachJustThePartsThatLeadThrough) {
       const Tortuosity t = tortuosity(solid, whole(solid), axis);
       EXPECT_EQ(t.reached > 0, porosity(solid).through[static_cast<std::size_t>(axis)] > 0) << seed;
       if (t.reached > 0) {
-        EXPECT_GE(t.least, 1);
-        EXPECT_LE(t.least, t.mean);
-        EXPECT_LE(t.mean, t.most);
+        EXPECT_GE(t.minimum, 1);
+        EXPECT_LE(t.minimum, t.mean);
+        EXPECT_LE(t.mean, t.maximum);
       }
     }
   }
@@ -106,7 +106,7 @@ TEST(Tortuosity, TurnedAndMirroredBoxesAreTheSame) {
     EXPECT_EQ(straight.reached, other.reached);
     EXPECT_NEAR(straight.mean, other.mean, 1e-12);
     // From the other side the shortest way is the same.
-    EXPECT_EQ(straight.least, of(turned(box, {0, 1, 2}, {false, false, true})).least);
+    EXPECT_EQ(straight.minimum, of(turned(box, {0, 1, 2}, {false, false, true})).minimum);
   }
 }
 

@@ -106,8 +106,8 @@ class SlowHead {
       behind_.push_back(k * pitch * std::cos(angle) + offset * std::sin(angle));
       across_.push_back(i * pitch * std::sin(angle) - offset * std::cos(angle));
     }
-    const double least = *std::min_element(behind_.begin(), behind_.end());
-    for (double& behind : behind_) behind -= least;
+    const double minimum = *std::min_element(behind_.begin(), behind_.end());
+    for (double& behind : behind_) behind -= minimum;
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors) {
@@ -127,11 +127,11 @@ class SlowHead {
   void drop(const Sweep& sweep, std::uint32_t step, std::uint32_t nozzle) {
     const double along = step * grid_.step_nm() - behind_[nozzle];  // from the centre of place 0
     const double across = static_cast<double>(sweep.first_line) * grid_.line_nm + across_[nozzle];
-    const double place = along / grid_.place_nm, line = across / grid_.line_nm;
+    const double position = along / grid_.position_nm, line = across / grid_.line_nm;
     // The nearest place; lags are rounded half down, so that a drop half way between two belongs to the farther one.
-    const auto p = static_cast<std::int64_t>(std::floor(place + 0.5 + 1e-6));
+    const auto p = static_cast<std::int64_t>(std::floor(position + 0.5 + 1e-6));
     const auto l = static_cast<std::int64_t>(std::llround(line));
-    if (p < 0 || l < 0 || p >= grid_.places || l >= grid_.lines) {
+    if (p < 0 || l < 0 || p >= grid_.positions || l >= grid_.lines) {
       ++outside;
       return;
     }

@@ -51,7 +51,7 @@ HeadGrid grid_of(const Machine& machine) {
 
 TEST(TiltedHead, FourNozzlesAtFortyFiveDegreesGiveTheVectorsOfTheArticle) {
   const HeadGrid grid = grid_of(small_machine(4, 45, 4, 4));
-  ASSERT_EQ(grid.places, 4u);
+  ASSERT_EQ(grid.positions, 4u);
   ASSERT_EQ(grid.lines, 4u);
   EXPECT_EQ(grid.lag, (std::vector<std::uint32_t>{0, 1, 2, 3}));
   EXPECT_EQ(grid.steps(), 7u);
@@ -111,7 +111,7 @@ TEST(TiltedHead, EquationOneAtThirtyOneDegreesScansColumnsFromTheFront) {
     EXPECT_EQ(fired.contains(b) ? fired[b] : "0000", model[b]) << "b " << b;
   }
   machine.head.nozzles = 128;
-  EXPECT_EQ(grid_of(machine).most_lag, 76u);
+  EXPECT_EQ(grid_of(machine).max_lag, 76u);
   EXPECT_NEAR(grid_of(machine).lag_pixels, std::tan(31 * 3.14159265358979 / 180), 1e-6);
 }
 
@@ -135,7 +135,7 @@ TEST(TiltedHead, FortyFiveDegreesByTheGeneralRuleIsTheSpecialCaseForAllNozzles) 
     machine.mounting.nozzle_0 = axis == ScanAxis::kX ? Side::kBack : Side::kLeft;
     const HeadGrid grid = grid_of(machine);
     for (std::uint32_t i = 0; i < 128; ++i) EXPECT_EQ(grid.lag[i], i);
-    EXPECT_EQ(grid.steps(), grid.places + 127u);
+    EXPECT_EQ(grid.steps(), grid.positions + 127u);
     EXPECT_NEAR(25.4e6 / grid.line_nm, 262.0, 0.05);
   }
 }
@@ -170,7 +170,7 @@ class RandomMachine {
   Machine machine;
 };
 
-TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherWhateverTheMounting) {
+TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherRegardlessOfTheMounting) {
   for (std::uint32_t seed = 0; seed < 300; ++seed) {
     RandomMachine setup(seed);
     const HeadGrid grid = grid_of(setup.machine);
@@ -205,7 +205,7 @@ TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherWhateverTheMounting) {
 
 // A full bed, swaths of 20 lines that share 8: of line k of them the upper swath fires (8 - k) / 9 of each 64 places, evenly
 // spread, the lower one the others.
-TEST(Compile, JointsFadeFromOneSwathToTheNext) {
+TEST(Compile, StitchesFadeFromOneSwathToTheNext) {
   Machine machine = small_machine(20, 90, 640, 32);
   machine.mounting.overlap_lines = 8;
   for (const std::uint32_t shift : {0u, 5u}) {
@@ -213,14 +213,14 @@ TEST(Compile, JointsFadeFromOneSwathToTheNext) {
     const HeadGrid grid = grid_of(machine);
     const Runs runs = runs_of(Image(grid.image.rows(), std::vector<int>(grid.image.columns(), 1)));
     CompileScratch scratch;
-    std::vector<std::vector<std::uint32_t>> places(grid.lines);  // of the upper swath, by line
+    std::vector<std::vector<std::uint32_t>> positions(grid.lines);  // of the upper swath, by line
     const std::uint32_t layer = 1;
     const auto count = compile(
         grid, runs, scratch,
         [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
           for (std::uint32_t s = vectors.first_step; sweep.swath == 0 && s < vectors.first_step + vectors.steps; ++s) {
             for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
-              if ((vectors.step(s)[0] >> i & 1) != 0) places[static_cast<std::size_t>(sweep.first_line + i)].push_back(s);
+              if ((vectors.step(s)[0] >> i & 1) != 0) positions[static_cast<std::size_t>(sweep.first_line + i)].push_back(s);
             }
           }
           return {};
@@ -229,26 +229,26 @@ TEST(Compile, JointsFadeFromOneSwathToTheNext) {
     ASSERT_TRUE(count.ok());
     EXPECT_EQ(count->drops, set_pixels(runs));
     for (std::uint32_t k = 0; k < 8; ++k) {
-      const auto& own = places[12 + k - shift];
+      const auto& own = positions[12 + k - shift];
       const std::uint32_t share = (8 - k) * 64 / 9;
-      ASSERT_EQ(own.size(), grid.places / 64 * share) << k;
+      ASSERT_EQ(own.size(), grid.positions / 64 * share) << k;
       for (std::size_t i = 1; i < own.size(); ++i) EXPECT_LE(own[i] - own[i - 1], 2 * (64 / share) + 1) << k;
     }
-    EXPECT_EQ(places[11 - shift].size(), grid.places);
-    EXPECT_TRUE(places[20 - shift].empty());
+    EXPECT_EQ(positions[11 - shift].size(), grid.positions);
+    EXPECT_TRUE(positions[20 - shift].empty());
   }
 }
 
-TEST(Compile, BothWaysToVectorsGiveTheSameBits) {
+TEST(Compile, BothDirectionsToVectorsGiveTheSameBits) {
   for (std::uint32_t seed = 0; seed < 200; ++seed) {
     RandomMachine setup(seed);
     const HeadGrid grid = grid_of(setup.machine);
     FireScratch scratch;
-    std::vector<Buffer<std::uint32_t>> places(grid.nozzles);
+    std::vector<Buffer<std::uint32_t>> positions(grid.nozzles);
     std::vector<Line> lines;
-    for (auto& line : places) {
+    for (auto& line : positions) {
       const unsigned rarity = 1 + setup.random() % 40;
-      for (std::uint32_t p = 0; p <= grid.places; ++p) {
+      for (std::uint32_t p = 0; p <= grid.positions; ++p) {
         if (setup.random() % rarity == 0) line.push_back(p);
       }
       if (line.size() % 2) line.pop_back();

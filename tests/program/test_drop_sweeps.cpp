@@ -3,22 +3,22 @@
 
 #include <numeric>
 
+#include "pipeline/report/machine_text.h"
 #include "stages/program/compile.h"
-#include "stages/program/explain.h"
-#include "stages/write/program/dialect.h"
+#include "stages/program/dialect.h"
 #include "tests/program/machines.h"
 
 namespace lamina::program {
 namespace {
 
 /// A head square to a scan along x whose pixels are 100 um long: at 10 mm/s a nozzle passes 100 places a second.
-Machine head_of(std::uint32_t most_drops, double highest_frequency_hz, std::uint32_t nozzles = 4) {
+Machine head_of(std::uint32_t max_drops, double highest_frequency_hz, std::uint32_t nozzles = 4) {
   Machine machine;
   machine.name = "test";
   machine.dialect = "planes";
   machine.head.nozzles = nozzles;
   machine.head.pitch_um = 100;
-  machine.head.most_drops = most_drops;
+  machine.head.max_drops = max_drops;
   machine.head.highest_frequency_hz = highest_frequency_hz;
   machine.motion.scan_speed_mm_s = 10;
   machine.bed.size_mm = {0.8, 0.1 * nozzles};
@@ -32,9 +32,9 @@ HeadGrid grid_of_head(const Machine& machine) {
 }
 
 /// The pixels of more than k drops, for each k, of rows of digits.
-std::vector<Runs> planes_of(const std::vector<std::string>& rows, std::uint32_t most) {
+std::vector<Runs> planes_of(const std::vector<std::string>& rows, std::uint32_t maximum) {
   std::vector<Runs> planes;
-  for (std::uint32_t k = 0; k < most; ++k) {
+  for (std::uint32_t k = 0; k < maximum; ++k) {
     testing::Image image;
     for (const std::string& row : rows) {
       image.emplace_back();
@@ -77,7 +77,7 @@ FiredSweeps sweeps_fired_by(const HeadGrid& grid, const std::vector<Runs>& plane
 
 // 100 places a second: of 350 Hz each gets 3 drops, of 299 Hz 2, of 700 Hz 7, and no more than the head has.
 TEST(DropSweeps, FireWhatTheFrequencyAllows) {
-  const auto drops = [](std::uint32_t most, double hertz) { return grid_of_head(head_of(most, hertz)).sweep_drops; };
+  const auto drops = [](std::uint32_t maximum, double hertz) { return grid_of_head(head_of(maximum, hertz)).sweep_drops; };
   EXPECT_EQ(drops(7, 350), 3u);
   EXPECT_EQ(drops(7, 299), 2u);
   EXPECT_EQ(drops(7, 300), 3u);
@@ -91,13 +91,13 @@ TEST(DropSweeps, FireWhatTheFrequencyAllows) {
 }
 
 TEST(DropSweeps, TakeAsManyBitsAsTheHeadHasDrops) {
-  for (const auto& [most, bits] : {std::pair{1u, 1u}, {2u, 2u}, {3u, 2u}, {4u, 4u}, {7u, 4u}, {15u, 4u}}) {
-    EXPECT_EQ(grid_of_head(head_of(most, 100)).drop_bits, bits) << most;
+  for (const auto& [maximum, bits] : {std::pair{1u, 1u}, {2u, 2u}, {3u, 2u}, {4u, 4u}, {7u, 4u}, {15u, 4u}}) {
+    EXPECT_EQ(grid_of_head(head_of(maximum, 100)).drop_bits, bits) << maximum;
   }
-  for (const std::uint32_t most : {0u, 16u, 64u}) {
-    const auto grid = make_head_grid(head_of(most, 1e5));
+  for (const std::uint32_t maximum : {0u, 16u, 64u}) {
+    const auto grid = make_head_grid(head_of(maximum, 1e5));
     ASSERT_FALSE(grid.ok());
-    EXPECT_NE(grid.error().message.find("head.most_drops: give 1 to 15"), std::string::npos) << grid.error().message;
+    EXPECT_NE(grid.error().message.find("head.max_drops: give 1 to 15"), std::string::npos) << grid.error().message;
   }
   EXPECT_FALSE(make_head_grid(head_of(7, 1e5, 16'385)).ok());
   EXPECT_TRUE(make_head_grid(head_of(7, 1e5, 16'384)).ok());
@@ -133,24 +133,24 @@ TEST(DropSweeps, AreAddedWhereDropsComeTooFast) {
 
 // A pixel of d drops takes ceil(d / k) sweeps of k drops, and ceil(d / m) of a head that is fast enough.
 TEST(DropSweeps, AddedOnesAreThoseBeyondTheHeadsOwn) {
-  for (std::uint32_t most = 2; most <= 15; ++most) {
-    for (std::uint32_t allowed = 1; allowed <= most; ++allowed) {
-      const HeadGrid grid = grid_of_head(head_of(most, 100.0 * allowed));
+  for (std::uint32_t maximum = 2; maximum <= 15; ++maximum) {
+    for (std::uint32_t allowed = 1; allowed <= maximum; ++allowed) {
+      const HeadGrid grid = grid_of_head(head_of(maximum, 100.0 * allowed));
       ASSERT_EQ(grid.sweep_drops, allowed);
       for (std::uint32_t drops = 1; drops <= 9; ++drops) {
         const std::string row = std::string("00") + static_cast<char>('0' + drops) + "00000";
         // Planes are those of the job, whatever the layer has.
         const FiredSweeps fired = sweeps_fired_by(grid, planes_of({row, "00000000", "00000000", "00000000"}, 12));
-        const std::uint32_t sweeps = (drops + allowed - 1) / allowed, own = (drops + most - 1) / most;
+        const std::uint32_t sweeps = (drops + allowed - 1) / allowed, own = (drops + maximum - 1) / maximum;
         EXPECT_EQ(fired.sweeps.size(), sweeps);
-        EXPECT_EQ(fired.count.added, sweeps - own) << most << " " << allowed << " " << drops;
+        EXPECT_EQ(fired.count.added, sweeps - own) << maximum << " " << allowed << " " << drops;
         EXPECT_EQ(fired.count.drops, drops);
       }
     }
   }
 }
 
-TEST(DropSweeps, BothWaysToTheVectorsAgree) {
+TEST(DropSweeps, BothDirectionsToTheVectorsAgree) {
   for (const std::uint32_t ticks : {1u, 3u}) {
     Machine machine = head_of(7, 5000, 200);
     machine.head.row_offset_um = {0, 300};
@@ -163,8 +163,8 @@ TEST(DropSweeps, BothWaysToTheVectorsAgree) {
     std::vector<std::vector<std::uint32_t>> changes(std::size_t{grid.nozzles} * grid.drop_bits);
     std::vector<Line> lines;
     for (auto& line : changes) {
-      for (std::uint32_t c = random() % 5; c < grid.places && random() % 40 != 0; c += 1 + random() % 4) line.push_back(c);
-      if (line.size() % 2 == 1) line.push_back(grid.places);
+      for (std::uint32_t c = random() % 5; c < grid.positions && random() % 40 != 0; c += 1 + random() % 4) line.push_back(c);
+      if (line.size() % 2 == 1) line.push_back(grid.positions);
       lines.emplace_back(line);
     }
     FireScratch scratch;
@@ -178,18 +178,18 @@ TEST(DropSweeps, BothWaysToTheVectorsAgree) {
 }
 
 TEST(DropSweeps, AreRefusedOfADialectOfOneDrop) {
-  for (const write::Dialect& dialect : write::dialects()) {
+  for (const program::Dialect& dialect : program::dialects()) {
     Machine machine = head_of(3, 5000);
     const HeadGrid grid = grid_of_head(machine);
-    const Status status = write::check_dialect(dialect, machine, grid);
+    const Status status = program::check_dialect(dialect, machine, grid);
     const bool says = dialect.id == "planes" || dialect.id == "raw";
     EXPECT_EQ(status.ok(), says) << dialect.id;
     if (says) continue;
-    EXPECT_NE(status.error().message.find("head.most_drops: 3"), std::string::npos) << status.error().message;
+    EXPECT_NE(status.error().message.find("head.max_drops: 3"), std::string::npos) << status.error().message;
   }
 }
 
-TEST(DropSweeps, AreTold) {
+TEST(DropSweeps, AreReported) {
   const Machine slow = head_of(7, 350), fast = head_of(7, 700);
   EXPECT_EQ(sweeps_text(fast, grid_of_head(fast), {12, 0, 0}), "2 over a place for up to 12 drops a pixel, up to 7 in each");
   EXPECT_EQ(

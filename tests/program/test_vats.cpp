@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/report/image_text.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
@@ -54,7 +55,7 @@ TEST(Vats, ByHand) {
   const VatPlan pauses = planned(machine, 51, {1});
   EXPECT_TRUE(pauses.status().ok());
   EXPECT_EQ(pauses.refills(), (std::vector<std::uint32_t>{10, 30, 50}));
-  EXPECT_EQ(refills_text(pauses.refills()), "pauses before layers 10, 30 and 50 for vats to be filled");
+  EXPECT_EQ(pipeline::refills_text(pauses.refills()), "pauses before layers 10, 30 and 50 for vats to be filled");
 }
 
 // Both vats half of the dose each: 0.0625 mm, written as such. In turns each takes every other layer. A pause fills both.

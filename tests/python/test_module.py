@@ -29,15 +29,15 @@ def run(*words):
 class Module(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.place = tempfile.TemporaryDirectory()
-        cls.directory = pathlib.Path(cls.place.name)
+        cls.position = tempfile.TemporaryDirectory()
+        cls.directory = pathlib.Path(cls.position.name)
         done = run("jet", PART, "--bed", "200x160", "--dpi", "300x200", "--layer", "0.5", "--quiet", "-o", cls.directory / "out")
         assert done.returncode == 0, done.stderr
         cls.plan = lamina.plan(PART, SETTINGS)
 
     @classmethod
     def tearDownClass(cls):
-        cls.place.cleanup()
+        cls.position.cleanup()
 
     def file(self, index):
         return self.directory / "out/layers" / f"{index:06}.tif"
@@ -84,7 +84,7 @@ class Module(unittest.TestCase):
         self.assertEqual(triangles.shape[1:], (3, 3))
         self.assertTrue((triangles.reshape(-1, 3).max(axis=0) > triangles.reshape(-1, 3).min(axis=0)).all())
 
-    def test_layers_are_planned_when_they_are_asked_for_and_kept_by_nobody(self):
+    def test_layers_are_planned_when_they_are_requested_for_and_kept_by_none(self):
         plan = lamina.plan(PART, {**SETTINGS, "layers.thickness_mm": 0.0001})
         self.assertEqual(len(plan), 170000)
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -151,9 +151,9 @@ class Module(unittest.TestCase):
             self.assertEqual(points.dtype, np.int32)
             x, y = points.astype(float).T / 1e6
             area += 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-        self.assertAlmostEqual(area, contours.area_mm2, places=6)
+        self.assertAlmostEqual(area, contours.area_mm2, positions=6)
         pixel = 25.4 ** 2 / (self.plan.dpi[0] * self.plan.dpi[1])
-        self.assertAlmostEqual(layer.set_pixels * pixel / area, 1, places=2)
+        self.assertAlmostEqual(layer.set_pixels * pixel / area, 1, positions=2)
         self.assertEqual(contours.offset[-1], len(contours.point))
         self.assertIs(contours.point.base, contours)
 
@@ -280,10 +280,10 @@ class Module(unittest.TestCase):
 
     def test_slices_of_a_plan_are_sequences_that_plan_on_demand(self):
         indices = list(range(len(self.plan)))
-        for asked in (slice(0, 3), slice(None), slice(-2, None), slice(5, 2), slice(None, None, -4), slice(3, 1000, 2)):
-            some = self.plan[asked]
-            self.assertEqual([layer.index for layer in some], indices[asked])
-            self.assertEqual(len(some), len(indices[asked]))
+        for requested in (slice(0, 3), slice(None), slice(-2, None), slice(5, 2), slice(None, None, -4), slice(3, 1000, 2)):
+            some = self.plan[requested]
+            self.assertEqual([layer.index for layer in some], indices[requested])
+            self.assertEqual(len(some), len(indices[requested]))
         some = self.plan[2:20:3]
         self.assertEqual((some[1].index, some[-1].index), (5, 17))
         self.assertEqual([layer.index for layer in some[::-2]], indices[2:20:3][::-2])
@@ -312,7 +312,7 @@ class Module(unittest.TestCase):
             self.assertTrue(getattr(lamina, name).__doc__, name)
         self.assertEqual("lamina " + lamina.__version__, run("--version").stdout.strip())
 
-    def test_a_plan_that_nobody_holds_is_gone_and_an_iterator_holds_its_plan(self):
+    def test_a_plan_that_none_holds_is_gone_and_an_iterator_holds_its_plan(self):
         plan = lamina.plan(CROWN, {"bed.dpi": 100, "layers.thickness_mm": 1})
         layers = iter(plan)
         del plan

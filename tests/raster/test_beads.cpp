@@ -40,7 +40,7 @@ TEST(BeadRaster, SetsThePixelsWhoseCentresLieInABeadAndNoOthers) {
     const PixelGrid grid{PixelAxis(dpi, 5'000'000), PixelAxis(dpi + (round % 3) * 100, 4'000'000)};
     // Steps of whole pixels at 254 dpi put many centres exactly on edges.
     const std::int64_t step = round % 4 == 1 ? 50'000 : 1;
-    const auto place = [&](std::int64_t limit) {
+    const auto position = [&](std::int64_t limit) {
       return static_cast<Nm>(std::uniform_int_distribution<std::int64_t>(-300'000 / step, (limit + 300'000) / step)(random) *
                              step);
     };
@@ -48,8 +48,8 @@ TEST(BeadRaster, SetsThePixelsWhoseCentresLieInABeadAndNoOthers) {
     std::vector<std::tuple<Point2, Point2, Nm, BeadEnds>> list;
     BeadRaster raster(grid);
     for (int i = 0; i < beads; ++i) {
-      const Point2 a{place(5'000'000), place(4'000'000)};
-      Point2 b{place(5'000'000), place(4'000'000)};
+      const Point2 a{position(5'000'000), position(4'000'000)};
+      Point2 b{position(5'000'000), position(4'000'000)};
       const int kind = static_cast<int>(random() % 5);
       if (kind == 0) b.y = a.y;
       if (kind == 1) b.x = a.x;

@@ -5,7 +5,6 @@
 #include <random>
 
 #include "stages/raster/beams.h"
-#include "stages/raster/height_buckets.h"
 #include "stages/raster/height_runs.h"
 #include "tests/raster/shapes.h"
 
@@ -105,7 +104,7 @@ TEST(Beams, FindEveryClusterThatContoursFindInTheirRowsOnce) {
       ClusterVisits by_rays, by_height;
       beams->find_clusters(sampling, plane, first, last, by_rays);
       for (std::uint32_t p = 0; p < placed.size(); ++p) {
-        raster::HeightBuckets(*placed[p].mesh).find_clusters(plane, p, by_height);
+        heights_of(placed[p].mesh->bounds).find(plane, plane, [&](std::uint32_t c) { by_height.push_back({c, p}); });
       }
       const auto rays = counted(by_rays);
       for (const auto& [cluster, times] : rays) EXPECT_EQ(times, 1);

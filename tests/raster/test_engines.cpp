@@ -14,7 +14,7 @@ namespace {
 
 using raster::Engine;
 
-std::string place_of_difference(const RunsView& a, const RunsView& b) {
+std::string position_of_difference(const RunsView& a, const RunsView& b) {
   if (a.rows() != b.rows()) return "row counts differ";
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     const auto x = a.row(r), y = b.row(r);
@@ -56,7 +56,7 @@ std::uint64_t expect_exact(const Triangles& triangles, const PixelGrid& grid, co
       pixels += set_pixels(expected);
       for (Engine engine : {Engine::kRays, Engine::kContours}) {
         const auto report = rasterizer->layer(engine, plane, scratch, runs);
-        EXPECT_EQ(place_of_difference(runs, expected), "")
+        EXPECT_EQ(position_of_difference(runs, expected), "")
             << (engine == Engine::kRays ? "rays" : "contours") << " at " << plane << " nm";
         EXPECT_EQ(report.open_rows, 0u);
         EXPECT_LE(report.crossings, rasterizer->crossings_bound(plane));
@@ -136,7 +136,7 @@ TEST(Engines, AgreeAtTheFarEndOfTheReach) {
   EXPECT_GT(expect_exact(random_tetrahedra(12, pick), grid, {1, 700'000'001, 2'000'000'000}), 0u);
 }
 
-TEST(Engines, CopiesStandWhereTheirOffsetsSay) {
+TEST(Engines, CopiesAreWhereTheirOffsetsSay) {
   const PixelGrid grid{{600, 60'000'000}, {300, 50'000'000}};
   std::mt19937 random(11);
   const auto pick = [&] {
@@ -193,7 +193,7 @@ TEST(Engines, AgreeWhereALayerHasSoManyCrossingsThatRaysTakeItInBands) {
   const PixelGrid grid{{1200, 22'000'000}, {2400, 22'000'000}};
   std::mt19937 random(23);
   const auto pick = [&] {
-    const auto any = [&](unsigned most) { return static_cast<Nm>(random() % most); };
+    const auto any = [&](unsigned maximum) { return static_cast<Nm>(random() % maximum); };
     return Point3{any(22'000'000), any(22'000'000), any(1'000'000)};
   };
   Mesh mesh = make_mesh(random_tetrahedra(1000, pick));
@@ -204,7 +204,7 @@ TEST(Engines, AgreeWhereALayerHasSoManyCrossingsThatRaysTakeItInBands) {
   const auto report = rasterizer->layer(Engine::kRays, 500'000, scratch, rays);
   EXPECT_GT(report.crossings, 1u << 19);
   EXPECT_GT(report.segments, rasterizer->layer(Engine::kContours, 500'000, scratch, contours).segments);  // cut again in each
-  EXPECT_EQ(place_of_difference(rays, contours), "");
+  EXPECT_EQ(position_of_difference(rays, contours), "");
   EXPECT_GT(set_pixels(rays), 0u);
 }
 
@@ -221,13 +221,13 @@ TEST(Scan, ARowThatStaysOpenEndsAtItsLastCrossingAndIsReported) {
   const auto report = rasterizer->layer(Engine::kRays, 500'000, scratch, rays);
   rasterizer->layer(Engine::kContours, 500'000, scratch, contours);
   EXPECT_EQ(report.open_rows, 10u);
-  EXPECT_EQ(place_of_difference(rays, contours), "");
+  EXPECT_EQ(position_of_difference(rays, contours), "");
   for (std::uint32_t r = 0; r < rays.view().rows(); ++r) {
     for (std::uint32_t column : rays.view().row(r)) EXPECT_LE(column, 40u);
   }
 }
 
-TEST(Scan, AnOpenPartEndsWhereItEndsWhateverStandsBesideIt) {
+TEST(Scan, AnOpenPartEndsWhereItEndsRegardlessOfWhatIsNextToIt) {
   const PixelGrid grid{{254, 30'000'000}, {254, 8'000'000}};
   const Triangles whole = box({1'000'000, 1'000'000, 0}, {4'000'000, 3'000'000, 1'000'000});
   Triangles without_right = whole, without_left;
@@ -251,7 +251,7 @@ TEST(Scan, AnOpenPartEndsWhereItEndsWhateverStandsBesideIt) {
     rasterizer->layer(Engine::kContours, 500'000, scratch, contours);
     EXPECT_EQ(report.open_rows, 20u);
     EXPECT_EQ(report.first_open_row, 10u);
-    EXPECT_EQ(place_of_difference(rays, contours), "");
+    EXPECT_EQ(position_of_difference(rays, contours), "");
     for (std::uint32_t r = 0; r < rays.view().rows(); ++r) {
       const auto row = rays.view().row(r);
       if (row.empty()) continue;

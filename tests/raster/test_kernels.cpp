@@ -151,21 +151,21 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClu
 Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part,
                  const Segments& segments, Nm plane, std::array<std::uint32_t, 2> rows) {
   const std::uint32_t count = rows[1] - rows[0];
-  std::vector<std::uint32_t> place(count), in_row(count);
+  std::vector<std::uint32_t> position(count), in_row(count);
   for (std::size_t i = 0; i < segments.size; ++i) {
     for (std::uint32_t row = segments.rows[i].first; row < segments.rows[i].end(); ++row) ++in_row[row - rows[0]];
   }
   std::uint32_t total = 0;
   for (std::uint32_t row = 0; row < count; ++row) {
-    place[row] = total;
+    position[row] = total;
     total += in_row[row];
   }
   std::vector<std::uint32_t> crossing(total, UINT32_MAX);
-  kernels.fill({sampling, segments, part.placed, plane, rows[0], place.data(), crossing.data()});
+  kernels.fill({sampling, segments, part.placed, plane, rows[0], position.data(), crossing.data()});
   Crossings all;
   for (std::uint32_t row = 0, i = 0; row < count; ++row) {
-    EXPECT_EQ(place[row], i + in_row[row]) << "row " << row;
-    for (; i < place[row]; ++i) all.emplace_back(row + rows[0], crossing[i] >> 1, (crossing[i] & 1) != 0);
+    EXPECT_EQ(position[row], i + in_row[row]) << "row " << row;
+    for (; i < position[row]; ++i) all.emplace_back(row + rows[0], crossing[i] >> 1, (crossing[i] & 1) != 0);
   }
   std::ranges::sort(all);
   return all;

@@ -8,7 +8,6 @@
 #include <random>
 
 #include "stages/load/load.h"
-#include "stages/raster/height_buckets.h"
 #include "stages/raster/layer_bound.h"
 #include "stages/raster/raster.h"
 #include "tests/raster/shapes.h"
@@ -38,7 +37,7 @@ TEST(LayerBound, IsNeverBelowWhatRandomSolidsHave) {
     const Nm size = seed % 3 == 0 ? scale : scale / 20 + 1;  // of a solid; the others are small and many
     Triangles triangles;
     for (int i = 0; i < (seed % 3 == 0 ? 12 : 150); ++i) {
-      const auto any = [&](Nm most) { return static_cast<Nm>(random() % static_cast<unsigned>(most)); };
+      const auto any = [&](Nm maximum) { return static_cast<Nm>(random() % static_cast<unsigned>(maximum)); };
       const Point3 at{any(scale), any(scale), any(scale)};
       const auto pick = [&] { return Point3{at.x + any(size), at.y + any(seed % 5 == 0 ? 50 : size), at.z + any(size)}; };
       for (const Triangle& t : random_tetrahedra(1, pick)) triangles.push_back(t);
@@ -56,11 +55,11 @@ TEST(LayerBound, IsNeverBelowWhatRandomSolidsHave) {
       raster::LayerScratch scratch;
       Runs runs;
       const raster::LayerReport report = rasterizer->layer(raster::Engine::kContours, plane, scratch, runs);
-      const LayerBound::Count most = bound.at(plane);
-      ASSERT_LE(report.segments, most.segments) << "seed " << seed << " at " << plane << " nm";
-      ASSERT_LE(report.crossings, most.crossings) << "seed " << seed << " at " << plane << " nm";
-      ASSERT_LE(scratch.visits.size(), most.clusters) << "seed " << seed << " at " << plane << " nm";
-      ASSERT_LE(most.crossings, bound.most_crossings());
+      const LayerBound::CrossingCount maximum = bound.at(plane);
+      ASSERT_LE(report.segments, maximum.segments) << "seed " << seed << " at " << plane << " nm";
+      ASSERT_LE(report.crossings, maximum.crossings) << "seed " << seed << " at " << plane << " nm";
+      ASSERT_LE(scratch.visits.size(), maximum.clusters) << "seed " << seed << " at " << plane << " nm";
+      ASSERT_LE(maximum.crossings, bound.max_crossings());
       ASSERT_LE(report.scratch_bytes + bytes_held(runs.change) + bytes_held(runs.row_offset),
                 rasterizer->layer_bytes_bound(plane));
       crossings += report.crossings;
@@ -72,7 +71,7 @@ TEST(LayerBound, IsNeverBelowWhatRandomSolidsHave) {
 TEST(CrossingSums, OfPartsOfAMeshBoundTheWholeInAnyOrder) {
   std::mt19937 random(17);
   const auto pick = [&] {
-    const auto any = [&](unsigned most) { return static_cast<Nm>(random() % most); };
+    const auto any = [&](unsigned maximum) { return static_cast<Nm>(random() % maximum); };
     return Point3{any(50'000'000), any(50'000'000), any(1'000'000) + 1'000'000 * any(150) - 40'000'000};
   };
   Triangles triangles = random_tetrahedra(900, pick);
@@ -150,7 +149,7 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
   auto rasterizer = raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kNonzero, true, true);
   ASSERT_TRUE(rasterizer.ok());
   for (const raster::Engine engine : {raster::Engine::kRays, raster::Engine::kContours}) {
-    std::uint64_t claimed = 0, taken = 0, most = 0;
+    std::uint64_t claimed = 0, taken = 0, maximum = 0;
     raster::LayerScratch kept;  // from layer to layer, as a thread does
     Runs kept_runs;
     for (Nm plane = 25'000; plane < top; plane += top / 40) {
@@ -159,9 +158,9 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
       const raster::LayerReport report = rasterizer->layer(engine, plane, scratch, runs);
       const std::uint64_t bound = rasterizer->layer_bytes_bound(plane);
       EXPECT_GE(bound, report.scratch_bytes + bytes_held(runs.change) + bytes_held(runs.row_offset)) << name << " at " << plane;
-      most = std::max(most, bound);
+      maximum = std::max(maximum, bound);
       const std::uint64_t holds = rasterizer->layer(engine, plane, kept, kept_runs).scratch_bytes;
-      EXPECT_GE(most, holds + bytes_held(kept_runs.change) + bytes_held(kept_runs.row_offset)) << name << " up to " << plane;
+      EXPECT_GE(maximum, holds + bytes_held(kept_runs.change) + bytes_held(kept_runs.row_offset)) << name << " up to " << plane;
       claimed += bound;
       taken += scratch.visits.size() * sizeof(raster::ClusterVisit) + report.segments * raster::Segments::kBytes +
                4 * (report.crossings + runs.change.size() + 2 * runs.row_offset.size());
@@ -190,7 +189,7 @@ TEST(Tents, AreTheSameBitsWithEveryInstructionSetAndReturnToNothing) {
     }
     raster::Sides plain_sides, sides;
     raster::Tents plain, tents;
-    raster::tents_for(Isa::kPlain).look_up(cluster, vertices.data(), plain_sides);
+    raster::tents_for(Isa::kPlain).find(cluster, vertices.data(), plain_sides);
     raster::tents_for(Isa::kPlain).raise(plain_sides, shift, -(1 << (27 - shift)), plain);
     for (std::uint32_t lane = 0; lane < raster::kClusterSize; ++lane) {
       EXPECT_EQ(plain_sides.z[1][lane], vertices[cluster.corner[1][lane]].z);
@@ -203,8 +202,8 @@ TEST(Tents, AreTheSameBitsWithEveryInstructionSetAndReturnToNothing) {
       EXPECT_EQ(std::ldexp(up, 16), std::floor(std::ldexp(up, 16)));
     }
     for (const Isa isa : {Isa::kAvx2, Isa::kAvx512}) {
-      const raster::TentKernels& kernels = raster::tents_for(isa_at_most(isa));
-      kernels.look_up(cluster, vertices.data(), sides);
+      const raster::TentKernels& kernels = raster::tents_for(limited_isa(isa));
+      kernels.find(cluster, vertices.data(), sides);
       kernels.raise(sides, shift, -(1 << (27 - shift)), tents);
       ASSERT_EQ(std::memcmp(&sides, &plain_sides, sizeof sides), 0) << i;
       ASSERT_EQ(std::memcmp(&tents, &plain, sizeof tents), 0) << i;
@@ -231,7 +230,7 @@ TEST(CrossingSums, WhatEndsBelowAGapIsNotCountedAboveIt) {
   }
 }
 
-TEST(CrossingSums, FewerSlabsHoldAtLeastAsMuchAndNoMoreThanTheLargestOfThoseJoined) {
+TEST(CrossingSums, FewerSlabsHoldNoLessThanAsMuchAndNoMoreThanTheLargestOfThoseJoined) {
   std::mt19937 random(8);
   for (int round = 0; round < 50; ++round) {
     CrossingSums::Table fine{12, static_cast<std::int64_t>(random() % 400) - 200, {}};
@@ -259,7 +258,7 @@ TEST(CrossingSums, FewerSlabsHoldAtLeastAsMuchAndNoMoreThanTheLargestOfThoseJoin
   }
 }
 
-TEST(LayerBound, ClaimsAtMostTwiceWhatLayersOfPartsTake) {
+TEST(LayerBound, ClaimsNoMoreThanTwiceWhatLayersOfPartsTake) {
   expect_true_within_two(make_mesh(torus(40, 16)), 1200, "a coarse torus");
   expect_true_within_two(make_mesh(torus(400, 120)), 1200, "a fine torus");
   auto crown = load::load(std::string(LAMINA_TEST_DIR) + "/corpus/dental_crown.stl", {});

@@ -54,7 +54,7 @@ std::vector<Nm> planes_through(const std::vector<Triangle>& facets) {
   for (const auto& [area, z] : largest) planes.insert({z - 1, z, z + 1});
   planes.insert({facets[facets.size() / 2].a.z, facets[facets.size() / 3].b.z});
   for (Nm i = 1; planes.size() < 14; ++i) planes.insert(static_cast<Nm>(std::int64_t{top} * (2 * i - 1) / 17));
-  planes.erase(planes.begin(), planes.lower_bound(0));
+  planes.erase(planes.begin(), planes.threshold_levels(0));
   return {planes.begin(), planes.end()};
 }
 
@@ -121,10 +121,10 @@ void check_part(const fs::path& file, const std::string& name, Checked& checked)
   ++checked.parts;
 }
 
-void check_folder(const fs::path& folder, std::uint32_t least_parts) {
+void check_folder(const fs::path& folder, std::uint32_t min_parts) {
   Checked checked;
   for (const fs::path& file : part_files(folder)) check_part(file, fs::relative(file, folder).string(), checked);
-  EXPECT_GE(checked.parts, least_parts) << "too few parts in " << folder;
+  EXPECT_GE(checked.parts, min_parts) << "too few parts in " << folder;
   EXPECT_LE(checked.too_large, 1u) << "parts of more than a metre are not compared";
   EXPECT_GT(checked.pixels, 0u);
   std::cout << "compared bit for bit with the contract: " << checked.parts << " parts, " << checked.layers

@@ -53,18 +53,18 @@ class Printhead {
   int sprays = 1;
 
  private:
-  static std::size_t place(int dot) { return static_cast<std::size_t>(dot / 2 * 3 + (dot & 1)); }
+  static std::size_t location(int dot) { return static_cast<std::size_t>(dot / 2 * 3 + (dot & 1)); }
   static int shift(int dot) { return (dot & 1) != 0 ? 0 : 4; }
   std::uint16_t dotline_get(int dot) const {
     const auto at = static_cast<std::uint16_t>(dot);
     if (at > 840) return 0;
-    return static_cast<std::uint16_t>((buffer_[place(at)] << 8 | buffer_[place(at) + 1]) >> shift(at) & 0xfff);
+    return static_cast<std::uint16_t>((buffer_[location(at)] << 8 | buffer_[location(at) + 1]) >> shift(at) & 0xfff);
   }
   void dotline_set(int dot, std::uint16_t line) {
     if (dot > 840) return;
     const int mask = 0xfff << shift(dot), bits = line << shift(dot);
-    buffer_[place(dot)] = static_cast<std::uint8_t>((buffer_[place(dot)] & ~(mask >> 8)) | bits >> 8);
-    buffer_[place(dot) + 1] = static_cast<std::uint8_t>((buffer_[place(dot) + 1] & ~mask) | (bits & 0xff));
+    buffer_[location(dot)] = static_cast<std::uint8_t>((buffer_[location(dot)] & ~(mask >> 8)) | bits >> 8);
+    buffer_[location(dot) + 1] = static_cast<std::uint8_t>((buffer_[location(dot) + 1] & ~mask) | (bits & 0xff));
   }
   int dotline_set_range(int dot, int length, std::uint16_t line) {
     int done = 0;
@@ -75,7 +75,7 @@ class Printhead {
       ++done;
     }
     if (length == 1) return done;
-    std::size_t at = place(dot);
+    std::size_t at = location(dot);
     for (; done < length; done += 2, at += 3) {
       buffer_[at] = static_cast<std::uint8_t>(line >> 4);
       buffer_[at + 1] = static_cast<std::uint8_t>(line << 4 | line >> 4);

@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/replay/machine.h"
 #include "tests/program/machines.h"
@@ -36,14 +35,14 @@ inline Result<replay::Count> verdict(const ResolvedMachine& resolved, const Runs
 using Pixel = std::pair<std::int64_t, std::int64_t>;  // column, row
 
 inline Pixel pixel_of(const ResolvedMachine& resolved, const replay::VirtualMachine& machine,
-                      const firmware::Hp45Port::Seen& seen, std::uint32_t nozzle) {
+                      const firmware::Hp45Port::Findings& detected, std::uint32_t nozzle) {
   const HeadGrid& grid = resolved.grid;
   const auto& mount = resolved.machine.mounting;
   const bool x = grid.scan_axis == ScanAxis::kX;
   const double line_0 = grid.line_position_nm(0), line_1 = grid.line_position_nm(1);
   const double step_0 = grid.step_position_nm(0), step_1 = grid.step_position_nm(1);
-  const double line = ((seen.across_mm - mount.offset_mm[x ? 1 : 0]) * 1e6 - line_0) / (line_1 - line_0);
-  const double step = ((seen.along_um / 1000 - mount.offset_mm[x ? 0 : 1]) * 1e6 - step_0) / (step_1 - step_0);
+  const double line = ((detected.across_mm - mount.offset_mm[x ? 1 : 0]) * 1e6 - line_0) / (line_1 - line_0);
+  const double step = ((detected.along_um / 1000 - mount.offset_mm[x ? 0 : 1]) * 1e6 - step_0) / (step_1 - step_0);
   const auto [column, row] = machine.nozzle_at(std::llround(line), std::round(step), nozzle);
   return {std::llround(column), std::llround(row)};
 }
@@ -73,7 +72,7 @@ inline std::string text_of(const Lines& lines) {
 }
 
 /// The n-th line that begins so, from 0; from the end if negative.
-inline std::size_t place_of_line(const Lines& lines, std::string_view begin, int n = 0) {
+inline std::size_t index_of_line(const Lines& lines, std::string_view begin, int n = 0) {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (lines[i].starts_with(begin)) found.push_back(i);

@@ -23,7 +23,7 @@ class Hp45Port {
   using Nozzles = std::bitset<300>;  // number 0 of the firmware first
   /// What a row shows where it passes a step of a raster, and what the clock fires: centre of the row along the scan in um,
   /// and across in mm as G-code has it.
-  struct Seen {
+  struct Findings {
     int row = 0;
     double along_um = 0, across_mm = 0;
     Nozzles nozzles;
@@ -35,7 +35,7 @@ class Hp45Port {
   Hp45Port(char along, char across, double origin_um, double pitch_um)
       : along_(along), across_(across), origin_(origin_um), pitch_(pitch_um) {}
 
-  std::vector<Seen> shown, fired;
+  std::vector<Findings> shown, fired;
   std::uint64_t unknown = 0;  // lines that the controller answers with "Unknown command"
   double tick_us = 5;         // of the main loop
   bool clocked = false;       // keeps the bursts
@@ -76,8 +76,8 @@ class Hp45Port {
     std::map<char, double> to;
     while (moves && words >> word) to[word[0]] = std::strtod(word.c_str() + 1, nullptr);
     if (to.count('F') != 0) speed_ = to['F'] / 60;
-    if (to.count(across_) != 0) place_[across_] = to[across_] + (relative_ ? place_[across_] : 0);
-    if (to.count(along_) != 0) go((to[along_] + (relative_ ? place_[along_] : 0)) * 1000);
+    if (to.count(across_) != 0) position_[across_] = to[across_] + (relative_ ? position_[across_] : 0);
+    if (to.count(along_) != 0) go((to[along_] + (relative_ ? position_[along_] : 0)) * 1000);
   }
   void go(double to_um) {
     const double from = x_, way = to_um - from, needs = std::abs(way) / (speed_ * 1e-3);  // us
@@ -86,7 +86,7 @@ class Hp45Port {
       loop();
     }
     x_ = to_um;
-    place_[along_] = to_um / 1000;
+    position_[along_] = to_um / 1000;
     loop();
     rest(400'000);
   }
@@ -139,12 +139,12 @@ class Hp45Port {
     position();
     values();
     bursts();
-    look();
+    inspection();
   }
   void position() {
     const long counted = base_ + std::lround((x_ - zero_) * static_cast<double>(per_inch_) / 25'400);
-    if (counted != seen_) {
-      seen_ = counted;
+    if (counted != detected_) {
+      detected_ = counted;
       um_ = static_cast<long>(static_cast<double>(counted) * 25'400 / static_cast<double>(per_inch_));
       if (++pulses_ >= 50) {
         pulses_ = 0;
@@ -210,10 +210,10 @@ class Hp45Port {
     burst_at_ = clock_;
     if (clocked && (rows_[0].on || rows_[1].on)) keep(fired, 0), keep(fired, 1);
   }
-  void keep(std::vector<Seen>& into, int s) {
-    if (rows_[s].now.any()) into.push_back({s, x_ + (s == 1 ? 2025 : -2025), place_[across_], rows_[s].now, measures_ > 1});
+  void keep(std::vector<Findings>& into, int s) {
+    if (rows_[s].now.any()) into.push_back({s, x_ + (s == 1 ? 2025 : -2025), position_[across_], rows_[s].now, measures_ > 1});
   }
-  void look() {
+  void inspection() {
     for (int s = 0; s < 2; ++s) {
       const auto at = static_cast<long>(std::floor((x_ + (s == 1 ? 2025 : -2025) - origin_) / pitch_));
       if (at != rows_[s].shot_at && (rows_[0].on || rows_[1].on)) keep(shown, s);
@@ -223,13 +223,13 @@ class Hp45Port {
 
   char along_, across_;
   double origin_, pitch_;
-  std::map<char, double> place_;
+  std::map<char, double> position_;
   bool relative_ = false;
   double speed_ = 1, x_ = 0, clock_ = 1e6;
   std::array<Row, 2> rows_;
   std::vector<Stored> buffer_{1};
   int repeat_ = 1;
-  long per_inch_ = 600, density_ = 100, counts_ = 0, base_ = 0, seen_ = 0, um_ = 0, measured_um_ = 0, velocity_ = 0,
+  long per_inch_ = 600, density_ = 100, counts_ = 0, base_ = 0, detected_ = 0, um_ = 0, measured_um_ = 0, velocity_ = 0,
        direction_ = 0;
   int pulses_ = 0, measures_ = 0;
   double zero_ = 0, measured_at_ = 0, delay_ = 0, burst_at_ = 0;

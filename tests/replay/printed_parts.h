@@ -8,13 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/raster/raster.h"
 #include "stages/replay/machine.h"
-#include "stages/write/program/dialect.h"
 
 namespace lamina::printed_parts {
 
@@ -26,26 +25,26 @@ struct Program {
 };
 
 inline Program program_of(const pipeline::ResolvedMachine& resolved, const RunsView& image) {
-  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
   LayerCycle cycle;
   cycle.layer = kLayer.index;
   cycle.layers = 9;
   cycle.bottom_nm = kLayer.bottom;
   cycle.thickness_nm = kLayer.thickness;
-  write::ProgramBytes bytes;
+  program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
-  writer->care_of_layer(cycle, bytes);
+  writer->maintenance_of_layer(cycle, bytes);
   program::CompileScratch scratch;
   const auto count = program::compile(
       resolved.grid, image, scratch,
       [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        writer->care_before(sweep, vectors, bytes);
+        writer->maintenance_before(sweep, vectors, bytes);
         writer->sweep(sweep, vectors, bytes);
         return {};
       },
       kLayer.index);
   EXPECT_TRUE(count.ok());
-  writer->care_behind(bytes);
+  writer->maintenance_after(bytes);
   writer->end_layer(cycle, bytes);
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
 }

@@ -14,23 +14,23 @@
 namespace lamina::printed_parts {
 
 /// Firing off the bed, wiping, and where the machine's dialect can say it a lamp, a pump, a cap and a roller that turns.
-inline void all_care_of(Machine& m) {
+inline void all_maintenance_of(Machine& m) {
   const bool bar = m.dialect == "brundlefab", stops = m.dialect == "m578";
   m.bed.size_mm = {12, bar ? 12.0 : 20.0};
   m.motion.both_directions = !bar;
-  m.care.spit_layers = 7;
-  m.care.spit_drops = stops ? 3 : bar ? 5 : 40;
-  m.care.spit_mm = bar ? std::array{400.0, 0.0} : std::array{-45.0, -10.0};
+  m.maintenance.spit_layers = 7;
+  m.maintenance.spit_drops = stops ? 3 : bar ? 5 : 40;
+  m.maintenance.spit_mm = bar ? std::array{400.0, 0.0} : std::array{-45.0, -10.0};
   if (bar) return;
-  m.care.wipe_layers = 7;
-  m.care.wipe_mm = {{-45, -30, -45, -12}};
+  m.maintenance.wipe_layers = 7;
+  m.maintenance.wipe_mm = {{-45, -30, -45, -12}};
   if (m.dialect == "hp45") return;
   m.powder.dry_s = 2.5;
   m.powder.dry_on_lines = {"M106 S255"};
   m.powder.dry_off_lines = {"M107"};
   m.powder.roller_rpm = stops ? 0 : 350;
-  m.care.wipe_lines = {"M42 P4 S1", "M42 P4 S0"};
-  m.care.cap_mm = {{-50, -10}};
+  m.maintenance.wipe_lines = {"M42 P4 S1", "M42 P4 S0"};
+  m.maintenance.cap_mm = {{-50, -10}};
 }
 
 struct TamperBench {
@@ -41,7 +41,7 @@ struct TamperBench {
   Program program;
   std::vector<std::string> pieces;  // lines; of binary programs records, heads of sweeps, segments
 
-  explicit TamperBench(const std::string& machine, const std::function<void(Machine&)>& change = all_care_of)
+  explicit TamperBench(const std::string& machine, const std::function<void(Machine&)>& change = all_maintenance_of)
       : resolved(shipped(machine, change)) {
     const PixelGrid& grid = resolved.grid.image;
     program::testing::Image pixels(grid.rows(), std::vector<int>(grid.columns(), 0));
@@ -74,7 +74,7 @@ struct TamperBench {
     return found.at(static_cast<std::size_t>(n < 0 ? static_cast<int>(found.size()) + n : n));
   }
   /// What lamina verify says of a program whose hash the manifest has: "" if it takes it. `counts`: what it compares there
-  std::string told(const std::string& text) const {
+  std::string reported(const std::string& text) const {
     const auto found = count(text);
     if (!found.ok()) return found.error().message;
     static const std::string kOther = "other numbers than the manifest's";

@@ -219,20 +219,20 @@ TEST(Brundlefab, NumbersAreReadAsTheFirmwareReadsThem) {
   using replay::brundle::Block;
   using replay::brundle::read_block;
   Block block;
-  EXPECT_EQ(read_block("G1 X12.25 Y-3 ; away", 1, block), "");
+  EXPECT_TRUE(read_block("G1 X12.25 Y-3 ; away", 1, block).ok());
   EXPECT_EQ(block.code, 'G');
   EXPECT_EQ(block.command, 1);
   EXPECT_EQ(block['X'], 12.25f);
   EXPECT_EQ(block['Y'], -3.0f);
-  EXPECT_EQ(read_block("G1 Z-1.5", 1, block), "");
+  EXPECT_TRUE(read_block("G1 Z-1.5", 1, block).ok());
   EXPECT_EQ(block['Z'], -0.5f);  // neg * ipart + fpart / fbase
-  EXPECT_EQ(read_block("G1 X1", 25.4f, block), "");
+  EXPECT_TRUE(read_block("G1 X1", 25.4f, block).ok());
   EXPECT_FLOAT_EQ(block['X'], 25.4f);
-  EXPECT_EQ(read_block("M117 Slice 3 of 9", 1, block), "");
+  EXPECT_TRUE(read_block("M117 Slice 3 of 9", 1, block).ok());
   EXPECT_EQ(block.text, "Slice 3 of 9");
-  EXPECT_NE(read_block("G1 X40000", 1, block), "");
-  EXPECT_NE(read_block("G1 X1.23456", 1, block), "");
-  EXPECT_NE(read_block("G1 X1*57", 1, block), "");
+  EXPECT_FALSE(read_block("G1 X40000", 1, block).ok());
+  EXPECT_FALSE(read_block("G1 X1.23456", 1, block).ok());
+  EXPECT_FALSE(read_block("G1 X1*57", 1, block).ok());
 }
 
 /// What dotline.cpp itself leaves, compiled and run: an abc at dot 10 or 11, repeated.

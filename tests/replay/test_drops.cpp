@@ -28,13 +28,13 @@ Levels random_drops(const PixelGrid& grid, std::uint32_t seed) {
 
 printed_parts::Program program_of_drops(const pipeline::ResolvedMachine& resolved, std::span<const RunsView> planes,
                                         std::vector<std::uint32_t>& numbers) {
-  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
   LayerCycle cycle;
   cycle.layer = printed_parts::kLayer.index;
   cycle.layers = 9;
   cycle.bottom_nm = printed_parts::kLayer.bottom;
   cycle.thickness_nm = printed_parts::kLayer.thickness;
-  write::ProgramBytes bytes;
+  program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   program::CompileScratch scratch;
   const auto count =
@@ -58,7 +58,7 @@ TEST_P(Drops, AreReplayedDropForDrop) {
     });
     const Levels levels = random_drops(resolved.grid.image, 7);
     std::array<Runs, 3> planes;
-    for (std::uint8_t k = 0; k < 3; ++k) at_least(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+    for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
     const auto program = program_of_drops(resolved, views, numbers);
@@ -84,23 +84,23 @@ TEST_P(Drops, AreReplayedDropForDrop) {
 }
 
 /// A machine whose head fires `most` drops of a pixel, `allowed` of them at its speed.
-pipeline::ResolvedMachine grey(const char* name, std::uint32_t most, std::uint32_t allowed) {
+pipeline::ResolvedMachine grey(const char* name, std::uint32_t maximum, std::uint32_t allowed) {
   return printed_parts::shipped(name, [&](Machine& machine) {
-    machine.head.most_drops = most;
+    machine.head.max_drops = maximum;
     const auto grid = program::make_head_grid(machine);
-    machine.head.highest_frequency_hz = machine.motion.scan_speed_mm_s * 1e6 / grid->place_nm * (allowed + 0.5);
+    machine.head.highest_frequency_hz = machine.motion.scan_speed_mm_s * 1e6 / grid->position_nm * (allowed + 0.5);
   });
 }
 
 class GreyDrops : public testing::TestWithParam<const char*> {};
 
 TEST_P(GreyDrops, AreReplayedDropForDrop) {
-  for (const auto& [most, allowed] : {std::pair{2u, 2u}, {3u, 3u}, {3u, 2u}, {7u, 7u}, {7u, 2u}, {15u, 15u}, {15u, 1u}}) {
-    const auto resolved = grey(GetParam(), most, allowed);
+  for (const auto& [maximum, allowed] : {std::pair{2u, 2u}, {3u, 3u}, {3u, 2u}, {7u, 7u}, {7u, 2u}, {15u, 15u}, {15u, 1u}}) {
+    const auto resolved = grey(GetParam(), maximum, allowed);
     ASSERT_EQ(resolved.grid.sweep_drops, allowed);
-    const Levels levels = random_drops(resolved.grid.image, most);
+    const Levels levels = random_drops(resolved.grid.image, maximum);
     std::array<Runs, 3> planes;
-    for (std::uint8_t k = 0; k < 3; ++k) at_least(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+    for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
     const auto program = program_of_drops(resolved, views, numbers);
@@ -111,36 +111,36 @@ TEST_P(GreyDrops, AreReplayedDropForDrop) {
       return machine->replay(program.text, printed_parts::kLayer, wanted, 0, 0);
     };
     const auto same = replay(resolved.machine, views);
-    ASSERT_TRUE(same.ok()) << most << " " << allowed << ": " << same.error().message;
+    ASSERT_TRUE(same.ok()) << maximum << " " << allowed << ": " << same.error().message;
     EXPECT_EQ(same->drops, program.count.drops);
     EXPECT_EQ(same->sweeps, numbers.size());
-    EXPECT_EQ(same->most_at_place, std::min(3u, allowed));
+    EXPECT_EQ(same->max_per_position, std::min(3u, allowed));
     EXPECT_EQ(same->added, program.count.added);
-    EXPECT_EQ(same->added > 0, allowed < std::min(3u, most));
+    EXPECT_EQ(same->added > 0, allowed < std::min(3u, maximum));
     EXPECT_FALSE(replay(resolved.machine, std::array<RunsView, 3>{views[0], views[1], views[1]}).ok());
     EXPECT_FALSE(replay(resolved.machine, std::span(views).first(2)).ok());
     const std::uint32_t fired = std::min(3u, allowed);
     if (fired < 2) continue;
     // A head that fires fewer drops, or slower.
     Machine fewer = resolved.machine;
-    fewer.head.most_drops = 2;
-    if (most == 3 && fired == 3) {  // as many bits
-      const auto told = replay(fewer, views);
-      ASSERT_FALSE(told.ok());
-      EXPECT_NE(told.error().message.find("drops at a place, the head has at most"), std::string::npos);
+    fewer.head.max_drops = 2;
+    if (maximum == 3 && fired == 3) {  // as many bits
+      const auto reported = replay(fewer, views);
+      ASSERT_FALSE(reported.ok());
+      EXPECT_NE(reported.error().message.find("drops at a place, the head has at most"), std::string::npos);
     }
     Machine slower = resolved.machine;
     slower.head.highest_frequency_hz *= (fired - 0.5) / (allowed + 0.5);
-    const auto told = replay(slower, views);
-    ASSERT_FALSE(told.ok());
-    EXPECT_NE(told.error().message.find("times a second; they can"), std::string::npos) << told.error().message;
+    const auto reported = replay(slower, views);
+    ASSERT_FALSE(reported.ok());
+    EXPECT_NE(reported.error().message.find("times a second; they can"), std::string::npos) << reported.error().message;
   }
 }
 
 TEST_P(GreyDrops, OfBlockedNozzlesAreMovedAndMadeUp) {
   for (const BlockedRule rule : {BlockedRule::kReport, BlockedRule::kNeighbour, BlockedRule::kSecondPass}) {
     auto resolved = printed_parts::shipped(GetParam(), [&](Machine& machine) {
-      machine.head.most_drops = 3;
+      machine.head.max_drops = 3;
       machine.head.highest_frequency_hz *= 2;
       machine.head.blocked = {4, 5, 9};
       machine.head.blocked_rule = rule;
@@ -148,7 +148,7 @@ TEST_P(GreyDrops, OfBlockedNozzlesAreMovedAndMadeUp) {
     ASSERT_GE(resolved.grid.sweep_drops, 2u);
     const Levels levels = random_drops(resolved.grid.image, 7);
     std::array<Runs, 3> planes;
-    for (std::uint8_t k = 0; k < 3; ++k) at_least(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+    for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
     const auto program = program_of_drops(resolved, views, numbers);
@@ -173,7 +173,7 @@ pipeline::ResolvedMachine six_drops(const char* dialect) {
   machine.dialect = dialect;
   machine.head.nozzles = 4;
   machine.head.pitch_um = 100;
-  machine.head.most_drops = 6;
+  machine.head.max_drops = 6;
   machine.motion.scan_speed_mm_s = 10;
   machine.bed.size_mm = {0.8, 0.4};
   auto resolved = pipeline::resolve_profile(machine);
@@ -192,7 +192,7 @@ std::string five_and_six(const pipeline::ResolvedMachine& resolved) {
   levels.end_row();
   levels.end_row();
   std::array<Runs, 6> planes;
-  for (std::uint8_t k = 0; k < 6; ++k) at_least(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
+  for (std::uint8_t k = 0; k < 6; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
   const std::vector<RunsView> views(planes.begin(), planes.end());
   std::vector<std::uint32_t> numbers;
   return program_of_drops(resolved, views, numbers).text;
@@ -213,9 +213,9 @@ TEST(GreyPrograms, OfPlanesAreSpeltByHand) {
   const std::vector<std::uint32_t> rows{3, 1, 1, 4, 1u << 31, 1u << 29, (1u << 31) | (1u << 29), 0};
   for (std::size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(word_at(text, grey + 4 * (6 + i)), rows[i]) << i;
   EXPECT_EQ(word_at(text, grey + 4 * 14), 0x4C03u);
-  write::ProgramBytes start;
+  program::ProgramBytes start;
   const auto resolved = six_drops("planes");
-  write::find_dialect("planes")->make_writer(resolved.machine, resolved.grid)->start(9, start);
+  program::find_dialect("planes")->make_writer(resolved.machine, resolved.grid)->start(9, start);
   const std::string begin(reinterpret_cast<const char*>(start.data()), start.size());
   EXPECT_EQ(begin.size(), 4u * 10);
   for (const auto& [word, value] : {std::pair{0u, 0x4C04u}, {1u, 8u}, {2u, 2u}, {3u, 9u}, {9u, 4u}})
@@ -236,7 +236,7 @@ TEST(GreyPrograms, OfRawAreSpeltByHand) {
 }
 
 // Three sweeps over the same steps in one direction; without two of them their ways there and back are saved.
-TEST(AddedSweeps, TakeTheTimeOfTheirWays) {
+TEST(AddedSweeps, TakeTheTimeOfTheirPaths) {
   for (const bool both : {false, true}) {
     const auto resolved = printed_parts::shipped("jet1000", [&](Machine& machine) { machine.motion.both_directions = both; });
     const auto& motion = resolved.machine.motion;
@@ -264,7 +264,7 @@ TEST(AddedSweeps, TakeTheTimeOfTheirWays) {
 }
 
 // Two places of two sweeps each: without the second ones the head would run there over the first place and back over the other.
-TEST(AddedSweeps, AreComparedWithSweepsThatRunBothWays) {
+TEST(AddedSweeps, AreComparedWithSweepsThatRunBothDirections) {
   const auto resolved = printed_parts::shipped("jet1000", [](Machine& machine) { machine.motion.both_directions = true; });
   const auto machine =
       replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());

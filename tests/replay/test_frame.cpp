@@ -21,8 +21,8 @@ struct Framed {
       : resolved(printed_parts::shipped(name, change)),
         machine(*replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows(),
                                                kFramedLayers)) {
-    const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
-    write::ProgramBytes bytes;
+    const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+    program::ProgramBytes bytes;
     writer->start(kFramedLayers, bytes);
     start.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     bytes.clear();
@@ -47,20 +47,20 @@ TEST(Frame, OfEachProfileIsTakenWithAndWithoutABase) {
 }
 
 // A line of the BrundleFab may be missing where each layer says it again, or where it is for a person's eyes.
-TEST(Frame, LinesThatAreLeftOutAreTold) {
+TEST(Frame, LinesThatAreLeftOutAreReported) {
   for (const char* name : {"nuferbj", "hp45", "oasis", "reprap-inkjet", "brundlefab"}) {
     const Framed framed(name, [](Machine& m) { m.powder.base_layers = 3; });
     const bool bar = framed.resolved.machine.dialect == "brundlefab";
-    std::size_t told = 0;
+    std::size_t reported = 0;
     for (std::size_t at = 0; at < framed.start.size();) {
       const std::size_t end = framed.start.find('\n', at) + 1;
       const std::string line = framed.start.substr(at, end - at),
                         fault = framed.fault(framed.start.substr(0, at) + framed.start.substr(end));
-      told += !fault.empty();
+      reported += !fault.empty();
       EXPECT_TRUE(!fault.empty() || bar || line[0] == ';') << name << ": " << line;
       at = end;
     }
-    EXPECT_GE(told, bar ? 4u : 3u) << name;
+    EXPECT_GE(reported, bar ? 4u : 3u) << name;
   }
 }
 
@@ -84,7 +84,7 @@ TEST(Frame, HeadersSayTheHeadAndTheImage) {
   }
 }
 
-TEST(Frame, UnitsPlacesAndZerosAreHeld) {
+TEST(Frame, UnitsPositionsAndZerosAreHeld) {
   const Framed hp45("hp45", [](Machine& m) { m.powder.base_layers = 3; });
   const auto replaced = [&](const std::string& from, const std::string& to) {
     std::string text = hp45.start;

@@ -26,15 +26,15 @@ Difference port_difference(const ResolvedMachine& resolved, const RunsView& imag
   EXPECT_EQ(port.unknown, 0u);
   std::vector<bool> once(std::size_t{grid.columns()} * grid.rows());
   Difference difference;
-  for (const auto& seen : port.shown) {
+  for (const auto& detected : port.shown) {
     for (std::uint32_t n = 0; n < 300; ++n) {
-      if (!seen.nozzles[n]) continue;
-      const Pixel pixel = pixel_of(resolved, machine, seen, 299 - n);
+      if (!detected.nozzles[n]) continue;
+      const Pixel pixel = pixel_of(resolved, machine, detected, 299 - n);
       ++difference.fired;
       const bool wanted = printed_parts::is_set(image, pixel.first, pixel.second);
-      const std::size_t place = wanted ? static_cast<std::size_t>(pixel.second * grid.columns() + pixel.first) : 0;
-      difference.added += !wanted || once[place];
-      if (wanted) once[place] = true;
+      const std::size_t position = wanted ? static_cast<std::size_t>(pixel.second * grid.columns() + pixel.first) : 0;
+      difference.added += !wanted || once[position];
+      if (wanted) once[position] = true;
     }
   }
   difference.missing = set_pixels(image) - (difference.fired - difference.added);
@@ -139,17 +139,17 @@ TEST(Hp45, BurstsOfTheClockFallWithinAPixelOfTheImage) {
   port.clocked = true;
   port.tick_us = 2;
   port.run(program_of(resolved, image).text);
-  std::uint64_t drops = 0, beside = 0;
-  for (const auto& seen : port.fired) {
+  std::uint64_t drops = 0, neighbour = 0;
+  for (const auto& detected : port.fired) {
     for (std::uint32_t n = 0; n < 300; ++n) {
-      if (!seen.nozzles[n]) continue;
-      const Pixel at = pixel_of(resolved, virtual_machine, seen, 299 - n);
+      if (!detected.nozzles[n]) continue;
+      const Pixel at = pixel_of(resolved, virtual_machine, detected, 299 - n);
       ++drops;
       const auto set = [&](int aside) { return printed_parts::is_set(image, at.first + aside, at.second); };
-      beside += !set(0) && !set(-1) && !set(1);
+      neighbour += !set(0) && !set(-1) && !set(1);
     }
   }
-  EXPECT_EQ(beside, 0u);
+  EXPECT_EQ(neighbour, 0u);
   EXPECT_NEAR(static_cast<double>(drops) / static_cast<double>(set_pixels(image)), 1, 0.03);
 }
 
@@ -187,7 +187,7 @@ TEST(Hp45, SweepsThatStartWhereTheControllerCannotCountStartAtZero) {
   }
 }
 
-TEST(Oasis, SpreadersThatStartBesideTheGantryAreRefused) {
+TEST(Oasis, SpreadersThatStartNextToTheGantryAreRefused) {
   Machine machine = shipped_by_name("oasis");
   machine.powder.roller_axis = "Y";
   const auto refused = resolve_profile(machine);

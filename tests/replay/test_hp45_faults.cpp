@@ -16,7 +16,7 @@ TEST(Hp45, PlantedFaultsAreFound) {
   const SlottedDisc disc({20, 20});
   const Lines& sound = disc.lines;
   ASSERT_TRUE(disc.verdict_of(sound).ok());
-  const std::size_t first = place_of_line(sound, "SBR"), second_sweep = place_of_line(sound, "BCL", 1);
+  const std::size_t first = index_of_line(sound, "SBR"), second_sweep = index_of_line(sound, "BCL", 1);
   const std::size_t sweep_1 =
       first + static_cast<std::size_t>(std::find_if(sound.begin() + static_cast<std::ptrdiff_t>(first), sound.end(),
                                                     [](const auto& l) { return l[0] == 'G'; }) -
@@ -60,22 +60,22 @@ TEST(Hp45, PlantedFaultsAreFound) {
       {"a swath is missing",
        [&](Lines& l) {
          l.erase(l.begin() + static_cast<std::ptrdiff_t>(second_sweep),
-                 l.begin() + static_cast<std::ptrdiff_t>(place_of_line(l, "SBR", -1)) + 3);
+                 l.begin() + static_cast<std::ptrdiff_t>(index_of_line(l, "SBR", -1)) + 3);
        }},
       {"a sweep's movement is missing", [&](Lines& l) { erase(l, sweep_1); }},
-      {"300 dpi", [&](Lines& l) { l[place_of_line(l, "SDP")] = "SDP Es"; }},
-      {"half the density", [&](Lines& l) { l[place_of_line(l, "SDN")] = "SDN y"; }},
-      {"another encoder", [&](Lines& l) { l[place_of_line(l, "SER")] = "SER Es"; }},
-      {"one row of nozzles", [&](Lines& l) { l[place_of_line(l, "SSID")] = "SSID B"; }},
-      {"a buffer that is kept", [&](Lines& l) { l[place_of_line(l, "BMOD")] = "BMOD B"; }},
-      {"no wait before the lines", [&](Lines& l) { erase(l, place_of_line(l, "G4", 0)); }},
+      {"300 dpi", [&](Lines& l) { l[index_of_line(l, "SDP")] = "SDP Es"; }},
+      {"half the density", [&](Lines& l) { l[index_of_line(l, "SDN")] = "SDN y"; }},
+      {"another encoder", [&](Lines& l) { l[index_of_line(l, "SER")] = "SER Es"; }},
+      {"one row of nozzles", [&](Lines& l) { l[index_of_line(l, "SSID")] = "SSID B"; }},
+      {"a buffer that is kept", [&](Lines& l) { l[index_of_line(l, "BMOD")] = "BMOD B"; }},
+      {"no wait before the lines", [&](Lines& l) { erase(l, index_of_line(l, "G4", 0)); }},
       {"no wait behind the sweep",
        [&](Lines& l) {
-         erase(l, place_of_line(l, "G4", 2));
-         erase(l, place_of_line(l, "G4", 1));
+         erase(l, index_of_line(l, "G4", 2));
+         erase(l, index_of_line(l, "G4", 1));
        }},
-      {"the encoder is not zeroed", [&](Lines& l) { erase(l, place_of_line(l, "SEP")); }},
-      {"the encoder is zeroed elsewhere", [&](Lines& l) { l[place_of_line(l, "SEP")] = "SEP A"; }},
+      {"the encoder is not zeroed", [&](Lines& l) { erase(l, index_of_line(l, "SEP")); }},
+      {"the encoder is zeroed elsewhere", [&](Lines& l) { l[index_of_line(l, "SEP")] = "SEP A"; }},
       {"lines before the head is at its start",
        [&](Lines& l) {
          std::rotate(l.begin() + static_cast<std::ptrdiff_t>(first) - 4, l.begin() + static_cast<std::ptrdiff_t>(first),
@@ -122,7 +122,7 @@ TEST(Hp45, EncoderFarFinerThanPixelsIsFoundWhereTheProfileNamesNone) {
   Lines lines = disc.lines;
   const auto sound = disc.verdict_of(lines);
   ASSERT_TRUE(sound.ok()) << sound.error().message;
-  lines[place_of_line(lines, "SER")] = "SER GM4";  // 25,400
+  lines[index_of_line(lines, "SER")] = "SER GM4";  // 25,400
   const auto printed = disc.verdict_of(lines);
   ASSERT_FALSE(printed.ok());
   EXPECT_NE(printed.error().message.find("far more than pixels of 42.3 um need"), std::string::npos) << printed.error().message;

@@ -55,17 +55,17 @@ class Hp45Stream {
   std::vector<Shown> shown;
 
   void say(const std::string& command, const std::string& rest) {
-    if (controller_.execute(command, rest).empty()) text += command + " " + rest + "\n";
+    if (controller_.execute(command, rest).ok()) text += command + " " + rest + "\n";
   }
   void go(std::int64_t counts) {
     text += fmt::format("G1 X{:.6f} F15000\nG4 P0\n", static_cast<double>(counts) * 25.4 / 600);
     controller_.move(static_cast<double>(counts) * kCountUm, [&](const replay::hp45::Controller::Firing& firing) {
-      const double least = std::min(firing.from_um, firing.to_um), most = std::max(firing.from_um, firing.to_um);
-      for (auto k = static_cast<std::int64_t>(std::ceil(least / kCountUm));
-           firing.steady && static_cast<double>(k) * kCountUm < most; ++k) {
+      const double minimum = std::min(firing.from_um, firing.to_um), maximum = std::max(firing.from_um, firing.to_um);
+      for (auto k = static_cast<std::int64_t>(std::ceil(minimum / kCountUm));
+           firing.steady && static_cast<double>(k) * kCountUm < maximum; ++k) {
         std::string nozzles;
-        for (std::uint32_t place = 0; place < 300; ++place) {
-          nozzles += ((*firing.burst)[place / 64] >> (63 - place % 64) & 1) != 0 ? '1' : '0';
+        for (std::uint32_t position = 0; position < 300; ++position) {
+          nozzles += ((*firing.burst)[position / 64] >> (63 - position % 64) & 1) != 0 ? '1' : '0';
         }
         shown.emplace_back(static_cast<int>(firing.row), k, nozzles);
       }
@@ -87,25 +87,25 @@ std::string in_base64(std::int64_t value) {
 
 // Ways of an idle controller are not walked count by count: 4,000 of 2 km, which are 1.9e11 counts. Behind them it fires as
 // behind a short one of the same counts, modulo the 50 that a measure of speed takes.
-TEST(Hp45, LongWaysOfAnIdleControllerChangeNothing) {
+TEST(Hp45, LongPathsOfAnIdleControllerChangeNothing) {
   const auto fired = [](std::int64_t counts, int times) {
     replay::hp45::Controller controller;
-    std::string seen;
+    std::string detected;
     const auto watch = [&](const replay::hp45::Controller::Firing& firing) {
-      seen += fmt::format("{} {} {:.3f} {:.3f} {}\n", firing.row, firing.line, firing.from_um, firing.to_um, firing.steady);
+      detected += fmt::format("{} {} {:.3f} {:.3f} {}\n", firing.row, firing.line, firing.from_um, firing.to_um, firing.steady);
     };
     for (int i = 0; i < times; ++i) {
       controller.move(static_cast<double>(counts) * Hp45Stream::kCountUm, watch);
       controller.move(0, watch);
     }
-    EXPECT_EQ(controller.execute("SER", "JY"), "");
-    EXPECT_EQ(controller.execute("SEP", "A"), "");
+    EXPECT_TRUE(controller.execute("SER", "JY").ok());
+    EXPECT_TRUE(controller.execute("SEP", "A").ok());
     for (const char* line : {"B9A ", "D6A ", "F3A "}) {
       const char nozzles = line[0] == 'D' ? 'B' : 'A';
-      EXPECT_EQ(controller.execute("SBR", line + std::string(50, nozzles)), "");
+      EXPECT_TRUE(controller.execute("SBR", line + std::string(50, nozzles)).ok());
     }
     controller.move(60'000, watch);
-    return seen;
+    return detected;
   };
   const std::string once = fired(150, 1);
   EXPECT_NE(once, "");
@@ -117,7 +117,7 @@ TEST(Hp45, DecoderAndPortAgreeOnRandomStreams) {
   std::size_t points = 0;
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
     program::testing::Random random(seed);
-    const auto below = [&](std::uint32_t most) { return static_cast<std::int64_t>(random() % most); };
+    const auto below = [&](std::uint32_t maximum) { return static_cast<std::int64_t>(random() % maximum); };
     Hp45Stream stream;
     stream.go(below(800) - 400);
     for (int turn = 0; turn < 6; ++turn) {
@@ -137,9 +137,9 @@ TEST(Hp45, DecoderAndPortAgreeOnRandomStreams) {
     port.tick_us = 10;
     port.run(stream.text);
     std::vector<Shown> shown;
-    for (const auto& seen : port.shown) {
-      if (seen.steady)
-        shown.emplace_back(seen.row, std::llround(seen.along_um / Hp45Stream::kCountUm), seen.nozzles.to_string());
+    for (const auto& detected : port.shown) {
+      if (detected.steady)
+        shown.emplace_back(detected.row, std::llround(detected.along_um / Hp45Stream::kCountUm), detected.nozzles.to_string());
     }
     for (auto* one : {&shown, &stream.shown}) {
       std::stable_sort(one->begin(), one->end(),

@@ -97,10 +97,10 @@ TEST(M578, SweepsWithoutARampAreFiredEitherWay) {
   }
 }
 
-TEST(M578, ProgramsTellTheFirmwareThatTheyAreFor) {
+TEST(M578, ProgramsStateTheFirmwareThatTheyAreFor) {
   const auto resolved = printed_parts::shipped("reprap-inkjet", [](Machine&) {});
-  write::ProgramBytes bytes;
-  write::find_dialect("m578")->make_writer(resolved.machine, resolved.grid)->start(9, bytes);
+  program::ProgramBytes bytes;
+  program::find_dialect("m578")->make_writer(resolved.machine, resolved.grid)->start(9, bytes);
   const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   EXPECT_NE(text.find("for RepRapFirmware 1.09r to 3.4 built with SUPPORT_INKJET\n"), std::string::npos) << text;
 }

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "stages/write/program/program_text.h"
+#include "stages/program/program_text.h"
 #include "tests/program/machines.h"
 #include "tests/replay/printed_parts.h"
 
@@ -70,8 +70,8 @@ TEST(PowderCycle, PowderThatIsSpreadOverTheDropsIsFound) {
     LayerCycle cycle;
     cycle.bottom_nm = printed_parts::kLayer.bottom;
     cycle.thickness_nm = printed_parts::kLayer.thickness;
-    write::ProgramBytes bytes;
-    write::put_powder_cycle(bench.resolved.machine, cycle, bytes);
+    program::ProgramBytes bytes;
+    program::put_powder_cycle(bench.resolved.machine, cycle, bytes);
     const std::string moves(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     std::string text = bench.program.text;
     const std::size_t at = text.find(moves);
@@ -86,15 +86,15 @@ TEST(PowderCycle, PowderThatIsSpreadOverTheDropsIsFound) {
   }
 }
 
-TEST(PowderCycle, AHeadThatWaitsBesideItsPlaceIsFound) {
+TEST(PowderCycle, AHeadThatWaitsNextToItsPositionIsFound) {
   for (const char* name : kCycleMachines) {
     const CycleBench bench(name);
     const double waits = bench.resolved.machine.motion.safe_mm[0];
-    const std::string there = fmt::format("X{:.4f} ", waits), beside = fmt::format("X{:.4f} ", waits + 1);
+    const std::string there = fmt::format("X{:.4f} ", waits), neighbour = fmt::format("X{:.4f} ", waits + 1);
     std::string text = bench.program.text;
     const std::size_t last = text.rfind(there);
     ASSERT_NE(last, std::string::npos) << name;
-    text.replace(last, there.size(), beside);
+    text.replace(last, there.size(), neighbour);
     EXPECT_NE(bench.fault(text).find("and the next layer finds it at"), std::string::npos) << name << bench.fault(text);
   }
 }
@@ -108,7 +108,7 @@ TEST(PowderCycle, AVatThatTheMachineDoesNotHaveIsFound) {
 }
 
 // A roller on the gantry moves as the head's axis does.
-TEST(PowderCycle, RollersOnTheGantryAreSeen) {
+TEST(PowderCycle, RollersOnTheGantryAreDetected) {
   for (const char* name : {"nuferbj", "hp45", "reprap-inkjet"}) {
     const CycleBench bench(name, [](Machine& m) { m.powder.roller_axis = m.motion.x_axis; });
     EXPECT_EQ(bench.fault(bench.program.text), "") << name;
@@ -184,7 +184,7 @@ TEST(PowderCycle, FeedingToAHeightAndALayerThatEndsRelativeAreFound) {
 }
 
 // SerialGRBL.py, NewLayer: 0.25 mm below the top of a layer from 0.7 to 0.8 mm, and 0.25 mm beside 1.1 layers fed.
-TEST(PowderCycle, WherePistonsStandWhilePowderIsSpreadIsHeld) {
+TEST(PowderCycle, WherePistonsAreWhilePowderIsSpreadIsHeld) {
   const CycleBench bench("oasis");
   ASSERT_EQ(bench.fault(bench.program.text), "");
   const auto replaced = [&](const std::string& from, const std::string& to) {

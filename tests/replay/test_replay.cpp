@@ -9,12 +9,11 @@
 #include <filesystem>
 #include <regex>
 
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/raster/raster.h"
-#include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 #include "tests/replay/printed_parts.h"
 
@@ -60,20 +59,20 @@ TEST(Replay, PrintsTheImageBitForBitOnEveryShippedProfile) {
 }
 
 /// A closed part as large as asked across its larger side, standing in the middle of a bed; nothing if it is not closed.
-struct Standing {
+struct AxisPositions {
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
   Box bounds;
 };
 
-Standing scaled(const Part& part, double side_mm, const Machine& machine) {
+AxisPositions scaled(const Part& part, double side_mm, const Machine& machine) {
   const double factor =
       side_mm * 1e6 / static_cast<double>(std::max({part.bounds.width(), part.bounds.depth(), std::int64_t{1}}));
   const auto point = [&](const Point3& p) {
     const auto nm = [&](Nm v) { return static_cast<Nm>(std::llround(v * factor)); };
     return Point3{nm(p.x), nm(p.y), nm(p.z)};
   };
-  Standing made;
+  AxisPositions made;
   for (const Mesh& mesh : part.meshes) {
     Mesh& own = made.meshes.emplace_back(mesh);
     own.bounds = {};
@@ -127,15 +126,15 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedProfile) {
     for (const ResolvedMachine& resolved : machines) {
       // 16 mm are 500,000 pixels of 1200 dpi, a quarter of them under a sanitizer; the coarse machines print larger parts.
       const double dots = 25.4e6 / resolved.grid.line_nm;
-      Standing standing =
+      AxisPositions axis_positions =
           scaled(*part, std::min(kSideMm * 1200 / dots, 0.6 * resolved.machine.bed.size_mm[0]), resolved.machine);
-      const auto rasterizer =
-          raster::Rasterizer::build(standing.meshes, standing.instances, resolved.grid.image, FillRule::kNonzero, false, true);
+      const auto rasterizer = raster::Rasterizer::build(axis_positions.meshes, axis_positions.instances, resolved.grid.image,
+                                                        FillRule::kNonzero, false, true);
       ASSERT_TRUE(rasterizer.ok());
       raster::LayerScratch scratch;
       Runs runs;
       for (const double share : {0.07, 0.46, 0.83}) {
-        const auto plane = static_cast<Nm>(static_cast<double>(standing.bounds.height()) * share);
+        const auto plane = static_cast<Nm>(static_cast<double>(axis_positions.bounds.height()) * share);
         rasterizer->layer(raster::Engine::kContours, plane, scratch, runs);
         const Written program = printed_parts::program_of(resolved, runs);
         const auto printed = printed_parts::verified(resolved, runs, program);
@@ -152,9 +151,9 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedProfile) {
 TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
   for (std::uint32_t seed = 0; seed < 120; ++seed) {
     Random random(seed);
-    const auto dialects = write::dialects();
-    const write::Dialect& dialect = dialects[seed % dialects.size()];
-    Machine machine = program::testing::small_machine(std::min(2 + random() % 140, dialect.most_nozzles), 90, 100, 100);
+    const auto dialects = program::dialects();
+    const program::Dialect& dialect = dialects[seed % dialects.size()];
+    Machine machine = program::testing::small_machine(std::min(2 + random() % 140, dialect.max_nozzles), 90, 100, 100);
     machine.dialect = dialect.id;
     const bool x = random() % 2 == 0;
     machine.mounting.tilt_deg = std::array{90.0, 45.0, 31.0, 120.0}[random() % 4];
@@ -183,16 +182,16 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
 }
 
 /// Whether a fault says where: a swath and a step of it, or that the first of them has not been reached.
-bool tells_the_place(const std::string& fault) {
-  static const std::regex place(
+bool names_the_position(const std::string& fault) {
+  static const std::regex position(
       "layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath|powder cycle"
       "|line [0-9]+ across, place [0-9]+ along, which no swath comes over): .*");
-  return std::regex_match(fault, place);
+  return std::regex_match(fault, position);
 }
 
 TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
   std::vector<ResolvedMachine> machines;
-  for (const write::Dialect& dialect : write::dialects()) {
+  for (const program::Dialect& dialect : program::dialects()) {
     Machine machine = program::testing::small_machine(12, 90, 100, 100);
     machine.dialect = dialect.id;
     program::testing::fit_firmware(machine);
@@ -217,7 +216,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
       const auto printed = printed_parts::verified(resolved, runs, {program.text.substr(0, length), program.count});
       ASSERT_FALSE(printed.ok()) << name << " cut to " << length;
       EXPECT_EQ(printed.error().fault, Fault::kVerification);
-      EXPECT_TRUE(tells_the_place(printed.error().message)) << name << ": " << printed.error().message;
+      EXPECT_TRUE(names_the_position(printed.error().message)) << name << ": " << printed.error().message;
       before_all += printed.error().message.find("before its first swath") != std::string::npos;
     }
     EXPECT_LT(before_all * 4, cuts) << name;  // where the bed, the roller and the vats move
@@ -226,9 +225,9 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     other[20][40] ^= 1;
     const auto printed = printed_parts::verified(resolved, runs_of(other), program);
     ASSERT_FALSE(printed.ok());
-    EXPECT_TRUE(tells_the_place(printed.error().message)) << printed.error().message;
+    EXPECT_TRUE(names_the_position(printed.error().message)) << printed.error().message;
     EXPECT_NE(printed.error().message.find("column 40, row 20"), std::string::npos) << name << ": " << printed.error().message;
-    if (number < write::dialects().size()) {
+    if (number < program::dialects().size()) {
       EXPECT_NE(printed.error().message.find("layer 7, swath 1, step 40: "), std::string::npos) << printed.error().message;
     }
     // Any byte of the vectors changed: never a crash, hardly ever unnoticed, and the place told.
@@ -240,7 +239,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
       const auto replayed = printed_parts::verified(resolved, runs, edited);
       unnoticed += replayed.ok();
       if (!replayed.ok()) {
-        EXPECT_TRUE(tells_the_place(replayed.error().message)) << name << " byte " << at << ": " << replayed.error().message;
+        EXPECT_TRUE(names_the_position(replayed.error().message)) << name << " byte " << at << ": " << replayed.error().message;
       }
     }
     EXPECT_LT(unnoticed * 3, tried) << name;  // numbers of speeds and of swaths print the same

@@ -32,16 +32,16 @@ const struct {
     {"brundlefab", {"G1 Y", "G10 L1 P0 ", "G28 Y0", "G90", "T0", "T1 P", "G1 X400"}},
 };
 
-TEST(Tampering, WhatIsLeftOutIsTold) {
+TEST(Tampering, WhatIsLeftOutIsReported) {
   for (const auto& [machine, harmless] : kTampered) {
     const TamperBench bench(machine);
-    ASSERT_EQ(bench.told(bench.program.text), "") << machine;
+    ASSERT_EQ(bench.reported(bench.program.text), "") << machine;
     std::size_t tried = 0, taken = 0;
     for (std::size_t i = 0; i < bench.pieces.size(); ++i) {
       const std::string& piece = bench.pieces[i];
       if (piece[0] == ';') continue;
       ++tried;
-      if (!bench.told(bench.with(i, "")).empty()) continue;
+      if (!bench.reported(bench.with(i, "")).empty()) continue;
       ++taken;
       const bool named = std::ranges::any_of(harmless, [&](const std::string& begin) { return piece.starts_with(begin); });
       EXPECT_TRUE(named) << machine << ", piece " << i << ": " << piece.substr(0, 40);
@@ -63,7 +63,7 @@ std::vector<std::string> greater_by_one(const std::string& line) {
   return changed;
 }
 
-TEST(Tampering, OtherNumbersAreTold) {
+TEST(Tampering, OtherNumbersAreReported) {
   for (const char* machine : {"nuferbj", "hp45", "oasis", "reprap-inkjet"}) {
     const TamperBench bench(machine);
     std::size_t tried = 0;
@@ -71,7 +71,7 @@ TEST(Tampering, OtherNumbersAreTold) {
       const std::string& line = bench.pieces[i];
       if ((line[0] != 'G' && line[0] != 'M') || line.starts_with("M117")) continue;
       for (const std::string& other : greater_by_one(line)) {
-        EXPECT_NE(bench.told(bench.with(i, other)), "") << machine << ": " << other;
+        EXPECT_NE(bench.reported(bench.with(i, other)), "") << machine << ": " << other;
         ++tried;
       }
     }
@@ -80,14 +80,14 @@ TEST(Tampering, OtherNumbersAreTold) {
 }
 
 // 16 um, or 64 of what is counted, in the second byte of each number.
-TEST(Tampering, OtherNumbersOfRecordsAreTold) {
+TEST(Tampering, OtherNumbersOfRecordsAreReported) {
   for (const char* machine : {"xaar128-raw", "jet1000", "jet1000-grey"}) {
     const TamperBench bench(machine);
     for (std::size_t i = 0; i < bench.pieces.size(); ++i) {
       for (std::size_t at = 1; at < bench.head_bytes(bench.pieces[i]); at += 4) {
         std::string other = bench.pieces[i];
         other[at] = static_cast<char>(other[at] ^ 64);
-        EXPECT_NE(bench.told(bench.with(i, other)), "") << machine << ", piece " << i << ", byte " << at;
+        EXPECT_NE(bench.reported(bench.with(i, other)), "") << machine << ", piece " << i << ", byte " << at;
       }
     }
   }

@@ -121,7 +121,7 @@ def requests(browser):
     return [url for url in urls if not url.startswith(("file://", "data:", "blob:"))]
 
 
-def look(browser, page, layer, shots, only_open):
+def inspection(browser, page, layer, shots, only_open):
     said = {}
     for domain in ("Page", "Runtime", "Log", "Network"):
         browser.call(domain + ".enable")
@@ -164,10 +164,10 @@ def look(browser, page, layer, shots, only_open):
         browser.click("#warnings button")
         steps["warning"] = browser.value(STATE)
         said["warning"] = browser.value("document.querySelector('#warnings button').textContent")
-    said["places"] = browser.value("[...document.querySelectorAll('#places button')].map(b => b.textContent)")
-    if said["places"]:
+    said["locations"] = browser.value("[...document.querySelectorAll('#places button')].map(b => b.textContent)")
+    if said["locations"]:
         browser.click("#places li:last-child button")
-        steps["place"] = browser.value(STATE)
+        steps["position"] = browser.value(STATE)
         # Each frame of the picture in pixels of the image: left, top, right, bottom.
         said["frames"] = browser.value("(() => { const s = laminaReport.state, v = document.getElementById('view'), h = laminaReport.head,"
                                        " r = h.pixel_mm[1] / h.pixel_mm[0];"
@@ -176,7 +176,7 @@ def look(browser, page, layer, shots, only_open):
     browser.value("document.querySelector('#files').open = true")
     browser.settle()
     # Every picture has the shape of its place: a circle is one. And each plot says what it is.
-    said["stretched"] = browser.value("[...document.querySelectorAll('canvas')].map(c => { const b = c.getBoundingClientRect();"
+    said["scaled"] = browser.value("[...document.querySelectorAll('canvas')].map(c => { const b = c.getBoundingClientRect();"
                                       " return (c.width / c.height) / (b.width / b.height); })")
     said["labels"] = browser.value("[...document.querySelectorAll('canvas')].map(c => c.getAttribute('aria-label'))")
     said["file_rows"] = browser.value("document.querySelectorAll('#files tr').length")
@@ -215,7 +215,7 @@ def main():
         try:
             target = browser.call("Target.createTarget", url="about:blank")["targetId"]
             browser.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-            json.dump(look(browser, sys.argv[1], int(sys.argv[2]), shots, "--open" in sys.argv), sys.stdout)
+            json.dump(inspection(browser, sys.argv[1], int(sys.argv[2]), shots, "--open" in sys.argv), sys.stdout)
         finally:
             browser.process.kill()
             browser.process.wait()

@@ -61,17 +61,17 @@ inline GcodeFile read_gcode(const std::string& text) {
       char* end = nullptr;
       const double value = std::strtod(word.c_str() + 1, &end);
       const std::string letters = "XYZEF";
-      const auto place = letters.find(word[0]);
+      const auto position = letters.find(word[0]);
       if (word.size() > 1 && *end != 0) wrong("not a number: " + word);
       if (word.size() > 1 && word.find_first_not_of("0123456789.-", 1) != std::string::npos)
         wrong("not a plain decimal: " + word);
       if ((command == "G0" || command == "G1" || command == "G92")) {
-        if (place == std::string::npos || word.size() < 2) {
+        if (position == std::string::npos || word.size() < 2) {
           wrong("unknown letter");
           continue;
         }
-        at[place] = value;
-        given[place] = true;
+        at[position] = value;
+        given[position] = true;
       }
     }
     if (command == "M83") relative = true;

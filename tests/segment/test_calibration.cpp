@@ -105,17 +105,17 @@ TEST(Prediction, PoresOfTable16) {
   }
 }
 
-TEST(Prediction, AThinStretchLongerThanTheStabilisationDistanceIsWarnedOf) {
+TEST(Prediction, AThinIntervalLongerThanTheStabilisationDistanceIsWarnedOf) {
   Segmentation s = of_configuration(4.4, 100, 1, 0.43);
   const Calibration& anet = anet_a8_calibration();
   EXPECT_TRUE(warnings(s, anet).empty());
   s.thin_mm = 4.5;
   ASSERT_EQ(warnings(s, anet).size(), 1);
-  EXPECT_NE(warnings(s, anet)[0].find("at most 4.45 mm"), std::string::npos) << warnings(s, anet)[0];
+  EXPECT_NE(warnings(s, anet)[0].text.find("at most 4.45 mm"), std::string::npos) << warnings(s, anet)[0].text;
   s.thin_mm = 1.5;
   s.thick_speed = 100;
   ASSERT_EQ(warnings(s, anet).size(), 1);
-  EXPECT_NE(warnings(s, anet)[0].find("75 %"), std::string::npos) << warnings(s, anet)[0];
+  EXPECT_NE(warnings(s, anet)[0].text.find("75 %"), std::string::npos) << warnings(s, anet)[0].text;
 }
 
 TEST(Prediction, WrongParametersAreNamedInOneLine) {

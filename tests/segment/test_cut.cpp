@@ -83,7 +83,7 @@ TEST(CutLine, LawsHoldForRandomLines) {
     cut.thin = between(1, small ? 6 : 5'000'000);
     cut.thick = between(1, small ? 6 : 5'000'000);
     cut.origin = between(small ? -9 : -90'000'000, small ? 9 : 90'000'000);
-    cut.least_end = between(0, 1) == 0 ? 0 : cut.thick / 2;
+    cut.min_end = between(0, 1) == 0 ? 0 : cut.thick / 2;
     const std::int64_t from = between(small ? -40 : -400'000'000, small ? 40 : 400'000'000);
     const std::int64_t to = from + between(1, small ? 60 : 100'000'000);
     const auto list = pieces(cut, from, to);
@@ -91,14 +91,14 @@ TEST(CutLine, LawsHoldForRandomLines) {
     ASSERT_FALSE(list.empty());
     ASSERT_EQ(list.front().begin, from);
     ASSERT_EQ(list.back().end, to);
-    std::int64_t least_thin = INT64_MAX;
+    std::int64_t min_thin = INT64_MAX;
     for (std::size_t k = 0; k < list.size(); ++k) {
       ASSERT_LT(list[k].begin, list[k].end);
       if (k > 0) {
         ASSERT_EQ(list[k].begin, list[k - 1].end);
         ASSERT_NE(list[k].thickness, list[k - 1].thickness);
       }
-      if (list[k].thickness == Thickness::kThin) least_thin = std::min(least_thin, list[k].end - list[k].begin);
+      if (list[k].thickness == Thickness::kThin) min_thin = std::min(min_thin, list[k].end - list[k].begin);
     }
     if (cut.rule == CutRule::kGrid) {
       ASSERT_EQ(list, fukuda(from, to, cut));
@@ -107,9 +107,9 @@ TEST(CutLine, LawsHoldForRandomLines) {
       ASSERT_EQ(list.front().thickness, Thickness::kThick);
       ASSERT_EQ(list.back().thickness, Thickness::kThick);
       if (list.size() > 1) {
-        ASSERT_EQ(least_thin, cut.thin);
-        ASSERT_GE(list.front().end - list.front().begin, std::max<std::int64_t>(cut.least_end, 1));
-        ASSERT_GE(list.back().end - list.back().begin, std::max<std::int64_t>(cut.least_end, 1));
+        ASSERT_EQ(min_thin, cut.thin);
+        ASSERT_GE(list.front().end - list.front().begin, std::max<std::int64_t>(cut.min_end, 1));
+        ASSERT_GE(list.back().end - list.back().begin, std::max<std::int64_t>(cut.min_end, 1));
       }
       for (std::size_t k = 1; k + 1 < list.size(); ++k) {
         if (list[k].thickness == Thickness::kThick) {
@@ -121,8 +121,8 @@ TEST(CutLine, LawsHoldForRandomLines) {
       // --- as many as fit
       if (cut.rule == CutRule::kThickEnds) {
         const auto count = static_cast<std::int64_t>(list.size() / 2);
-        const std::int64_t least = 2 * std::max<std::int64_t>(cut.least_end, 1);
-        ASSERT_GT((count + 1) * cut.thin + count * cut.thick + least, to - from);
+        const std::int64_t minimum = 2 * std::max<std::int64_t>(cut.min_end, 1);
+        ASSERT_GT((count + 1) * cut.thin + count * cut.thick + minimum, to - from);
         ASSERT_LE(std::abs((list.front().end - from) - (to - list.back().begin)), list.size() == 1 ? to - from : 1);
       }
     }
@@ -138,7 +138,7 @@ TEST(CutLine, LawsHoldForRandomLines) {
   }
 }
 
-TEST(CutLine, LengthsOfTheSpeedTestGiveOneThinStretchBetweenEqualEnds) {
+TEST(CutLine, LengthsOfTheSpeedTestGiveOneThinIntervalBetweenEqualEnds) {
   LineCut cut{CutRule::kThickEnds, 30'000'000, 10'000'000, 0, 5'000'000};
   const std::vector<Piece> whole = {{0, 10'000'000, Thickness::kThick},
                                     {10'000'000, 40'000'000, Thickness::kThin},
@@ -170,7 +170,7 @@ Toolpaths zigzag(std::int32_t first, std::int32_t count, double degrees) {
   return paths;
 }
 
-TEST(ExpandToolpaths, SegmentedLinesAreAllLaidOneWayWhateverLiesBetweenThem) {
+TEST(ExpandToolpaths, SegmentedLinesAreAllDepositedOneDirectionRegardlessOfWhatIsBetweenThem) {
   for (const double degrees : {0.0, 90.0, 37.0, 135.0}) {
     for (std::uint32_t continuous = 1; continuous <= 4; ++continuous) {
       const Toolpaths paths = zigzag(-3, 20, degrees);
@@ -183,7 +183,7 @@ TEST(ExpandToolpaths, SegmentedLinesAreAllLaidOneWayWhateverLiesBetweenThem) {
       std::uint32_t segmented = 0;
       std::int32_t last_line = kNoLine;
       Point2 at{};
-      for_each_stretch(paths, cut, [&](const Stretch& s) {
+      for_each_interval(paths, cut, [&](const PathInterval& s) {
         if (!s.jump) {
           ASSERT_EQ(s.from, at);
         }
@@ -207,7 +207,7 @@ TEST(ExpandToolpaths, SegmentedLinesAreAllLaidOneWayWhateverLiesBetweenThem) {
 TEST(ExpandToolpaths, PlainPathsComeOutAsTheyAreStored) {
   const Toolpaths paths = zigzag(0, 9, 12);
   std::vector<Point2> points;
-  for_each_stretch(paths, LayerCut{}, [&](const Stretch& s) {
+  for_each_interval(paths, LayerCut{}, [&](const PathInterval& s) {
     EXPECT_EQ(s.jump, points.empty());
     if (s.jump) points.push_back(s.from);
     points.push_back(s.to);
@@ -215,7 +215,7 @@ TEST(ExpandToolpaths, PlainPathsComeOutAsTheyAreStored) {
   EXPECT_TRUE(std::equal(points.begin(), points.end(), paths.point.begin(), paths.point.end()));
 }
 
-TEST(ExpandToolpaths, ClosedCurvesAreCutIntoWholePeriodsFromTheMiddleOfAThickStretch) {
+TEST(ExpandToolpaths, ClosedCurvesAreCutIntoWholePeriodsFromTheMiddleOfAThickInterval) {
   std::mt19937 random(5);
   for (int turn = 0; turn < 300; ++turn) {
     const int corners = 3 + static_cast<int>(random() % (turn % 2 == 0 ? 400 : 5));
@@ -235,19 +235,19 @@ TEST(ExpandToolpaths, ClosedCurvesAreCutIntoWholePeriodsFromTheMiddleOfAThickStr
     cut.line.rule = std::array{CutRule::kGrid, CutRule::kThickEnds, CutRule::kAligned}[turn % 3];
     cut.line.thin = 300'000 + random() % 3'000'000;
     cut.line.thick = 300'000 + random() % 3'000'000;
-    cut.line.least_end = random() % 2'000'000;
+    cut.line.min_end = random() % 2'000'000;
     if (turn % 4 != 0) cut.shift = static_cast<std::int64_t>(random() % 80'000'000) - 40'000'000;
-    std::vector<std::pair<Thickness, double>> stretches;
+    std::vector<std::pair<Thickness, double>> intervals;
     Point2 begin{}, at{};
-    for_each_stretch(paths, cut, [&](const Stretch& s) {
-      ASSERT_EQ(s.jump, stretches.empty());
+    for_each_interval(paths, cut, [&](const PathInterval& s) {
+      ASSERT_EQ(s.jump, intervals.empty());
       if (s.jump) begin = s.from;
       if (!s.jump) {
         ASSERT_EQ(s.from, at);
       }
       at = s.to;
-      if (stretches.empty() || stretches.back().first != s.thickness) stretches.push_back({s.thickness, 0});
-      stretches.back().second += expand_detail::distance(s.from, s.to);
+      if (intervals.empty() || intervals.back().first != s.thickness) intervals.push_back({s.thickness, 0});
+      intervals.back().second += expand_detail::distance(s.from, s.to);
     });
     EXPECT_EQ(at, begin) << "stays closed";
     // It begins where it is stored to begin, or as far along as the shift says.
@@ -259,19 +259,19 @@ TEST(ExpandToolpaths, ClosedCurvesAreCutIntoWholePeriodsFromTheMiddleOfAThickStr
 
     const double slack = 4 + corners;  // ends of stretches are rounded to the nm
     const auto periods = static_cast<std::int64_t>(length / static_cast<double>(cut.line.thin + cut.line.thick));
-    ASSERT_EQ(static_cast<std::int64_t>(stretches.size()), 2 * periods + 1) << turn;
+    ASSERT_EQ(static_cast<std::int64_t>(intervals.size()), 2 * periods + 1) << turn;
     double sum = 0;
-    for (std::size_t i = 0; i < stretches.size(); ++i) {
-      sum += stretches[i].second;
-      ASSERT_EQ(stretches[i].first, i % 2 == 0 ? Thickness::kThick : Thickness::kThin);
+    for (std::size_t i = 0; i < intervals.size(); ++i) {
+      sum += intervals[i].second;
+      ASSERT_EQ(intervals[i].first, i % 2 == 0 ? Thickness::kThick : Thickness::kThin);
       if (periods == 0) continue;
       const double thick = length / static_cast<double>(periods) - static_cast<double>(cut.line.thin);
-      const bool end = i == 0 || i + 1 == stretches.size();
+      const bool end = i == 0 || i + 1 == intervals.size();
       const double expected = i % 2 == 1 ? static_cast<double>(cut.line.thin) : end ? thick / 2 : thick;
-      ASSERT_NEAR(stretches[i].second, expected, slack + static_cast<double>(periods)) << turn << ", stretch " << i;
+      ASSERT_NEAR(intervals[i].second, expected, slack + static_cast<double>(periods)) << turn << ", stretch " << i;
       ASSERT_GE(expected, static_cast<double>(i % 2 == 1 ? cut.line.thin : end ? cut.line.thick / 2 : cut.line.thick) - 1);
     }
-    EXPECT_NEAR(sum, length, slack + 2 * static_cast<double>(stretches.size()));
+    EXPECT_NEAR(sum, length, slack + 2 * static_cast<double>(intervals.size()));
   }
 }
 

@@ -18,26 +18,26 @@ DesignLimits limits() {
   return *found;
 }
 
-PoreWish porous(double porosity, double darcy) {
-  PoreWish wish;
-  if (porosity > 0) wish.porosity = porosity;
-  if (darcy > 0) wish.permeability_m2 = darcy * 9.869233e-13;
-  return wish;
+PoreTarget porous(double porosity, double darcy) {
+  PoreTarget target;
+  if (porosity > 0) target.porosity = porosity;
+  if (darcy > 0) target.permeability_m2 = darcy * 9.869233e-13;
+  return target;
 }
 
 /// The pores of a found design, and that the machine can lay it without a warning.
 void expect_sound(const Design& design) {
   EXPECT_TRUE(check(design.plan, 0.4).ok());
-  for (const std::string& line : warnings(design.plan, anet_a8_calibration())) ADD_FAILURE() << line;
+  for (const Warning& warning : warnings(design.plan, anet_a8_calibration())) ADD_FAILURE() << warning.text;
   EXPECT_GE(design.plan.thick_extrusion, 75);
   EXPECT_LE(design.plan.thick_extrusion, 125);
   EXPECT_GE(design.pores.width_mm, 0.0299);
   EXPECT_GE(design.pores.length_mm, 0.299);
   EXPECT_LE(design.plan.thin_mm, 4.45 / 2 + 1e-3);
   // A thin stretch begins and ends at the speed of the thick one; the machine comes near to what it is told.
-  const double slow = 15 * design.plan.thick_speed / 100, told = 15 * design.plan.thin_speed / 100;
-  EXPECT_GE(std::sqrt(slow * slow + 400 * design.plan.thin_mm), 0.76 * told);
-  EXPECT_LE(design.plan.continuous, DesignLimits::kMostContinuous);
+  const double slow = 15 * design.plan.thick_speed / 100, reported = 15 * design.plan.thin_speed / 100;
+  EXPECT_GE(std::sqrt(slow * slow + 400 * design.plan.thin_mm), 0.76 * reported);
+  EXPECT_LE(design.plan.continuous, DesignLimits::kMaxContinuous);
 }
 
 TEST(SlotModel, AStraightSlotIsTheCubicLaw) {
@@ -93,7 +93,7 @@ TEST(SlotModel, WiderAndLongerPoresLetMoreThrough) {
   EXPECT_LT(rarer.porosity, middle.porosity);
 }
 
-TEST(DesignLimits, WhatIsAskedIsBroughtWithinThem) {
+TEST(DesignLimits, WhatIsRequestedIsBroughtWithinThem) {
   for (const double extrusion : {20.0, 90.0, 300.0}) {
     for (const double far : {-50.0, 50.0}) {
       const Choice choice = limits().nearest({far > 0 ? 9u : 0u, extrusion, far, far, far});
@@ -104,7 +104,7 @@ TEST(DesignLimits, WhatIsAskedIsBroughtWithinThem) {
   }
 }
 
-TEST(DesignLimits, WithoutWidthsOfRepeatedStretchesNothingIsDesigned) {
+TEST(DesignLimits, WithoutWidthsOfRepeatedIntervalsNothingIsDesigned) {
   Calibration calibration = anet_a8_calibration();
   calibration.repeated.clear();
   const auto none = DesignLimits::of(test::slow_printer(), calibration);
@@ -126,7 +126,7 @@ TEST(DesignLimits, WhatWasMeasuredIsNotBeyondIt) {
   EXPECT_LT(limits().beyond({1, 100, 1.5, 1.2, 0})[2], 0);
 }
 
-TEST(DesignSearch, WishesWithinTheTablesAreMet) {
+TEST(DesignSearch, TargetsWithinTheTablesAreMet) {
   for (const auto& [porosity, darcy] : {std::pair{0.24, 100.0}, {0.20, 60.0}, {0.18, 0.0}, {0.0, 40.0}, {0.0, 250.0}}) {
     const Design design = search(porous(porosity, darcy), limits(), {});
     EXPECT_LE(design.miss, 5e-3) << porosity << " " << darcy;
@@ -137,34 +137,34 @@ TEST(DesignSearch, WishesWithinTheTablesAreMet) {
 TEST(DesignSearch, OfManyTheOneThatWasMeasuredIsTaken) {
   const auto measured = limits().plan_of({1, 100, 1.5, 1.5, 0.01});
   ASSERT_TRUE(measured.ok());
-  const Slots slots = slots_of(limits().laid(*measured), 0.3);
-  PoreWish wish;
-  wish.permeability_m2 = slots.permeability_m2;
-  const Design design = search(wish, limits(), {});
+  const Slots slots = slots_of(limits().deposited(*measured), 0.3);
+  PoreTarget target;
+  target.permeability_m2 = slots.permeability_m2;
+  const Design design = search(target, limits(), {});
   EXPECT_LE(design.miss, 5e-3);
   EXPECT_LT(design.beyond, 0.02) << design.choice.thick_mm << " " << design.choice.thin_mm << " " << design.choice.gap_mm;
 }
 
 TEST(DesignSearch, PoresHaveTheirWidthAndLength) {
-  PoreWish wish;
-  wish.pore_width_mm = 0.12;
-  wish.pore_length_mm = 0.9;
-  const Design design = search(wish, limits(), {});
+  PoreTarget target;
+  target.pore_width_mm = 0.12;
+  target.pore_length_mm = 0.9;
+  const Design design = search(target, limits(), {});
   EXPECT_NEAR(design.pores.width_mm, 0.12, 0.0006);
   EXPECT_NEAR(design.pores.length_mm, 0.9, 0.0045);
   expect_sound(design);
 }
 
 TEST(DesignSearch, WhatCannotBeReachedIsApproached) {
-  const Design most = search(porous(0.6, 0), limits(), {});
-  EXPECT_GT(most.miss, 0.2);
-  expect_sound(most);
+  const Design maximum = search(porous(0.6, 0), limits(), {});
+  EXPECT_GT(maximum.miss, 0.2);
+  expect_sound(maximum);
   // Nothing else within the limits comes nearer.
   for (const double thin : {1.2, 1.8, 2.2})
     for (const double gap : {-0.01, 0.0, 0.018})
       for (const double extrusion : {75.0, 110.0, 125.0})
-        EXPECT_LE(slots_of(limits().laid(*limits().plan_of(limits().nearest({1, extrusion, 1, thin, gap}))), 0.3).porosity,
-                  most.slots.porosity + 1e-4);
+        EXPECT_LE(slots_of(limits().deposited(*limits().plan_of(limits().nearest({1, extrusion, 1, thin, gap}))), 0.3).porosity,
+                  maximum.slots.porosity + 1e-4);
   const Design far = search(porous(0, 1e5), limits(), {});
   EXPECT_GT(far.miss, 0.5);
   expect_sound(far);
@@ -174,7 +174,7 @@ TEST(DesignSearch, TheRatioOfABetterComputationMovesThePlan) {
   const Design plain = search(porous(0.24, 100), limits(), {}), corrected = search(porous(0.24, 100), limits(), {0.99, 0.8});
   EXPECT_LE(corrected.miss, 5e-3);
   EXPECT_NEAR(corrected.slots.permeability_m2, 100 * 9.869233e-13, 1e-12);
-  EXPECT_NEAR(slots_of(limits().laid(corrected.plan), 0.3).permeability_m2, 125 * 9.869233e-13, 2e-12);
+  EXPECT_NEAR(slots_of(limits().deposited(corrected.plan), 0.3).permeability_m2, 125 * 9.869233e-13, 2e-12);
   EXPECT_NE(plain.settings.spacing_sc_mm, corrected.settings.spacing_sc_mm);
   const Design again = search(porous(0.24, 100), limits(), {0.99, 0.8});
   EXPECT_EQ(again.settings.spacing_sc_mm, corrected.settings.spacing_sc_mm);
@@ -183,8 +183,8 @@ TEST(DesignSearch, TheRatioOfABetterComputationMovesThePlan) {
 
 TEST(DesignSearch, WhatIsKnownOfAPlanHoldsThereAndFadesAwayFromIt) {
   const DesignLimits bounds = limits();
-  const PoreWish wish = porous(0.21, 0);
-  const Design free = search(wish, bounds, {});
+  const PoreTarget target = porous(0.21, 0);
+  const Design free = search(target, bounds, {});
   const std::vector<RatioAt> here{{free.choice, {1.08, 0.7}}};
   // Of that plan what is known, of others something between that and nothing.
   const Design again = search(porous(0.21 * 1.08, 0), bounds, {}, {}, here);
@@ -194,7 +194,7 @@ TEST(DesignSearch, WhatIsKnownOfAPlanHoldsThereAndFadesAwayFromIt) {
   const Design far = search(porous(0.165, 0), bounds, {}, {3, 3}, here);
   EXPECT_LT(far.ratio.porosity, again.ratio.porosity);
   EXPECT_GT(far.ratio.permeability, again.ratio.permeability);
-  EXPECT_NEAR(search(wish, bounds, {}, {}, std::vector<RatioAt>{{free.choice, {1, 1}}}).slots.porosity, free.slots.porosity,
+  EXPECT_NEAR(search(target, bounds, {}, {}, std::vector<RatioAt>{{free.choice, {1, 1}}}).slots.porosity, free.slots.porosity,
               1e-6);
 }
 

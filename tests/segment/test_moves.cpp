@@ -38,24 +38,24 @@ TEST(LayerCut, DirectionsAreExactInQuarterTurnsAndTheSameHalfATurnApart) {
 
 TEST(LayerCut, BeginsAtTheSideOfThePartAndIsMovedByTheShift) {
   Segmentation plan;
-  CutPlace place;
-  EXPECT_FALSE(layer_cut(plan, place, part()).on);
-  place.on = true;
-  EXPECT_EQ(layer_cut(plan, place, part()).line.origin, 3 * kMm);
-  place.angle = kTurn / 4;
-  EXPECT_EQ(layer_cut(plan, place, part()).line.origin, 5 * kMm);
-  place.shift_mm = -0.25;
-  EXPECT_EQ(layer_cut(plan, place, part()).line.origin, 5 * kMm - 250'000);
-  EXPECT_EQ(layer_cut(plan, place, part()).shift, -250'000);
+  CutPosition position;
+  EXPECT_FALSE(layer_cut(plan, position, part()).on);
+  position.on = true;
+  EXPECT_EQ(layer_cut(plan, position, part()).line.origin, 3 * kMm);
+  position.angle = kTurn / 4;
+  EXPECT_EQ(layer_cut(plan, position, part()).line.origin, 5 * kMm);
+  position.shift_mm = -0.25;
+  EXPECT_EQ(layer_cut(plan, position, part()).line.origin, 5 * kMm - 250'000);
+  EXPECT_EQ(layer_cut(plan, position, part()).shift, -250'000);
 }
 
-TEST(LayerCut, ThinStretchesHaveTheirMiddlesOnTheLinesOfTheTurnedLayer) {
+TEST(LayerCut, ThinIntervalsHaveTheirMiddlesOnTheLinesOfTheTurnedLayer) {
   Segmentation plan;
-  CutPlace place;
-  place.on = true;
+  CutPosition position;
+  position.on = true;
   // Lines along x; those of the turned layer run along y, and across them is -x.
-  place.first_line = -7.0 * kMm;
-  EXPECT_EQ(layer_cut(plan, place, part()).line.origin, 7 * kMm - nm_of(plan.thin_mm) / 2);
+  position.first_line = -7.0 * kMm;
+  EXPECT_EQ(layer_cut(plan, position, part()).line.origin, 7 * kMm - nm_of(plan.thin_mm) / 2);
 }
 
 /// A wall and three lines of 20 mm, two of them segmented.
@@ -72,30 +72,30 @@ Toolpaths paths() {
   return made;
 }
 
-TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
+TEST(Moves, AreAllThatIsDepositedWithTheSpeedAndAreaOfTheirKind) {
   Segmentation plan;
-  CutPlace place;
-  place.on = true;
-  const LayerCut cut = layer_cut(plan, place, part());
+  CutPosition position;
+  position.on = true;
+  const LayerCut cut = layer_cut(plan, position, part());
   Extruder machine;
   const Layer layer{4, 1'000'000, 300'000};
   MoveTable table(plan, cut, machine, layer);
-  LaidSums sums;
+  DepositedSums sums;
   std::vector<BeadMove> moves;
   double length_mm = 0;
   const Toolpaths all = paths();
-  const bool whole = for_each_move(all, cut, table, sums, [&](const BeadMove& move) -> std::optional<LaidMove> {
+  const bool whole = for_each_move(all, cut, table, sums, [&](const BeadMove& move) -> std::optional<DepositedMove> {
     moves.push_back(move);
     const double length = std::hypot(mm(move.to.x - move.from.x), mm(move.to.y - move.from.y));
     length_mm += length;
-    return LaidMove{length, length * move.area_mm2};
+    return DepositedMove{length, length * move.area_mm2};
   });
   EXPECT_TRUE(whole);
   EXPECT_NEAR(length_mm, 80, 1e-9);
   EXPECT_EQ(sums.segments.lines, 2u);
   EXPECT_EQ(sums.segments.pieces, 2u);
   EXPECT_GT(sums.segments.thin, 0u);
-  EXPECT_EQ(sums.segments.stretches, 2 * sums.segments.thin + 2);  // thick at both ends
+  EXPECT_EQ(sums.segments.intervals, 2 * sums.segments.thin + 2);  // thick at both ends
   const double full = bead_area(0.4, 0.3);
   EXPECT_EQ(moves.front().speed_mm_s, machine.speed.wall_mm_s);
   EXPECT_EQ(moves.front().width, 400'000);
@@ -111,19 +111,19 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
 
   // A first layer is laid no faster than its limit, and a sink that stops is given nothing more.
   MoveTable first(plan, cut, machine, {0, 0, 300'000});
-  std::size_t laid = 0;
-  EXPECT_FALSE(for_each_move(all, cut, first, sums, [&](const BeadMove& move) -> std::optional<LaidMove> {
+  std::size_t deposited = 0;
+  EXPECT_FALSE(for_each_move(all, cut, first, sums, [&](const BeadMove& move) -> std::optional<DepositedMove> {
     if (move.kind == PathKind::kOuter) {
       EXPECT_EQ(move.speed_mm_s, machine.speed.first_layer_mm_s);
     }
-    if (++laid == 3) return std::nullopt;
-    return LaidMove{1, move.area_mm2};
+    if (++deposited == 3) return std::nullopt;
+    return DepositedMove{1, move.area_mm2};
   }));
-  EXPECT_EQ(laid, 3u);
+  EXPECT_EQ(deposited, 3u);
 }
 
 /// What is laid of 1 mm of wall of 0.4 x 0.3 mm, and how wide it is told to be.
-MoveTable::Entry wall_of(const Extruder& machine) {
+MoveTable::MoveEntry wall_of(const Extruder& machine) {
   const Segmentation plan;
   const LayerCut cut;
   MoveTable table(plan, cut, machine, {4, 1'000'000, 300'000});
@@ -149,44 +149,44 @@ TEST(Moves, OneVolumeIsTheProfilesAreaTimesItsFlowAndTheWidthsAreThoseOfThatVolu
   EXPECT_EQ(wall_of(machine).width, 400'000);
 }
 
-TEST(Moves, StretchesThatAccelerationCannotFollowAreCountedWithTheSpeedThatTheyReach) {
+TEST(Moves, IntervalsThatAccelerationCannotFollowAreCountedWithTheSpeedThatTheyReach) {
   Extruder machine;
   machine.speed.acceleration_mm_s2 = 400;
   machine.speed.corner_mm_s = 8;
-  ShortStretches shorts;
+  ShortIntervals shorts;
   SpeedCounter counter(machine, shorts);
   Nm at = 0;
-  const auto lay = [&](Thickness thickness, double length, double speed) {
+  const auto deposit = [&](Thickness thickness, double length, double speed) {
     const Nm to = at + static_cast<Nm>(nm_of(length));
     counter.add({{at, 0}, {to, 0}, PathKind::kRaster, thickness, 400'000, 0, false, 7}, length, speed);
     at = to;
   };
   // Half of 1.5 mm is left to speed up from 7.5 mm/s: sqrt(7.5^2 + 2 x 400 x 0.75) = 25.6 of 30 mm/s.
   for (int i = 0; i < 5; ++i) {
-    lay(Thickness::kThick, 1.5, 7.5);
-    lay(Thickness::kThin, i == 4 ? 1.7 : 1.5, 30);
+    deposit(Thickness::kThick, 1.5, 7.5);
+    deposit(Thickness::kThin, i == 4 ? 1.7 : 1.5, 30);
   }
-  lay(Thickness::kThick, 1.5, 7.5);
+  deposit(Thickness::kThick, 1.5, 7.5);
   counter.end();
   EXPECT_EQ(shorts.count, 5u);
   EXPECT_NEAR(shorts.shortest_mm, 1.5, 1e-12);
   EXPECT_NEAR(shorts.reached_mm_s, std::sqrt(7.5 * 7.5 + 400 * 1.7), 1e-9);
-  EXPECT_NEAR(shorts.told_mm_s, 30, 1e-12);
+  EXPECT_NEAR(shorts.commanded_mm_s, 30, 1e-12);
   // 2.2 mm are enough: 30^2 - 7.5^2 = 843.75 = 400 x 2.11. Corners of a curve do not divide a stretch.
   shorts = {};
-  lay(Thickness::kThick, 1.5, 7.5);
-  lay(Thickness::kThin, 1.1, 30);
-  lay(Thickness::kThin, 1.1, 30);
-  lay(Thickness::kThick, 1.5, 7.5);
+  deposit(Thickness::kThick, 1.5, 7.5);
+  deposit(Thickness::kThin, 1.1, 30);
+  deposit(Thickness::kThin, 1.1, 30);
+  deposit(Thickness::kThick, 1.5, 7.5);
   counter.end();
   EXPECT_EQ(shorts.count, 0u);
   // A line begins and ends with half of the speed of a corner; one that is not divided does not count.
-  lay(Thickness::kThin, 1, 30);
-  lay(Thickness::kThick, 1.5, 7.5);
+  deposit(Thickness::kThin, 1, 30);
+  deposit(Thickness::kThick, 1.5, 7.5);
   counter.end();
   EXPECT_EQ(shorts.count, 1u);
   EXPECT_NEAR(shorts.reached_mm_s, std::sqrt((4 * 4 + 7.5 * 7.5) / 2 + 400 * 1), 1e-9);
-  lay(Thickness::kThick, 0.01, 7.5);
+  deposit(Thickness::kThick, 0.01, 7.5);
   counter.end();
   EXPECT_EQ(shorts.count, 1u);
 }

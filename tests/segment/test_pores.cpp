@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/segment/laid/crossing.h"
-#include "stages/segment/laid/pores.h"
+#include "stages/segment/deposited/pores.h"
 #include "stages/segment/layer_cut.h"
+#include "stages/segment/pore_geometry.h"
 
 namespace lamina::segment {
 namespace {
@@ -31,7 +31,7 @@ Toolpaths parallel_lines(double distance_mm, int count, double cut_off_mm = 0) {
 LayerCut cut_along_x(const Segmentation& plan) {
   LayerCut cut;
   cut.on = true;
-  cut.line = {plan.rule, nm_of(plan.thin_mm), nm_of(plan.thick_mm), 0, nm_of(plan.least_end_mm)};
+  cut.line = {plan.rule, nm_of(plan.thin_mm), nm_of(plan.thick_mm), 0, nm_of(plan.min_end_mm)};
   return cut;
 }
 
@@ -39,7 +39,7 @@ PoreCounts pores_of(const Toolpaths& paths, const LayerCut& cut, const Segmentat
   PoreCounts counts;
   const ToolpathsView view = paths;
   PoreCounter counter(view, cut, plan, counts);
-  for_each_stretch(view, cut, [&](const Stretch& s) { counter.add(s); });
+  for_each_interval(view, cut, [&](const PathInterval& s) { counter.add(s); });
   counter.end();
   return counts;
 }
@@ -55,7 +55,7 @@ TEST(Pores, AreThoseThatTheDistanceOfTheLinesCloses) {
   EXPECT_NEAR(mean(pores.width_mm, pores.closed), 0.43 - (0.31 + 0.39) / 2, 1e-6);
 }
 
-TEST(Pores, BetweenLinesThatThickStretchesDoNotReachNoneCloses) {
+TEST(Pores, BetweenLinesThatThickIntervalsDoNotReachNoneCloses) {
   const Segmentation plan;
   const PoreCounts pores = pores_of(parallel_lines(2.4, 7), cut_along_x(plan), plan);
   EXPECT_EQ(pores.closed, 0u);
@@ -67,7 +67,7 @@ TEST(Pores, BetweenLinesThatThickStretchesDoNotReachNoneCloses) {
   EXPECT_EQ(pores_of(parallel_lines(last + 0.0001, 7), cut_along_x(plan), plan).closed, 0u);
 }
 
-TEST(Pores, NeedALineBesideAllOfThemAndRoom) {
+TEST(Pores, NeedALineNextToAllOfThemAndSpace) {
   Segmentation plan;
   // The neighbours end at 16 mm: the thin stretches from 15 to 16.5 mm have none.
   EXPECT_EQ(pores_of(parallel_lines(0.43, 7, 4), cut_along_x(plan), plan).closed, 3 * 4 * 2);
@@ -83,7 +83,7 @@ TEST(Pores, NeedALineBesideAllOfThemAndRoom) {
   EXPECT_EQ(grid.edges, 2 * 6 + 2 * 2);
 }
 
-TEST(Pores, LieBesideClosedCurvesToo) {
+TEST(Pores, LieNextToClosedCurvesToo) {
   Toolpaths paths;
   for (const int n : {0, 1, 2}) {
     const Nm in = n * 430'000;
@@ -102,7 +102,7 @@ TEST(Pores, LieBesideClosedCurvesToo) {
 }
 
 /// Lines of a square of 20 mm, 0.5 mm apart, and the middles of their thin stretches on every `period` of the lines across.
-TEST(Crossing, OnlyTheThinStretchesThatLieUnderOneAreCounted) {
+TEST(Crossing, OnlyTheThinIntervalsThatLieUnderOneAreCounted) {
   const Segmentation plan;  // 1.5 + 1.5 mm
   Toolpaths paths = parallel_lines(0.5, 41), above = paths;
   for (Point2& p : above.point) std::swap(p.x, p.y);
@@ -111,21 +111,22 @@ TEST(Crossing, OnlyTheThinStretchesThatLieUnderOneAreCounted) {
   over.along_y = 1;
   cut.line.origin = over.line.origin = -750'000;  // thin stretches have their middles on line 0 of the other layer
   struct Thin {
-    double place, low, high;
+    double position, low, high;
   };
   std::vector<Thin> lower, upper;
-  for_each_stretch(paths, cut, [&](const Stretch& s) {
+  for_each_interval(paths, cut, [&](const PathInterval& s) {
     if (s.thickness == Thickness::kThin)
       lower.push_back({mm(s.from.y), mm(std::min(s.from.x, s.to.x)), mm(std::max(s.from.x, s.to.x))});
   });
-  for_each_stretch(above, over, [&](const Stretch& s) {
+  for_each_interval(above, over, [&](const PathInterval& s) {
     if (s.thickness == Thickness::kThin)
       upper.push_back({mm(s.from.x), mm(std::min(s.from.y, s.to.y)), mm(std::max(s.from.y, s.to.y))});
   });
   std::uint64_t meet = 0;
   for (const Thin& a : lower) {
-    meet += std::ranges::any_of(
-        upper, [&](const Thin& b) { return a.low <= b.place && b.place <= a.high && b.low <= a.place && a.place <= b.high; });
+    meet += std::ranges::any_of(upper, [&](const Thin& b) {
+      return a.low <= b.position && b.position <= a.high && b.low <= a.position && a.position <= b.high;
+    });
   }
   PoreCounts counts;
   count_crossed(paths, cut, above, over, counts);

@@ -92,13 +92,13 @@ TEST(Gases, OneSampleByHand) {
 
 TEST(Gases, TheEquationIsWhatTheGradientAddsUpToAlongTheMedium) {
   // dp / dx = mu / k1 v + rho / k2 v^2 with v = v0 p0 / p and rho = rho0 p / p0, from the outlet backwards (Runge, Kutta).
-  const double k1 = 60 * kDarcy, k2 = 6e-6, length = 0.0255, outlet = 95000, told = 101325;
+  const double k1 = 60 * kDarcy, k2 = 6e-6, length = 0.0255, outlet = 95000, reported = 101325;
   const Fluid air{1.81e-5, 1.204};  // at `told`
   std::vector<FlowPoint> points;
   for (int i = 1; i <= 6; ++i) {
     const double v0 = 0.5 * i;
     const auto slope = [&](double p) {
-      const double v = v0 * told / p, rho = air.density_kg_m3 * p / told;
+      const double v = v0 * reported / p, rho = air.density_kg_m3 * p / reported;
       return air.viscosity_pa_s / k1 * v + rho / k2 * v * v;
     };
     double p = outlet;
@@ -110,7 +110,7 @@ TEST(Gases, TheEquationIsWhatTheGradientAddsUpToAlongTheMedium) {
     }
     points.push_back({v0, (p - outlet) / length});
   }
-  const auto gas = expanded(points, length, {outlet, told});
+  const auto gas = expanded(points, length, {outlet, reported});
   ASSERT_TRUE(gas.ok());
   const auto fit = fit_permeability(*gas, air);
   ASSERT_TRUE(fit.ok());

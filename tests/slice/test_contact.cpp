@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "stages/geometry/contours/contact.h"
-#include "stages/geometry/contours/meet.h"
-#include "stages/geometry/contours/tidy.h"
+#include "stages/geometry/contours/simplify.h"
 
 namespace lamina::test {
 namespace {
@@ -30,7 +29,7 @@ std::vector<std::uint32_t> groups_of(const Contours& contours) {
       for (std::size_t i = 0; i < n; ++i) {
         for (std::size_t j = c == d ? i + 1 : 0; j < m; ++j) {
           if (c == d && ((i + 1) % n == j || (j + 1) % n == i)) continue;
-          if (!stretches_meet(one[i], one[(i + 1) % n], other[j], other[(j + 1) % m])) continue;
+          if (!intervals_meet(one[i], one[(i + 1) % n], other[j], other[(j + 1) % m])) continue;
           group[c] = group[d] = 0;
           const std::uint32_t a = find(c), b = find(d);
           root[std::max(a, b)] = std::min(a, b);

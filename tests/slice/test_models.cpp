@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr double kNearNm = 1.5;
 
 struct Checked {
-  std::uint32_t parts = 0, layers = 0, united = 0;
+  std::uint32_t parts = 0, layers = 0, merged = 0;
   std::uint64_t pixels = 0, differing = 0;
 };
 
@@ -91,9 +91,9 @@ void check_part(const fs::path& file, std::int64_t layers, Checked& checked) {
   ASSERT_TRUE(slicer.ok()) << slicer.error().message;
 
   std::vector<slice::LayerContours> sliced(planes.size());
-  std::vector<slice::LayerReport> reports(planes.size());
+  std::vector<slice::SectionReport> reports(planes.size());
   tbb::parallel_for(std::size_t{0}, planes.size(), [&](std::size_t p) {
-    slice::LayerScratch scratch;
+    slice::SectionScratch scratch;
     auto report = slicer->layer(static_cast<std::uint32_t>(p), scratch, sliced[p]);
     if (report) reports[p] = *report;
   });
@@ -103,7 +103,7 @@ void check_part(const fs::path& file, std::int64_t layers, Checked& checked) {
   auto rasterizer = raster::Rasterizer::build(meshes, instances, grid, FillRule::kNonzero, false, true);
   ASSERT_TRUE(rasterizer.ok());
   raster::LayerScratch scratch;
-  slice::LayerScratch other;
+  slice::SectionScratch other;
   slice::LayerContours again;
   Runs bitmap;
   for (std::size_t p = 0; p < planes.size(); ++p) {
@@ -113,7 +113,7 @@ void check_part(const fs::path& file, std::int64_t layers, Checked& checked) {
     rasterizer->layer(raster::Engine::kContours, planes[p], scratch, bitmap);
     compare_with_bitmap(contours, bitmap, grid, checked);
     if (testing::Test::HasFailure()) return;
-    checked.united += reports[p].united;
+    checked.merged += reports[p].merged;
     ++checked.layers;
   }
   // One thread, backwards, with buffers that are full of another layer.
@@ -124,11 +124,11 @@ void check_part(const fs::path& file, std::int64_t layers, Checked& checked) {
   ++checked.parts;
 }
 
-void check_folder(const fs::path& folder, std::int64_t layers, std::uint32_t least_parts) {
+void check_folder(const fs::path& folder, std::int64_t layers, std::uint32_t min_parts) {
   Checked checked;
   for (const fs::path& file : part_files(folder)) check_part(file, layers, checked);
-  EXPECT_GE(checked.parts, least_parts);
-  std::cout << checked.parts << " parts, " << checked.layers << " layers (" << checked.united << " united): of "
+  EXPECT_GE(checked.parts, min_parts);
+  std::cout << checked.parts << " parts, " << checked.layers << " layers (" << checked.merged << " united): of "
             << checked.pixels << " set pixels " << checked.differing << " differ, all within " << kNearNm
             << " nm of a contour\n";
 }
@@ -166,7 +166,7 @@ TEST(SliceModels, VolumeIsAreaTimesThicknessAtThreeThicknesses) {
       options.fill_rule = FillRule::kPositive;
       const auto slicer = slice::Slicer::build(part->meshes, part->instances, body, planes, options);
       ASSERT_TRUE(slicer.ok());
-      slice::LayerScratch scratch;
+      slice::SectionScratch scratch;
       slice::LayerContours contours;
       const double thickness = static_cast<double>(part->bounds.height()) / static_cast<double>(layers);
       double sum = 0;

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "stages/geometry/contours/meet.h"
+#include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/simplify.h"
 #include "stages/load/load.h"
 #include "stages/slice/slice.h"
@@ -24,15 +24,15 @@ using Wide = __int128;
 bool is_beyond(Point2 p, Point2 a, Point2 b, Nm tolerance) {
   const Wide ux = std::int64_t{b.x} - a.x, uy = std::int64_t{b.y} - a.y, vx = std::int64_t{p.x} - a.x,
              vy = std::int64_t{p.y} - a.y;
-  const Wide along = ux * vx + uy * vy, length2 = ux * ux + uy * uy, most2 = Wide{tolerance} * tolerance;
-  if (along <= 0) return vx * vx + vy * vy > most2;
-  if (along >= length2) return (vx - ux) * (vx - ux) + (vy - uy) * (vy - uy) > most2;
+  const Wide along = ux * vx + uy * vy, length2 = ux * ux + uy * uy, max2 = Wide{tolerance} * tolerance;
+  if (along <= 0) return vx * vx + vy * vy > max2;
+  if (along >= length2) return (vx - ux) * (vx - ux) + (vy - uy) * (vy - uy) > max2;
   Wide area = ux * vy - uy * vx;
   if (area < 0) area = -area;
   // area^2 > most2 length2, without 128 bits running over: area / length > tolerance, whole part and rest
   const Wide whole = area / length2, rest = area % length2;  // area^2 / length2 = whole area + rest area / length2
   const Wide high = whole * area + rest * area / length2;    // rounded down
-  if (high != most2) return high > most2;
+  if (high != max2) return high > max2;
   return rest * area % length2 != 0;
 }
 
@@ -48,22 +48,22 @@ void compare_contour(std::span<const Point2> full, std::span<const Point2> less,
   measured.left += less.size();
   if (less.size() == full.size()) ++measured.whole, measured.of_whole += full.size();
   ASSERT_GE(less.size(), 3u);
-  std::vector<std::size_t> place;
-  for (std::size_t i = 0; i < full.size() && place.size() < less.size(); ++i) {
-    if (full[i] == less[place.size()]) place.push_back(i);
+  std::vector<std::size_t> position;
+  for (std::size_t i = 0; i < full.size() && position.size() < less.size(); ++i) {
+    if (full[i] == less[position.size()]) position.push_back(i);
   }
-  ASSERT_EQ(place.size(), less.size()) << "a point that is none of the full contour's, or out of order";
-  const std::size_t n = full.size(), count = place.size();
-  const auto stands_for = [&](std::size_t from, std::size_t to) {
+  ASSERT_EQ(position.size(), less.size()) << "a point that is none of the full contour's, or out of order";
+  const std::size_t n = full.size(), count = position.size();
+  const auto replaces = [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from + 1; i < (to > from ? to : to + n); ++i) {
       if (is_beyond(full[i % n], full[from], full[to], tolerance)) return false;
     }
     return true;
   };
-  for (std::size_t k = 0; k < count; ++k) ASSERT_TRUE(stands_for(place[k], place[(k + 1) % count])) << "moved further";
+  for (std::size_t k = 0; k < count; ++k) ASSERT_TRUE(replaces(position[k], position[(k + 1) % count])) << "moved further";
   if (count == 3 || count == n) return;
   for (std::size_t k = 0; k < count; ++k) {
-    ASSERT_FALSE(stands_for(place[(k + count - 1) % count], place[(k + 1) % count])) << "point " << k << " may go";
+    ASSERT_FALSE(replaces(position[(k + count - 1) % count], position[(k + 1) % count])) << "point " << k << " may go";
   }
 }
 
@@ -90,7 +90,7 @@ bool any_meet(const ContoursView& contours) {
   }
   for (std::size_t i = 0; i < edge.size(); ++i) {
     for (std::size_t j = i + 1; j < edge.size(); ++j) {
-      if (next[i] != j && next[j] != i && stretches_meet(edge[i][0], edge[i][1], edge[j][0], edge[j][1])) return true;
+      if (next[i] != j && next[j] != i && intervals_meet(edge[i][0], edge[i][1], edge[j][0], edge[j][1])) return true;
     }
   }
   return false;
@@ -178,7 +178,7 @@ TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
     SimplifyScratch scratch;
     simplify(less, 10'000, scratch);
     // 8 x 18 looks a point, then stretches of at most 7/8: 89 levels. All teeth looked at for each are 25,000 a point.
-    EXPECT_LT(scratch.looks, 400 * full.point.size());
+    EXPECT_LT(scratch.inspections, 400 * full.point.size());
     EXPECT_EQ(less.point.size(), static_cast<std::size_t>(2 * teeth + 1));
     Measured measured;
     compare(full, less, 10'000, measured);
@@ -241,7 +241,7 @@ void compare_part(const fs::path& file, std::int64_t layers, OfPart& found) {
     EXPECT_TRUE(slicer.ok());
     std::vector<slice::LayerContours> sliced(planes.size());
     tbb::parallel_for(std::size_t{0}, planes.size(), [&](std::size_t p) {
-      slice::LayerScratch scratch;
+      slice::SectionScratch scratch;
       EXPECT_TRUE(slicer->layer(static_cast<std::uint32_t>(p), scratch, sliced[p]).ok());
     });
     return sliced;

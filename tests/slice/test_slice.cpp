@@ -6,7 +6,6 @@
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
 #include "stages/geometry/contours/simplify.h"
-#include "stages/geometry/contours/tidy.h"
 #include "stages/slice/slice.h"
 #include "tests/raster/shapes.h"
 #include "tests/slice/contour_laws.h"
@@ -18,7 +17,7 @@ using slice::Edge;
 
 struct Sliced {
   slice::LayerContours contours;
-  slice::LayerReport report;
+  slice::SectionReport report;
 };
 
 Sliced sliced(const Triangles& triangles, Nm plane, slice::SliceOptions options = {}) {
@@ -28,7 +27,7 @@ Sliced sliced(const Triangles& triangles, Nm plane, slice::SliceOptions options 
   const std::vector<Nm> planes{plane};
   auto slicer = slice::Slicer::build(meshes, instances, body, planes, options);
   EXPECT_TRUE(slicer.ok());
-  slice::LayerScratch scratch;
+  slice::SectionScratch scratch;
   Sliced result;
   auto report = slicer->layer(0, scratch, result.contours);
   EXPECT_TRUE(report.ok()) << (report ? "" : report.error().message);
@@ -113,7 +112,7 @@ TEST(Slice, UnionFollowsTheFillRule) {
   EXPECT_EQ(area(joined({a, moved(a, {1000, 1000, 0})}), FillRule::kNonzero), 2e6);
 }
 
-TEST(Slice, WhatIsInContactIsUnitedWhereverItLies) {
+TEST(Slice, WhatIsInContactIsMergedWhereverItLies) {
   // Crossing boxes within a solid, within a hole of it, and within an island in that hole; whole ones beside them.
   const Triangles crossing = joined({box({0, 0, 0}, {100, 100, 1000}), box({50, 50, 0}, {150, 150, 1000})});
   const Triangles holes = reversed(moved(crossing, {1300, 300, 0}));
@@ -128,7 +127,7 @@ TEST(Slice, WhatIsInContactIsUnitedWhereverItLies) {
     slice::SliceOptions options;
     options.fill_rule = rule;
     const Sliced result = sliced(all, 500, options);
-    EXPECT_EQ(result.report.united, 4u);
+    EXPECT_EQ(result.report.merged, 4u);
     expect_clean(result.contours.contours, "crossing boxes");
     // The two boxes that are holes overlap in 50 x 50: there the winding number is -1, which nonzero takes for solid.
     EXPECT_EQ(square(result), area + (rule == FillRule::kNonzero ? 2 * 2500 : 0));
@@ -143,7 +142,7 @@ TEST(Slice, IslandsInHolesAlternate) {
   }
   const Sliced result = sliced(all, 500);
   EXPECT_EQ(result.contours.contours.size(), 9u);
-  EXPECT_EQ(result.report.united, 0u) << "contours that keep clear need no boolean operation";
+  EXPECT_EQ(result.report.merged, 0u) << "contours that keep clear need no boolean operation";
   expect_clean(result.contours.contours, "rings");
 }
 
@@ -191,12 +190,12 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
     std::vector<std::int64_t> planes;
     for (std::int64_t z = -6000; z < 6000; z += 1 + static_cast<std::int64_t>(random() % static_cast<unsigned>(spread)))
       planes.push_back(z);
-    const slice::PlaneIndex index(triangles, planes);
+    const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
     Buffer<std::uint32_t> found;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 200)) {
       found.clear();
-      index.find(p, found);
-      EXPECT_LE(found.size(), index.most_facets(p));
+      index.append(p, found);
+      EXPECT_LE(found.size(), index.max_found(p));
       std::vector<std::uint32_t> expected;
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         const auto [low, high] = std::minmax({triangles[t].a.z, triangles[t].b.z, triangles[t].c.z});
@@ -257,19 +256,19 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
           (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
       return area > 0 ? 1 : area < 0 ? -1 : 0;
     };
-    struct Stretch {
+    struct ContourSegment {
       Point2 a, b;
       std::uint32_t c, k, n;
     };
-    std::vector<Stretch> all;
+    std::vector<ContourSegment> all;
     for (std::uint32_t c = 0; c < contours.size(); ++c) {
       const auto n = static_cast<std::uint32_t>(contours[c].size());
       for (std::uint32_t k = 0; k < n; ++k) all.push_back({contours[c][k], contours[c][(k + 1) % n], c, k, n});
     }
     for (std::size_t p = 0; p < all.size(); ++p) {
       for (std::size_t q = p + 1; q < all.size(); ++q) {
-        const Stretch& s = all[p];
-        const Stretch& t = all[q];
+        const ContourSegment& s = all[p];
+        const ContourSegment& t = all[q];
         if (s.c == t.c && ((s.k + 1) % s.n == t.k || (t.k + 1) % t.n == s.k)) continue;
         const bool apart = std::max(s.a.x, s.b.x) < std::min(t.a.x, t.b.x) || std::max(t.a.x, t.b.x) < std::min(s.a.x, s.b.x) ||
                            std::max(s.a.y, s.b.y) < std::min(t.a.y, t.b.y) || std::max(t.a.y, t.b.y) < std::min(s.a.y, s.b.y);

@@ -20,13 +20,13 @@ using Tensor = std::array<std::array<double, 3>, 3>;
 constexpr std::uint32_t kFineCut = 3;
 
 /// All 48 ways, 24 turns and their mirrors.
-std::vector<stokes::Turn> all_ways() {
-  std::vector<stokes::Turn> ways;
+std::vector<stokes::Turn> all_turns() {
+  std::vector<stokes::Turn> paths;
   std::array<std::size_t, 3> from{0, 1, 2};
   do {
-    for (unsigned m = 0; m < 8; ++m) ways.push_back({from, {(m & 1) != 0, (m & 2) != 0, (m & 4) != 0}});
+    for (unsigned m = 0; m < 8; ++m) paths.push_back({from, {(m & 1) != 0, (m & 2) != 0, (m & 4) != 0}});
   } while (std::next_permutation(from.begin(), from.end()));
-  return ways;
+  return paths;
 }
 
 template <class Value>
@@ -72,7 +72,7 @@ Tensor expected(const Tensor& k, const stokes::Turn& way) {
 
 void expect_the_same_however_it_lies(const Lying& lying) {
   const Tensor k = tensor_of(lying);
-  for (const stokes::Turn& way : all_ways()) {
+  for (const stokes::Turn& way : all_turns()) {
     const Tensor found = tensor_of(lying.by(way)), wanted = expected(k, way);
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t b = 0; b < 3; ++b)
@@ -83,7 +83,7 @@ void expect_the_same_however_it_lies(const Lying& lying) {
 
 Voxels odd_blobs(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, unsigned seed) {
   std::mt19937 random(seed);
-  const auto some = [&](double most) { return most * static_cast<double>(random() % 1000) * 1e-3; };
+  const auto some = [&](double maximum) { return maximum * static_cast<double>(random() % 1000) * 1e-3; };
   std::vector<std::array<double, 4>> balls(7);
   for (auto& ball : balls) ball = {some(nx), some(ny), some(nz), 4 + some(4)};
   const auto off = [](std::uint32_t at, double centre, std::uint32_t size) {
@@ -101,7 +101,7 @@ TEST(CanonicalBox, BlobsHaveTheSameDigitsHoweverTheyLie) {
   expect_the_same_however_it_lies({odd_blobs(21, 27, 24, 6), {true, true, true}, {1000, 1000, 1000}});
 }
 
-TEST(CanonicalBox, AxesAreToldApartByTheirEdgesAndEnds) {
+TEST(CanonicalBox, AxesAreDistinguishedByTheirEdgesAndEnds) {
   expect_the_same_however_it_lies({odd_blobs(24, 24, 24, 7), {true, false, true}, {1000, 1000, 700}});
 }
 
@@ -129,17 +129,17 @@ TEST(CanonicalBox, WhatSymmetryForbidsIsNothing) {
     for (std::size_t b = 0; b < 3; ++b) EXPECT_EQ(k[a][b] != 0, a == b);
 }
 
-TEST(CanonicalBox, PlacesAreFoundBothWays) {
+TEST(CanonicalBox, PositionsAreFoundBothDirections) {
   const Lying lying{odd_blobs(9, 6, 12, 8), {}, {1000, 1000, 1000}};
   const VoxelStack box = lying.stack();
-  std::set<stokes::Place> seen;
+  std::set<stokes::CellIndex> detected;
   const Result<stokes::Canonical> canonical = stokes::Canonical::of(box, 0);
   ASSERT_TRUE(canonical.ok());
   const VoxelView turned = canonical->view();
   const stokes::Turn& turn = canonical->turn();
   EXPECT_EQ(turn.from[stokes::Canonical::kAxis], 0u);
   EXPECT_EQ(set_voxels(turned), set_voxels(box));
-  const auto solid = [](const VoxelView& of, const stokes::Place& at) {
+  const auto solid = [](const VoxelView& of, const stokes::CellIndex& at) {
     bool in = false;
     for (const std::uint32_t change : of.row(at[1], at[2])) in ^= change <= at[0];
     return in;
@@ -147,21 +147,21 @@ TEST(CanonicalBox, PlacesAreFoundBothWays) {
   for (std::uint32_t z = 0; z < box.nz; ++z) {
     for (std::uint32_t y = 0; y < box.ny; ++y) {
       for (std::uint32_t x = 0; x < box.nx; ++x) {
-        const stokes::Place at{x, y, z}, there = turn.in_turned(at, turned.size());
+        const stokes::CellIndex at{x, y, z}, there = turn.in_turned(at, turned.size());
         EXPECT_EQ(solid(turned, there), solid(box, at));
         EXPECT_EQ(turn.in_box(there, turned.size()), at);
-        seen.insert(there);
+        detected.insert(there);
       }
     }
   }
-  EXPECT_EQ(seen.size(), box.view().voxels());
+  EXPECT_EQ(detected.size(), box.view().voxels());
 }
 
 /// Inertia tells upstream from downstream: the end that the flow comes from stays.
 TEST(CanonicalBox, WhatInertiaBendsIsNotReversed) {
   const Lying lying{odd_blobs(12, 12, 12, 9), {true, true, true}, {1000, 1000, 1000}};
   std::set<bool> reversed;
-  for (const stokes::Turn& way : all_ways()) {
+  for (const stokes::Turn& way : all_turns()) {
     const VoxelStack box = lying.by(way).stack();
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_FALSE(stokes::Canonical::of(box, axis, false)->turn().backwards[2]);

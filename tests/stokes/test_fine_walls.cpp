@@ -31,7 +31,7 @@ stokes::Flow fine_flow_through(const VoxelView& fine, int axis, double tolerance
 }
 
 /// Walls at thirds of voxels: W^3 / 12 in all, up to the differences of second order.
-TEST(FineWalls, SlitsFollowTheCubicLawWhereverTheirWallsStand) {
+TEST(FineWalls, SlitsFollowTheCubicLawWhereverTheirWallsAre) {
   for (const double width : {8.0, 8 + 1 / 3.0, 8 + 2 / 3.0, 9.0}) {
     for (const double low : {1.0, 1 + 1 / 3.0, 1 + 2 / 3.0}) {
       const VoxelStack box = fine_box_of(1, 11, 1, [&](double, double y, double) { return y < low || y > low + width; });
@@ -90,7 +90,7 @@ double drag_of_spheres(const std::vector<std::array<double, 3>>& centres, double
 const std::vector<std::array<double, 3>> kSimple = {{0, 0, 0}}, kBody = {{0, 0, 0}, {0.5, 0.5, 0.5}},
                                          kFace = {{0, 0, 0}, {0.5, 0.5, 0}, {0.5, 0, 0.5}, {0, 0.5, 0.5}};
 
-TEST(FineWalls, TouchingSpheresAreAsPublishedWithinTheErrorThatIsTold) {
+TEST(FineWalls, TouchingSpheresAreAsPublishedWithinTheErrorThatIsReported) {
   struct Published {
     std::vector<std::array<double, 3>> centres;
     double share, drag;
@@ -104,10 +104,10 @@ TEST(FineWalls, TouchingSpheresAreAsPublishedWithinTheErrorThatIsTold) {
     const double radius = std::cbrt(3 * array.share / (4 * std::numbers::pi * count));
     EXPECT_NEAR(off, 0, array.within) << count;
     const double surface = 4 * std::numbers::pi * radius * radius * count / array.side;
-    EXPECT_LT(std::abs(off), stokes::least_error(1 - array.share, surface, kFiner)) << count;
+    EXPECT_LT(std::abs(off), stokes::error_floor(1 - array.share, surface, kFiner)) << count;
   }
-  EXPECT_EQ(stokes::least_error(0, 0.1, kFiner), 1) << "nothing is known of what does not flow";
-  EXPECT_EQ(stokes::least_error(1, 0, kFiner), 0);
+  EXPECT_EQ(stokes::error_floor(0, 0.1, kFiner), 1) << "nothing is known of what does not flow";
+  EXPECT_EQ(stokes::error_floor(1, 0, kFiner), 0);
 }
 
 TEST(FineWalls, AFilmThinnerThanAVoxelIsTight) {

@@ -139,7 +139,7 @@ TEST(Flow, EndsOfTheBoxAndHollowsAreClosed) {
   EXPECT_EQ(none.error().message, "there is no void for a fluid");
 }
 
-TEST(Flow, StopsWhenItIsTold) {
+TEST(Flow, StopsOnRequest) {
   const VoxelStack box = blobs(16, 3);
   const Result<stokes::Grid> grid = stokes::make_grid(box, 3);
   stokes::Field field = stokes::field_of(grid->cells);

@@ -7,10 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "stages/stokes/convection.h"
 #include "stages/stokes/flow.h"
 #include "stages/stokes/inertia.h"
-#include "stages/stokes/sweep.h"
+#include "stages/stokes/operator.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina {
@@ -94,22 +93,22 @@ TEST(Inertia, ConvectionTakesNoEnergy) {
 
 /// Vortices u = (sin x cos y, -cos x sin y), in each plane: (u . grad) u = (sin 2x, sin 2y) / 2, with an error of second order.
 /// Where each cell of a box without solid lies, found by going from neighbour to neighbour.
-std::vector<std::array<std::uint32_t, 3>> places_of(const stokes::Cells& cells) {
-  std::vector<std::array<std::uint32_t, 3>> place(cells.size(), {UINT32_MAX, 0, 0});
+std::vector<std::array<std::uint32_t, 3>> positions_of(const stokes::Cells& cells) {
+  std::vector<std::array<std::uint32_t, 3>> position(cells.size(), {UINT32_MAX, 0, 0});
   std::vector<std::uint32_t> waiting{0};
-  place[0] = {0, 0, 0};
+  position[0] = {0, 0, 0};
   while (!waiting.empty()) {
     const std::uint32_t i = waiting.back();
     waiting.pop_back();
     for (std::size_t a = 0; a < 3; ++a) {
       const std::uint32_t ahead = cells.neighbour[i][2 * a + 1];
-      if (place[ahead][0] != UINT32_MAX) continue;
-      place[ahead] = place[i];
-      place[ahead][a] = (place[i][a] + 1) % cells.box[a];
+      if (position[ahead][0] != UINT32_MAX) continue;
+      position[ahead] = position[i];
+      position[ahead][a] = (position[i][a] + 1) % cells.box[a];
       waiting.push_back(ahead);
     }
   }
-  return place;
+  return position;
 }
 
 TEST(Inertia, ConvectionIsThatOfVortices) {
@@ -120,17 +119,17 @@ TEST(Inertia, ConvectionIsThatOfVortices) {
       const int b = (a + 1) % 3;
       const double k = 2 * std::numbers::pi / n;
       Field u = stokes::field_of(grid.cells);
-      const auto places = places_of(grid.cells);
-      const auto place = [&](std::uint32_t i, int axis) { return places[i][static_cast<std::size_t>(axis)]; };
+      const auto positions = positions_of(grid.cells);
+      const auto position = [&](std::uint32_t i, int axis) { return positions[i][static_cast<std::size_t>(axis)]; };
       for (std::uint32_t i = 0; i < grid.cells.size(); ++i) {
-        const double x = k * place(i, a), y = k * place(i, b);  // of the cell's middle; faces are half a voxel further
+        const double x = k * position(i, a), y = k * position(i, b);  // of the cell's middle; faces are half a voxel further
         u[i][a] = static_cast<float>(std::sin(x + k / 2) * std::cos(y));
         u[i][b] = static_cast<float>(-std::cos(x) * std::sin(y + k / 2));
       }
       const Field force = convected(grid, u, u, 1);
       for (std::uint32_t i = 0; i < grid.cells.size(); ++i) {
         for (const int axis : {a, b}) {
-          const double by_hand = k * 0.5 * std::sin(2 * k * (place(i, axis) + 0.5));
+          const double by_hand = k * 0.5 * std::sin(2 * k * (position(i, axis) + 0.5));
           worst[n == 32 ? 1 : 0] = std::max(worst[n == 32 ? 1 : 0], std::abs(double{force[i][axis]} - by_hand) / k);
         }
       }
@@ -212,7 +211,7 @@ TEST(Inertia, SweepsToTheVelocityWanted) {
   }
   EXPECT_NEAR(apparent(grid, 0, points->back().force, 1e-4), points->back().velocity / points->back().force,
               3e-3 * points->back().velocity / points->back().force);
-  options.most_rounds = 1;
+  options.max_rounds = 1;
   const auto cut = stokes::sweep(grid, 0, 400, 4, options);
   ASSERT_TRUE(cut.ok());
   ASSERT_FALSE(cut->empty());

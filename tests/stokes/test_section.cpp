@@ -39,7 +39,7 @@ Solved solved(const VoxelStack& solid, int axis) {
 }
 
 stokes::Section section_through(const VoxelStack& solid, const Solved& run, int axis, std::uint32_t ends) {
-  return stokes::section_of({stokes::places_of(solid, 1), run.grid.cells.box, axis, axis}, run.grid.cells, run.field,
+  return stokes::section_of({stokes::positions_of(solid, 1), run.grid.cells.box, axis, axis}, run.grid.cells, run.field,
                             run.flow.permeability[static_cast<std::size_t>(axis)], ends);
 }
 
@@ -50,15 +50,15 @@ double mean_of(const Plane& plane) {
 TEST(Section, CellsLieWhereTheirNeighboursSay) {
   const VoxelStack solid = narrowed_slit();
   const stokes::Grid grid = *stokes::make_grid(solid, 4);
-  const auto places = stokes::places_of(solid, 1);
-  ASSERT_EQ(places.size(), grid.cells.size());
+  const auto positions = stokes::positions_of(solid, 1);
+  ASSERT_EQ(positions.size(), grid.cells.size());
   for (std::uint32_t i = 0; i < grid.cells.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
       const std::uint32_t above = grid.cells.neighbour[i][2 * a + 1];
       if (above == grid.cells.size()) continue;
-      auto expected = places[i];
+      auto expected = positions[i];
       expected[a] = (expected[a] + 1) % grid.cells.box[a];
-      ASSERT_EQ(places[above], expected);
+      ASSERT_EQ(positions[above], expected);
     }
   }
 }
@@ -75,7 +75,7 @@ TEST(Section, AsMuchPassesTheThroatAsTheWholeBox) {
   EXPECT_EQ(section.fastest[2], 9u) << "creeping flow is the same backwards: fastest between the tops of the bumps";
 }
 
-TEST(Section, TheFastestPlaceIsInBothPlanesAndSpeedIsNoLessThanVelocity) {
+TEST(Section, TheFastestPositionIsInBothPlanesAndSpeedIsNoLessThanVelocity) {
   const VoxelStack solid = narrowed_slit();
   const Solved run = solved(solid, 2);
   const stokes::Section section = section_through(solid, run, 2, 0);

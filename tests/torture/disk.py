@@ -32,7 +32,7 @@ def mount(folder, size_kb):
     subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size_kb}k", "none", folder], check=True)
 
 
-def judge(ran, words, tally, name, ends):
+def check(ran, words, tally, name, ends):
     """An end on a full disk: done, or exit 4 with a line that names a file."""
     if ran.code is None:
         tally.fault(name, "hangs", " ".join(words))
@@ -51,7 +51,7 @@ def full(program, job, ref, folder, size_kb, tally):
     used_kb = (used.f_blocks - used.f_bfree) * used.f_frsize // 1024
     subprocess.run(["mount", "-o", f"remount,size={used_kb + size_kb}k", folder], check=True)
     ran = program.run(job.begin, folder)
-    judge(ran, job.begin, tally, job.name, job.ends)
+    check(ran, job.begin, tally, job.name, job.ends)
     there = jobs.outputs(folder, job)
     if not job.over:
         kill.check_whole(there, ref, tally, job.name)
@@ -82,7 +82,7 @@ def limited(program, job, ref, folder, size_kb, tally):
         signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
 
     ran = program.run(job.begin, folder, preexec_fn=limit)
-    judge(ran, job.begin, tally, job.name, job.ends)
+    check(ran, job.begin, tally, job.name, job.ends)
     if not job.over:
         kill.check_whole(jobs.outputs(folder, job), ref, tally, job.name)
     ends = jobs.going_on_ends(job, jobs.outputs(folder, job), ref)

@@ -245,7 +245,7 @@ def reference(program, job, folder):
         assert files in (None, now), f"{job.name}: two whole runs differ"
         files = now
         seconds.append(ran.seconds)
-        in_flight = max(in_flight, ran.summary().get("most_layers_in_flight", 0))
+        in_flight = max(in_flight, ran.summary().get("max_layers_in_flight", 0))
     return Reference(files, sorted(seconds)[1], in_flight)
 
 

@@ -5,7 +5,7 @@ import signal
 import jobs
 from tally import Tally
 
-MOST_KILLS = 2  # before the run that is let finish
+MAX_KILLS = 2  # before the run that is let finish
 
 
 def cut(program, words, folder, ref, tally, name, draw, ends=0):
@@ -35,7 +35,7 @@ def one_trial(program, job, ref, folder, tally, draw):
         if ran.code != 0:
             tally.fault(job.name, "wrong", f"{' '.join(words)}: exit {ran.code}: {ran.error[-300:]}")
     words = job.begin
-    for _ in range(draw.randint(1, MOST_KILLS)):
+    for _ in range(draw.randint(1, MAX_KILLS)):
         ends = jobs.going_on_ends(job, jobs.outputs(folder, job), ref)
         kills += cut(program, words, folder, ref, tally, job.name, draw, ends)
         # Over an older job its files may still stand there.

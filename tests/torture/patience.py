@@ -75,7 +75,7 @@ def one_trial(program, name, words, folder, moment, tally):
         since = time.monotonic()
         ran = program.end(process, since, 60)
         waited = time.monotonic() - since
-        tally.most(name, "slowest_ms", round(waited * 1000))
+        tally.maximum(name, "slowest_ms", round(waited * 1000))
         if ran.code is None or waited > LONGEST:
             tally.fault(name, "hangs", f"{waited:.2f} s after a signal at {moment:.2f} s")
         elif ran.code not in (0, 130, -signal.SIGINT):

@@ -37,7 +37,7 @@ def deep_brackets(path):
         file.write("a=" + "[" * 100000 + "\n")
 
 
-PLACES = [pipe, folder, device, endless_line, deep_keys, deep_brackets]
+INPUTS = [pipe, folder, device, endless_line, deep_keys, deep_brackets]
 
 # Commands with X in place of a file that they read.
 READERS = [
@@ -55,7 +55,7 @@ OVER_JOBS = [["verify", "out"], ["report", "out", "-o", "o.html"], ["preview", "
              ["merge", "out", "-o", "out"]]
 
 
-def judge(ran, name, shown, tally, must_fail):
+def check(ran, name, shown, tally, must_fail):
     tally.trial(name)
     if ran.code is None:
         tally.fault(name, "hangs", shown)
@@ -68,13 +68,13 @@ def judge(ran, name, shown, tally, must_fail):
 
 
 def readers(program, work, tally):
-    for place in PLACES:
+    for position in INPUTS:
         for words in READERS:
             at = jobs.fresh(os.path.join(work, "read"))
-            place(os.path.join(at, "X"))
+            position(os.path.join(at, "X"))
             ran = program.run(words, at, SECONDS)
             # A folder is a fine list of parts for a batch, though an empty one.
-            judge(ran, f"{place.__name__} instead of what is read", " ".join(words), tally, must_fail=True)
+            check(ran, f"{position.__name__} instead of what is read", " ".join(words), tally, must_fail=True)
 
 
 def over_jobs(program, work, tally):
@@ -83,7 +83,7 @@ def over_jobs(program, work, tally):
     ran = program.run(begin, made)
     assert ran.code == 0, ran.error
     names = sorted(jobs.tree(made))
-    for place in PLACES[:4]:
+    for position in INPUTS[:4]:
         for name in names:
             if name.count("0000") and not name.split(os.sep)[-1].startswith("000001"):
                 continue  # one layer stands for all
@@ -92,9 +92,9 @@ def over_jobs(program, work, tally):
                 shutil.rmtree(at, ignore_errors=True)
                 shutil.copytree(made, at)
                 os.remove(os.path.join(at, name))
-                place(os.path.join(at, name))
+                position(os.path.join(at, name))
                 ran = program.run(words, at, SECONDS)
-                judge(ran, f"{place.__name__} in a finished job", f"{name}: {' '.join(words)}", tally, must_fail=words[0] == "verify")
+                check(ran, f"{position.__name__} in a finished job", f"{name}: {' '.join(words)}", tally, must_fail=words[0] == "verify")
 
 
 def main(program, settings, draw):

@@ -31,7 +31,7 @@ class Tally:
         if self.row(name)[kind] <= 3:
             self.examples.append(f"{self.title}, {name}: {kind}: {example}")
 
-    def most(self, name, column, value):
+    def maximum(self, name, column, value):
         self.row(name)[column] = max(self.row(name)[column], value)
 
     def faults(self):

@@ -6,7 +6,6 @@
 #include <cstdlib>
 
 #include "stages/pores/porosity.h"
-#include "stages/view/colour_scale.h"
 #include "stages/view/pore_picture.h"
 #include "tests/pores/boxes.h"
 
@@ -29,7 +28,7 @@ view::PorePicture picture_of(const VoxelStack& solid, const VoxelStack& through)
   view::PorePicture picture;
   picture.solid = solid;
   picture.through = through;
-  picture.place = {15, 10, 4};
+  picture.position = {15, 10, 4};
   return picture;
 }
 
@@ -72,7 +71,7 @@ TEST(PorePicture, TheBarOfLengthsIsAsLongAsItSays) {
 }
 
 /// Four cells around the place, which is in the middle.
-TEST(PorePicture, WhatRepeatsIsDrawnAroundThePlace) {
+TEST(PorePicture, WhatRepeatsIsDrawnAroundThePosition) {
   const VoxelStack solid = slit({true, true, true}), through = pores::void_through(solid, 2);
   const Plot plot = view::draw_pores(picture_of(solid, through));
   const Plot::Image& across = plot.images[0];
@@ -89,7 +88,7 @@ TEST(PorePicture, WhatRepeatsIsDrawnAroundThePlace) {
 }
 
 /// 0.3, 0.3 and 0.4 mm of 1; beads along y at x = 0.5 mm.
-TEST(PorePicture, LayersAndTheMiddlesOfBeadsAreTold) {
+TEST(PorePicture, LayersAndTheMiddlesOfBeadsAreReported) {
   const VoxelStack solid = slit({}), through = pores::void_through(solid, 2);
   view::PorePicture picture = picture_of(solid, through);
   picture.layer_tops_mm = {0.3, 0.6, 1};  // the cavity lies in the second one

@@ -13,21 +13,21 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/shell_words.h"
-#include "stages/data/text/terminal.h"
+#include "pipeline/job/lists/batch_list.h"
 #include "stages/load/load.h"
-#include "stages/read/jobs/batch_list.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/shell_words.h"
+#include "stages/support/text/terminal.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::uint64_t kLeastBatchBytes = 48ull << 20;  // the layers of one job, and what it holds beside them
+constexpr std::uint64_t kMinBatchBytes = 48ull << 20;  // the layers of one job, and what it holds beside them
 
 CommandSpec batch_spec() {
   CommandSpec spec;
@@ -145,7 +145,7 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
     return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", name)};
   }
   const CommandSpec spec = spec_of(*command);
-  const Result<Arguments> read = terminal::read_arguments(spec, {words.begin() + 1, words.end()});
+  const Result<Arguments> read = pipeline::read_arguments(spec, {words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return Error{Fault::kUsage, "--help is no job"};
   Job planned;
@@ -203,9 +203,9 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
         arguments.read("--time-limit", {0.001, 1e9, " s"}, options.time_limit_seconds)}) {
     if (!status) return status.error();
   }
-  if (options.memory_bytes < kLeastBatchBytes) {
+  if (options.memory_bytes < kMinBatchBytes) {
     return at_option("--memory", fmt::format("{} is less than any job takes; give {}M or more", arguments.text("--memory"),
-                                             kLeastBatchBytes >> 20))
+                                             kMinBatchBytes >> 20))
         .error();
   }
   if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
@@ -252,24 +252,24 @@ class BatchConsole {
 };
 
 /// Reads --sync. errors  kUsage
-Result<write::Durable> read_sync(const Arguments& arguments) {
+Result<Durable> read_sync(const Arguments& arguments) {
   Job job;
   const auto key = std::ranges::find(job_keys(), "--sync", &JobKey::flag);
   if (arguments.has(key->flag)) {
     if (Status status = at_option(key->flag, key->read(arguments.text(key->flag), job)); !status) return status.error();
   }
-  return job.sync == Sync::kOff ? write::Durable::kNo : write::Durable::kAll;
+  return job.sync == Sync::kOff ? Durable::kNo : Durable::kAll;
 }
 
 Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const bool quiet = arguments.has("--quiet");
   std::vector<std::string> with;
-  const Result<write::Durable> durable = read_sync(arguments);
+  const Result<Durable> durable = read_sync(arguments);
   if (!durable) return durable.error();
   const Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
   const BatchOptions& options = *read;
-  Result<std::vector<BatchEntry>> entries = read::read_batch(arguments.operands, with, load::is_part_name);
+  Result<std::vector<BatchEntry>> entries = pipeline::read_batch(arguments.operands, with, load::is_part_name);
   if (!entries) return entries.error();
   const auto read_words = [sync = arguments.text("--sync")](const auto& words) { return read_call(words, sync); };
   const auto jobs =
@@ -289,9 +289,9 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   console.clear();
   if (!summary) return summary.error();
   const Json json = batch_json(*jobs, *summary, options);
-  const write::FileOptions how{.follow = false, .durable = *durable};
-  Status written = write::write_file(options.directory + "/summary.json", json_line(json, 2), how);
-  if (written) written = write::write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
+  const FileOptions how{.follow = false, .durable = *durable};
+  Status written = write_file(options.directory + "/summary.json", json_line(json, 2), how);
+  if (written) written = write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
   if (summary->interrupted) {
@@ -301,7 +301,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
     if (Status status = context.give(json); !status) code = context.complain(status.error());
   }
   if (summary->abandoned) {  // a job that does not stop is still running
-    write::remove_watched();
+    remove_watched();
     std::_Exit(code);
   }
   return code;

@@ -5,9 +5,9 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/commands/calibrate_powder.h"
 #include "pipeline/cli/console.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -121,7 +121,7 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
   }
   const auto made = calibrate_profile(request, arguments.text("--measured"), gap, arguments.has("--exact-spacing"));
   if (!made) return made.error();
-  if (Status status = write::write_file(request.directory, made->toml); !status) return status;
+  if (Status status = write_file(request.directory, made->toml); !status) return status;
   return say_profile(*made, arguments, context);
 }
 

@@ -3,16 +3,17 @@
 #include <fmt/format.h>
 
 #include "pipeline/calibrate/chart_job.h"
+#include "pipeline/calibrate/chart_reading.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/chart/draw.h"
-#include "stages/chart/measured.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
-#include "stages/write/replaceable.h"
+#include "stages/calibration/chart/draw.h"
+#include "stages/formats/chart/chart.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -46,12 +47,12 @@ Outcome weigh(const ChartRequest& request, double mass_mg, const Arguments& argu
   auto machine = find_machine(request.machine);
   if (!machine) return machine.error();
   const double before = machine->head.drop_pl;
-  machine->head.drop_pl = chart::drop_pl_of(mass_mg, density, static_cast<double>(request.drops));
+  machine->head.drop_pl = calibration::drop_pl_of(mass_mg, density, static_cast<double>(request.drops));
   const auto profile = measured_profile(*machine);
   if (!profile)
     return at_option("--weighed-mg",
                      fmt::format("{} of {} drops: {}", arguments.text("--weighed-mg"), request.drops, profile.error().message));
-  if (Status status = write::write_file(request.directory, *profile); !status) return status;
+  if (Status status = write_file(request.directory, *profile); !status) return status;
   if (!arguments.has("--quiet"))
     context.say_text(fmt::format("drop      {:.4g} pl, was {:.4g}\nprofile   {}\n", machine->head.drop_pl, before,
                                  one_line(request.directory)));
@@ -64,27 +65,27 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
   auto machine = find_machine(request.machine);
   if (!machine) return machine.error();
   const std::string chart =
-      write::is_file(arguments.text("--chart")) ? arguments.text("--chart") : arguments.text("--chart") + "/chart.json";
+      is_file(arguments.text("--chart")) ? arguments.text("--chart") : arguments.text("--chart") + "/chart.json";
   const auto text = read_file(chart, {.fault = Fault::kInput, .missing = "no such chart; lamina calibrate -o DIR writes one"});
-  const auto laid = text ? read_chart(*text, chart) : text.error();
-  if (!laid) return laid.error();
-  if (laid->machine != machine->name)
-    return at_option("--chart", fmt::format("{} is of {}, not of {}", chart, one_line(laid->machine), machine->name));
-  const auto seen = scanned(
-      "chart", {{"photo", arguments.text("--scan")}, {"chart", Json::parse(*text)}, {"picture", arguments.has("--overlay")}},
+  const auto deposited = text ? read_chart(*text, chart) : text.error();
+  if (!deposited) return deposited.error();
+  if (deposited->machine != machine->name)
+    return at_option("--chart", fmt::format("{} is of {}, not of {}", chart, one_line(deposited->machine), machine->name));
+  const auto detected = scanned(
+      "chart", {{"photo", arguments.text("--scan")}, {"chart", parse_json(*text)}, {"picture", arguments.has("--overlay")}},
       arguments.text("--overlay"));
-  if (!seen) return seen.error();
-  const auto lines = chart::take_over(*seen, *laid, *machine);
+  if (!detected) return detected.error();
+  const auto lines = take_over(*detected, *deposited, *machine);
   if (!lines) return lines.error();
   const auto profile = measured_profile(*machine);
   if (!profile) return profile.error();
-  if (Status status = write::write_file(request.directory, *profile); !status) return status;
+  if (Status status = write_file(request.directory, *profile); !status) return status;
   if (!arguments.has("--quiet")) {
     for (const std::string& line : *lines) context.say(line);
     context.say("profile   " + request.directory);
   }
   if (!arguments.has("--json")) return {};
-  return context.give({{"command", "calibrate"}, {"profile", request.directory}, {"reading", Json::parse(*seen)}});
+  return context.give({{"command", "calibrate"}, {"profile", request.directory}, {"reading", parse_json(*detected)}});
 }
 
 }  // namespace

@@ -4,10 +4,10 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/data/text/json.h"
+#include "pipeline/manifest/images_on_record.h"
 #include "stages/data/units.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/images_on_record.h"
+#include "stages/formats/images/image.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -33,21 +33,21 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--pixel", {1, 2000, " um"}, photo_um); !status) return status;
   const auto machine = arguments.has("--machine") ? find_machine(arguments.text("--machine")) : Machine();
   if (!machine) return machine.error();
-  const auto layer = read::dark_pixels(arguments.operands[0], are_grey_drops(arguments.operands[0]) ? 255 : 128);
+  const auto layer = formats::dark_pixels(arguments.operands[0], are_grey_drops(arguments.operands[0]) ? 255 : 128);
   if (!layer) return layer.error();
   if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
     return Error{Fault::kInput, fmt::format("{}: tells no resolution; give an image that lamina wrote", arguments.operands[0])};
-  const auto told = scanned("compare",
-                            {{"photo", arguments.operands[1]},
-                             {"photo_um", photo_um},
-                             {"scan_along_x", machine->mounting.scan_axis == ScanAxis::kX},
-                             {"pixel_nm", {kNmPerInch / layer->dpi_x, kNmPerInch / layer->dpi_y}},
-                             {"columns", layer->runs.columns},
-                             {"row_offset", layer->runs.row_offset},
-                             {"change", layer->runs.change}},
-                            "");
-  if (!told) return told.error();
-  Json json = Json::parse(*told);
+  const auto reported = scanned("compare",
+                                {{"photo", arguments.operands[1]},
+                                 {"photo_um", photo_um},
+                                 {"scan_along_x", machine->mounting.scan_axis == ScanAxis::kX},
+                                 {"pixel_nm", {kNmPerInch / layer->dpi_x, kNmPerInch / layer->dpi_y}},
+                                 {"columns", layer->runs.columns},
+                                 {"row_offset", layer->runs.row_offset},
+                                 {"change", layer->runs.change}},
+                                "");
+  if (!reported) return reported.error();
+  Json json = parse_json(*reported);
   const auto number = [](const Json& value) { return value.get<double>(); };
   const char* axis = machine->mounting.scan_axis == ScanAxis::kX ? "from the back" : "from the left";
   Answer answer(arguments, context);
@@ -56,7 +56,8 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
                            number(band["to_mm"]), axis));
   for (const Json& body : json["bodies"])
     answer.say(fmt::format("area      {:.2f} of {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back",
-                           number(body["seen_mm2"]), number(body["expected_mm2"]), number(body["x_mm"]), number(body["y_mm"])));
+                           number(body["detected_mm2"]), number(body["expected_mm2"]), number(body["x_mm"]),
+                           number(body["y_mm"])));
   for (const Json& ink : json["extra"])
     answer.say(
         fmt::format("extra     {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back, where the layer has no ink",

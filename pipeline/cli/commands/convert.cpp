@@ -7,18 +7,17 @@
 #include <optional>
 
 #include "pipeline/cli/command.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/value.h"
+#include "pipeline/manifest/images_on_record.h"
 #include "stages/dose/shares.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/layer_images.h"
 #include "stages/raster/mirror.h"
-#include "stages/read/layer_images.h"
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/manifest/images_on_record.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -54,9 +53,9 @@ CommandSpec convert_spec() {
 }
 
 struct Conversion {
-  read::LayerImages images;
-  const write::ImageFormat* bits;  // one of both
-  const write::LevelFormat* grey;
+  formats::LayerImages images;
+  const formats::ImageFormat* bits;  // one of both
+  const formats::LevelFormat* grey;
   std::uint8_t full;  // the highest level of grey
   std::array<double, 2> dpi;
   std::string output, mirror;
@@ -73,7 +72,7 @@ struct Converted {
 };
 
 /// One layer, read, turned and coded.
-Status code_bits(const Conversion& all, std::uint32_t layer, write::Bytes& file, Converted& done) {
+Status code_bits(const Conversion& all, std::uint32_t layer, formats::Bytes& file, Converted& done) {
   auto runs = all.images.read(layer);
   if (!runs) return runs.error();
   if (!all.mirror.empty()) {
@@ -85,7 +84,7 @@ Status code_bits(const Conversion& all, std::uint32_t layer, write::Bytes& file,
   return all.bits->make_encoder()->encode(*runs, all.dpi[0], all.dpi[1], file);
 }
 
-Status code_grey(const Conversion& all, std::uint32_t layer, write::Bytes& file, Converted& done) {
+Status code_grey(const Conversion& all, std::uint32_t layer, formats::Bytes& file, Converted& done) {
   auto levels = all.images.levels(layer, all.full);
   if (!levels) return levels.error();
   if (!all.mirror.empty()) {
@@ -98,17 +97,17 @@ Status code_grey(const Conversion& all, std::uint32_t layer, write::Bytes& file,
 }
 
 Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) {
-  write::Bytes file;
+  formats::Bytes file;
   const Status status = all.grey != nullptr ? code_grey(all, layer, file, done) : code_bits(all, layer, file, done);
   if (!status && status.error().fault == Fault::kOutput)
     return Error{status.error().fault, fmt::format("image {}: {}", layer, status.error().message)};
   if (!status) return status;
   done.bytes = file.size();
-  return write::write_file(all.name(layer), file, {.lock = false, .follow = false, .durable = write::Durable::kNo});
+  return write_file(all.name(layer), file, {.lock = false, .follow = false, .durable = Durable::kNo});
 }
 
 /// errors  kUsage: what is there would be replaced
-Status check_place(const Conversion& all, const std::string& stack) {
+Status check_output(const Conversion& all, const std::string& stack) {
   std::error_code error;
   const fs::path in = fs::weakly_canonical(stack, error), out = fs::weakly_canonical(all.output, error);
   if (out == in || (fs::is_regular_file(in, error) && in.parent_path() == out))
@@ -147,8 +146,8 @@ Status convert_all(const Conversion& all, const std::atomic<bool>& cancel, Conve
   return {};
 }
 
-Result<read::LayerImagesRequest> request_of(const Arguments& arguments) {
-  read::LayerImagesRequest request;
+Result<formats::LayerImagesRequest> request_of(const Arguments& arguments) {
+  formats::LayerImagesRequest request;
   request.invert = arguments.has("--invert");
   request.missing_empty = arguments.has("--missing-empty");
   std::int64_t threshold = 128;
@@ -162,8 +161,8 @@ Result<read::LayerImagesRequest> request_of(const Arguments& arguments) {
 
 /// The format, and the highest level of a grey one. errors  kUsage
 Status choose_format(const Arguments& arguments, const std::string& id, Conversion& all) {
-  all.bits = write::find_image_format(id);
-  all.grey = write::find_level_format(id);
+  all.bits = formats::find_image_format(id);
+  all.grey = formats::find_level_format(id);
   if (all.grey == nullptr && (all.bits == nullptr || all.bits->extension.empty()))
     return Error{Fault::kUsage, fmt::format("--format {}: is none of the image formats; `lamina jet --help` lists them", id)};
   const bool nibbles = id == "tiff-4";
@@ -205,9 +204,9 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  const auto told = images_on_record(stack);
-  if (!told) return told.error();
-  auto images = read::LayerImages::open(told->path, *request);
+  const auto reported = images_on_record(stack);
+  if (!reported) return reported.error();
+  auto images = formats::LayerImages::open(reported->path, *request);
   if (!images) return images.error();
   std::array<double, 2>& dpi = all.dpi;
   dpi = {images->dpi_x(), images->dpi_y()};
@@ -219,8 +218,8 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   all.first_number = images->first_number();
   all.images = std::move(*images);
-  if (Status status = check_place(all, stack); !status) return status;
-  const auto claim = write::Claim::take(output + "/manifest.json", output);
+  if (Status status = check_output(all, stack); !status) return status;
+  const auto claim = Claim::take(output + "/manifest.json", output);
   if (!claim) return claim.error();
   Converted sum;
   context.progress({ProgressEvent::Stage::kLayers, 0, all.images.layers()});

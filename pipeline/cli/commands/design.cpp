@@ -6,19 +6,18 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
-#include "pipeline/design/gradient.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/segment/design/design_page.h"
+#include "pipeline/pores/design_page.h"
 #include "stages/segment/permeability.h"  // the unit
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr const char *kWishes = "Wish: one or two of them", *kGradient = "Regions of a wish with two ends";
+constexpr const char *kTargets = "Wish: one or two of them", *kGradient = "Regions of a wish with two ends";
 
 CommandSpec design_spec() {
   CommandSpec spec;
@@ -28,10 +27,10 @@ CommandSpec design_spec() {
       "will be, and writes the job file. A wish with two ends changes from the bottom to the top, in regions of their own\n"
       "filling. A wish that cannot be met ends with exit code 5 and the nearest that can.";
   spec.options = {
-      {"--porosity", "PERCENT", "void in the filling, as in 24; 20:26 from the bottom to the top", "", kWishes},
-      {"--permeability", "DARCY", "k1 along the height, as in 100; 60:150 from the bottom to the top", "", kWishes},
+      {"--porosity", "PERCENT", "void in the filling, as in 24; 20:26 from the bottom to the top", "", kTargets},
+      {"--permeability", "DARCY", "k1 along the height, as in 100; 60:150 from the bottom to the top", "", kTargets},
       {"--pore", "WIDTHxLENGTH", "mm, of the pore beside a thin stretch, as in 0.12x0.9; 0.1x0.9:0.14x0.9 upwards", "",
-       kWishes},
+       kTargets},
       {"--height", "MM", "of the part, for wishes with two ends", "", kGradient},
       {"--steps", "N", "regions as high as each other", "5", kGradient},
       {"--tops", "MM[,MM...]", "tops of the regions in place of them, the lowest first, the part's height last", "", kGradient},
@@ -56,25 +55,25 @@ CommandSpec design_spec() {
 }
 
 /// A wish at the bottom and at the top; the same where it has no gradient.
-struct WishEnds {
-  segment::PoreWish bottom, top;
+struct TargetEnds {
+  segment::PoreTarget bottom, top;
   bool gradient = false;
 };
 
 /// Gives the texts of both ends to a reader. errors  kUsage
-Status read_ends(const Arguments& arguments, const char* flag, WishEnds& wish,
-                 const std::function<std::string(std::string_view, segment::PoreWish&)>& read) {
+Status read_ends(const Arguments& arguments, const char* flag, TargetEnds& target,
+                 const std::function<std::string(std::string_view, segment::PoreTarget&)>& read) {
   if (!arguments.has(flag)) return {};
   const std::string text = arguments.text(flag);
   const auto ends = split(text, ":");
   if (ends.size() > 2)
     return at_option(flag, fmt::format("'{}' has more than two ends; name those at the bottom and at the top", one_line(text)));
-  wish.gradient = wish.gradient || ends.size() == 2;
-  if (const Status status = at_option(flag, read(ends.front(), wish.bottom)); !status) return status;
-  return at_option(flag, read(ends.back(), wish.top));
+  target.gradient = target.gradient || ends.size() == 2;
+  if (const Status status = at_option(flag, read(ends.front(), target.bottom)); !status) return status;
+  return at_option(flag, read(ends.back(), target.top));
 }
 
-std::string read_pore(std::string_view text, segment::PoreWish& wish) {
+std::string read_pore(std::string_view text, segment::PoreTarget& target) {
   const auto sides = split(text, "x");
   std::array<double, 2> side{};
   if (sides.size() != 2) return fmt::format("'{}' is no width and length, as in 0.12x0.9", one_line(std::string(text)));
@@ -82,40 +81,40 @@ std::string read_pore(std::string_view text, segment::PoreWish& wish) {
     if (std::string wrong = read_number(sides[i], 0.001, 100, " mm", side[i]); !wrong.empty()) return wrong;
   }
   if (side[0] >= side[1]) return fmt::format("{} mm is the width and has to be less than the length, {} mm", side[0], side[1]);
-  wish.pore_width_mm = side[0];
-  wish.pore_length_mm = side[1];
+  target.pore_width_mm = side[0];
+  target.pore_length_mm = side[1];
   return {};
 }
 
 /// A number, times what it is told in.
-auto number_reader(const Limits& limits, double unit, std::optional<double> segment::PoreWish::*target) {
-  return [limits, unit, target](std::string_view text, segment::PoreWish& wish) {
+auto number_reader(const Limits& limits, double unit, std::optional<double> segment::PoreTarget::*member) {
+  return [limits, unit, member](std::string_view text, segment::PoreTarget& target) {
     double value = 0;
     std::string wrong = read_value(text, limits, value);
-    if (wrong.empty()) wish.*target = value * unit;
+    if (wrong.empty()) target.*member = value * unit;
     return wrong;
   };
 }
 
 /// errors  kUsage
-Result<WishEnds> read_wish(const Arguments& arguments) {
-  WishEnds wish;
+Result<TargetEnds> read_target(const Arguments& arguments) {
+  TargetEnds target;
   for (const Status& status :
-       {read_ends(arguments, "--porosity", wish, number_reader({0.1, 99, " %"}, 0.01, &segment::PoreWish::porosity)),
-        read_ends(arguments, "--permeability", wish,
-                  number_reader({1e-3, 1e6, " D"}, segment::kDarcy, &segment::PoreWish::permeability_m2)),
-        read_ends(arguments, "--pore", wish, read_pore)}) {
+       {read_ends(arguments, "--porosity", target, number_reader({0.1, 99, " %"}, 0.01, &segment::PoreTarget::porosity)),
+        read_ends(arguments, "--permeability", target,
+                  number_reader({1e-3, 1e6, " D"}, segment::kDarcy, &segment::PoreTarget::permeability_m2)),
+        read_ends(arguments, "--pore", target, read_pore)}) {
     if (!status) return status.error();
   }
-  const int wishes = arguments.has("--porosity") + arguments.has("--permeability") + arguments.has("--pore");
-  if (wishes == 0) return Error{Fault::kUsage, "nothing is wished for; give --porosity, --permeability or --pore"};
-  if (wishes == 3)
+  const int targets = arguments.has("--porosity") + arguments.has("--permeability") + arguments.has("--pore");
+  if (targets == 0) return Error{Fault::kUsage, "nothing is wished for; give --porosity, --permeability or --pore"};
+  if (targets == 3)
     return Error{Fault::kUsage, "--porosity, --permeability and --pore are more than a filling can follow; leave one out"};
-  return wish;
+  return target;
 }
 
 /// The regions of a gradient. errors  kUsage
-Result<std::vector<segment::WishStep>> read_steps(const Arguments& arguments, const WishEnds& wish) {
+Result<std::vector<segment::TargetStep>> read_steps(const Arguments& arguments, const TargetEnds& target) {
   if (arguments.has("--tops") && (arguments.has("--height") || arguments.has("--steps")))
     return Error{Fault::kUsage, "--tops says all regions, --height and --steps make equal ones; give one of the two"};
   const auto profile = designable_extruder(arguments.text("--machine"));
@@ -125,12 +124,12 @@ Result<std::vector<segment::WishStep>> read_steps(const Arguments& arguments, co
   double height = 0;
   std::uint32_t steps = 5;
   for (const Status& status :
-       {arguments.read("--height", {0.1, 1000, " mm"}, height), arguments.read("--steps", {2, segment::kMostRegions}, steps)}) {
+       {arguments.read("--height", {0.1, 1000, " mm"}, height), arguments.read("--steps", {2, segment::kMaxRegions}, steps)}) {
     if (!status) return status.error();
   }
   if (arguments.has("--tops")) {
-    const std::string asked = arguments.text("--tops");
-    for (const std::string_view top : split(asked, ",")) {
+    const std::string requested = arguments.text("--tops");
+    for (const std::string_view top : split(requested, ",")) {
       if (const std::string wrong = read_number(top, 0.1, 1000, " mm", tops_mm.emplace_back()); !wrong.empty())
         return at_option("--tops", wrong).error();
     }
@@ -140,11 +139,11 @@ Result<std::vector<segment::WishStep>> read_steps(const Arguments& arguments, co
   const bool equal = tops_mm.empty();
   auto tops = equal ? segment::equal_tops(height, steps, layer_mm) : segment::whole_tops(tops_mm, layer_mm);
   if (!tops) return at_option(equal ? "--steps" : "--tops", tops.error().message).error();
-  if (const double most = profile->machine.bed.build_height_mm; tops->back() > most)
+  if (const double maximum = profile->machine.bed.build_height_mm; tops->back() > maximum)
     return at_option(equal ? "--height" : "--tops", fmt::format("{:g} mm is higher than the {:g} mm that {} builds",
-                                                                tops->back(), most, profile->machine.name))
+                                                                tops->back(), maximum, profile->machine.name))
         .error();
-  return segment::steps_of(wish.bottom, wish.top, *tops);
+  return segment::steps_of(target.bottom, target.top, *tops);
 }
 
 Result<DesignRequest> read_request(const Arguments& arguments) {
@@ -152,7 +151,7 @@ Result<DesignRequest> read_request(const Arguments& arguments) {
   request.machine = arguments.text("--machine");
   double voxel = 10;
   if (const Status status = arguments.read("--voxel", {1, 50, " um"}, voxel); !status) return status.error();
-  request.grid = {voxel, 2 * voxel, voxel, request.grid.places};
+  request.grid = {voxel, 2 * voxel, voxel, request.grid.positions};
   return request;
 }
 
@@ -163,7 +162,7 @@ Outcome give_found(const Found& found, const std::string& missed, const Argument
   if (!arguments.has("--quiet")) context.say_text(as_text(found));
   const bool enough = found.met || arguments.has("--nearest"), written = !output.empty() && enough;
   if (written) {
-    if (const Status status = write::write_file(output, found.toml); !status) return status;
+    if (const Status status = write_file(output, found.toml); !status) return status;
   }
   if (arguments.has("--json")) {
     if (const Status status = context.give(as_json(found, written ? output : "")); !status) return status;
@@ -175,31 +174,31 @@ Outcome give_found(const Found& found, const std::string& missed, const Argument
 Outcome run_design(const Arguments& arguments, Context& context) {
   if (!arguments.has("--machine"))
     return Error{Fault::kUsage, "--machine is missing; name an extrusion printer, as lamina extrude takes it"};
-  const auto wish = read_wish(arguments);
-  if (!wish) return wish.error();
+  const auto target = read_target(arguments);
+  if (!target) return target.error();
   auto request = read_request(arguments);
   if (!request) return request.error();
   if (const Status status = check_folder("-o", arguments.text("-o,--output")); !status) return status;
   const std::atomic<bool>& cancel = context.cancel();
   const auto go_on = [&](double) { return !cancel; };
-  if (wish->gradient) {
-    const auto steps = read_steps(arguments, *wish);
+  if (target->gradient) {
+    const auto steps = read_steps(arguments, *target);
     if (!steps) return steps.error();
     keep_on_signals();
     const auto found = design_gradient(*request, *steps, go_on);
     if (!found) return found.error();
-    return give_found(*found, segment::missed_text(*found), arguments, context);
+    return give_found(*found, missed_text(*found), arguments, context);
   }
   for (const char* flag : {"--height", "--steps", "--tops"})
     if (arguments.has(flag)) return at_option(flag, "is of a gradient, and none is wished for, as in --porosity 20:26");
-  request->wish = wish->bottom;
+  request->target = target->bottom;
   keep_on_signals();
   const auto found = design_job(*request, go_on);
   if (!found) return found.error();
-  return give_found(*found,
-                    fmt::format("nearest is {}, which misses the wish by {:.0f} %",
-                                segment::nearest_text(request->wish, *found), 100 * found->miss),
-                    arguments, context);
+  return give_found(
+      *found,
+      fmt::format("nearest is {}, which misses the wish by {:.0f} %", nearest_text(request->target, *found), 100 * found->miss),
+      arguments, context);
 }
 
 }  // namespace

@@ -7,21 +7,21 @@
 #include "pipeline/cli/needs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/summary.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
-#include "stages/write/mesh3mf/mesh3mf.h"
-#include "stages/write/package/threemf_package.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/stl/mesh_stl.h"
+#include "pipeline/report/summary.h"
+#include "stages/formats/stl/mesh_stl.h"
+#include "stages/formats/threemf/mesh3mf.h"
+#include "stages/formats/threemf/threemf_package.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-const KeyChoice kExportKeys = {"bed.size_mm", "place", "load", "run.output", "part"};
+const KeyChoice kExportKeys = {"bed.size_mm", "placement", "load", "run.output", "part"};
 
 CommandSpec export_spec() {
   CommandSpec spec;
@@ -55,7 +55,7 @@ Result<MeshFormat> format_of(const std::string& output) {
   if (output.empty()) return Error{Fault::kUsage, "-o FILE is missing; name a .stl or .3mf file, or - for STL on stdout"};
   const std::string ending = lower_case(fs::path(output).extension().string());
   if (ending == ".3mf") return MeshFormat::k3mf;
-  if (ending == ".stl" || ending.empty() || write::is_stream(output)) return MeshFormat::kStl;
+  if (ending == ".stl" || ending.empty() || is_stream(output)) return MeshFormat::kStl;
   return Error{Fault::kUsage, fmt::format("-o {}: end the name with .stl or .3mf", output)};
 }
 
@@ -77,17 +77,17 @@ Result<Exported> write_meshes(const Scene& scene, MeshFormat format, const std::
   const std::string program = fmt::format("lamina {}", version());
   Exported exported;
   for (const Instance& instance : scene.instances) exported.volume_mm3 += scene.meshes[instance.mesh].volume_mm3;
-  auto file = write::File::open(output, {.stream = format == MeshFormat::kStl});
+  auto file = File::open(output, {.stream = format == MeshFormat::kStl});
   if (!file) return file.error();
   if (format == MeshFormat::kStl) {
-    const auto counts = write::stl::write_stl(*file, scene.meshes, scene.instances, program);
+    const auto counts = formats::stl::write_stl(*file, scene.meshes, scene.instances, program);
     if (!counts) return counts.error();
     exported.triangles = counts->triangles;
     exported.rounding_mm = counts->rounding_mm;
   } else {
-    std::vector<write::Mesh3mfObject> objects;
+    std::vector<formats::Mesh3mfObject> objects;
     for (const Mesh& mesh : scene.meshes) objects.push_back({fs::path(mesh.name).filename().string(), mesh.triangles});
-    const auto counts = write::write_mesh_3mf(*file, objects, scene.instances, program);
+    const auto counts = formats::write_mesh_3mf(*file, objects, scene.instances, program);
     if (!counts) return counts.error();
     exported.left_out = counts->degenerate;
     for (const Instance& instance : scene.instances) exported.triangles += scene.meshes[instance.mesh].triangles.size();
@@ -121,7 +121,7 @@ Json json_of(const Scene& scene, const Exported& exported, const std::string& ou
                {"files", 1},
                {"bytes_written", exported.file.bytes},
                {"meshes", scene.meshes.size()},
-               {"places", scene.instances.size()},
+               {"instances", scene.instances.size()},
                {"triangles", exported.triangles},
                {"left_out", exported.left_out},
                {"volume_mm3", exported.volume_mm3},
@@ -138,10 +138,10 @@ Outcome run_export(const Arguments& arguments, Context& context) {
   const std::string& output = job->output;
   const Result<MeshFormat> format = format_of(output);
   if (!format) return format.error();
-  if (Status status = *format == MeshFormat::k3mf ? write::check_3mf_date() : Status(); !status) return status;
+  if (Status status = *format == MeshFormat::k3mf ? formats::check_3mf_date() : Status(); !status) return status;
   if (Status status = check_needs(Product::kContours, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  if (write::is_file(output) && !arguments.has("--overwrite")) {
+  if (is_file(output) && !arguments.has("--overwrite")) {
     return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another file", output)};
   }
   const Result<Bed> bed = bed_of(*job);

@@ -7,14 +7,14 @@
 #include "pipeline/cli/needs.h"
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/job/file.h"
-#include "pipeline/job/heights.h"
+#include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/heights.h"
-#include "stages/data/text/value.h"
-#include "stages/heights/study/study_plot.h"
-#include "stages/heights/study/study_text.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/manifest.h"  // title_of
-#include "stages/write/rp3/rp3.h"
+#include "pipeline/report/heights_plot.h"
+#include "pipeline/report/heights_study.h"
+#include "stages/formats/rp3/rp3.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -51,19 +51,19 @@ CommandSpec heights_spec() {
   return spec;
 }
 
-Status tell(const std::string& path, const std::string& text, Context& context) {
-  return path.empty() ? context.print(text) : write::write_file(path, text, {.stream = true});
+Status report(const std::string& path, const std::string& text, Context& context) {
+  return path.empty() ? context.print(text) : write_file(path, text, {.stream = true});
 }
 
 /// The job as asked, and with what the command sets by itself.
-struct AskedJob {
-  Job asked, studied;
+struct HeightsJob {
+  Job requested, studied;
 };
 
-Result<AskedJob> job_of(const Arguments& arguments) {
+Result<HeightsJob> job_of(const Arguments& arguments) {
   Result<Job> read = read_job_options(kHeightsCommandKeys, arguments);
   if (!read) return read.error();
-  const Job asked = *read;
+  const Job requested = *read;
   if (read->parts.empty()) return Error{Fault::kUsage, "no part to look at; name one or more STL, OBJ or 3MF files"};
   // Heights do not depend on the parts' positions or on the size of the bed.
   if (read->bed_mm || read->machine.profile.empty()) read->bed_mm = kLargestBed.size_mm;
@@ -77,7 +77,7 @@ Result<AskedJob> job_of(const Arguments& arguments) {
     if (Status status = check_needs(Product::kContours, arguments, *read, true); !status) return status.error();
   }
   if (Status status = check_job(*read); !status) return status.error();
-  return AskedJob{asked, std::move(*read)};
+  return HeightsJob{requested, std::move(*read)};
 }
 
 /// A file of this form holds one unnamed table.
@@ -92,16 +92,16 @@ Status check_one_table(const Job& job, const Arguments& arguments) {
 }
 
 std::string rp3_text(const Job& job, const heights::Study& study) {
-  std::vector<write::rp3::Layer> layers;
-  for (std::size_t i = 0; i < study.layers(); ++i) layers.push_back({mm(study.thickness(i)), heights::angle(study, i)});
-  write::rp3::Settings settings;
+  std::vector<formats::rp3::LayerSetting> layers;
+  for (std::size_t i = 0; i < study.layers(); ++i) layers.push_back({mm(study.thickness(i)), angle(study, i)});
+  formats::rp3::Settings settings;
   settings.shrink = job.parts.front().shrink;
   settings.rotation_deg = job.parts.front().rotate_deg;
-  return write::rp3::text_of(layers, settings);
+  return formats::rp3::text_of(layers, settings);
 }
 
 std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies) {
-  heights::StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
+  StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
   for (const PartSummary& part : scene.parts) parts.paths.push_back(part.path);
   switch (form) {
     case Form::kJson: return study_json(parts, studies);
@@ -125,7 +125,7 @@ Result<std::vector<heights::Study>> studies_of(const Arguments& arguments, const
                                                const heights::Options& options) {
   std::vector<heights::Study> studies;
   if (arguments.has("--compare") || job.heights.per_part) {
-    auto all = arguments.has("--compare") ? study_all_ways(index, options) : study_per_part(index, options);
+    auto all = arguments.has("--compare") ? study_all_modes(index, options) : study_per_part(index, options);
     if (!all) return all;
     studies = std::move(*all);
   } else if (!arguments.has("--measure")) {
@@ -148,7 +148,7 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
     if (Status status = at_option("--format", read_word(kForms, arguments.text("--format"), form)); !status) return status;
   }
   if (const Status status = check_plot_name(plot); !status) return status.error();
-  const Result<AskedJob> read = job_of(arguments);
+  const Result<HeightsJob> read = job_of(arguments);
   if (!read) return read.error();
   const Job* const job = &read->studied;
   if (form == Form::kRp3) {
@@ -162,16 +162,16 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
 
   Result<heights::Options> options = options_of(arguments, *job);
   if (!options) return options.error();
-  options->tells_time = arguments.has("--compare");
+  options->estimates_time = arguments.has("--compare");
   const heights::SurfaceIndex index = index_scene(*job, *scene, *options);
   const std::chrono::duration<double> surface = Clock::now() - start - load;
   const auto studies = studies_of(arguments, *job, index, *options);
   if (!studies) return studies.error();
   if (arguments.has("--save-job")) {
-    if (Status status = save_job(arguments.text("--save-job"), read->asked, "heights"); !status) return status.error();
+    if (Status status = save_job(arguments.text("--save-job"), read->requested, "heights"); !status) return status.error();
   }
   const heights::Study& last = studies->back();
-  if (Status status = tell(output, table_text(form, *job, *scene, *studies), context); !status) return status.error();
+  if (Status status = report(output, table_text(form, *job, *scene, *studies), context); !status) return status.error();
   if (studies->size() == 1 && !arguments.has("--quiet")) {
     context.say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
                             surface.count(), last.plan_seconds, last.evaluate_seconds));

@@ -2,19 +2,19 @@
 
 #include <algorithm>
 
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/needs.h"
+#include "pipeline/manifest/images_on_record.h"
 #include "pipeline/plan/scene.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/load/info/info.h"
-#include "stages/read/layer_images.h"
-#include "stages/read/stack_info.h"
+#include "pipeline/pores/pore_analysis.h"
+#include "pipeline/report/part_info.h"
+#include "stages/formats/images/layer_images.h"
+#include "stages/formats/images/stack_info.h"
 #include "stages/slice/surplus.h"
-#include "stages/write/manifest/images_on_record.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -58,8 +58,8 @@ CommandSpec info_spec() {
   return spec;
 }
 
-Status tell_print(const std::string& path, double density_g_cm3, const Arguments& arguments, Context& context) {
-  const Result<LaidPrint> print = look_at_print(path, density_g_cm3);
+Status report_print(const std::string& path, double density_g_cm3, const Arguments& arguments, Context& context) {
+  const Result<PrintAnalysis> print = analyse_print(path, density_g_cm3);
   if (!print) return print.error();
   if (!arguments.has("--json")) return context.print(one_line(path) + "\n" + as_text(*print));
   Json json = {{"path", path}};
@@ -68,19 +68,20 @@ Status tell_print(const std::string& path, double density_g_cm3, const Arguments
 }
 
 /// errors  kInput: some images cannot be read
-Status tell_images(const std::string& path, int threshold, const Arguments& arguments, Context& context) {
-  const auto told = images_on_record(path);
-  if (!told) return told.error();
-  const Result<read::StackInfo> info = read::look_at_stack(told->path, threshold);
+Status report_images(const std::string& path, int threshold, const Arguments& arguments, Context& context) {
+  const auto reported = images_on_record(path);
+  if (!reported) return reported.error();
+  const Result<formats::StackInfo> info = formats::inspect_stack(reported->path, threshold);
   if (!info) return info.error();
-  Json json = read::as_json(*info);
-  std::string text = read::as_text(*info);
-  if (told->thickness > 0) {
-    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers", number_text(mm(told->thickness)),
-                        number_text(mm(told->bottom)),
-                        told->levels > 0 ? fmt::format("; shares of voxels in {} levels", told->levels) : "",
-                        told->mirror.empty() || told->mirror == "none" ? "" : "; mirrored " + told->mirror);
-    json["layers"] = {{"thickness_mm", mm(told->thickness)}, {"bottom_mm", mm(told->bottom)}, {"levels", told->levels}};
+  Json json = formats::as_json(*info);
+  std::string text = formats::as_text(*info);
+  if (reported->thickness > 0) {
+    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers",
+                        number_text(mm(reported->thickness)), number_text(mm(reported->bottom)),
+                        reported->levels > 0 ? fmt::format("; shares of voxels in {} levels", reported->levels) : "",
+                        reported->mirror.empty() || reported->mirror == "none" ? "" : "; mirrored " + reported->mirror);
+    json["layers"] = {
+        {"thickness_mm", mm(reported->thickness)}, {"bottom_mm", mm(reported->bottom)}, {"levels", reported->levels}};
   } else {
     text +=
         fmt::format("  {:<12}no manifest of lamina tells how thick they are; jet wants --layer or part.layer_mm\n", "layers");
@@ -95,10 +96,10 @@ Status tell_images(const std::string& path, int threshold, const Arguments& argu
 /// errors  kUsage: an option that is of none of the operands
 Status check_flags(const Arguments& arguments) {
   const auto any = [&](auto names) { return std::ranges::any_of(arguments.operands, names); };
-  const bool parts = any([](const std::string& path) { return !names_toolpaths(path) && !read::names_images(path); });
+  const bool parts = any([](const std::string& path) { return !names_toolpaths(path) && !formats::names_images(path); });
   if (arguments.has("--density") && !any(names_toolpaths))
     return at_option("--density", "is of toolpaths; parts have no filament");
-  if (arguments.has("--threshold") && !any(read::names_images))
+  if (arguments.has("--threshold") && !any(formats::names_images))
     return at_option("--threshold", "is of layer images; leave it out");
   for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld"})
     if (arguments.has(flag) && !parts) return at_option(flag, "is of parts, not of toolpaths or images");
@@ -119,23 +120,23 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   int code = 0;
   for (const PartRequest& part : job->parts) {
     if (names_toolpaths(part.path)) {
-      if (Status status = tell_print(part.path, density_g_cm3, arguments, context); !status)
+      if (Status status = report_print(part.path, density_g_cm3, arguments, context); !status)
         code = std::max(code, context.complain(status.error()));
       continue;
     }
-    if (read::names_images(part.path)) {
-      if (Status status = tell_images(part.path, static_cast<int>(threshold), arguments, context); !status)
+    if (formats::names_images(part.path)) {
+      if (Status status = report_images(part.path, static_cast<int>(threshold), arguments, context); !status)
         code = std::max(code, context.complain(status.error()));
       continue;
     }
     const load::LoadOptions options = load_options(*job, part);
-    const Result<std::string> page = (arguments.has("--json") ? load::describe_part_json : load::describe_part_text)(
-        part.path, options, slice::surplus_areas);
+    const Result<std::string> page =
+        (arguments.has("--json") ? describe_part_json : describe_part_text)(part.path, options, slice::surplus_areas);
     if (!page) {
       code = std::max(code, context.complain(page.error()));
       continue;
     }
-    const Status status = arguments.has("--json") ? context.give(Json::parse(*page)) : context.print(*page);
+    const Status status = arguments.has("--json") ? context.give(parse_json(*page)) : context.print(*page);
     if (!status) return status.error();
   }
   return code;

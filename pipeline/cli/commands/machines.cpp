@@ -6,16 +6,13 @@
 #include <vector>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/machine/extruder.h"
-#include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
-#include "stages/data/text/readable.h"
-#include "stages/program/explain.h"
-#include "stages/program/image_of_bed.h"
+#include "pipeline/report/machine_text.h"
+#include "stages/program/dialect.h"
 #include "stages/program/orientation_target.h"
-#include "stages/write/file.h"
-#include "stages/write/program/dialect.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -62,27 +59,27 @@ std::string explain(const ExtruderProfile& profile) {
 }
 
 /// A profile whose layer 1 has the care that is due in some layers, and the share of layers that are such.
-struct CareCase {
+struct MaintenanceCase {
   Machine machine;
   double share = 1;
 };
 
 /// Shots and wipes are due every so many layers, apart or in the same one: up to four kinds of layers.
-std::vector<CareCase> care_cases(const Machine& machine) {
+std::vector<MaintenanceCase> maintenance_cases(const Machine& machine) {
   constexpr std::uint32_t kNever = 1'000'000;  // a layer later than 1
-  const auto& care = machine.care;
-  const double shots = care.spit_layers, wipes = care.wipe_layers;
+  const auto& maintenance = machine.maintenance;
+  const double shots = maintenance.spit_layers, wipes = maintenance.wipe_layers;
   const double both =
       shots > 0 && wipes > 0
-          ? 1.0 / static_cast<double>(std::lcm(std::uint64_t{care.spit_layers}, std::uint64_t{care.wipe_layers}))
+          ? 1.0 / static_cast<double>(std::lcm(std::uint64_t{maintenance.spit_layers}, std::uint64_t{maintenance.wipe_layers}))
           : 0;
   const double shot = shots > 0 ? 1 / shots : 0, wipe = wipes > 0 ? 1 / wipes : 0;
-  std::vector<CareCase> cases;
+  std::vector<MaintenanceCase> cases;
   const auto add = [&](bool shoots, bool wipes_too, double share) {
     if (share < 1e-12) return;
-    CareCase& made = cases.emplace_back(CareCase{machine, share});
-    if (shots > 0) made.machine.care.spit_layers = shoots ? 1 : kNever;
-    if (wipes > 0) made.machine.care.wipe_layers = wipes_too ? 1 : kNever;
+    MaintenanceCase& made = cases.emplace_back(MaintenanceCase{machine, share});
+    if (shots > 0) made.machine.maintenance.spit_layers = shoots ? 1 : kNever;
+    if (wipes > 0) made.machine.maintenance.wipe_layers = wipes_too ? 1 : kNever;
   };
   add(false, false, 1 - shot - wipe + both);
   add(true, false, shot - both);
@@ -117,7 +114,7 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
     const Status status = written.write_layer(layer, std::vector<RunsView>(drops, of.view()), {0}, work, record);
     return status ? Result<ProgramRecord>(record) : Result<ProgramRecord>(status.error());
   };
-  for (const CareCase& one : care_cases(resolved.machine)) {
+  for (const MaintenanceCase& one : maintenance_cases(resolved.machine)) {
     const auto filled = timed(one.machine, image, 1), none = timed(one.machine, empty, 1);
     if (!filled || !none) return filled ? none.error() : filled.error();
     full.sweeps = filled->sweeps;
@@ -129,12 +126,12 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
     if (!all) return all.error();
     full.drops_seconds += one.share * static_cast<double>(all->microseconds) / 1e6;
   }
-  if (resolved.machine.care.spits() || resolved.machine.care.wipes()) {
+  if (resolved.machine.maintenance.spits() || resolved.machine.maintenance.wipes()) {
     Machine without = resolved.machine;
-    without.care = {};
+    without.maintenance = {};
     const auto filled = timed(without, image, 1);
     if (!filled) return filled.error();
-    full.care_seconds = full.seconds - static_cast<double>(filled->microseconds) / 1e6;
+    full.maintenance_seconds = full.seconds - static_cast<double>(filled->microseconds) / 1e6;
   }
   return std::optional(full);
 }
@@ -147,9 +144,9 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
   if (!powder) {
     const auto extrusion = find_extruder(name);
     if (!extrusion) return powder.error();
-    return whole ? read::extruder_text(*extrusion) : explain(*extrusion);
+    return whole ? pipeline::extruder_text(*extrusion) : explain(*extrusion);
   }
-  if (whole) return read::sourced_text(read::machine_text(*powder), *files);
+  if (whole) return pipeline::sourced_text(pipeline::machine_text(*powder), *files);
   const auto resolved = resolve_profile(*powder);
   if (!resolved) return resolved.error();
   const auto full = time_full_layer(*resolved);
@@ -160,7 +157,7 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
 Outcome run_machines(const Arguments& arguments, Context& context) {
   if (arguments.has("--target")) {
     const auto part = program::orientation_target();
-    if (Status status = write::write_file(arguments.text("--target"), part); !status) return status.error();
+    if (Status status = write_file(arguments.text("--target"), part); !status) return status.error();
     context.say(
         fmt::format("{}: an F of 20 x 30 mm: its stem lies along +y, its arms point to +x, a step of 1 mm on top lies at its "
                     "foot; read mirrored or turned, so is the machine",
@@ -169,9 +166,10 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
   }
   std::string text;
   std::vector<std::string> presets;
-  if (Status status = arguments.read("--preset", read::read_presets, presets); !status) return status;
+  if (Status status = arguments.read("--preset", pipeline::read_presets, presets); !status) return status;
   if (arguments.has("--dialects")) {
-    for (const write::Dialect& dialect : write::dialects()) text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
+    for (const program::Dialect& dialect : program::dialects())
+      text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
   }
   for (const std::string& name : arguments.all("--show")) {
     const auto profile = printer_text(name, presets, true);
@@ -193,7 +191,7 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     }
     text += "\n--preset:\n";
     for (const ShippedProfile& shipped : shipped_presets()) text += fmt::format("{}\n", shipped.name);
-    const read::Library library = profile_library();
+    const pipeline::Library library = profile_library();
     if (!library.own_names().empty()) text += fmt::format("\nin {}:\n", one_line(library.folder()));
     for (const std::string& name : library.own_names()) text += one_line(name) + "\n";
     text += "\nlamina extrude:\n";

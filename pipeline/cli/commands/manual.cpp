@@ -9,10 +9,10 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "stages/data/text/readable.h"
-#include "stages/terminal/completion.h"
-#include "stages/terminal/pages.h"
-#include "stages/write/file.h"
+#include "pipeline/cli/terminal/completion.h"
+#include "pipeline/cli/terminal/pages.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -34,9 +34,9 @@ CommandSpec completion_spec() {
 
 Outcome run_completion(const Arguments& arguments, Context& context) {
   const std::string shell = arguments.operands.size() == 1 ? arguments.operands.front() : "";
-  if (shell == "bash") return context.print(terminal::bash_completion(all_specs()));
-  if (shell == "zsh") return context.print(terminal::zsh_completion(all_specs()));
-  if (shell == "fish") return context.print(terminal::fish_completion(all_specs()));
+  if (shell == "bash") return context.print(pipeline::bash_completion(all_specs()));
+  if (shell == "zsh") return context.print(pipeline::zsh_completion(all_specs()));
+  if (shell == "fish") return context.print(pipeline::fish_completion(all_specs()));
   return Error{Fault::kUsage, "name one shell: bash, zsh or fish"};
 }
 
@@ -57,14 +57,14 @@ CommandSpec manual_spec() {
 }
 
 std::string page_of(const CommandSpec& spec, bool markdown) {
-  return markdown ? terminal::markdown_page(spec) : terminal::man_page(spec);
+  return markdown ? pipeline::markdown_page(spec) : pipeline::man_page(spec);
 }
 
 /// Writes all pages, or none if one would replace a user's file.
 Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
   std::vector<std::pair<std::string, std::string>> pages;  // path, text
   const std::vector<CommandSpec> specs = all_specs();
-  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), terminal::man_page(specs));
+  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), pipeline::man_page(specs));
   for (const CommandSpec& spec : specs) {
     pages.emplace_back(fmt::format("{}/{}{}{}", directory, markdown ? "" : "lamina-", spec.name, markdown ? ".md" : ".1"),
                        page_of(spec, markdown));
@@ -77,7 +77,7 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
   std::filesystem::create_directories(directory, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
   for (const auto& [path, text] : pages) {
-    if (Status status = write::write_file(path, text); !status) return status;
+    if (Status status = write_file(path, text); !status) return status;
   }
   return {};
 }
@@ -92,7 +92,7 @@ Outcome run_manual(const Arguments& arguments, Context& context) {
   if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
     if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
-    return context.print(terminal::man_page(all_specs()));
+    return context.print(pipeline::man_page(all_specs()));
   }
   const Command* command = find_command(arguments.operands.front());
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(arguments.operands.front())};

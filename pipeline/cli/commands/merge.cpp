@@ -3,9 +3,9 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
-#include "pipeline/run/summary.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/report/summary.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -50,12 +50,12 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
     for (const Warning& warning : report->warnings) context.say("warning: " + one_line(warning.text));
   }
   if (!arguments.has("--json")) return {};
-  Json told = {{"command", "merge"},       {"directory", report->output}, {"shards", report->shards},
-               {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
-  if (report->microseconds > 0) told["print_seconds"] = 1e-6 * static_cast<double>(report->microseconds);
-  if (!sweeps.empty()) told["sweeps"] = sweeps;
-  told["warnings"] = warnings_json(report->warnings);
-  return context.give(told);
+  Json reported = {{"command", "merge"},       {"directory", report->output}, {"shards", report->shards},
+                   {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
+  if (report->microseconds > 0) reported["print_seconds"] = 1e-6 * static_cast<double>(report->microseconds);
+  if (!sweeps.empty()) reported["sweeps"] = sweeps;
+  reported["warnings"] = warnings_json(report->warnings);
+  return context.give(reported);
 }
 
 }  // namespace

@@ -5,18 +5,27 @@
 #include <numbers>
 
 #include "pipeline/calibrate/drops_page.h"
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/cli/pore_job.h"
 #include "pipeline/cli/pore_print.h"
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/pore_analysis.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
+
+/// A warning about implausible properties of a fluid, one line; "" if none.
+std::string odd_about(const segment::Fluid& fluid) {
+  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
+  return fmt::format(
+      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
+      "k2 for air is {:.4g} times smaller",
+      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
+}
 
 CommandSpec permeability_spec() {
   CommandSpec spec;
@@ -50,7 +59,7 @@ CommandSpec permeability_spec() {
        "spread: as the printer's melt lags and spreads; laid: no spread along lines; told: by the file; default: spread by known printers",
        "",
        "Toolpaths",
-       {"laid", "spread", "told"}},
+       {"deposited", "spread", "stated"}},
       {"--machine", "NAME|FILE", "printer that lays them, or of a job; default: the one that the file names", "", "Toolpaths"},
       {"--set", "KEY=VALUE", "of a job file: set any key, as in --set fill.width_mm=0.5", "", "Job"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
@@ -87,9 +96,9 @@ Status read_pressures(const Arguments& arguments, segment::DropsSettings& settin
   if (!settings.gas) return {};
   segment::GasPressures& gas = *settings.gas;
   if (Status status = arguments.read("--outlet-pressure", {1, 1e9}, gas.outlet_pa); !status) return status;
-  gas.told_pa = gas.outlet_pa;
-  if (Status status = arguments.read("--flow-pressure", {1, 1e9}, gas.told_pa); !status) return status;
-  if (!arguments.has("--density") && !arguments.has("--convention")) settings.fluid.density_kg_m3 *= gas.told_pa / 101325;
+  gas.reference_pa = gas.outlet_pa;
+  if (Status status = arguments.read("--flow-pressure", {1, 1e9}, gas.reference_pa); !status) return status;
+  if (!arguments.has("--density") && !arguments.has("--convention")) settings.fluid.density_kg_m3 *= gas.reference_pa / 101325;
   return {};
 }
 
@@ -150,7 +159,7 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
           fmt::format("note: {} is of {}, the first of {} configurations", plot, fits->front().group.name, fits->size()));
     }
   }
-  if (std::string warning = segment::odd_about(settings->fluid); !warning.empty()) warnings.push_back(std::move(warning));
+  if (std::string warning = odd_about(settings->fluid); !warning.empty()) warnings.push_back(std::move(warning));
   for (const std::string& warning : warnings) {
     context.say_text(fmt::format("warning   {}\n", one_line(warning)));
     json["warnings"].push_back(warning);
@@ -173,7 +182,7 @@ Status refuse(const Arguments& arguments, std::span<const std::string_view> flag
 }
 
 /// What can be told of one file or folder. part  as predict_print() takes it
-Outcome look_at_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
+Outcome analyse_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   if (arguments.operands.size() != 1)
     return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
   const std::string& operand = arguments.operands.front();
@@ -197,10 +206,10 @@ Outcome look_at_file(const Arguments& arguments, Context& context, const std::op
 
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (!arguments.operands.empty() && names_job(arguments.operands.front()))
-    return predict_job(arguments, context, look_at_file);
+    return predict_job(arguments, context, analyse_file);
   if (const Status fits = refuse(arguments, std::array<std::string_view, 1>{"--set"}, "job files, as in job.toml"); !fits)
     return fits;
-  return look_at_file(arguments, context, std::nullopt);
+  return analyse_file(arguments, context, std::nullopt);
 }
 
 }  // namespace

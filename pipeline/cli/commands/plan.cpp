@@ -6,19 +6,18 @@
 #include <optional>
 #include <span>
 
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/needs.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/job.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/pores/pore_analysis.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/data/text/json.h"
-#include "stages/write/file.h"
-#include "stages/write/levels/level_format.h"
+#include "stages/formats/image_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -68,7 +67,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   return spec;
 }
 
-/// What a job file leaves to the printer, one line for each: files of earlier versions meant other defaults.
+/// What a job file leaves to the printer, one line for each.
 std::vector<std::string> notes_on_defaults(const std::string& path, const Job& job) {
   const std::string file = path == "-" ? "the job" : path;
   std::vector<std::string> notes;
@@ -93,8 +92,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  for (std::string& note : notes_on_needs(row.product, arguments, *job)) job->notes.push_back(std::move(note));
-  for (const std::string& note : job->notes) {
+  for (const std::string& note : notes_on_needs(row.product, arguments, *job)) {
     if (!job->quiet) context.say("note: " + note);
   }
   Result<Resolved> resolved = resolve(*job, row.product);
@@ -104,7 +102,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
     if (arguments.has("--job")) left = notes_on_defaults(arguments.text("--job"), resolved->job);
   }
-  std::optional<write::File> file;  // takes its name once the job is planned
+  std::optional<File> file;  // takes its name once the job is planned
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
     if (saved.bed_mm || saved.machine.profile.empty()) saved.bed_mm = resolved->bed.size_mm;
@@ -118,7 +116,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (auto done = file->finish(); !done) kept = done.error();
     file.reset();
   };
-  const bool tells_pores =
+  const bool reports_pores =
       row.product == Product::kMoves && resolved->job.segment.any() && !job->dry_run && (!job->quiet || job->json);
   const auto progress = [&](const ProgressEvent& event) {
     if (event.stage == ProgressEvent::Stage::kLayers) keep_job();
@@ -128,14 +126,14 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (!summary) return summary.error();
   keep_job();
   if (!kept) return kept.error();
-  if (tells_pores) add_pores(summary->output, *summary);
+  if (reports_pores) add_pores(summary->output, *summary);
   if (Status status = write_quote(arguments, summary->quote); !status) return status.error();
   if (!job->quiet) {
     for (const std::string& note : left) context.say("note: " + note);
     context.say_text(summary->text());
   }
   if (job->json) {
-    if (Status status = context.give(Json::parse(summary->json())); !status) return status.error();
+    if (Status status = context.give(parse_json(summary->json())); !status) return status.error();
   }
   Outcome outcome;
   outcome.layers_planned = summary->layers_planned;
@@ -146,7 +144,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
 // --- lamina jet
 
 // clang-format off
-const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "machine", "dose", "fill", "segment.fill", "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "placement", "image", "machine", "dose", "fill", "segment.fill", "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
                             "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
                             "segment.thin_width_mm", "load", "run", "part"};
 // clang-format on
@@ -161,8 +159,8 @@ const OptionSpec kJetSwitches[] = {
 
 std::string jet_closing() {
   std::string text = "Formats:\n";
-  for (const auto& format : write::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
-  for (const auto& format : write::level_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
+  for (const auto& format : formats::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
+  for (const auto& format : formats::level_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
   return text +
          "\nLengths are mm, angles degrees. Part options hold for every part; a job file sets them for each.\n\n"
          "Examples:\n"
@@ -201,7 +199,7 @@ PlanCommand jet_row() {
 
 // --- lamina slice
 
-const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "place",        "image.fill", "load",
+const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "placement",    "image.fill", "load",
                               "run.output",      "run.threads", "run.memory", "run.sync",     "run.layers", "run.strict",
                               "run.allow_empty", "slice",       "fill",       "segment.fill", "part"};
 
@@ -215,9 +213,9 @@ const OptionSpec kSliceWords[] = {{"--tolerance", "", "", "0", ""}};
 Status complete_slice(const Arguments& arguments, Job& job) {
   if (arguments.text("--fill") == "segmented")
     return at_option("--fill", "segmented lines are of lamina extrude and lamina jet");
-  const InputFile asked = {arguments.text("--job"), "the job file"};
+  const InputFile requested = {arguments.text("--job"), "the job file"};
   const std::string kept = job.output + "/job.toml";
-  return check_outputs({&asked, 1}, {&kept, 1});
+  return check_outputs({&requested, 1}, {&kept, 1});
 }
 
 std::string slice_closing() {
@@ -247,7 +245,7 @@ PlanCommand slice_row() {
 
 const KeyChoice kExtrudeKeys = {"layers",
                                 "heights",
-                                "place",
+                                "placement",
                                 "machine.profile",
                                 "fill",
                                 "image.fill",

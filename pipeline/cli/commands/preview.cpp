@@ -1,5 +1,5 @@
 #include "pipeline/cli/command.h"
-#include "stages/write/other_program.h"
+#include "stages/support/io/other_program.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -37,7 +37,7 @@ CommandSpec preview_spec() {
   return spec;
 }
 
-Outcome run_preview(const Arguments& arguments, Context&) { return write::hand_over("lamina-preview", arguments.given); }
+Outcome run_preview(const Arguments& arguments, Context&) { return hand_over("lamina-preview", arguments.given); }
 
 }  // namespace
 

@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/pores/pore_analysis.h"
 #include "pipeline/show/report.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -20,7 +20,7 @@ CommandSpec report_spec() {
   spec.operand_meaning = "finished directory of lamina jet, or G-code file of lamina extrude beside its manifest";
   spec.options = {
       {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
-      {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
+      {"--max-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
       {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "say nothing but errors", "", ""}};
@@ -28,7 +28,7 @@ CommandSpec report_spec() {
       "Examples:\n"
       "  lamina report out -o report.html\n"
       "  lamina report out -o report.html --parts parts/      the parts themselves from three sides\n"
-      "  lamina report out -o small.html --most-bytes 2M      for a mail\n"
+      "  lamina report out -o small.html --max-bytes 2M      for a mail\n"
       "  lamina report part.gcode -o part.html                toolpaths, drawn in their beads' true widths";
   return spec;
 }
@@ -49,7 +49,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
     return Error{Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)};
   }
   ReportOptions options;
-  if (Status status = arguments.read("--most-bytes", read_bytes, options.size_limit); !status) return status;
+  if (Status status = arguments.read("--max-bytes", read_bytes, options.size_limit); !status) return status;
   options.parts = arguments.all("--parts");
   std::error_code ignored;
   if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored)) {
@@ -59,18 +59,18 @@ Outcome run_report(const Arguments& arguments, Context& context) {
     if (!std::filesystem::exists(parts, ignored))
       return Error{Fault::kInput, fmt::format("--parts: {}: no such file or folder", parts)};
   }
-  LaidPage laid = laid_page(arguments.operands.front());
-  options.laid = std::move(laid.text);
-  options.laid_svg = std::move(laid.svg);
+  AnalysisPage deposited = analysis_page(arguments.operands.front());
+  options.deposited = std::move(deposited.text);
+  options.deposited_svg = std::move(deposited.svg);
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
-  if (Status status = write::write_file(output, report->page); !status) return status.error();
+  if (Status status = write_file(output, report->page); !status) return status.error();
   Answer answer(arguments, context);
   answer.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
                          readable_bytes(report->page.size())));
   if (const std::uint64_t bytes = report->page.size(); bytes > options.size_limit && !arguments.has("--quiet"))
-    context.say(fmt::format("note: {} takes {}, more than --most-bytes; no page of this job is smaller", output,
-                            readable_bytes(bytes)));
+    context.say(
+        fmt::format("note: {} takes {}, more than --max-bytes; no page of this job is smaller", output, readable_bytes(bytes)));
   if (!report->without_parts.empty()) answer.say("views are of the layers: " + report->without_parts);
   return answer.status();
 }

@@ -5,11 +5,11 @@
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/replay/time/totals.h"
-#include "stages/sanity/records.h"
+#include "pipeline/report/replay_text.h"
+#include "stages/checks/records.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -47,7 +47,7 @@ Json report_json(const VerifyReport& report) {
   Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
                {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
   if (!report.machine.empty()) json["replay"] = replay::totals_json(totals_of(report));
-  if (report.use.facts) json["use"] = *report.use.facts;
+  if (const Json* use = report.use.facts.find("use")) json["use"] = *use;
   for (const UnfedPowder& powder : report.unfed) {
     json["unfed"].push_back({{"material", powder.name}, {"pixels", powder.pixels}, {"layers", powder.layers}});
   }
@@ -85,9 +85,9 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
         for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
         for (const auto& [name, what] : report->use.results)
           answer.say(fmt::format("{:<10}{}", name == "material" ? "used" : name, what));
-        std::vector<Warning> doubts;
-        for (const UnfedPowder& powder : report->unfed) sanity::warn_of_unfed(powder, doubts);
-        for (const Warning& doubt : doubts) answer.say("warning   " + one_line(doubt.text));
+        std::vector<Warning> warnings;
+        for (const UnfedPowder& powder : report->unfed) checks::warn_of_unfed(powder, warnings);
+        for (const Warning& warning : warnings) answer.say("warning   " + one_line(warning.text));
       }
       if (Status status = answer.status(); !status) return status;
     }

@@ -12,12 +12,12 @@
 #define LAMINA_TARGET LAMINA_AVX2
 #define LAMINA_LANES LAMINA_AVX2 __attribute__((always_inline)) inline
 
-namespace lamina::cover::avx2 {
+namespace lamina::coverage::avx2 {
 namespace {
 
 using Part = __m256d;
-LAMINA_LANES Part least_of(Part a, Part b) { return _mm256_min_pd(a, b); }
-LAMINA_LANES Part most_of(Part a, Part b) { return _mm256_max_pd(a, b); }
+LAMINA_LANES Part min_of(Part a, Part b) { return _mm256_min_pd(a, b); }
+LAMINA_LANES Part max_of(Part a, Part b) { return _mm256_max_pd(a, b); }
 LAMINA_LANES std::uint32_t signs_of(Part a) { return static_cast<std::uint32_t>(_mm256_movemask_pd(a)); }
 
 #include "stages/coverage/band/parts.h"
@@ -26,13 +26,13 @@ LAMINA_LANES std::uint32_t signs_of(Part a) { return static_cast<std::uint32_t>(
 
 }  // namespace
 
-LAMINA_AVX2 void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach,
-                     BandSums& sums) {
-  lay_body(piece, rows, columns, cells, reach, sums);
+LAMINA_AVX2 void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
+                         ColumnReach& reach, BandSums& sums) {
+  add_body(piece, rows, columns, cells, reach, sums);
 }
 LAMINA_AVX2 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
 
-}  // namespace lamina::cover::avx2
+}  // namespace lamina::coverage::avx2
 
 #undef LAMINA_LANES
 #undef LAMINA_TARGET

@@ -14,7 +14,7 @@
 
 LAMINA_AVX512_BEGIN
 
-namespace lamina::cover::avx512 {
+namespace lamina::coverage::avx512 {
 namespace {
 
 using Eight = __m512d;
@@ -26,8 +26,8 @@ LAMINA_LANES Eight plus(Eight a, Eight b) { return _mm512_add_pd(a, b); }
 LAMINA_LANES Eight less(Eight a, Eight b) { return _mm512_sub_pd(a, b); }
 LAMINA_LANES Eight times(Eight a, Eight b) { return _mm512_mul_pd(a, b); }
 LAMINA_LANES Eight over(Eight a, Eight b) { return _mm512_div_pd(a, b); }
-LAMINA_LANES Eight least(Eight a, Eight b) { return _mm512_min_pd(a, b); }
-LAMINA_LANES Eight most(Eight a, Eight b) { return _mm512_max_pd(a, b); }
+LAMINA_LANES Eight minimum(Eight a, Eight b) { return _mm512_min_pd(a, b); }
+LAMINA_LANES Eight maximum(Eight a, Eight b) { return _mm512_max_pd(a, b); }
 LAMINA_LANES Eight absolute(Eight a) { return _mm512_abs_pd(a); }
 LAMINA_LANES Eight whole_below(Eight a) { return _mm512_floor_pd(a); }
 LAMINA_LANES Mask below(Eight a, Eight b) { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); }
@@ -82,13 +82,13 @@ LAMINA_LANES void note_changes(std::uint64_t levels, std::uint32_t columns, std:
 
 }  // namespace
 
-LAMINA_AVX512 void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach,
-                       BandSums& sums) {
-  lay_body(piece, rows, columns, cells, reach, sums);
+LAMINA_AVX512 void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
+                           ColumnReach& reach, BandSums& sums) {
+  add_body(piece, rows, columns, cells, reach, sums);
 }
 LAMINA_AVX512 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
 
-}  // namespace lamina::cover::avx512
+}  // namespace lamina::coverage::avx512
 
 LAMINA_AVX512_END
 #undef LAMINA_LANES

@@ -1,18 +1,18 @@
 // stages/coverage/band/body.h: the kernels of kernels.h, on the lanes of an instruction set. Included once for each, in its
 // namespace, behind Eight, Mask and what is done with them; LAMINA_LANES has the target.
 
-/// A triangle that what lies behind it sees along x (volume.h), in each of eight rows; x from the facet's lowest corner.
+/// A triangle that what lies behind it sees along x (slab_facet.h), in each of eight rows; x from the facet's lowest corner.
 struct Tent {
   Eight x0, x1, x2, area, mean, rise, fall;
 };
 
 /// Corners in any order.
 LAMINA_LANES Tent tent_of(Eight a, Eight b, Eight c, Eight area) {
-  const Eight low = least(a, b), high = most(a, b), inner = least(high, c);
+  const Eight low = minimum(a, b), high = maximum(a, b), inner = minimum(high, c);
   Tent t;
-  t.x0 = least(low, c);
-  t.x2 = most(high, c);
-  t.x1 = most(low, inner);
+  t.x0 = minimum(low, c);
+  t.x2 = maximum(high, c);
+  t.x1 = maximum(low, inner);
   t.area = area;
   t.mean = times(plus(plus(t.x0, t.x1), t.x2), all(1.0 / 3));
   const Eight span = less(t.x2, t.x0), third = times(area, all(1.0 / 3));
@@ -44,13 +44,13 @@ LAMINA_LANES TentPair pair_of(const TentRows& rows, std::uint32_t lane) {
 /// Volume between a tent and x, behind it.
 LAMINA_LANES Eight behind(const Tent& t, Eight x) {
   const Mask rises = below(x, t.x1);
-  const Eight from = most(pick(rises, less(x, t.x0), less(t.x2, x)), all(0));
+  const Eight from = maximum(pick(rises, less(x, t.x0), less(t.x2, x)), all(0));
   const Eight part = times(times(pick(rises, t.rise, t.fall), from), times(from, from));
   return plus(drop(rises, times(t.area, less(x, t.mean))), part);
 }
 LAMINA_LANES Eight behind(const TentPair& t, Eight x) { return plus(behind(t.a, x), behind(t.b, x)); }
 
-LAMINA_LANES void lay_columns(const TentPair& tents, double from_x, const double* edges, double* partial,
+LAMINA_LANES void add_columns(const TentPair& tents, double from_x, const double* edges, double* partial,
                               std::uint32_t columns) {
   const Eight from = all(from_x);
   Eight now = behind(tents, less(load(edges), from));
@@ -75,10 +75,10 @@ LAMINA_LANES void add_lanes(double* to, std::uint32_t begin, std::uint32_t end, 
 
 LAMINA_LANES Eight along(double at, double per_y, Eight from) { return plus(all(at), times(from, all(per_y))); }
 
-LAMINA_LANES void lay_body(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach,
-                           BandSums& sums) {
-  const Eight low = most(less(load(rows.y.data()), all(piece.from_y)), all(piece.low));
-  const Eight high = least(less(load(rows.y.data() + 1), all(piece.from_y)), all(piece.high));
+LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
+                           ColumnReach& reach, BandSums& sums) {
+  const Eight low = maximum(less(load(rows.y.data()), all(piece.from_y)), all(piece.low));
+  const Eight high = minimum(less(load(rows.y.data() + 1), all(piece.from_y)), all(piece.high));
   const Mask has_height = below(low, high);
   const Eight on_low = less(low, all(piece.on.y)), on_high = less(high, all(piece.on.y));
   const Eight back_low = less(low, all(piece.back.y)), back_high = less(high, all(piece.back.y));
@@ -86,16 +86,16 @@ LAMINA_LANES void lay_body(const Trapezoid& piece, const BandRows& rows, const E
   const Eight x_back_low = along(piece.back.x, piece.back.dx, back_low);
   const Eight x_back_high = along(piece.back.x, piece.back.dx, back_high);
 
-  const Eight room = all(piece.slope_room), left_end = all(piece.left), right_end = all(piece.right);
-  const Eight leftmost = less(least(least(x_on_low, x_on_high), least(x_back_low, x_back_high)), room);
-  const Eight rightmost = plus(most(most(x_on_low, x_on_high), most(x_back_low, x_back_high)), room);
-  const Eight left = pick(has_height, most(leftmost, left_end), left_end);
-  const Eight right = pick(has_height, least(rightmost, right_end), right_end);
+  const Eight slack = all(piece.slope_margin), left_end = all(piece.left), right_end = all(piece.right);
+  const Eight leftmost = less(minimum(minimum(x_on_low, x_on_high), minimum(x_back_low, x_back_high)), slack);
+  const Eight rightmost = plus(maximum(maximum(x_on_low, x_on_high), maximum(x_back_low, x_back_high)), slack);
+  const Eight left = pick(has_height, maximum(leftmost, left_end), left_end);
+  const Eight right = pick(has_height, minimum(rightmost, right_end), right_end);
   const Eight per_nm = all(columns.per_nm()), last_column = all(static_cast<double>(columns.count() - 1));
   const auto bounded = [&](Eight x, double by) LAMINA_TARGET {
-    return least(most(times(plus(x, all(piece.from_x + by)), per_nm), all(0)), last_column);
+    return minimum(maximum(times(plus(x, all(piece.from_x + by)), per_nm), all(0)), last_column);
   };
-  const Eight first_column = bounded(left, -kRoom), end_column = bounded(right, kRoom + Edges::kBehind);
+  const Eight first_column = bounded(left, -kSlack), end_column = bounded(right, kSlack + Edges::kBehind);
   store_whole(reach.first.data(), first_column);
   store_whole(reach.last.data(), end_column);
 
@@ -123,7 +123,7 @@ LAMINA_LANES void lay_body(const Trapezoid& piece, const BandRows& rows, const E
     cells.held(lane).mark(first, last);
     if (piece.suspect) cells.suspect(lane).mark(first, last);
     if ((with_area >> lane & 1) == 0) continue;
-    lay_columns(pair_of(tents, lane), piece.from_x, columns.data() + first, cells.partial(lane) + first, last - first + 1);
+    add_columns(pair_of(tents, lane), piece.from_x, columns.data() + first, cells.partial(lane) + first, last - first + 1);
     cells.passed(lane)[last + 1] += area[lane];
   }
 }
@@ -137,11 +137,11 @@ LAMINA_LANES bool is_even(const double* partial, const double* passed) {
 }
 
 /// Levels of a stretch, from `winding` before it; returns that behind it.
-LAMINA_LANES std::int64_t sweep_stretch(const RowTask& row, const Stretch& stretch, std::uint32_t& level, Changes& changes) {
+LAMINA_LANES std::int64_t sweep_span(const RowTask& row, const ColumnSpan& span, std::uint32_t& level, Changes& changes) {
   const Eight top = all(row.top), spoilt = all(row.spoilt * row.top), rounding = all(0x1p-49);
-  double cover = static_cast<double>(stretch.winding) * row.area;
-  for (std::uint32_t c = stretch.first; c < stretch.end; c += kLanes) {
-    const std::uint32_t columns = std::min(stretch.end - c, kLanes), ends = std::min(columns + 1, kLanes);
+  double cover = static_cast<double>(span.winding) * row.area;
+  for (std::uint32_t c = span.first; c < span.end; c += kLanes) {
+    const std::uint32_t columns = std::min(span.end - c, kLanes), ends = std::min(columns + 1, kLanes);
     const Eight width = less(load(row.edges + c + 1), load(row.edges + c));
     const Eight old_partial = load(row.partial + c), old_passed = load(row.passed + c);
     const Eight partial = keep_first(columns, old_partial), passed = keep_first(ends, old_passed);
@@ -151,55 +151,55 @@ LAMINA_LANES std::int64_t sweep_stretch(const RowTask& row, const Stretch& stret
     cover = last_of(behind);
     const Eight volume = plus(times(behind, width), partial);
     const Eight per_voxel = pick(below(width, all(row.widest)), all(row.per_narrowest), all(row.per_widest));
-    const Eight place = plus(times(volume, per_voxel), all(0.5));
-    const Eight off = plus(spoilt, times(rounding, plus(absolute(place), top)));
-    const Eight lowest = most(least(whole_below(less(place, off)), top), all(0));
-    const Eight highest = most(least(whole_below(plus(place, off)), top), all(0));
+    const Eight position = plus(times(volume, per_voxel), all(0.5));
+    const Eight off = plus(spoilt, times(rounding, plus(absolute(position), top)));
+    const Eight lowest = maximum(minimum(whole_below(less(position, off)), top), all(0));
+    const Eight highest = maximum(minimum(whole_below(plus(position, off)), top), all(0));
     const std::uint32_t valid = (1u << columns) - 1;
     std::uint64_t levels = bytes_of(lowest);
     const std::uint32_t undecided = bits(below(lowest, highest)) & valid;
     const std::uint32_t suspects = row.has_suspects ? row.suspect.eight(c) & valid : 0;
     if ((undecided | suspects) != 0) [[unlikely]] {
-      Doubt doubt{stretch, c, undecided, suspects, {}};
-      store(doubt.volume.data(), volume);
-      levels = row.judge->decide(doubt, levels);
+      OpenLanes open_lanes{span, c, undecided, suspects, {}};
+      store(open_lanes.volume.data(), volume);
+      levels = row.resolver->decide(open_lanes, levels);
     }
     note_changes(levels, columns, c, level, changes);
     // A flat top, or a floor, within the layer.
-    if (stretch.end - c >= 128 && !row.has_suspects && is_zero(old_partial, old_passed)) [[unlikely]] {
-      const std::uint32_t until = undecided != 0 ? row.judge->even_until() : stretch.end;
+    if (span.end - c >= 128 && !row.has_suspects && is_zero(old_partial, old_passed)) [[unlikely]] {
+      const std::uint32_t until = undecided != 0 ? row.resolver->even_until() : span.end;
       while (c + kLanes + 64 < until && is_even(row.partial + c + kLanes, row.passed + c + kLanes)) c += 64;
     }
   }
-  if ((stretch.end - stretch.first) % kLanes == 0) {
-    cover += row.passed[stretch.end];
-    row.passed[stretch.end] = 0;
+  if ((span.end - span.first) % kLanes == 0) {
+    cover += row.passed[span.end];
+    row.passed[span.end] = 0;
   }
   return static_cast<std::int64_t>(std::floor(cover / row.area + 0.5));
 }
 
 LAMINA_LANES void sweep_body(const RowTask& row_of, Changes& result) {
-  const RowTask row = row_of;  // none of it is looked up again after what is written
+  const RowTask row = row_of;  // a copy: no member is read again after a write
   Changes changes = result;
-  Stretch stretch;
+  ColumnSpan span;
   std::uint32_t level = 0, at = 0;
   const auto pass_free = [&](std::uint32_t end) LAMINA_TARGET {
     const std::uint32_t free =
-        is_solid(row.fill, static_cast<std::int32_t>(stretch.winding)) ? static_cast<std::uint32_t>(row.top) : 0;
+        is_solid(row.fill, static_cast<std::int32_t>(span.winding)) ? static_cast<std::uint32_t>(row.top) : 0;
     if (at < end && free != level) {
       changes.column[changes.count] = at;
       changes.level[changes.count++] = static_cast<std::uint8_t>(free);
       level = free;
     }
-    if (at < end && (stretch.winding < 0 || stretch.winding > 1)) row.judge->free(stretch.winding, at, end);
+    if (at < end && (span.winding < 0 || span.winding > 1)) row.resolver->free(span.winding, at, end);
   };
   for (std::uint32_t c = row.held.next(0); c != ColumnMarks::kNone; c = row.held.next(at)) {
     pass_free(c);
-    stretch.first = c;
-    stretch.end = row.held.end_of(c);
-    changes.held += stretch.end - stretch.first;
-    stretch.winding = sweep_stretch(row, stretch, level, changes);
-    at = stretch.end;
+    span.first = c;
+    span.end = row.held.end_of(c);
+    changes.held += span.end - span.first;
+    span.winding = sweep_span(row, span, level, changes);
+    at = span.end;
   }
   pass_free(row.columns);
   result = changes;

@@ -6,7 +6,7 @@
 
 #include "stages/data/buffer.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 inline constexpr std::uint32_t kBandRows = 8;
 /// Kernels work on so many columns, or rows, at once, and may read that far beyond the last column.
@@ -109,4 +109,4 @@ class BandCells {
   Buffer<std::uint64_t> word_, group_;
 };
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

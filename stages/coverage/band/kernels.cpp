@@ -2,29 +2,32 @@
 
 #include "stages/geometry/targets.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 namespace plain {
-void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach, BandSums& sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums);
 void sweep(const RowTask& row, Changes& changes);
 }  // namespace plain
 namespace avx2 {
-void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach, BandSums& sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums);
 void sweep(const RowTask& row, Changes& changes);
 }  // namespace avx2
 namespace avx512 {
-void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach, BandSums& sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums);
 void sweep(const RowTask& row, Changes& changes);
 }  // namespace avx512
 
 const BandKernels& band_kernels_for([[maybe_unused]] Isa isa) {
-  static constexpr BandKernels kPlain{plain::lay, plain::sweep};
+  static constexpr BandKernels kPlain{plain::deposit, plain::sweep};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr BandKernels kAvx2{avx2::lay, avx2::sweep}, kAvx512{avx512::lay, avx512::sweep};
+  static constexpr BandKernels kAvx2{avx2::deposit, avx2::sweep}, kAvx512{avx512::deposit, avx512::sweep};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif
   return kPlain;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

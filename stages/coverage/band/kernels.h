@@ -1,4 +1,4 @@
-// stages/coverage/band/kernels.h: trapezoids are laid into the cells of eight rows, and cells of a row become changes of level.
+// stages/coverage/band/kernels.h: adds trapezoids to cells of eight rows, and converts cells of a row into changes of level.
 //
 // Eight rows of a trapezoid are cut out at once, then eight columns of a row at a time get what it adds. All instruction sets
 // do the same with the same numbers in the same order.
@@ -11,7 +11,7 @@
 #include "stages/coverage/band/trapezoid.h"
 #include "stages/data/choices.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// Rows of a band: row `first` + lane lies between y[lane] and y[lane + 1], nm on the bed.
 struct BandRows {
@@ -20,7 +20,7 @@ struct BandRows {
 };
 
 /// Columns that a trapezoid may reach in each row; last included. Of its own rows alone.
-struct Reach {
+struct ColumnReach {
   std::array<std::uint32_t, kBandRows> first, last;
 };
 
@@ -30,31 +30,31 @@ struct BandSums {
 };
 
 /// Columns that hold facets, one next to the other.
-struct Stretch {
+struct ColumnSpan {
   std::uint32_t first = 0, end = 0;
   std::int64_t winding = 0;  // before it
 };
 
-/// Some of eight columns that doubles do not decide, or whose samples have to be looked at: a bit each.
-struct Doubt {
-  const Stretch& stretch;
+/// Some of eight columns that doubles do not decide, or whose samples have to be read: a bit each.
+struct OpenLanes {
+  const ColumnSpan& span;
   std::uint32_t column;               // the first of the eight
   std::uint32_t undecided, suspects;  // an undecided one may be suspect
   std::array<double, kLanes> volume;  // nm^3
 };
 
 /// Decides them.
-class Judge {
+class LaneResolver {
  public:
-  /// levels  eight, a byte each, the first lowest; returned with those that were asked for
-  virtual std::uint64_t decide(const Doubt& doubt, std::uint64_t levels) = 0;
+  /// levels  eight, a byte each, the first lowest; returned with the requested ones
+  virtual std::uint64_t decide(const OpenLanes& open_lanes, std::uint64_t levels) = 0;
   /// Where the level of the last column that decide() decided, which holds no facet with area along x, ends.
   virtual std::uint32_t even_until() const = 0;
   /// Columns [begin, end), which hold no facet, lie at that winding number, neither 0 nor 1.
   virtual void free(std::int64_t winding, std::uint32_t begin, std::uint32_t end) = 0;
 
  protected:
-  ~Judge() = default;
+  ~LaneResolver() = default;
 };
 
 /// A row whose cells are complete. They are empty again once it is swept, but for marks.
@@ -70,7 +70,7 @@ struct RowTask {
   double *partial, *passed;
   ColumnMarks held, suspect;
   bool has_suspects;
-  Judge* judge;
+  LaneResolver* resolver;
 };
 
 /// Where the level changes, and what it is from there on; before the first it is 0. Room for one more than columns.
@@ -82,12 +82,12 @@ struct Changes {
 };
 
 struct BandKernels {
-  void (*lay)(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach,
-              BandSums& sums);
+  void (*deposit)(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+                  BandSums& sums);
   void (*sweep)(const RowTask& row, Changes& changes);
 };
 
 /// isa  one that this processor has (geometry/isa.h), not kAuto
 const BandKernels& band_kernels_for(Isa isa);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

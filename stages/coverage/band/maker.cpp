@@ -3,23 +3,23 @@
 #include "stages/coverage/coverage.h"
 #include "stages/coverage/edges.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// A facet's piece in the layer has five corners at most, and one trapezoid less.
-constexpr std::uint64_t kMostPieces = 4;
-constexpr std::size_t kMoreRoom = 64;
+constexpr std::uint64_t kMaxPieces = 4;
+constexpr std::size_t kExtraCapacity = 64;
 
 }  // namespace
 
 std::uint64_t BandMaker::bytes_of(std::uint64_t facets, std::uint32_t columns) {
   // Rows list facets where doubles do not decide, and double their room.
-  const std::uint64_t pieces = kMostPieces * facets, room = pieces + pieces / 8 + 2 * kMoreRoom;
-  return room * (sizeof(Trapezoid) + sizeof(Reach)) + 2 * pieces * sizeof(RowFacet) + BandCells::bytes_of(columns) +
+  const std::uint64_t pieces = kMaxPieces * facets, slack = pieces + pieces / 8 + 2 * kExtraCapacity;
+  return slack * (sizeof(Trapezoid) + sizeof(ColumnReach)) + 2 * pieces * sizeof(RowFacet) + BandCells::bytes_of(columns) +
          (std::uint64_t{columns} + 1 + kLanes) * (sizeof(std::uint32_t) + sizeof(std::uint8_t));
 }
 
-void BandMaker::start(const Slab& slab, Isa isa) {
+void BandMaker::start(const BandSlab& slab, Isa isa) {
   kernels_ = &band_kernels_for(isa);
   cells_.start(slab.edges.count());
   active_.clear();
@@ -28,32 +28,32 @@ void BandMaker::start(const Slab& slab, Isa isa) {
 }
 
 void BandMaker::enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows) {
-  if (active_.size() + kMostPieces > active_.capacity()) active_.reserve(active_.size() + active_.size() / 8 + kMoreRoom);
+  if (active_.size() + kMaxPieces > active_.capacity()) active_.reserve(active_.size() + active_.size() / 8 + kExtraCapacity);
   cut_trapezoids(facet, index, rows, active_);
 }
 
 /// All that reaches the band goes into its cells.
-void BandMaker::lay(const Slab& slab, BandSums& sums) {
+void BandMaker::deposit(const BandSlab& slab, BandSums& sums) {
   sums = {};
-  make_room(reach_, active_.size());
+  ensure_capacity(reach_, active_.size());
   reach_.resize(active_.size());
   const std::uint32_t last = rows_.first + rows_.count - 1;
   for (std::size_t i = 0; i < active_.size(); ++i) {
     const Trapezoid& piece = active_[i];
     if (piece.first_row > last || piece.last_row < rows_.first) continue;
-    kernels_->lay(piece, rows_, slab.edges, cells_, reach_[i], sums);
+    kernels_->deposit(piece, rows_, slab.edges, cells_, reach_[i], sums);
   }
 }
 
 /// Runs between changes; those of level 0 are none.
 void BandMaker::append(const Changes& changes, std::uint32_t columns, Levels& out) const {
-  const std::size_t before = out.level.size(), most = before + changes.count;
-  if (out.level.capacity() < most) {
-    out.level.reserve(2 * most);
-    out.change.reserve(4 * most);
+  const std::size_t before = out.level.size(), maximum = before + changes.count;
+  if (out.level.capacity() < maximum) {
+    out.level.reserve(2 * maximum);
+    out.change.reserve(4 * maximum);
   }
-  out.level.resize(most);
-  out.change.resize(2 * most);
+  out.level.resize(maximum);
+  out.change.resize(2 * maximum);
   changes.column[changes.count] = columns;
   std::uint32_t* change = out.change.data() + 2 * before;
   std::uint8_t* level = out.level.data() + before;
@@ -70,7 +70,7 @@ void BandMaker::append(const Changes& changes, std::uint32_t columns, Levels& ou
   out.end_row();
 }
 
-RowTask BandMaker::task(const Slab& slab, std::uint32_t lane, const BandSums& sums) {
+RowTask BandMaker::task(const BandSlab& slab, std::uint32_t lane, const BandSums& sums) {
   const double depth = rows_.y[lane + 1] - rows_.y[lane], area = depth * slab.sides.z, count = sums.count[lane];
   const double scale = sums.size[lane] + count * widest_side(slab, depth), added = sums.columns[lane] + 2 * count;
   const ColumnMarks suspect = cells_.suspect(lane);
@@ -88,21 +88,21 @@ RowTask BandMaker::task(const Slab& slab, std::uint32_t lane, const BandSums& su
           .held = cells_.held(lane),
           .suspect = suspect,
           .has_suspects = suspect.next(0) != ColumnMarks::kNone,
-          .judge = &judge_};
+          .resolver = &resolver_};
 }
 
-void BandMaker::make(const Slab& slab, std::uint32_t first, std::uint32_t rows, Levels& out, LayerReport& report) {
+void BandMaker::make(const BandSlab& slab, std::uint32_t first, std::uint32_t rows, Levels& out, CoverageReport& report) {
   rows_.first = first;
   rows_.count = rows;
   for (std::uint32_t i = 0; i <= kBandRows; ++i) {
     rows_.y[i] = static_cast<double>(edge(slab.rows, std::int64_t{first} + std::min(i, rows)));
   }
   BandSums sums;
-  lay(slab, sums);
+  deposit(slab, sums);
   for (std::uint32_t lane = rows; lane-- > 0;) {
     Changes changes{column_.data(), level_.data()};
     if (sums.count[lane] > 0) {
-      judge_.start(slab, {active_, reach_}, first + lane, first, report);
+      resolver_.start(slab, {active_, reach_}, first + lane, first, report);
       const RowTask row = task(slab, lane, sums);
       kernels_->sweep(row, changes);
       report.held_voxels += changes.held;
@@ -114,4 +114,4 @@ void BandMaker::make(const Slab& slab, std::uint32_t first, std::uint32_t rows, 
   std::erase_if(active_, [&](const Trapezoid& piece) { return piece.first_row >= first; });
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

@@ -1,5 +1,5 @@
 // stages/coverage/band/parts.h: eight lanes in parts of kPartBytes, which compilers turn into what the target has. Included
-// once for each of those instruction sets, in its namespace, behind Part, an array of doubles, and its least_of(), most_of()
+// once for each of those instruction sets, in its namespace, behind Part, an array of doubles, and its min_of(), max_of()
 // and signs_of(); LAMINA_LANES has the target.
 
 constexpr int kWidth = sizeof(Part) / sizeof(double), kParts = 8 / kWidth;
@@ -35,9 +35,9 @@ LAMINA_LANES Eight plus(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] 
 LAMINA_LANES Eight less(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] - b.part[i]); }
 LAMINA_LANES Eight times(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] * b.part[i]); }
 LAMINA_LANES Eight over(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] / b.part[i]); }
-LAMINA_LANES Eight least(const Eight& a, const Eight& b) { LAMINA_EACH(least_of(a.part[i], b.part[i])); }
-LAMINA_LANES Eight most(const Eight& a, const Eight& b) { LAMINA_EACH(most_of(a.part[i], b.part[i])); }
-LAMINA_LANES Eight absolute(const Eight& a) { LAMINA_EACH(most_of(a.part[i], -a.part[i])); }
+LAMINA_LANES Eight minimum(const Eight& a, const Eight& b) { LAMINA_EACH(min_of(a.part[i], b.part[i])); }
+LAMINA_LANES Eight maximum(const Eight& a, const Eight& b) { LAMINA_EACH(max_of(a.part[i], b.part[i])); }
+LAMINA_LANES Eight absolute(const Eight& a) { LAMINA_EACH(max_of(a.part[i], -a.part[i])); }
 /// Of less than 2^51.
 LAMINA_LANES Eight whole_below(const Eight& a) {
   Eight near;

@@ -12,18 +12,18 @@
 #define LAMINA_TARGET
 #define LAMINA_LANES __attribute__((always_inline)) inline
 
-namespace lamina::cover::plain {
+namespace lamina::coverage::plain {
 namespace {
 
 #if defined(__SSE2__)
 using Part = __m128d;
-LAMINA_LANES Part least_of(Part a, Part b) { return _mm_min_pd(a, b); }
-LAMINA_LANES Part most_of(Part a, Part b) { return _mm_max_pd(a, b); }
+LAMINA_LANES Part min_of(Part a, Part b) { return _mm_min_pd(a, b); }
+LAMINA_LANES Part max_of(Part a, Part b) { return _mm_max_pd(a, b); }
 LAMINA_LANES std::uint32_t signs_of(Part a) { return static_cast<std::uint32_t>(_mm_movemask_pd(a)); }
 #else
 using Part = double __attribute__((vector_size(16)));
-LAMINA_LANES Part least_of(Part a, Part b) { return a < b ? a : b; }
-LAMINA_LANES Part most_of(Part a, Part b) { return a > b ? a : b; }
+LAMINA_LANES Part min_of(Part a, Part b) { return a < b ? a : b; }
+LAMINA_LANES Part max_of(Part a, Part b) { return a > b ? a : b; }
 LAMINA_LANES std::uint32_t signs_of(Part a) { return (std::signbit(a[0]) ? 1u : 0) | (std::signbit(a[1]) ? 2u : 0); }
 #endif
 
@@ -33,12 +33,13 @@ LAMINA_LANES std::uint32_t signs_of(Part a) { return (std::signbit(a[0]) ? 1u : 
 
 }  // namespace
 
-void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach, BandSums& sums) {
-  lay_body(piece, rows, columns, cells, reach, sums);
+void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
+             BandSums& sums) {
+  add_body(piece, rows, columns, cells, reach, sums);
 }
 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
 
-}  // namespace lamina::cover::plain
+}  // namespace lamina::coverage::plain
 
 #undef LAMINA_LANES
 #undef LAMINA_TARGET

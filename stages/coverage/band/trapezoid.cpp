@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// By how much a corner may lie off, of the facet's size (docs/coverage.md).
-constexpr double kCornerRoom = 0x1p-48;
+constexpr double kCornerMargin = 0x1p-48;
 
 /// One of two ways along the border, from the highest corner downwards.
 struct Way {
-  Trapezoid::Side side;
+  Trapezoid::TrapezoidSide side;
   double end;        // y of the next corner
   std::uint32_t to;  // that corner
 };
@@ -29,10 +29,11 @@ void take_edge(const SlabFacet& facet, std::uint32_t next, Way& way) {
   }
 }
 
-double x_at(const Trapezoid::Side& side, double y) { return side.x + (y - side.y) * side.dx; }
+double x_at(const Trapezoid::TrapezoidSide& side, double y) { return side.x + (y - side.y) * side.dx; }
 
 /// The piece between two sides, which has height.
-void bound(const Trapezoid::Side& on, const Trapezoid::Side& back, double low, double high, Trapezoid& piece) {
+void bound(const Trapezoid::TrapezoidSide& on, const Trapezoid::TrapezoidSide& back, double low, double high,
+           Trapezoid& piece) {
   piece.on = on;
   piece.back = back;
   piece.low = low;
@@ -40,7 +41,7 @@ void bound(const Trapezoid::Side& on, const Trapezoid::Side& back, double low, d
   const double x[] = {x_at(on, low), x_at(on, high), x_at(back, low), x_at(back, high)};
   piece.left = *std::ranges::min_element(x);
   piece.right = *std::ranges::max_element(x);
-  piece.slope_room = kCornerRoom * piece.size * std::max(std::abs(on.dx), std::abs(back.dx));
+  piece.slope_margin = kCornerMargin * piece.size * std::max(std::abs(on.dx), std::abs(back.dx));
 }
 
 /// All corners lie at one y.
@@ -50,7 +51,7 @@ void bound_flat(const SlabFacet& facet, double y, Trapezoid& piece) {
   piece.low = piece.high = y;
   piece.left = *std::min_element(begin, end);
   piece.right = *std::max_element(begin, end);
-  piece.slope_room = 0;
+  piece.slope_margin = 0;
 }
 
 }  // namespace
@@ -69,8 +70,8 @@ void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& ro
   piece.edgewise = facet.edgewise;
   piece.suspect = facet.suspect;
   const auto append = [&] {
-    piece.first_row = rows.at(piece.from_y + piece.low - kRoom);
-    piece.last_row = rows.at(piece.from_y + piece.high + kRoom);
+    piece.first_row = rows.at(piece.from_y + piece.low - kSlack);
+    piece.last_row = rows.at(piece.from_y + piece.high + kSlack);
     to.push_back(piece);
   };
   const std::size_t before = to.size();
@@ -98,4 +99,4 @@ void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& ro
   append();
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

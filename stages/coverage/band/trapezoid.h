@@ -1,4 +1,4 @@
-// stages/coverage/band/trapezoid.h: what of a facet lies between two of its corners, seen from along x.
+// stages/coverage/band/trapezoid.h: the piece of a facet between two of its corners, projected along x.
 //
 // Two edges of the facet's piece within the layer bound it, and a plane of one y at each end. So each row of voxels cuts a
 // trapezoid out of it again, by two chords.
@@ -10,18 +10,18 @@
 #include "stages/coverage/slab_facet.h"
 #include "stages/data/buffer.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// nm, from the lowest corner of the facet's box.
 struct Trapezoid {
   /// An edge: a point of it, and what a step along y adds.
-  struct Side {
+  struct TrapezoidSide {
     double y, x, z, dx, dz;
   };
-  Side on, back;                      // in the order of the facet's corners downwards, and against it
+  TrapezoidSide on, back;             // in the order of the facet's corners downwards, and against it
   double low, high;                   // y at its ends
   double left, right;                 // x that it reaches
-  double slope_room;                  // by which x of a chord may be off
+  double slope_margin;                // by which x of a chord may be off
   double from_x, from_y;              // the lowest corner, on the bed
   double size;                        // of the facet
   std::uint32_t facet;                // its index in the layer
@@ -33,4 +33,4 @@ struct Trapezoid {
 /// facet has none.
 void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& rows, Buffer<Trapezoid>& to);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

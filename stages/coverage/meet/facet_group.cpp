@@ -6,12 +6,12 @@
 #include "stages/coverage/meet/triangles_meet.h"
 #include "stages/geometry/targets.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 /// Roundings of a plane's value: two of each coordinate of its normal, one of a difference, one of a product, three of sums;
 /// each at most 2^-24 of the normal's longest coordinate times the distance.
-constexpr float kRoomOfPlane = 0x1p-20F;
+constexpr float kPlaneMargin = 0x1p-20F;
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void FacetGroup::add(const Triangle& t, std::uint32_t its_number) {
     normal[which][0][lane] = static_cast<float>(x);
     normal[which][1][lane] = static_cast<float>(y);
     normal[which][2][lane] = static_cast<float>(z);
-    room[which][lane] = kRoomOfPlane * static_cast<float>(std::max({std::abs(x), std::abs(y), std::abs(z)}));
+    slack[which][lane] = kPlaneMargin * static_cast<float>(std::max({std::abs(x), std::abs(y), std::abs(z)}));
   };
   put(0, n[0], n[1], n[2]);
   for (std::uint32_t k = 0; k < 3; ++k) {
@@ -77,4 +77,4 @@ const PairKernels& pair_kernels_for([[maybe_unused]] Isa isa) {
   return kPlain;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

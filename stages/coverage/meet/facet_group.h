@@ -7,7 +7,7 @@
 #include "stages/data/choices.h"
 #include "stages/data/mesh.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 inline constexpr std::uint32_t kGroupSize = 16;
 
@@ -27,7 +27,7 @@ struct alignas(64) FacetGroup {
   Nm corner[3][3][kGroupSize];  // [corner][axis][lane]
   BoxLanes box;
   float normal[4][3][kGroupSize];  // own, edges 0-1, 1-2, 2-0
-  float room[4][kGroupSize];
+  float slack[4][kGroupSize];
   float offset[kGroupSize],
       reach[kGroupSize];  // of edge 1-2: its value at corner 0 with the sign turned, |corner 1 - corner 0|
   std::uint32_t number[kGroupSize];
@@ -40,17 +40,17 @@ struct alignas(64) FacetGroup {
 
 /// Pairs of facets of two groups whose boxes touch: what has to be known or decided of them.
 struct FoundPairs {
-  struct Edge {
+  struct FacetEdges {
     std::uint8_t a, b, edge_a, edge_b;  // lanes; edges from those corners to the next, walked opposite ways
   };
   struct Pair {
     std::uint8_t a, b;
   };
-  static constexpr std::size_t kMost = kGroupSize * kGroupSize;
-  std::array<Edge, 9 * kMost> edge;
-  std::array<Pair, kMost> doubtful;   // may meet beyond what they share
-  std::array<Pair, 9 * kMost> alike;  // walk an edge the same way
-  std::uint32_t edges = 0, doubts = 0, alikes = 0;
+  static constexpr std::size_t kMax = kGroupSize * kGroupSize;
+  std::array<FacetEdges, 9 * kMax> edge;
+  std::array<Pair, kMax> uncertain;  // may meet beyond what they share
+  std::array<Pair, 9 * kMax> alike;  // walk an edge the same way
+  std::uint32_t edges = 0, uncertain_count = 0, alikes = 0;
 };
 
 /// The same numbers with each instruction set.
@@ -58,7 +58,7 @@ struct PairKernels {
   /// Which of the boxes touch the box. A bit a lane.
   std::uint32_t (*touching)(const BoxLanes& boxes, const Box& box);
   /// All pairs of a facet of `a` with one of `b`, which lies in `around_b`, whose boxes touch; within a group (`a` is `b`) each
-  /// once. Both groups fit into a box of kWidestPair. Facets that share an edge are not doubtful if their normals are less than
+  /// once. Both groups fit into a box of kWidestPair. Facets that share an edge are no suspects if their normals are less than
   /// a right angle apart; others are not if one of their planes parts them, with the corner that both have on it.
   void (*pairs)(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundPairs& found);
 };
@@ -80,4 +80,4 @@ std::uint32_t touching(const BoxLanes& boxes, const Box& box);
 void pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundPairs& found);
 }  // namespace avx512
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

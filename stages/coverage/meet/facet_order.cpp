@@ -9,11 +9,11 @@
 
 #include "stages/coverage/meet/triangles_meet.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 constexpr std::uint64_t kNoFacet = UINT64_MAX;
-constexpr int kKeyBits = 32, kMostBits = 16;  // of a place along the curve; of one axis
+constexpr int kKeyBits = 32, kMaxBits = 16;  // of a place along the curve; of one axis
 
 /// Where points of a box come along the curve.
 class Curve {
@@ -26,7 +26,7 @@ class Curve {
     for (; used < kKeyBits; ++used) {
       int widest = -1;
       for (int axis = 0; axis < 3; ++axis) {
-        if (bits[axis] == kMostBits) continue;
+        if (bits[axis] == kMaxBits) continue;
         if (widest < 0 || (side[axis] >> bits[axis]) > (side[widest] >> bits[widest])) widest = axis;
       }
       axis_of[used] = widest;
@@ -34,16 +34,16 @@ class Curve {
     }
     for (int axis = 0; axis < 3; ++axis) {
       cells_[axis] = static_cast<double>((std::int64_t{1} << bits[axis])) / static_cast<double>(side[axis]);
-      std::array<std::uint32_t, kMostBits> place{};  // of each bit of the axis, from its highest on
+      std::array<std::uint32_t, kMaxBits> position{};  // of each bit of the axis, from its highest on
       int next = 0;
       for (int k = 0; k < used; ++k) {
-        if (axis_of[k] == axis) place[next++] = 1u << (kKeyBits - 1 - k);
+        if (axis_of[k] == axis) position[next++] = 1u << (kKeyBits - 1 - k);
       }
       for (std::uint32_t byte = 0; byte < 256; ++byte) {
         for (int bit = 0; bit < 8; ++bit) {
           if ((byte >> bit & 1) == 0) continue;
-          if (bit < bits[axis]) spread_[axis][0][byte] |= place[bits[axis] - 1 - bit];
-          if (bit + 8 < bits[axis]) spread_[axis][1][byte] |= place[bits[axis] - 1 - bit - 8];
+          if (bit < bits[axis]) spread_[axis][0][byte] |= position[bits[axis] - 1 - bit];
+          if (bit + 8 < bits[axis]) spread_[axis][1][byte] |= position[bits[axis] - 1 - bit - 8];
         }
       }
     }
@@ -73,13 +73,13 @@ void sort_entries(Buffer<std::uint64_t>& entry) {
   std::erase(entry, kNoFacet);
   Buffer<std::uint64_t> other;
   other.resize(entry.size());
-  std::vector<std::uint32_t> place(std::size_t{kPasses} * kValues);
+  std::vector<std::uint32_t> position(std::size_t{kPasses} * kValues);
   const auto digit = [](std::uint64_t of, int pass) { return of >> (32 + kDigit * pass) & (kValues - 1); };
   for (const std::uint64_t of : entry) {
-    for (int pass = 0; pass < kPasses; ++pass) ++place[pass * kValues + digit(of, pass)];
+    for (int pass = 0; pass < kPasses; ++pass) ++position[pass * kValues + digit(of, pass)];
   }
   for (int pass = 0; pass < kPasses; ++pass) {
-    std::uint32_t* const next = place.data() + pass * kValues;
+    std::uint32_t* const next = position.data() + pass * kValues;
     std::uint32_t total = 0;
     for (std::uint32_t value = 0; value < kValues; ++value) total += std::exchange(next[value], total);
     for (const std::uint64_t of : entry) other[next[digit(of, pass)]++] = of;
@@ -106,8 +106,8 @@ void FacetOrder::sort(const MeshBlocks& mesh) {
   Buffer<std::uint64_t> entry;
   entry.resize(std::size_t{mesh.cluster_count()} * kClusterSize);
   tbb::parallel_for(std::uint32_t{0}, mesh.cluster_count(), [&](std::uint32_t c) {
-    Cluster room;
-    const Cluster& cluster = mesh.cluster(c, room);
+    Cluster slack;
+    const Cluster& cluster = mesh.cluster(c, slack);
     for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
       const std::uint32_t number = c * kClusterSize + lane;
       const Triangle t = cluster.triangle(lane);
@@ -144,4 +144,4 @@ void FacetOrder::bound(const MeshBlocks& mesh) {
   }
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

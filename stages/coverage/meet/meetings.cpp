@@ -15,15 +15,15 @@
 #include "stages/coverage/meet/triangles_meet.h"
 #include "stages/geometry/isa.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 using Wide = __int128;
 
-constexpr std::size_t kMostNeighbours = 4096;
+constexpr std::size_t kMaxNeighbours = 4096;
 constexpr std::uint32_t kGroupsAtOnce = 512;
-constexpr std::uint32_t kMostRays = 1 << 16;
-constexpr std::uint32_t kNobody = UINT32_MAX;
+constexpr std::uint32_t kMaxRays = 1 << 16;
+constexpr std::uint32_t kDiscard = UINT32_MAX;
 
 /// Of each facet, numbered cluster * kClusterSize + lane, those behind its three edges.
 using Neighbours = Buffer<std::array<std::uint32_t, 3>>;
@@ -49,10 +49,10 @@ class Findings {
   }
   /// Behind that edge lies another; two of them are too many.
   void note(std::uint32_t facet, std::uint32_t edge, std::uint32_t other) {
-    if (std::atomic_ref(neighbours_[facet][edge]).exchange(other, std::memory_order_relaxed) != kNobody) suspect(facet);
+    if (std::atomic_ref(neighbours_[facet][edge]).exchange(other, std::memory_order_relaxed) != kDiscard) suspect(facet);
   }
   bool has_all(std::uint32_t facet) const {
-    return std::ranges::none_of(neighbours_[facet], [](std::uint32_t other) { return other == kNobody; });
+    return std::ranges::none_of(neighbours_[facet], [](std::uint32_t other) { return other == kDiscard; });
   }
 
  private:
@@ -83,21 +83,21 @@ void far_pairs(const FacetGroup& a, const FacetGroup& b, Findings& findings) {
 }
 
 /// Groups as kernels take them; those of some groups are kept.
-class GroupRoom {
+class GroupBuffer {
  public:
-  GroupRoom(const MeshBlocks& mesh, const FacetOrder& order) : mesh_(mesh), order_(order) {
+  GroupBuffer(const MeshBlocks& mesh, const FacetOrder& order) : mesh_(mesh), order_(order) {
     held_.resize(kHeld);
-    number_.assign(kHeld, kNobody);
+    number_.assign(kHeld, kDiscard);
   }
   const FacetGroup& of(std::uint32_t group) {
-    FacetGroup& room = held_[group % kHeld];
-    if (number_[group % kHeld] != group) fill(group, room);
+    FacetGroup& slack = held_[group % kHeld];
+    if (number_[group % kHeld] != group) fill(group, slack);
     number_[group % kHeld] = group;
-    return room;
+    return slack;
   }
-  void fill(std::uint32_t group, FacetGroup& room) const {
-    room.start();
-    for (const std::uint32_t f : order_.facets(group)) room.add(mesh_.triangle(f / kClusterSize, f % kClusterSize), f);
+  void fill(std::uint32_t group, FacetGroup& slack) const {
+    slack.start();
+    for (const std::uint32_t f : order_.facets(group)) slack.add(mesh_.triangle(f / kClusterSize, f % kClusterSize), f);
   }
 
  private:
@@ -108,14 +108,14 @@ class GroupRoom {
   std::vector<std::uint32_t> number_;
 };
 
-void look_at_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a, const Box& around_b,
-                   const PairKernels& kernels, FoundPairs& found, Findings& findings) {
+void test_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a, const Box& around_b, const PairKernels& kernels,
+                FoundPairs& found, Findings& findings) {
   Box around = around_a;
   around.add(around_b);
   if (std::max({around.width(), around.depth(), around.height()}) > kWidestPair) return far_pairs(a, b, findings);
   kernels.pairs(a, b, around_b, found);
   for (std::uint32_t i = 0; i < found.edges; ++i) {
-    const FoundPairs::Edge& edge = found.edge[i];
+    const FoundPairs::FacetEdges& edge = found.edge[i];
     findings.note(a.number[edge.a], edge.edge_a, b.number[edge.b]);
     findings.note(b.number[edge.b], edge.edge_b, a.number[edge.a]);
   }
@@ -124,23 +124,23 @@ void look_at_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a
     findings.suspect(b.number[pair.b]);
   };
   for (std::uint32_t i = 0; i < found.alikes; ++i) both(found.alike[i]);
-  for (std::uint32_t i = 0; i < found.doubts; ++i) {
-    const FoundPairs::Pair& pair = found.doubtful[i];
+  for (std::uint32_t i = 0; i < found.uncertain_count; ++i) {
+    const FoundPairs::Pair& pair = found.uncertain[i];
     int shared = 0;
     if (triangles_meet(Plane(a.facet(pair.a)), Plane(b.facet(pair.b)), shared)) both(pair);
   }
 }
 
-/// Each pair of groups that touch is looked at once: by the first of them, or by the other if that has too many others.
-void look_around(const MeshBlocks& mesh, const FacetOrder& order, const PairKernels& kernels, Findings& findings) {
+/// Each pair of groups that touch is tested once: by the first of them, or by the other if that has too many others.
+void test_neighbours(const MeshBlocks& mesh, const FacetOrder& order, const PairKernels& kernels, Findings& findings) {
   std::vector<std::uint8_t> crowded(order.groups());
   tbb::parallel_for(std::uint32_t{0}, order.groups(), [&](std::uint32_t g) {
     std::size_t others = 0;
     order.each(order.box(g), [&](std::uint32_t) { ++others; });
-    crowded[g] = others > kMostNeighbours ? 1 : 0;
+    crowded[g] = others > kMaxNeighbours ? 1 : 0;
   });
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, order.groups(), kGroupsAtOnce), [&](const auto& range) {
-    GroupRoom room(mesh, order);
+    GroupBuffer slack(mesh, order);
     FacetGroup own;
     const auto found = std::make_unique<FoundPairs>();
     for (std::uint32_t g = range.begin(); g < range.end(); ++g) {
@@ -148,10 +148,10 @@ void look_around(const MeshBlocks& mesh, const FacetOrder& order, const PairKern
         for (const std::uint32_t f : order.facets(g)) findings.suspect(f);
         continue;
       }
-      room.fill(g, own);
+      slack.fill(g, own);
       order.each(order.box(g), [&](std::uint32_t other) {
         if (other < g && crowded[other] == 0) return;
-        look_at_pairs(own, other == g ? own : room.of(other), order.box(g), order.box(other), kernels, *found, findings);
+        test_pairs(own, other == g ? own : slack.of(other), order.box(g), order.box(other), kernels, *found, findings);
       });
     }
   });
@@ -180,7 +180,7 @@ Hit hit(const Plane& plane, std::int64_t y, std::int64_t z) {
     turns += turn > 0 ? 1 : turn < 0 ? -1 : 0;
   }
   if (plane.nx == 0 || std::abs(turns) != 3) {
-    result.divisor = turns == 0 || std::abs(turns) == 1 ? 1 : 0;  // 0: on an edge, nobody can tell
+    result.divisor = turns == 0 || std::abs(turns) == 1 ? 1 : 0;  // 0: on an edge, undetermined
     return result;
   }
   const Point3& a = plane.facet.a;
@@ -202,7 +202,7 @@ int compare(const Hit& a, const Hit& b) {
 }
 
 /// Whether the winding number in front of the facet is 0, for certain.
-bool has_nothing_before_it(const MeshBlocks& mesh, const SlabIndex& index, const Plane& facet, std::uint32_t number) {
+bool has_nothing_before_it(const MeshBlocks& mesh, const IntervalTable<Nm>& index, const Plane& facet, std::uint32_t number) {
   const Triangle& t = facet.facet;
   const auto middle = [](std::int64_t a, std::int64_t b, std::int64_t c) {
     return 2 * floor_div(a + b + c, std::int64_t{3}) + 1;
@@ -212,14 +212,15 @@ bool has_nothing_before_it(const MeshBlocks& mesh, const SlabIndex& index, const
   if (!own.crosses) return false;
   std::int64_t winding = facet.nx > 0 ? -1 : 0;  // in front of a facet that +x leaves through lies what is behind all others
   bool certain = true;
-  Cluster room;
-  index.each(floor_div(z, std::int64_t{2}), floor_div(z, std::int64_t{2}) + 1, [&](std::uint32_t c) {
+  Cluster slack;
+  const std::int64_t below = floor_div(z, std::int64_t{2});
+  index.find(below, below, [&](std::uint32_t c) {
     const Box& box = mesh.bounds()[c];
     if (!certain || 2 * std::int64_t{box.lo.y} > y || 2 * std::int64_t{box.hi.y} < y ||
         2 * std::int64_t{box.lo.x} > own.whole + 1) {
       return;
     }
-    const Cluster& cluster = mesh.cluster(c, room);
+    const Cluster& cluster = mesh.cluster(c, slack);
     for (std::uint32_t i = 0; i < kClusterSize; ++i) {
       if (c * kClusterSize + i == number) continue;
       const Box of_facet = box_of(cluster.triangle(i));
@@ -241,29 +242,29 @@ bool has_nothing_before_it(const MeshBlocks& mesh, const SlabIndex& index, const
 }
 
 /// Shells of facets that are not suspect yet become suspect unless nothing is in front of them.
-void judge_shells(const MeshBlocks& mesh, const SlabIndex& index, const Neighbours& neighbours, Suspects& suspects) {
+void check_shells(const MeshBlocks& mesh, const IntervalTable<Nm>& index, const Neighbours& neighbours, Suspects& suspects) {
   const auto is_suspect = [&](std::uint32_t f) { return (suspects[f / kClusterSize] >> f % kClusterSize & 1) != 0; };
-  std::vector<bool> seen(neighbours.size());
+  std::vector<bool> detected(neighbours.size());
   std::vector<std::uint32_t> shell;
   std::uint32_t rays = 0;
   for (std::uint32_t first = 0; first < neighbours.size(); ++first) {
-    if (seen[first] || is_suspect(first) || neighbours[first][0] == kNobody) continue;
+    if (detected[first] || is_suspect(first) || neighbours[first][0] == kDiscard) continue;
     shell.assign(1, first);
-    seen[first] = true;
+    detected[first] = true;
     std::uint32_t widest = first;
-    double most = -1;
+    double maximum = -1;
     for (std::size_t i = 0; i < shell.size(); ++i) {
       const double width =
           std::abs(static_cast<double>(Plane(mesh.triangle(shell[i] / kClusterSize, shell[i] % kClusterSize)).nx));
-      if (width > most) most = width, widest = shell[i];
+      if (width > maximum) maximum = width, widest = shell[i];
       for (const std::uint32_t next : neighbours[shell[i]]) {
-        if (seen[next] || is_suspect(next)) continue;
-        seen[next] = true;
+        if (detected[next] || is_suspect(next)) continue;
+        detected[next] = true;
         shell.push_back(next);
       }
     }
     const Plane facet(mesh.triangle(widest / kClusterSize, widest % kClusterSize));
-    if (rays++ < kMostRays && has_nothing_before_it(mesh, index, facet, widest)) continue;
+    if (rays++ < kMaxRays && has_nothing_before_it(mesh, index, facet, widest)) continue;
     for (const std::uint32_t f : shell) {
       std::uint16_t& of_cluster = suspects[f / kClusterSize];
       of_cluster = static_cast<std::uint16_t>(of_cluster | 1u << f % kClusterSize);
@@ -273,17 +274,17 @@ void judge_shells(const MeshBlocks& mesh, const SlabIndex& index, const Neighbou
 
 }  // namespace
 
-Suspects find_suspects(const MeshBlocks& mesh, const SlabIndex& index, Isa isa) {
+Suspects find_suspects(const MeshBlocks& mesh, const IntervalTable<Nm>& index, Isa isa) {
   const std::uint32_t clusters = mesh.cluster_count();
   Suspects suspects;
   suspects.assign(clusters, 0);
   Neighbours neighbours;
-  neighbours.assign(std::size_t{clusters} * kClusterSize, {kNobody, kNobody, kNobody});
-  const PairKernels& kernels = pair_kernels_for(isa_at_most(isa));
+  neighbours.assign(std::size_t{clusters} * kClusterSize, {kDiscard, kDiscard, kDiscard});
+  const PairKernels& kernels = pair_kernels_for(limited_isa(isa));
   Findings findings(suspects, neighbours);
-  look_around(mesh, FacetOrder(mesh, kernels), kernels, findings);
-  judge_shells(mesh, index, neighbours, suspects);
+  test_neighbours(mesh, FacetOrder(mesh, kernels), kernels, findings);
+  check_shells(mesh, index, neighbours, suspects);
   return suspects;
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

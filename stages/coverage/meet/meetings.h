@@ -3,12 +3,12 @@
 
 #include <cstdint>
 
-#include "stages/coverage/slab_index.h"
 #include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/geometry/interval_table.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// A bit a facet: lane i of cluster c is suspect if bit i of suspects[c] is set.
 using Suspects = Buffer<std::uint16_t>;
@@ -22,6 +22,6 @@ using Suspects = Buffer<std::uint16_t>;
 /// cost  O(T log T) and some ten pairs a facet; parallel; 34 bytes a facet meanwhile. A group of 16 facets (facet_order.h)
 /// whose
 ///       box touches more than 4096 others is suspect as a whole, and so is what lies apart once 65,536 rays are shot
-Suspects find_suspects(const MeshBlocks& mesh, const SlabIndex& index, Isa isa = Isa::kAuto);
+Suspects find_suspects(const MeshBlocks& mesh, const IntervalTable<Nm>& index, Isa isa = Isa::kAuto);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

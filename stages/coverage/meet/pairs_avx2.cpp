@@ -7,7 +7,7 @@
 
 #define LAMINA_LANES LAMINA_AVX2 __attribute__((always_inline)) inline
 
-namespace lamina::cover::avx2 {
+namespace lamina::coverage::avx2 {
 namespace {
 
 constexpr std::uint32_t kLanes = 8;
@@ -26,7 +26,7 @@ LAMINA_LANES Floats plus(Floats a, Floats b) { return _mm256_add_ps(a, b); }
 LAMINA_LANES Floats less(Floats a, Floats b) { return _mm256_sub_ps(a, b); }
 LAMINA_LANES Floats times(Floats a, Floats b) { return _mm256_mul_ps(a, b); }
 LAMINA_LANES Floats absolute(Floats a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0F), a); }
-LAMINA_LANES std::uint32_t at_most(Ints a, Ints b) { return bits(_mm256_castsi256_ps(_mm256_cmpgt_epi32(a, b))) ^ 0xFF; }
+LAMINA_LANES std::uint32_t not_above(Ints a, Ints b) { return bits(_mm256_castsi256_ps(_mm256_cmpgt_epi32(a, b))) ^ 0xFF; }
 LAMINA_LANES std::uint32_t equal(Ints a, Ints b) { return bits(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b))); }
 LAMINA_LANES std::uint32_t above(Floats a, Floats b) { return bits(_mm256_cmp_ps(a, b, _CMP_GT_OQ)); }
 
@@ -39,6 +39,6 @@ LAMINA_AVX2 void pairs(const FacetGroup& a, const FacetGroup& b, const Box& arou
   pairs_body(a, b, around_b, found);
 }
 
-}  // namespace lamina::cover::avx2
+}  // namespace lamina::coverage::avx2
 #undef LAMINA_LANES
 #endif

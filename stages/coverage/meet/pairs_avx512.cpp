@@ -9,7 +9,7 @@
 
 LAMINA_AVX512_BEGIN
 
-namespace lamina::cover::avx512 {
+namespace lamina::coverage::avx512 {
 namespace {
 
 constexpr std::uint32_t kLanes = 16;
@@ -27,7 +27,7 @@ LAMINA_LANES Floats plus(Floats a, Floats b) { return _mm512_add_ps(a, b); }
 LAMINA_LANES Floats less(Floats a, Floats b) { return _mm512_sub_ps(a, b); }
 LAMINA_LANES Floats times(Floats a, Floats b) { return _mm512_mul_ps(a, b); }
 LAMINA_LANES Floats absolute(Floats a) { return _mm512_abs_ps(a); }
-LAMINA_LANES std::uint32_t at_most(Ints a, Ints b) { return _mm512_cmple_epi32_mask(a, b); }
+LAMINA_LANES std::uint32_t not_above(Ints a, Ints b) { return _mm512_cmple_epi32_mask(a, b); }
 LAMINA_LANES std::uint32_t equal(Ints a, Ints b) { return _mm512_cmpeq_epi32_mask(a, b); }
 LAMINA_LANES std::uint32_t above(Floats a, Floats b) { return _mm512_cmp_ps_mask(a, b, _CMP_GT_OQ); }
 
@@ -40,7 +40,7 @@ LAMINA_AVX512 void pairs(const FacetGroup& a, const FacetGroup& b, const Box& ar
   pairs_body(a, b, around_b, found);
 }
 
-}  // namespace lamina::cover::avx512
+}  // namespace lamina::coverage::avx512
 
 LAMINA_AVX512_END
 #undef LAMINA_LANES

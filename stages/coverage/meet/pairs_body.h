@@ -33,7 +33,8 @@ LAMINA_LANES Corners one_of(const FacetGroup& group, std::uint32_t lane) {
 LAMINA_LANES std::uint32_t touching_lanes(const BoxLanes& boxes, std::uint32_t first, const Nm* low, const Nm* high) {
   std::uint32_t touch = (1u << kLanes) - 1;
   for (int axis = 0; axis < 3; ++axis) {
-    touch &= at_most(load(boxes.low[axis] + first), all(high[axis])) & at_most(all(low[axis]), load(boxes.high[axis] + first));
+    touch &=
+        not_above(load(boxes.low[axis] + first), all(high[axis])) & not_above(all(low[axis]), load(boxes.high[axis] + first));
   }
   return touch;
 }
@@ -66,13 +67,13 @@ LAMINA_LANES std::uint32_t parted(const Corners& with_planes, const Corners& oth
   const std::uint32_t on_plane[4] = {on[0] | on[1] | on[2], on[0] | on[1], on[1] | on[2], on[2] | on[0]};
   std::uint32_t apart = 0;
   for (int plane = 0; plane < 4; ++plane) {
-    const Floats x = get.normal(plane, 0), y = get.normal(plane, 1), z = get.normal(plane, 2), room = get.room(plane);
+    const Floats x = get.normal(plane, 0), y = get.normal(plane, 1), z = get.normal(plane, 2), slack = get.slack(plane);
     std::uint32_t before = ~0u, behind = ~0u;
     for (int k = 0; k < 3; ++k) {
       Floats value = plus(plus(times(x, d[k][0]), times(y, d[k][1])), times(z, d[k][2]));
       Floats distance = far[k];
       if (plane == 2) value = less(value, get.offset()), distance = plus(distance, get.reach());
-      const Floats off_by = times(room, distance);
+      const Floats off_by = times(slack, distance);
       const std::uint32_t shared = off[k] & on_plane[plane];
       before &= above(value, off_by) | shared;
       if (plane == 0) behind &= above(less(zero(), value), off_by) | shared;
@@ -87,7 +88,7 @@ struct PlanesOfOne {
   const FacetGroup& group;
   std::uint32_t lane;
   LAMINA_LANES Floats normal(int plane, int axis) const { return all(group.normal[plane][axis][lane]); }
-  LAMINA_LANES Floats room(int plane) const { return all(group.room[plane][lane]); }
+  LAMINA_LANES Floats slack(int plane) const { return all(group.slack[plane][lane]); }
   LAMINA_LANES Floats offset() const { return all(group.offset[lane]); }
   LAMINA_LANES Floats reach() const { return all(group.reach[lane]); }
 };
@@ -95,7 +96,7 @@ struct PlanesOfLanes {
   const FacetGroup& group;
   std::uint32_t first;
   LAMINA_LANES Floats normal(int plane, int axis) const { return load(group.normal[plane][axis] + first); }
-  LAMINA_LANES Floats room(int plane) const { return load(group.room[plane] + first); }
+  LAMINA_LANES Floats slack(int plane) const { return load(group.slack[plane] + first); }
   LAMINA_LANES Floats offset() const { return load(group.offset + first); }
   LAMINA_LANES Floats reach() const { return load(group.reach + first); }
 };
@@ -134,16 +135,16 @@ LAMINA_LANES void pairs_of_lanes(const FacetGroup& a, std::uint32_t i, const Fac
   const Corners one = one_of(a, i), others = lanes_of(b, first);
   const Shared shared = shared_corners(one, others, lanes);
   const std::uint32_t *s = shared.of_a, two = (s[0] & s[1]) | (s[1] & s[2]) | (s[2] & s[0]);
-  std::uint32_t doubtful = lanes & ~two;
-  if (doubtful != 0) doubtful &= ~parted(one, others, PlanesOfOne{a, i}, shared.of_a, shared.of_b);
-  if (doubtful != 0) doubtful &= ~parted(others, one, PlanesOfLanes{b, first}, shared.of_b, shared.of_a);
+  std::uint32_t uncertain = lanes & ~two;
+  if (uncertain != 0) uncertain &= ~parted(one, others, PlanesOfOne{a, i}, shared.of_a, shared.of_b);
+  if (uncertain != 0) uncertain &= ~parted(others, one, PlanesOfLanes{b, first}, shared.of_b, shared.of_a);
   if (two != 0) {
     note_edges(shared, i, first, found);
-    doubtful |= two & (~alike_normals(a, i, b, first) | (s[0] & s[1] & s[2]));
+    uncertain |= two & (~alike_normals(a, i, b, first) | (s[0] & s[1] & s[2]));
   }
-  for (; doubtful != 0; doubtful &= doubtful - 1) {
-    const auto lane = static_cast<std::uint8_t>(first + static_cast<std::uint32_t>(__builtin_ctz(doubtful)));
-    found.doubtful[found.doubts++] = {static_cast<std::uint8_t>(i), lane};
+  for (; uncertain != 0; uncertain &= uncertain - 1) {
+    const auto lane = static_cast<std::uint8_t>(first + static_cast<std::uint32_t>(__builtin_ctz(uncertain)));
+    found.uncertain[found.uncertain_count++] = {static_cast<std::uint8_t>(i), lane};
   }
 }
 
@@ -155,7 +156,7 @@ LAMINA_LANES std::uint32_t touching_body(const BoxLanes& boxes, const Box& box) 
 }
 
 LAMINA_LANES void pairs_body(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundPairs& found) {
-  found.edges = found.doubts = found.alikes = 0;
+  found.edges = found.uncertain_count = found.alikes = 0;
   for (std::uint32_t near = touching_body(a.box, around_b); near != 0; near &= near - 1) {
     const auto i = static_cast<std::uint32_t>(__builtin_ctz(near));
     for (std::uint32_t first = 0; first < b.used; first += kLanes) pairs_of_lanes(a, i, b, first, found);

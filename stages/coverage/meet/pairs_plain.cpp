@@ -5,7 +5,7 @@
 
 #define LAMINA_LANES inline
 
-namespace lamina::cover::plain {
+namespace lamina::coverage::plain {
 namespace {
 
 constexpr std::uint32_t kLanes = 1;
@@ -23,7 +23,7 @@ Floats plus(Floats a, Floats b) { return a + b; }
 Floats less(Floats a, Floats b) { return a - b; }
 Floats times(Floats a, Floats b) { return a * b; }
 Floats absolute(Floats a) { return std::abs(a); }
-std::uint32_t at_most(Ints a, Ints b) { return a <= b ? 1 : 0; }
+std::uint32_t not_above(Ints a, Ints b) { return a <= b ? 1 : 0; }
 std::uint32_t equal(Ints a, Ints b) { return a == b ? 1 : 0; }
 std::uint32_t above(Floats a, Floats b) { return a > b ? 1 : 0; }
 
@@ -36,5 +36,5 @@ void pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundP
   pairs_body(a, b, around_b, found);
 }
 
-}  // namespace lamina::cover::plain
+}  // namespace lamina::coverage::plain
 #undef LAMINA_LANES

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace lamina::cover {
+namespace lamina::coverage {
 namespace {
 
 using Wide = __int128;
@@ -29,8 +29,8 @@ struct Flat {
   std::int64_t u, v;
 };
 
-/// Seen along the axis on which the plane has the largest area.
-Flat seen(const Plane& plane, const Point3& p) {
+/// Projects along the axis on which the plane has the largest area.
+Flat detected(const Plane& plane, const Point3& p) {
   const auto x = std::abs(plane.nx), y = std::abs(plane.ny), z = std::abs(plane.nz);
   if (x >= y && x >= z) return {p.y, p.z};
   return y >= z ? Flat{p.z, p.x} : Flat{p.x, p.y};
@@ -42,7 +42,7 @@ int turn(const Flat& a, const Flat& b, const Flat& c) {
 
 /// Whether the direction from v to p lies between those to a and b, or on one of them; all in the plane, less than half a turn.
 bool between(const Plane& plane, const Point3& v, const Point3& a, const Point3& b, const Point3& p) {
-  const Flat o = seen(plane, v), at = seen(plane, p), left = seen(plane, b), right = seen(plane, a);
+  const Flat o = detected(plane, v), at = detected(plane, p), left = detected(plane, b), right = detected(plane, a);
   const int way = turn(o, right, left);
   const int from_right = turn(o, right, at) * way, to_left = turn(o, at, left) * way;
   if (from_right > 0 && to_left > 0) return true;
@@ -52,18 +52,18 @@ bool between(const Plane& plane, const Point3& v, const Point3& a, const Point3&
   return (from_right == 0 && along(right)) || (to_left == 0 && along(left));
 }
 
-using Corners = std::array<const Point3*, 3>;
+using CornerPointers = std::array<const Point3*, 3>;
 
-Corners corners_of(const Triangle& t) { return {&t.a, &t.b, &t.c}; }
+CornerPointers corners_of(const Triangle& t) { return {&t.a, &t.b, &t.c}; }
 
 /// Of two facets in one plane.
 bool meet_in_plane(const Plane& f, const Plane& g) {
   const auto separated = [&](const Triangle& one, const Triangle& other) {
-    const Corners p = corners_of(one), q = corners_of(other);
-    const int way = turn(seen(f, one.a), seen(f, one.b), seen(f, one.c));
+    const CornerPointers p = corners_of(one), q = corners_of(other);
+    const int way = turn(detected(f, one.a), detected(f, one.b), detected(f, one.c));
     for (int i = 0; i < 3; ++i) {
-      const Flat from = seen(f, *p[i]), to = seen(f, *p[(i + 1) % 3]);
-      if (std::ranges::all_of(q, [&](const Point3* r) { return turn(from, to, seen(f, *r)) * way < 0; })) return true;
+      const Flat from = detected(f, *p[i]), to = detected(f, *p[(i + 1) % 3]);
+      if (std::ranges::all_of(q, [&](const Point3* r) { return turn(from, to, detected(f, *r)) * way < 0; })) return true;
     }
     return false;
   };
@@ -85,7 +85,7 @@ Arrow cross(const Arrow& a, const Arrow& b) { return {a.y * b.z - a.z * b.y, a.z
 
 /// Whether a plane along an edge of each lies between them, for certain.
 bool apart_by_edges(const Triangle& f, const Triangle& g) {
-  const Corners p = corners_of(f), q = corners_of(g);
+  const CornerPointers p = corners_of(f), q = corners_of(g);
   std::array<Arrow, 3> of_f, of_g;
   double farthest = 0;
   for (int i = 0; i < 3; ++i) {
@@ -97,14 +97,14 @@ bool apart_by_edges(const Triangle& f, const Triangle& g) {
     const Arrow e = arrow(*p[i], *p[(i + 1) % 3]);
     for (int k = 0; k < 3; ++k) {
       const Arrow h = arrow(*q[k], *q[(k + 1) % 3]), axis = cross(e, h);
-      const double room = 1e-13 * e.largest() * h.largest() * farthest;
+      const double slack = 1e-13 * e.largest() * h.largest() * farthest;
       const auto low = [&](const std::array<Arrow, 3>& all) {
         return std::min({axis.dot(all[0]), axis.dot(all[1]), axis.dot(all[2])});
       };
       const auto high = [&](const std::array<Arrow, 3>& all) {
         return std::max({axis.dot(all[0]), axis.dot(all[1]), axis.dot(all[2])});
       };
-      if (low(of_f) - high(of_g) > room || low(of_g) - high(of_f) > room) return true;
+      if (low(of_f) - high(of_g) > slack || low(of_g) - high(of_f) > slack) return true;
     }
   }
   return false;
@@ -146,7 +146,7 @@ Plane::Plane(const Triangle& t) : facet(t) {
 }
 
 bool triangles_meet(const Plane& f, const Plane& g, int& shared) {
-  const Corners p = corners_of(f.facet), q = corners_of(g.facet);
+  const CornerPointers p = corners_of(f.facet), q = corners_of(g.facet);
   shared = 0;
   int own = -1, others = -1, others_left = 3;  // of the shared corners: the last; the one of g that is left over
   for (int i = 0; i < 3; ++i) {
@@ -175,4 +175,4 @@ bool triangles_meet(const Plane& f, const Plane& g, int& shared) {
   return !apart_by_edges(f.facet, g.facet);
 }
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

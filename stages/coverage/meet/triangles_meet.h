@@ -5,7 +5,7 @@
 
 #include "stages/data/mesh.h"
 
-namespace lamina::cover {
+namespace lamina::coverage {
 
 /// A facet and its doubled area normal, which is exact where corners differ by less than 2^31 nm.
 struct Plane {
@@ -17,9 +17,9 @@ struct Plane {
   bool flat() const { return nx == 0 && ny == 0 && nz == 0; }  // no area
 };
 
-/// True if they do; also where they come so near that doubles cannot tell. Both have area.
+/// True if they do; also where they come too near for doubles to decide. Both have area.
 /// shared  corners that both have
 /// Source: separating axes of convex bodies (S. Gottschalk, 1996); coplanar and touching ones are decided in integers
 bool triangles_meet(const Plane& f, const Plane& g, int& shared);
 
-}  // namespace lamina::cover
+}  // namespace lamina::coverage

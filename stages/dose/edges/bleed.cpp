@@ -63,13 +63,13 @@ bool Bleeds::grows() const {
       zones_, [&](const ZoneBleed& zone) { return zone.above.grows() || (first_layers_ > 0 && zone.first.grows()); });
 }
 
-std::uint32_t Bleeds::most_rows() const {
-  std::size_t most = 0;
+std::uint32_t Bleeds::max_rows() const {
+  std::size_t maximum = 0;
   for (const ZoneBleed& zone : zones_) {
     for (const Bleed* bleed : {&zone.above, &zone.first})
-      most = std::max({most, bleed->outside.reach.half_width.size(), bleed->holes.reach.half_width.size()});
+      maximum = std::max({maximum, bleed->outside.reach.half_width.size(), bleed->holes.reach.half_width.size()});
   }
-  return static_cast<std::uint32_t>(most);
+  return static_cast<std::uint32_t>(maximum);
 }
 
 void Bleeds::remove(const Layer& layer, Runs& image, std::span<Runs> zone, BleedWork& work) const {
@@ -82,7 +82,7 @@ void Bleeds::remove(const Layer& layer, Runs& image, std::span<Runs> zone, Bleed
   // First all that stays within the layer: what is beside another part is no edge. Then what grows out of it.
   Runs whole;
   copy(image, whole);
-  const auto lay = [&](Runs& own) {
+  const auto deposit = [&](Runs& own) {
     combine(image, own, SetOperation::kUnion, work.second);
     std::swap(image, work.second);
   };
@@ -100,14 +100,14 @@ void Bleeds::remove(const Layer& layer, Runs& image, std::span<Runs> zone, Bleed
       combine(work.moved, zone[z], SetOperation::kIntersection, work.second);
       std::swap(zone[z], work.second);
     }
-    lay(zone[z]);
+    deposit(zone[z]);
   }
   for (std::uint32_t z = 0; z < zone.size(); ++z) {
     if (grown[z].change.empty()) continue;
     combine(grown[z], image, SetOperation::kDifference, work.moved);
     combine(zone[z], work.moved, SetOperation::kUnion, work.second);
     std::swap(zone[z], work.second);
-    lay(zone[z]);
+    deposit(zone[z]);
   }
 }
 

@@ -61,7 +61,7 @@ class Bleeds {
     return layer.index < first_layers_ ? zones_[zone].first : zones_[zone].above;
   }
   /// Pixels above and below that any edge moves to.
-  std::uint32_t most_rows() const;
+  std::uint32_t max_rows() const;
 
   /// Moves the edges of a layer. Zones grow in their order, none into another.
   /// image  of all zones; `zone` has that of each where there are several, and no pixel is set in two

@@ -19,15 +19,15 @@ void append(std::uint32_t begin, std::uint32_t end, Buffer<std::uint32_t>& runs)
 }
 
 /// The runs of `united` with those of `row`, each longer by `width` at both ends.
-void unite(Row united, Row row, std::uint32_t width, std::uint32_t columns, Buffer<std::uint32_t>& result) {
+void merge(Row merged, Row row, std::uint32_t width, std::uint32_t columns, Buffer<std::uint32_t>& result) {
   result.clear();
   std::size_t u = 0;
   for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
     const std::uint32_t begin = row[i] > width ? row[i] - width : 0;
-    for (; u + 1 < united.size() && united[u] <= begin; u += 2) append(united[u], united[u + 1], result);
+    for (; u + 1 < merged.size() && merged[u] <= begin; u += 2) append(merged[u], merged[u + 1], result);
     append(begin, columns - row[i + 1] > width ? row[i + 1] + width : columns, result);
   }
-  for (; u + 1 < united.size(); u += 2) append(united[u], united[u + 1], result);
+  for (; u + 1 < merged.size(); u += 2) append(merged[u], merged[u + 1], result);
 }
 
 }  // namespace
@@ -37,18 +37,18 @@ void dilate(const RunsView& image, const Reach& reach, Runs& result) {
   result.columns = image.columns;
   result.row_offset.assign(1, 0);
   result.change.clear();
-  Buffer<std::uint32_t> united, next;
+  Buffer<std::uint32_t> merged, next;
   for (std::int64_t r = 0; r < rows; ++r) {
     const Row own = image.row(static_cast<std::uint32_t>(r));
-    united.assign(own.begin(), own.end());
+    merged.assign(own.begin(), own.end());
     for (std::int64_t j = -far; j <= far; ++j) {
       if (r + j < 0 || r + j >= rows) continue;
       const Row row = image.row(static_cast<std::uint32_t>(r + j));
       if (row.empty()) continue;
-      unite(united, row, reach.half_width[static_cast<std::size_t>(j < 0 ? -j : j)], image.columns, next);
-      std::swap(united, next);
+      merge(merged, row, reach.half_width[static_cast<std::size_t>(j < 0 ? -j : j)], image.columns, next);
+      std::swap(merged, next);
     }
-    result.change.insert(result.change.end(), united.begin(), united.end());
+    result.change.insert(result.change.end(), merged.begin(), merged.end());
     result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
   }
 }

@@ -10,17 +10,41 @@
 #include "stages/geometry/blocks/kernels/kernels.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/blocks/sorted_block.h"
-#include "stages/geometry/blocks/vertex_numbers.h"
 #include "stages/geometry/isa.h"
 
 namespace lamina {
+
+// --- the vertices of a block, each once, and numbers for its corners.
+
+/// Numbers the vertices of one block after the other, in scratch memory of its own, which stays in a core's cache.
+class VertexNumbers {
+ public:
+  /// Numbers vertices in the order in which clusters name them. returns  whether there are at most 1.5 a triangle
+  /// cost  O(T) where hashes are of many values; no branch depends on whether a corner is a new vertex
+  bool number(const SortedBlock& block, const BlockKernels& kernels);
+
+  std::uint32_t count() const { return count_; }
+  /// Of each corner, in the shape of the clusters: IndexedCluster::corner.
+  const std::uint16_t* corners() const { return matches_.number.data(); }
+  /// For BlockKernels::write.
+  const CornerMatches& matches() const { return matches_; }
+
+ private:
+  void match_again(const SortedBlock& block);
+  void match_rest(const SortedBlock& block);
+
+  CornerMatches matches_;
+  std::uint32_t count_ = 0;
+};
+
+// ---
 
 /// Makes one block after the other, in scratch memory of its own: 300 KiB, which stays in a core's cache. It is unset until it
 /// is used: blocks of few triangles touch little of it.
 class BlockMaker {
  public:
   /// isa  the widest instruction set to use; blocks are the same with any
-  explicit BlockMaker(Isa isa = Isa::kAuto) : kernels_(block_kernels_for(isa_at_most(isa))) {}
+  explicit BlockMaker(Isa isa = Isa::kAuto) : kernels_(block_kernels_for(limited_isa(isa))) {}
 
   /// The triangles of a block of `mesh`, sorted; whoever calls hashes the corners: equal where vertices are, and of many values
   /// where they are not.

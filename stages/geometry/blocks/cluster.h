@@ -39,4 +39,9 @@ static_assert(sizeof(IndexedCluster) == 128);
 /// Writes all corners of an indexed cluster. 4 bytes behind the last vertex of the table must be readable.
 void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out);
 
+// --- how many triangles a block has.
+
+/// Triangles that are ordered and stored together: neighbours of a file's order, 144 KiB, which fits a core's cache.
+inline constexpr std::uint32_t kBlockSize = 4096;
+
 }  // namespace lamina

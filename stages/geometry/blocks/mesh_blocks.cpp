@@ -11,7 +11,7 @@ std::uint64_t bytes_of_bounds(std::uint32_t clusters) { return clusters * std::u
 
 /// No block takes more than its clusters do as they are read.
 static_assert(sizeof(IndexedCluster) + kClusterSize * 3 / 2 * sizeof(Point3) + 4 + 63 <= sizeof(Cluster));
-std::uint64_t most_bytes(std::uint32_t triangles) { return clusters_for(triangles) * std::uint64_t{sizeof(Cluster)}; }
+std::uint64_t max_bytes(std::uint32_t triangles) { return clusters_for(triangles) * std::uint64_t{sizeof(Cluster)}; }
 
 }  // namespace
 
@@ -20,7 +20,7 @@ MeshBlocks::MeshBlocks(std::uint32_t own, std::uint32_t added)
       added_(added),
       first_cap_(clusters_for(own)),
       first_cap_block_(blocks_for(own)),
-      pages_(most_bytes(own) + most_bytes(added) + bytes_of_bounds(clusters_for(own) + clusters_for(added))) {
+      pages_(max_bytes(own) + max_bytes(added) + bytes_of_bounds(clusters_for(own) + clusters_for(added))) {
   blocks_.resize(std::size_t{first_cap_block_} + blocks_for(added));
   const std::uint32_t clusters = first_cap_ + clusters_for(added);
   bounds_ = {reinterpret_cast<Box*>(pages_.take(clusters * sizeof(Box))), clusters};

@@ -7,7 +7,6 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
-#include "stages/geometry/blocks/block_size.h"
 #include "stages/geometry/blocks/cluster.h"
 #include "stages/geometry/blocks/pages.h"
 
@@ -34,11 +33,11 @@ class MeshBlocks {
   std::span<const Box> bounds() const { return bounds_; }
 
   /// A cluster, where it is stored or expanded into `room`; the reference lives as long as both.
-  const Cluster& cluster(std::uint32_t index, Cluster& room) const {
-    const Place place = place_of(index);
-    if (place.block.vertices == 0) return place.block.plain()[place.cluster];
-    expand_cluster(place.block.indexed()[place.cluster], place.block.vertex(), room);
-    return room;
+  const Cluster& cluster(std::uint32_t index, Cluster& unpacked) const {
+    const ClusterSlot position = slot_of(index);
+    if (position.block.vertices == 0) return position.block.plain()[position.cluster];
+    expand_cluster(position.block.indexed()[position.cluster], position.block.vertex(), unpacked);
+    return unpacked;
   }
 
   /// What names a cluster's corners.
@@ -51,31 +50,31 @@ class MeshBlocks {
     std::uint8_t step_of(std::int64_t z) const { return static_cast<std::uint8_t>((z - step_0) >> shift); }
   };
   Indexed indexed(std::uint32_t index) const {
-    const Place place = place_of(index);
-    if (place.block.vertices == 0) return {};
-    return {place.block.indexed() + place.cluster, place.block.vertex(), place.block.shift, place.block.step_0};
+    const ClusterSlot position = slot_of(index);
+    if (position.block.vertices == 0) return {};
+    return {position.block.indexed() + position.cluster, position.block.vertex(), position.block.shift, position.block.step_0};
   }
   /// A cluster of a block that stores them as they are read.
   const Cluster& listed(std::uint32_t index) const {
-    const Place place = place_of(index);
-    return place.block.plain()[place.cluster];
+    const ClusterSlot position = slot_of(index);
+    return position.block.plain()[position.cluster];
   }
 
   /// One triangle of a cluster.
   Triangle triangle(std::uint32_t cluster, std::uint32_t lane) const {
-    const Place place = place_of(cluster);
-    if (place.block.vertices == 0) return place.block.plain()[place.cluster].triangle(lane);
-    const Point3* const vertex = place.block.vertex();
-    const auto& corner = place.block.indexed()[place.cluster].corner;
+    const ClusterSlot position = slot_of(cluster);
+    if (position.block.vertices == 0) return position.block.plain()[position.cluster].triangle(lane);
+    const Point3* const vertex = position.block.vertex();
+    const auto& corner = position.block.indexed()[position.cluster].corner;
     return {vertex[corner[0][lane]], vertex[corner[1][lane]], vertex[corner[2][lane]]};
   }
 
   /// Where indexed() or listed() points to, to be fetched early. Nothing here fetches it: compilers take a function that does
   /// nothing else for one without effect, and leave calls of it out.
   std::span<const char> stored(std::uint32_t index) const {
-    const Place place = place_of(index);
-    const std::size_t size = place.block.vertices == 0 ? sizeof(Cluster) : sizeof(IndexedCluster);
-    return {place.block.bytes + place.cluster * size, size};
+    const ClusterSlot position = slot_of(index);
+    const std::size_t size = position.block.vertices == 0 ? sizeof(Cluster) : sizeof(IndexedCluster);
+    return {position.block.bytes + position.cluster * size, size};
   }
 
   /// Calls `see` for each vertex at least once, in no order of the file.
@@ -123,12 +122,12 @@ class MeshBlocks {
     const IndexedCluster* indexed() const { return reinterpret_cast<const IndexedCluster*>(bytes); }
     const Point3* vertex() const { return reinterpret_cast<const Point3*>(bytes + clusters * sizeof(IndexedCluster)); }
   };
-  struct Place {
+  struct ClusterSlot {
     const Block& block;
     std::uint32_t cluster;  // in the block
   };
 
-  Place place_of(std::uint32_t cluster) const {
+  ClusterSlot slot_of(std::uint32_t cluster) const {
     if (cluster < first_cap_) return {blocks_[cluster / kClusters], cluster % kClusters};
     const std::uint32_t cap = cluster - first_cap_;
     return {blocks_[first_cap_block_ + cap / kClusters], cap % kClusters};

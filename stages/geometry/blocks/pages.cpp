@@ -19,11 +19,11 @@ struct alignas(kPiece) Pages::HeapPiece {
   HeapPiece* before;
 };
 
-Pages::Pages(std::uint64_t most_bytes) : mapped_(most_bytes <= kLittle ? 0 : rounded_up(most_bytes, kPage)) {
+Pages::Pages(std::uint64_t max_bytes) : mapped_(max_bytes <= kLittle ? 0 : rounded_up(max_bytes, kPage)) {
   if (mapped_ == 0) return;
-  void* const place = ::mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (place == MAP_FAILED) throw std::bad_alloc();
-  begin_ = static_cast<char*>(place);
+  void* const position = ::mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (position == MAP_FAILED) throw std::bad_alloc();
+  begin_ = static_cast<char*>(position);
   ::madvise(begin_, mapped_, MADV_HUGEPAGE);  // where the system has none to give, nothing changes
 }
 

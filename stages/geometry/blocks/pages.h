@@ -15,12 +15,12 @@ namespace lamina {
 class Pages {
  public:
   /// throws  std::bad_alloc: the system has no such room
-  explicit Pages(std::uint64_t most_bytes);
+  explicit Pages(std::uint64_t max_bytes);
   ~Pages();
   Pages(const Pages&) = delete;
   Pages& operator=(const Pages&) = delete;
 
-  /// A piece at a multiple of 64 bytes, unset. All pieces together, each rounded up to 64, stay within most_bytes.
+  /// A piece at a multiple of 64 bytes, unset. All pieces together, each rounded up to 64, stay within max_bytes.
   char* take(std::size_t bytes);
 
   /// Gives addresses behind the last piece back; nothing may be taken afterwards.

@@ -6,7 +6,6 @@
 #include <span>
 
 #include "stages/data/mesh.h"
-#include "stages/geometry/blocks/block_size.h"
 #include "stages/geometry/blocks/cluster.h"
 
 namespace lamina {

@@ -1,11 +1,34 @@
 // stages/geometry/contours/contact.h: do contours keep clear of each other and of themselves?
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
-#include "stages/geometry/contours/monotone.h"
 
 namespace lamina {
+
+struct MonotoneChain {
+  std::uint32_t contour, begin, edges;  // from point `begin` of all on, wrapping at the contour's end
+  Point2 lo, hi;
+};
+
+struct MonotoneScratch {
+  Buffer<MonotoneChain> chain;
+  Buffer<std::uint32_t> open;
+  Buffer<std::pair<std::uint32_t, std::uint32_t>> contact;  // contours, one with itself too; some may come more than once
+
+  std::uint64_t bytes() const { return bytes_held(chain) + bytes_held(open) + bytes_held(contact); }
+};
+
+/// Leaves in scratch.contact enough of the pairs of contours in contact (contact.h says what that is) to join every
+/// group of them.
+///
+/// returns  false if the contours wind so much, or lie so close, that a grid is better; what is found then is void
+/// cost     O(P) for P points, else gives up after a few comparisons a point
+bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch);
 
 inline constexpr std::uint32_t kNoContact = UINT32_MAX;
 
@@ -25,13 +48,35 @@ struct ContactScratch {
 
 /// Groups contours by contact: two are in contact if an edge of one shares a point with an edge of the other, exactly,
 /// and a contour is in contact with itself if two of its edges that are not neighbours share a point. Contours without
-/// straight or repeated points (tidy.h) that are in no contact are simple and apart from all others, so they need no
+/// straight or repeated points (simplify.h) that are in no contact are simple and apart from all others, so they need no
 /// boolean operation.
 ///
 /// group    for each contour the lowest contour of its group, or kNoContact
 /// returns  whether there is any contact
-/// cost     O(P) as a rule: smooth contours are compared by halving (monotone.h), others edge by edge within the cells of a
+/// cost     O(P) as a rule: smooth contours are compared by halving, others edge by edge within the cells of a
 ///          grid about as fine as they are long
 bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group);
+
+// --- whether two straight stretches share a point, exactly.
+
+/// 1: p lies left of the line from a to b, -1: right of it, 0: on it
+inline int side_of(Point2 a, Point2 b, Point2 p) {
+  // Coordinates of a bed differ by less than 2^31, so nothing overflows.
+  const std::int64_t area =
+      (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+  return area > 0 ? 1 : area < 0 ? -1 : 0;
+}
+
+/// Whether the boxes around stretches ab and cd share a point.
+inline bool boxes_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
+  return std::max(a.x, b.x) >= std::min(c.x, d.x) && std::max(c.x, d.x) >= std::min(a.x, b.x) &&
+         std::max(a.y, b.y) >= std::min(c.y, d.y) && std::max(c.y, d.y) >= std::min(a.y, b.y);
+}
+
+/// Whether stretches ab and cd share a point, ends included.
+inline bool intervals_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
+  // Boxes meet, so collinear stretches do.
+  return boxes_meet(a, b, c, d) && side_of(a, b, c) * side_of(a, b, d) <= 0 && side_of(c, d, a) * side_of(c, d, b) <= 0;
+}
 
 }  // namespace lamina

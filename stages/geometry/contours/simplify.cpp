@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <span>
+#include <utility>
 
 #include "stages/geometry/contours/nest.h"
 
@@ -27,36 +28,36 @@ std::int64_t root(UInt128 value) {
 }
 
 /// All points within the tolerance of a stretch. Coordinates of a bed differ by less than 2^31, so products fit 64 bits.
-class Reach {
+class SegmentTolerance {
  public:
-  Reach(Point2 a, Point2 b, Nm tolerance) : a_(a), ux_(std::int64_t{b.x} - a.x), uy_(std::int64_t{b.y} - a.y) {
+  SegmentTolerance(Point2 a, Point2 b, Nm tolerance) : a_(a), ux_(std::int64_t{b.x} - a.x), uy_(std::int64_t{b.y} - a.y) {
     length2_ = ux_ * ux_ + uy_ * uy_;
-    most2_ = std::int64_t{tolerance} * tolerance;
-    most_ = root(static_cast<UInt128>(most2_) * static_cast<UInt128>(length2_));
+    max2_ = std::int64_t{tolerance} * tolerance;
+    max_ = root(static_cast<UInt128>(max2_) * static_cast<UInt128>(length2_));
   }
 
-  struct Place {
+  struct Deviation {
     bool beyond;         // further away than the tolerance
     std::int64_t apart;  // the larger of the distances along and across, times the length of the stretch
   };
-  Place place(Point2 p) const {
+  Deviation position(Point2 p) const {
     const std::int64_t vx = std::int64_t{p.x} - a_.x, vy = std::int64_t{p.y} - a_.y;
     const std::int64_t along = ux_ * vx + uy_ * vy, across = std::abs(ux_ * vy - uy_ * vx);
-    if (0 <= along && along <= length2_ && length2_ > 0) return {across > most_, across};
+    if (0 <= along && along <= length2_ && length2_ > 0) return {across > max_, across};
     const bool first = along < 0;
     const std::int64_t wx = first ? vx : vx - ux_, wy = first ? vy : vy - uy_;
-    return {wx * wx + wy * wy > most2_, std::max(across, first ? -along : along - length2_)};
+    return {wx * wx + wy * wy > max2_, std::max(across, first ? -along : along - length2_)};
   }
 
  private:
   Point2 a_;
-  std::int64_t ux_, uy_, length2_, most2_;
-  std::int64_t most_;  // across is whole: it is at most tolerance x length if it is at most the root of that squared
+  std::int64_t ux_, uy_, length2_, max2_;
+  std::int64_t max_;  // across is whole: it is at most tolerance x length if it is at most the root of that squared
 };
 
 /// So many looks at each point for every halving of the contour are enough for the furthest ones to be taken; contours of real
 /// parts take a quarter of that.
-constexpr std::size_t kLooksAPoint = 8;
+constexpr std::size_t kChecksPerPoint = 8;
 
 /// A contour's points in a circle, and which of them stay.
 class Ring {
@@ -85,39 +86,39 @@ class Ring {
 
   void split(std::size_t from, std::size_t to) {
     scratch_.open.assign(1, {from, to});
-    std::uint64_t looked_at = 0;
-    const std::uint64_t enough = kLooksAPoint * (to - from) * static_cast<std::uint64_t>(std::bit_width(to - from));
+    std::uint64_t inspected = 0;
+    const std::uint64_t enough = kChecksPerPoint * (to - from) * static_cast<std::uint64_t>(std::bit_width(to - from));
     while (!scratch_.open.empty()) {
       const auto [first, last] = scratch_.open.back();
       scratch_.open.pop_back();
-      looked_at += last - first;
-      const Reach reach(at(first), at(last), tolerance_);
+      inspected += last - first;
+      const SegmentTolerance reach(at(first), at(last), tolerance_);
       std::size_t furthest = first;
-      std::int64_t most = -1;
+      std::int64_t maximum = -1;
       bool beyond = false;
       for (std::size_t i = first + 1; i < last; ++i) {
-        const Reach::Place place = reach.place(at(i));
-        beyond |= place.beyond;
-        if (place.apart > most) most = place.apart, furthest = i;
+        const SegmentTolerance::Deviation position = reach.position(at(i));
+        beyond |= position.beyond;
+        if (position.apart > maximum) maximum = position.apart, furthest = i;
       }
       if (!beyond) continue;
       // The teeth of a comb are split off one by one: a stretch that has been looked at often is split near its middle.
-      const std::size_t near_end = looked_at > enough ? (last - first) / 8 : 0;
+      const std::size_t near_end = inspected > enough ? (last - first) / 8 : 0;
       if (furthest - first < near_end || last - furthest < near_end) furthest = first + (last - first) / 2;
       kept_[furthest < points_.size() ? furthest : furthest - points_.size()] = 1;
       scratch_.open.emplace_back(first, furthest);
       scratch_.open.emplace_back(furthest, last);
     }
-    scratch_.looks += looked_at;
+    scratch_.inspections += inspected;
   }
 
   /// Whether one stretch may stand for the two at `middle`.
   bool needless(std::uint32_t from, std::uint32_t middle, std::uint32_t to) const {
-    const Reach reach(points_[from], points_[to], tolerance_);
-    if (reach.place(points_[middle]).beyond) return false;
+    const SegmentTolerance reach(points_[from], points_[to], tolerance_);
+    if (reach.position(points_[middle]).beyond) return false;
     const std::size_t end = to > from ? to : to + points_.size();
     for (std::size_t i = std::size_t{from} + 1; i < end; ++i) {
-      if (reach.place(at(i)).beyond) return false;
+      if (reach.position(at(i)).beyond) return false;
     }
     return true;
   }
@@ -194,9 +195,9 @@ void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch) {
   };
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     scratch.whole[c] = 0;
-    const bool stands =
+    const bool suffices =
         contours[c].size() > 3 && Ring(contours[c], scratch.kept.data() + contours.offset[c], tolerance, scratch).mark();
-    if (!stands) keep_whole(c);
+    if (!suffices) keep_whole(c);
   }
   // Contours that became whole again may meet others that did not.
   for (bool again = true; again;) {
@@ -210,6 +211,128 @@ void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch) {
     }
   }
   if (same_nesting(contours, scratch.thinned)) std::swap(contours, scratch.thinned);
+}
+
+namespace {
+
+constexpr double kRounding = 1;  // nm that a new point may be off
+
+struct EdgeVector {
+  double x, y;
+};
+EdgeVector from_to(Point2 a, Point2 b) { return {static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y}; }
+double cross(EdgeVector a, EdgeVector b) { return a.x * b.y - a.y * b.x; }
+
+/// nm from a point to the nearest one of a stretch.
+double apart(Point2 p, Point2 a, Point2 b) {
+  const EdgeVector u = from_to(a, b), v = from_to(a, p);
+  const double length2 = u.x * u.x + u.y * u.y;
+  const double share = length2 > 0 ? std::clamp((u.x * v.x + u.y * v.y) / length2, 0.0, 1.0) : 0;
+  return std::hypot(v.x - share * u.x, v.y - share * u.y);
+}
+
+/// The point for both ends of bc, between a and d.
+Point2 merged(Point2 a, Point2 b, Point2 c, Point2 d) {
+  const EdgeVector before = from_to(a, b), own = from_to(b, c), after = from_to(c, d);
+  const double first = cross(before, own), second = cross(own, after), both = cross(before, after);
+  EdgeVector by{own.x / 2, own.y / 2};
+  if (first * second > 0 && both * first > 0) {
+    const double beyond = second / both;  // of ab, past b, to where it meets cd
+    by = {by.x / 2 + before.x * beyond / 2, by.y / 2 + before.y * beyond / 2};
+  }
+  return {static_cast<Nm>(std::lround(b.x + by.x)), static_cast<Nm>(std::lround(b.y + by.y))};
+}
+
+/// Appends a contour with its short edges merged, no point of it twice. returns  whether any was
+bool append_merged(std::span<const Point2> points, double shortest, double tolerance, Contours& out) {
+  const std::size_t count = points.size(), begin = out.point.size();
+  std::size_t left = count;
+  bool any = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point2 b = points[i], c = points[i + 1 < count ? i + 1 : 0];
+    const EdgeVector own = from_to(b, c);
+    const bool first_stays = i + 1 < count;  // the seam's edge would need the point that has been laid first
+    if (left > 4 && first_stays && own.x * own.x + own.y * own.y < shortest * shortest) {
+      const Point2 a = out.point.size() > begin ? out.point.back() : points.back();
+      const Point2 d = points[i + 2 < count ? i + 2 : i + 2 - count];
+      const Point2 p = merged(a, b, c, d);
+      if (apart(p, b, c) <= tolerance && apart(b, a, p) <= tolerance && apart(c, p, d) <= tolerance) {
+        out.point.push_back(p);
+        --left;
+        ++i;
+        any = true;
+        continue;
+      }
+    }
+    out.point.push_back(b);
+  }
+  out.close();
+  return any;
+}
+
+}  // namespace
+
+void merge_short_edges(Contours& contours, Nm shortest, Nm tolerance, MergeScratch& scratch) {
+  if (tolerance <= kRounding) return;
+  scratch.merged.clear();
+  bool any = false;
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    any |= append_merged(contours[c], shortest, tolerance - kRounding, scratch.merged);
+  }
+  if (any && !find_contacts(scratch.merged, scratch.contact, scratch.group)) std::swap(contours, scratch.merged);
+}
+
+namespace {
+
+std::int64_t cross(Point2 a, Point2 b, Point2 c) {
+  return (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
+}
+
+/// Moves the points of [begin, end) that matter to `out`, which may be `begin`; returns how many those are.
+std::size_t drop_straight(const Point2* begin, const Point2* end, Point2* out) {
+  std::size_t size = 0;
+  for (const Point2* p = begin; p != end; ++p) {
+    const Point2 point = *p;  // `out` may reach it
+    while (size > 0) {
+      if (out[size - 1] == point || (size > 1 && cross(out[size - 2], out[size - 1], point) == 0)) {
+        --size;
+      } else {
+        break;
+      }
+    }
+    out[size++] = point;
+  }
+  // Around the seam.
+  std::size_t first = 0;
+  while (size - first >= 3) {
+    if (out[size - 1] == out[first] || cross(out[size - 2], out[size - 1], out[first]) == 0) {
+      --size;
+    } else if (cross(out[size - 1], out[first], out[first + 1]) == 0) {
+      ++first;
+    } else {
+      break;
+    }
+  }
+  if (size - first < 3) return 0;
+  if (first > 0) std::copy(out + first, out + size, out);
+  return size - first;
+}
+
+}  // namespace
+
+void tidy(Contours& contours) {
+  Point2* const points = contours.point.data();
+  std::uint32_t kept_points = 0, kept_contours = 0, begin = 0;
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    const std::uint32_t end = contours.offset[c + 1];
+    const std::size_t size = drop_straight(points + begin, points + end, points + kept_points);
+    begin = end;
+    if (size == 0) continue;
+    kept_points += static_cast<std::uint32_t>(size);
+    contours.offset[++kept_contours] = kept_points;
+  }
+  contours.offset.resize(kept_contours + 1);
+  contours.point.resize(kept_points);
 }
 
 }  // namespace lamina

@@ -31,7 +31,7 @@ struct SimplifyScratch {
   Buffer<std::uint32_t> index;  // of a contour's points that stay: numbers, the next one and the one before
   Buffer<std::uint32_t> next, before;
   std::vector<std::pair<std::size_t, std::size_t>> open;
-  std::uint64_t looks = 0;  // at points while splitting, of all contours so far: the cost
+  std::uint64_t inspections = 0;  // at points while splitting, of all contours so far: the cost
   ContactScratch contact;
   Buffer<std::uint32_t> group;
 
@@ -49,5 +49,29 @@ struct SimplifyScratch {
 /// source     D. Douglas, T. Peucker, "Algorithms for the reduction of the number of points required to represent a
 ///            digitized line or its caricature", Cartographica 10 (1973)
 void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch);
+
+// --- short edges of contours become points.
+
+/// Reused from layer to layer.
+struct MergeScratch {
+  Contours merged;
+  ContactScratch contact;
+  Buffer<std::uint32_t> group;
+};
+
+/// Merges both ends of edges shorter than `shortest` into one point where no point of a contour moves further than the
+/// tolerance from what it was, nor the other way: their middle, or where both ends turn the same way half as high above it as
+/// their other edges meet. Contours stay as many, and clean: if any would touch another or itself, all keep their points.
+///
+/// tolerance  nm; 0 changes nothing
+/// cost       that of find_contacts()
+void merge_short_edges(Contours& contours, Nm shortest, Nm tolerance, MergeScratch& scratch);
+
+// --- points of contours that say nothing are dropped.
+
+/// Drops points that lie exactly on the line through their neighbours: spikes that run back on themselves and repeated
+/// points among them. Contours that have no area left are dropped.
+/// cost  O(P)
+void tidy(Contours& contours);
 
 }  // namespace lamina

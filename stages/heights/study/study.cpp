@@ -5,9 +5,9 @@
 #include <chrono>
 #include <utility>
 
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/number_text.h"
 #include "stages/heights/per_part.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::heights {
 namespace {
@@ -38,14 +38,14 @@ Result<Study> study(const SurfaceIndex& index, const Options& options) {
   Study study = study_of(index, options, std::move(*plan));
   study.plan_seconds = seconds;
   study.name = mode_name(options.mode);
-  if (options.mode == Mode::kUniform) study.name += fmt::format(" {} mm", number_text(mm(options.set.least())));
+  if (options.mode == Mode::kUniform) study.name += fmt::format(" {} mm", number_text(mm(options.set.minimum())));
   return study;
 }
 
 Result<Study> study_table(const SurfaceIndex& index, const Options& options, const std::string& path) {
   auto file = FileReader::open(path, {.fault = Fault::kInput,
                                       .missing = "no such file; name a file of heights",
-                                      .most_bytes = kMostTableBytes,
+                                      .max_bytes = kMaxTableBytes,
                                       .streams = true});
   if (!file) return file.error();
   Study study;
@@ -76,13 +76,13 @@ Result<Study> study_table(const SurfaceIndex& index, const Options& options, con
   return study;
 }
 
-Result<std::vector<Study>> study_all_ways(const SurfaceIndex& index, const Options& options) {
-  std::vector<std::pair<Mode, ThicknessSet>> ways = {{Mode::kUniform, {{options.set.least()}}}};
-  if (options.set.size() > 1) ways.push_back({Mode::kUniform, {{options.set.most()}}});
-  for (const Mode mode : {Mode::kAngle, Mode::kStepwise, Mode::kCusp, Mode::kOptimal}) ways.push_back({mode, options.set});
+Result<std::vector<Study>> study_all_modes(const SurfaceIndex& index, const Options& options) {
+  std::vector<std::pair<Mode, ThicknessSet>> paths = {{Mode::kUniform, {{options.set.minimum()}}}};
+  if (options.set.size() > 1) paths.push_back({Mode::kUniform, {{options.set.maximum()}}});
+  for (const Mode mode : {Mode::kAngle, Mode::kStepwise, Mode::kCusp, Mode::kOptimal}) paths.push_back({mode, options.set});
   std::vector<Study> studies;
   Options way = options;
-  for (auto& [mode, set] : ways) {
+  for (auto& [mode, set] : paths) {
     way.mode = mode;
     way.set = std::move(set);
     Result<Study> made = study(index, way);
@@ -107,8 +107,8 @@ Result<std::vector<Study>> study_per_part(SurfaceIndex index, Options options) {
     index.parts = {parts[part]};
     index.top = parts[part].top;
     index.area_mm2 = 0;
-    for (const Standing& standing : parts[part].standing) {
-      index.area_mm2 += index.meshes[standing.mesh].area_mm2 * standing.copies;
+    for (const PlacedSurface& placed : parts[part].placed) {
+      index.area_mm2 += index.meshes[placed.mesh].area_mm2 * placed.copies;
     }
     Study study = study_of(index, options, std::move(plan->parts[part]));
     for (LayerFacts& layer : study.evaluation.layers) layer.part = layer.part == kNoPart ? layer.part : part;

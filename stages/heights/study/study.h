@@ -35,7 +35,7 @@ Result<Study> study_table(const SurfaceIndex& index, const Options& options, con
 
 /// All modes with the thicknesses and limits of `options`, and uniform layers of the least and the greatest thickness.
 /// errors and cost  of study, for each
-Result<std::vector<Study>> study_all_ways(const SurfaceIndex& index, const Options& options);
+Result<std::vector<Study>> study_all_modes(const SurfaceIndex& index, const Options& options);
 
 /// The optimal table of all parts together, then the table of each part (per_part.h).
 /// errors  of plan_per_part

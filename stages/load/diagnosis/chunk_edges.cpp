@@ -63,8 +63,8 @@ std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint3
   for (std::uint32_t m = 0; m < matches; ++m) {
     const auto [one, other] = match_[m];
     const std::uint32_t key = key_[one];
-    const std::uint32_t once = others_[one] == 1, both_ways = (key ^ key_[other]) == 1;
-    const std::uint32_t found = once & both_ways;
+    const std::uint32_t once = others_[one] == 1, both_directions = (key ^ key_[other]) == 1;
+    const std::uint32_t found = once & both_directions;
     pair_[pairs_] = {static_cast<std::uint16_t>(one / 3), static_cast<std::uint16_t>(other / 3)};
     pairs_ += found;
     done_[one] |= static_cast<std::uint8_t>(found);

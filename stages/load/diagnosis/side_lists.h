@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/load/repair/topology.h"
+#include "stages/load/repair/vertices.h"
 
 namespace lamina::load {
 
@@ -23,5 +25,11 @@ class SideLists {
   Buffer<std::uint32_t> begin_;  // of each vertex, and the end
   Buffer<Side> sides_;
 };
+
+// --- facets that a mesh has twice; internal to load.
+
+/// Of some facets, those that an earlier one of them in the list has the same corners as, in the same orientation; each once,
+/// in no order. A facet that uses a vertex twice has no orientation. facets: is overwritten
+std::vector<std::uint32_t> repeats_among(const Numbered& mesh, std::vector<std::uint32_t>& facets);
 
 }  // namespace lamina::load

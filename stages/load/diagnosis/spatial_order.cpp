@@ -20,9 +20,9 @@ constexpr unsigned kBits = 7, kFineBits = 6;  // of a cell along an axis; of its
 constexpr std::uint32_t kCoarse = 1u << (3 * kBits - kFineBits), kFine = 1u << kFineBits;
 
 /// A cube around a box, divided into 2^kBits cells along each axis.
-class Cells {
+class CubeCells {
  public:
-  explicit Cells(const Box& bounds) : lo_(bounds.lo) {
+  explicit CubeCells(const Box& bounds) : lo_(bounds.lo) {
     const std::uint64_t side = std::max({reach(lo_.x, bounds.hi.x), reach(lo_.y, bounds.hi.y), reach(lo_.z, bounds.hi.z)});
     shift_ = std::max(static_cast<int>(std::bit_width(side)) - static_cast<int>(kBits), 0);
     for (std::uint32_t i = 0; i < spread_.size(); ++i) {
@@ -73,7 +73,7 @@ void order_finely(std::span<std::uint32_t> facets, std::span<const std::uint32_t
 }  // namespace
 
 Buffer<std::uint32_t> spatial_order(std::span<const Triangle> triangles, const Box& bounds) {
-  const Cells cells(bounds);
+  const CubeCells cells(bounds);
   const auto from = [&](std::uint32_t part) { return triangles.size() * part / kParts; };
   Buffer<std::uint32_t> code(triangles.size()), next(std::size_t{kParts} * kCoarse), order(triangles.size());
   prefer_large_pages(code);

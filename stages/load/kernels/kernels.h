@@ -12,7 +12,7 @@
 #include "stages/geometry/blocks/sorted_block.h"
 #include "stages/geometry/targets.h"
 #include "stages/load/repair/census.h"
-#include "stages/load/stl_facets.h"
+#include "stages/load/stl_binary.h"
 
 namespace lamina::load {
 

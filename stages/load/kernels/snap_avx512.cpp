@@ -28,7 +28,7 @@ struct Extremes {
   bool within_reach;
 };
 
-LAMINA_INLINE void look(const float* in, std::size_t count, Extremes& extremes) {
+LAMINA_INLINE void inspection(const float* in, std::size_t count, Extremes& extremes) {
   const __m512 reach = _mm512_set1_ps(kReach);
   __m512 lo[3], hi[3];
   __mmask16 beyond{};
@@ -62,7 +62,7 @@ bool snap(const char* facets, std::size_t count, Triangle* out, CoordinateBox& b
   std::array<Nm, kStripNumbers> snapped;
   for (std::size_t first = 0; first < count; first += kStrip) {
     const std::size_t size = std::min(kStrip, count - first), numbers = take_strip<3 * kFloats>(facets, first, size, corner);
-    look(corner.data(), numbers, extremes);
+    inspection(corner.data(), numbers, extremes);
     if (!extremes.within_reach) return false;
     Nm* const to = size == kStrip ? &out[first].a.x : snapped.data();
     for (std::size_t i = 0; i < numbers; i += kFloats / 2) {

@@ -17,7 +17,7 @@ void snap_strip(const float* __restrict in, Nm* __restrict out, std::size_t coun
 using Four = float __attribute__((vector_size(16)));
 using FourBits = std::int32_t __attribute__((vector_size(16)));
 
-bool look(const float* in, std::size_t count, std::array<float, kStep>& lowest, std::array<float, kStep>& highest) {
+bool inspection(const float* in, std::size_t count, std::array<float, kStep>& lowest, std::array<float, kStep>& highest) {
   constexpr std::size_t kFours = kStep / 4;
   Four lo[kFours], hi[kFours], at[kFours];
   std::memcpy(lo, lowest.data(), sizeof lo);
@@ -46,7 +46,7 @@ bool snap(const char* facets, std::size_t count, Triangle* out, CoordinateBox& b
   std::array<Nm, kStripNumbers> snapped;
   for (std::size_t first = 0; first < count; first += kStrip) {
     const std::size_t size = std::min(kStrip, count - first), numbers = take_strip<kStep>(facets, first, size, corner);
-    if (!look(corner.data(), numbers, lo, hi)) return false;
+    if (!inspection(corner.data(), numbers, lo, hi)) return false;
     snap_strip(corner.data(), size == kStrip ? &out[first].a.x : snapped.data(), numbers);
     if (size < kStrip) std::memcpy(&out[first].a.x, snapped.data(), 36 * size);
   }

@@ -17,7 +17,7 @@ namespace lamina::load {
 namespace {
 
 /// Triangles that are welded for advice, over all distances.
-constexpr std::uint64_t kMostWelded = std::uint64_t{1} << 24;
+constexpr std::uint64_t kMaxWelded = std::uint64_t{1} << 24;
 
 std::uint64_t open_edges(std::span<const Side> sides) {
   std::uint64_t open = 0;
@@ -30,21 +30,22 @@ bool makes_a_solid(const Buffer<Triangle>& triangles, const Box& bounds, std::in
   mesh.triangles = triangles;
   mesh.bounds = bounds;
   const RepairReport report = repair(mesh, distance);
-  return why_hollow(mesh, report).empty() && capped_share(mesh) < 0.1;
+  return check_solid(mesh, report) && capped_share(mesh) < 0.1;
 }
 
 }  // namespace
 
-std::string why_hollow(const Mesh& mesh, const RepairReport& report) {
-  if (mesh.triangles.empty()) return "its facets lie loose and enclose nothing";
+Status check_solid(const Mesh& mesh, const RepairReport& report) {
+  const auto hollow = [](std::string why) { return Error{Fault::kInput, std::move(why)}; };
+  if (mesh.triangles.empty()) return hollow("its facets lie loose and enclose nothing");
   const Enclosed held = enclosed(mesh);
-  if (held.nothing()) return "its facets enclose nothing";
+  if (held.nothing()) return hollow("its facets enclose nothing");
   const double before = std::fabs(report.volume_before_mm3);
   if (held.volume_mm3 >= before / 2) return {};
-  return fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before);
+  return hollow(fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before));
 }
 
-double weld_doubt(const Mesh& mesh, const RepairReport& report) {
+double weld_uncertainty(const Mesh& mesh, const RepairReport& report) {
   const double volume = std::fabs(census(mesh.triangles, mesh.bounds.middle().z).volume_mm3);
   return report.weld_moved_mm3 > 0 && volume > 0 ? 2 * report.weld_moved_mm3 / volume : 0;
 }
@@ -58,9 +59,9 @@ std::int64_t weld_that_closes(const Buffer<Triangle>& triangles, const Box& boun
   indexed.facet.resize(kept);
   const Buffer<Side> sides = sorted_sides(indexed.facet);
   const std::uint64_t open = open_edges(sides);
-  const auto most = std::min(static_cast<std::int64_t>(diagonal_nm(bounds) / 20), 2 * farthest_weld(indexed));
-  std::uint64_t left = std::max(kMostWelded, 2 * triangles.size());
-  for (std::int64_t distance = kWeldByItself; distance <= most; distance *= 2) {
+  const auto maximum = std::min(static_cast<std::int64_t>(diagonal_nm(bounds) / 20), 2 * farthest_weld(indexed));
+  std::uint64_t left = std::max(kMaxWelded, 2 * triangles.size());
+  for (std::int64_t distance = kWeldByItself; distance <= maximum; distance *= 2) {
     if (distance <= tried_nm) continue;
     if (left < triangles.size()) break;
     left -= triangles.size();

@@ -2,19 +2,19 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "stages/data/mesh.h"
+#include "stages/data/status.h"
 #include "stages/load/repair/repair.h"
 
 namespace lamina::load {
 
-/// Why a repaired mesh is no solid; "" if it is one.
-std::string why_hollow(const Mesh& mesh, const RepairReport& report);
+/// Whether a repaired mesh is a solid. errors  kInput, without a file: why it is none
+Status check_solid(const Mesh& mesh, const RepairReport& report);
 
 /// By how much of itself the volume of a welded mesh may be off: 0.02 is 2 %. Corners that lie apart by chance lie as far from
 /// where they belong as from each other; twice their standard deviation.
-double weld_doubt(const Mesh& mesh, const RepairReport& report);
+double weld_uncertainty(const Mesh& mesh, const RepairReport& report);
 
 /// The smallest distance, doubled again and again, at which the facets become a solid that hardly hangs on caps; 0 if none is
 /// found: up to a twentieth of the size, and up to what any edge allows (weld.h).

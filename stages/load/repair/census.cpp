@@ -12,7 +12,7 @@
 namespace lamina::load {
 namespace {
 
-constexpr std::size_t kMostSampled = std::size_t{1} << 15;
+constexpr std::size_t kMaxSampled = std::size_t{1} << 15;
 
 /// Twice the signed area of a facet seen from above, rounded.
 inline double shadow_of(const Triangle& t) {
@@ -42,7 +42,7 @@ void CensusSums::add(const CensusSums& other) {
 }
 
 // One facet in `share` is sampled, chosen by the sum of its corners' hashes.
-std::uint64_t sampled_share(std::size_t triangles) { return std::max<std::uint64_t>(1, triangles / kMostSampled); }
+std::uint64_t sampled_share(std::size_t triangles) { return std::max<std::uint64_t>(1, triangles / kMaxSampled); }
 
 bool any_reversed(std::span<const std::uint64_t> sampled) {
   std::size_t size = 64;

@@ -12,11 +12,9 @@
 
 #include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
-#include "stages/load/diagnosis/collector.h"
-#include "stages/load/diagnosis/repeats.h"
 #include "stages/load/diagnosis/side_lists.h"
+#include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
-#include "stages/load/repair/overlaps.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/vertices.h"
 
@@ -36,7 +34,7 @@ struct Shell {
 };
 
 /// More ends than this say little.
-constexpr std::size_t kMostEnds = 64;
+constexpr std::size_t kMaxEnds = 64;
 
 void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
   result.shells = static_cast<std::uint32_t>(shells.size());
@@ -49,10 +47,10 @@ void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
   }
   result.outward_mm3 = static_cast<double>(outward) / 6e18;
   result.shells_apart = result.non_manifold_edges.count == 0;
-  const bool all_seen =
+  const bool all_found =
       !result.shells_apart || for_each_overlap(boxes, [&](auto, auto) { return result.shells_apart = false; });
-  result.shells_apart = result.shells_apart && all_seen;
-  const bool many = 2 * boxes.size() > kMostEnds;
+  result.shells_apart = result.shells_apart && all_found;
+  const bool many = 2 * boxes.size() > kMaxEnds;
   for (const Box& box : many ? std::span<const Box>(&result.bounds, 1) : std::span<const Box>(boxes)) {
     result.shell_ends.push_back(box.lo.z);
     result.shell_ends.push_back(box.hi.z);
@@ -63,17 +61,17 @@ void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
 
 constexpr std::size_t kGrain = std::size_t{1} << 13;  // facets or vertices a task
 
-using Range = tbb::blocked_range<std::uint32_t>;
-Range all_of(std::size_t count) { return {0, static_cast<std::uint32_t>(count), kGrain}; }
+using BlockedRange = tbb::blocked_range<std::uint32_t>;
+BlockedRange all_of(std::size_t count) { return {0, static_cast<std::uint32_t>(count), kGrain}; }
 
 /// The box around points.
-struct SeenPoints {
+struct PointFindings {
   Box box;
 
-  void look(std::span<const Point3> points, const Range& range) {
+  void inspect(std::span<const Point3> points, const BlockedRange& range) {
     for (std::uint32_t i = range.begin(); i != range.end(); ++i) box.add(points[i]);
   }
-  void add(const SeenPoints& other) { box.add(other.box); }
+  void add(const PointFindings& other) { box.add(other.box); }
 };
 
 /// What several tasks write while edges are looked at.
@@ -91,8 +89,9 @@ struct Joined {
 };
 
 /// What edges show.
-struct SeenEdges {
-  explicit SeenEdges(std::size_t places) : open(places), non_manifold(places), misoriented(places), duplicate(places) {}
+struct EdgeFindings {
+  explicit EdgeFindings(std::size_t positions)
+      : open(positions), non_manifold(positions), misoriented(positions), duplicate(positions) {}
   Collector open, non_manifold, misoriented, duplicate;
   std::uint64_t count = 0;
   bool balanced = true;
@@ -100,7 +99,7 @@ struct SeenEdges {
   std::vector<std::uint32_t> may_repeat;  // facets
 
   /// Looks at all sides of an edge. returns  whether facets at it may be there twice
-  bool look(const Numbered& mesh, const Side* begin, const Side* end, Joined& joined) {
+  bool inspect(const Numbered& mesh, const Side* begin, const Side* end, Joined& joined) {
     ++count;
     joined.join(begin, end);
     if (end - begin == 2 && begin[0].forward != begin[1].forward) return false;
@@ -112,9 +111,9 @@ struct SeenEdges {
     return end - begin > 1;
   }
   /// Looks at edges one after the other.
-  void look(const Numbered& mesh, std::span<const Side> sides, Joined& joined) {
+  void inspect(const Numbered& mesh, std::span<const Side> sides, Joined& joined) {
     for_each_edge(sides, [&](const Side* begin, const Side* end) {
-      if (!look(mesh, begin, end, joined)) return;
+      if (!inspect(mesh, begin, end, joined)) return;
       for (const Side* side = begin; side != end; ++side) may_repeat.push_back(side->facet);
     });
   }
@@ -126,10 +125,10 @@ struct SeenEdges {
   }
 
   /// Of vertices whose sides chunks could not settle.
-  void look(const Numbered& mesh, const SideLists& lists, const Range& range, Joined& joined) {
-    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) look(mesh, lists.of(vertex), joined);
+  void inspect(const Numbered& mesh, const SideLists& lists, const BlockedRange& range, Joined& joined) {
+    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) inspect(mesh, lists.of(vertex), joined);
   }
-  void add(const SeenEdges& other) {
+  void add(const EdgeFindings& other) {
     open.add(other.open);
     non_manifold.add(other.non_manifold);
     misoriented.add(other.misoriented);
@@ -141,54 +140,55 @@ struct SeenEdges {
 };
 
 /// Of parts that tasks look at; results of one and the same parts are the same in any order.
-template <class Seen, class Look>
-Seen seen_in(const Range& range, const Seen& nothing, const Look& look) {
+template <class Findings, class Inspect>
+Findings find_in(const BlockedRange& range, const Findings& nothing, const Inspect& inspect) {
   return tbb::parallel_reduce(
       range, nothing,
-      [&](const Range& part, Seen seen) {
-        look(part, seen);
-        return seen;
+      [&](const BlockedRange& part, Findings visited) {
+        inspect(part, visited);
+        return visited;
       },
-      [](Seen one, const Seen& other) {
+      [](Findings one, const Findings& other) {
         one.add(other);
         return one;
       });
 }
 
 /// Chunk by chunk, and then the sides that several chunks share.
-SeenEdges edges_of(const Numbered& mesh, std::size_t places, Joined& joined) {
+EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joined) {
   struct Worker {
     ChunkEdges edges;
     ChunkPieces pieces;
     Buffer<Side> odd, rest;
     Buffer<std::uint32_t> collapsed;
-    SeenEdges seen;
-    explicit Worker(std::size_t places_told) : seen(places_told) {}
+    EdgeFindings visited;
+    explicit Worker(std::size_t max_reported) : visited(max_reported) {}
   };
-  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers([&] { return std::make_unique<Worker>(places); });
+  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers([&] { return std::make_unique<Worker>(positions); });
   tbb::parallel_for(std::size_t{0}, mesh.chunks(), [&](std::size_t chunk) {
     Worker& worker = *workers.local();
     const auto first = static_cast<std::uint32_t>(chunk * Numbered::kChunk);
     const std::span<const ChunkEdges::Pair> pairs = worker.edges.find(mesh, chunk, worker.odd, worker.rest, worker.collapsed);
     worker.pieces.join(pairs, joined.sets.parents().subspan(first, mesh.local_facets(chunk).size()), first);
-    worker.seen.count += pairs.size();
-    worker.seen.look(mesh, worker.odd, joined);
+    worker.visited.count += pairs.size();
+    worker.visited.inspect(mesh, worker.odd, joined);
   });
   std::vector<Buffer<Side>> rest;
-  SeenEdges within(places);
+  EdgeFindings within(positions);
   for (const std::unique_ptr<Worker>& worker : workers) {
     rest.push_back(std::move(worker->rest));
-    within.add(worker->seen);
+    within.add(worker->visited);
     within.may_repeat.insert(within.may_repeat.end(), worker->collapsed.begin(), worker->collapsed.end());
   }
   const auto vertices = static_cast<std::uint32_t>(mesh.vertices().size());
   const SideLists lists(vertices, rest);
   std::vector<Buffer<Side>>().swap(rest);
-  SeenEdges seen = seen_in(all_of(vertices), SeenEdges(places),
-                           [&](const Range& range, SeenEdges& some) { some.look(mesh, lists, range, joined); });
-  seen.add(within);
-  seen.add_repeats(mesh, repeats_among(mesh, seen.may_repeat));
-  return seen;
+  EdgeFindings visited = find_in(all_of(vertices), EdgeFindings(positions), [&](const BlockedRange& range, EdgeFindings& some) {
+    some.inspect(mesh, lists, range, joined);
+  });
+  visited.add(within);
+  visited.add_repeats(mesh, repeats_among(mesh, visited.may_repeat));
+  return visited;
 }
 
 /// The number of each facet's shell, by the smallest facets; those that use a vertex twice belong to none: UINT32_MAX.
@@ -202,13 +202,13 @@ Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std:
   return shell_of;
 }
 
-/// SeenShells by their numbers.
-struct SeenShells {
+/// ShellFindings by their numbers.
+struct ShellFindings {
   std::vector<Shell> shell;
 
   /// Of chunks.
-  void look(const Numbered& mesh, std::span<const std::uint32_t> shell_of, std::span<const std::uint8_t> unbalanced,
-            const Point3& from, const Range& chunks) {
+  void inspect(const Numbered& mesh, std::span<const std::uint32_t> shell_of, std::span<const std::uint8_t> unbalanced,
+               const Point3& from, const BlockedRange& chunks) {
     Buffer<Point3> points;
     for (std::size_t c = chunks.begin(); c != chunks.end(); ++c) {
       const std::span<const std::uint32_t> numbers = mesh.numbers_of(c);
@@ -216,10 +216,10 @@ struct SeenShells {
       for (std::size_t v = 0; v < numbers.size(); ++v) points[v] = mesh.vertices()[numbers[v]];
       const std::span<const Numbered::Local> facets = mesh.local_facets(c);
       const std::size_t first = c * Numbered::kChunk;
-      look(points, facets, shell_of.subspan(first, facets.size()), unbalanced.subspan(first, facets.size()), from);
+      inspect(points, facets, shell_of.subspan(first, facets.size()), unbalanced.subspan(first, facets.size()), from);
     }
   }
-  void add(const SeenShells& other) {
+  void add(const ShellFindings& other) {
     for (std::size_t s = 0; s < shell.size(); ++s) shell[s].add(other.shell[s]);
   }
 
@@ -228,8 +228,8 @@ struct SeenShells {
     return {points[facet[0]], points[facet[1]], points[facet[2]]};
   }
 
-  void look(std::span<const Point3> points, std::span<const Numbered::Local> facets, std::span<const std::uint32_t> shell_of,
-            std::span<const std::uint8_t> unbalanced, const Point3& from) {
+  void inspect(std::span<const Point3> points, std::span<const Numbered::Local> facets, std::span<const std::uint32_t> shell_of,
+               std::span<const std::uint8_t> unbalanced, const Point3& from) {
     const std::uint32_t only = shell_of.front();
     const bool all_in_one =
         only != UINT32_MAX && std::all_of(shell_of.begin(), shell_of.end(), [&](auto s) { return s == only; });
@@ -256,26 +256,26 @@ struct SeenShells {
 constexpr std::uint32_t kManyShells = 1024;
 
 /// What facets show one by one.
-Diagnosis diagnose_facets(std::span<const Triangle> triangles, std::size_t places) {
+Diagnosis diagnose_facets(std::span<const Triangle> triangles, std::size_t positions) {
   Diagnosis result;
   result.triangles = triangles.size();
-  DegenerateFacets degenerate(places);
-  tbb::parallel_for(all_of(triangles.size()), [&](const Range& range) {
-    degenerate.look(range.begin(), triangles.subspan(range.begin(), range.size()));
+  DegenerateFacets degenerate(positions);
+  tbb::parallel_for(all_of(triangles.size()), [&](const BlockedRange& range) {
+    degenerate.inspect(range.begin(), triangles.subspan(range.begin(), range.size()));
   });
   result.degenerate_facets = degenerate.finding();
   return result;
 }
 
 /// What edges and shells show.
-void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result) {
+void diagnose_edges(const Numbered& mesh, std::size_t positions, Diagnosis& result) {
   result.vertices = mesh.vertices().size();
-  result.bounds = seen_in(all_of(result.vertices), SeenPoints(), [&](const Range& range, SeenPoints& seen) {
-                    seen.look(mesh.vertices(), range);
+  result.bounds = find_in(all_of(result.vertices), PointFindings(), [&](const BlockedRange& range, PointFindings& visited) {
+                    visited.inspect(mesh.vertices(), range);
                   }).box;
   Joined joined(mesh.size());
   {
-    const SeenEdges edges = edges_of(mesh, places, joined);
+    const EdgeFindings edges = edges_of(mesh, positions, joined);
     result.edges = edges.count;
     result.balanced = edges.balanced;
     result.open_edges = edges.open.finding();
@@ -285,15 +285,15 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
   }
   std::uint32_t count = 0;
   const Buffer<std::uint32_t> shell_of = numbered_shells(mesh, joined.sets.parents(), count);
-  SeenShells shells{std::vector<Shell>(count)};
-  const auto measure = [&](const Range& range, SeenShells& seen) {
-    seen.look(mesh, shell_of, joined.unbalanced, result.bounds.lo, range);
+  ShellFindings shells{std::vector<Shell>(count)};
+  const auto measure = [&](const BlockedRange& range, ShellFindings& visited) {
+    visited.inspect(mesh, shell_of, joined.unbalanced, result.bounds.lo, range);
   };
-  const Range chunks(0, static_cast<std::uint32_t>(mesh.chunks()), 2);
+  const BlockedRange chunks(0, static_cast<std::uint32_t>(mesh.chunks()), 2);
   if (count > kManyShells)
     measure(chunks, shells);
   else
-    shells = seen_in(chunks, shells, measure);
+    shells = find_in(chunks, shells, measure);
   Int128 volume = 0;
   for (const Shell& shell : shells.shell) volume += shell.volume;
   result.volume_mm3 = static_cast<double>(volume) / 6e18;
@@ -302,9 +302,9 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
 
 }  // namespace
 
-Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
-  Diagnosis result = diagnose_facets(mesh.triangles, places);
-  diagnose_edges(Numbered(mesh.triangles, mesh.bounds), places, result);
+Diagnosis diagnose(const Mesh& mesh, std::size_t positions) {
+  Diagnosis result = diagnose_facets(mesh.triangles, positions);
+  diagnose_edges(Numbered(mesh.triangles, mesh.bounds), positions, result);
   return result;
 }
 
@@ -317,10 +317,10 @@ Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks) {
   return result;
 }
 
-Diagnosis diagnose_alone(Mesh& mesh, std::size_t places) {
-  Diagnosis result = diagnose_facets(mesh.triangles, places);
+Diagnosis diagnose_alone(Mesh& mesh, std::size_t positions) {
+  Diagnosis result = diagnose_facets(mesh.triangles, positions);
   Numbered numbered(std::move(mesh.triangles), mesh.bounds);
-  diagnose_edges(numbered, places, result);
+  diagnose_edges(numbered, positions, result);
   mesh.triangles = result.shells_apart ? Buffer<Triangle>() : numbered.give_back_list();
   return result;
 }

@@ -11,13 +11,13 @@ namespace lamina::load {
 
 /// What was found; counts, and the first places in file order (at most `places` of each kind).
 struct Diagnosis {
-  struct Place {
+  struct FaultPosition {
     std::uint32_t triangle;  // index in the mesh
     Point3 at;               // nm, middle of the edge or first corner of the facet
   };
   struct Finding {
     std::uint64_t count = 0;
-    std::vector<Place> first;
+    std::vector<FaultPosition> first;
   };
   std::uint64_t triangles = 0, vertices = 0, edges = 0;
   std::uint32_t shells = 0;           // components connected over vertices' edges
@@ -40,12 +40,12 @@ struct Diagnosis {
 /// The same for any number of threads. Of findings at one triangle, that at the lowest edge is the first.
 /// mesh.bounds  of the list; what is found does not depend on them
 /// cost         O(T), parallel; some 30 bytes a triangle, 10 more where neighbours in the mesh are none in the list
-Diagnosis diagnose(const Mesh& mesh, std::size_t places = 3);
+Diagnosis diagnose(const Mesh& mesh, std::size_t positions = 3);
 
 /// The same in the memory of the list, for a mesh whose volume alone is asked for afterwards: the list is empty where that is
 /// known without it, because shells lie apart, and as it was where they may overlap.
 /// cost: as above; no more memory than the list and a quarter of it, half of it where the list is in disorder
-Diagnosis diagnose_alone(Mesh& mesh, std::size_t places = 3);
+Diagnosis diagnose_alone(Mesh& mesh, std::size_t positions = 3);
 
 /// The same of blocks that hold no caps. Degenerate facets are not looked for, and no places are told: the order of the file is
 /// not known. blocks: given up as soon as their vertices are numbered

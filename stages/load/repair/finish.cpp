@@ -11,7 +11,7 @@
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/repair.h"
-#include "stages/load/winding/winding.h"
+#include "stages/load/winding/remesh.h"
 
 namespace lamina::load {
 namespace {
@@ -19,22 +19,23 @@ namespace {
 std::string plural(std::uint64_t count, const char* what) { return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s"); }
 
 /// Of a volume: what a weld may change without a word, and at all unless its distance is given.
-constexpr double kDoubtTold = 0.01, kMostDoubt = 0.03;
+constexpr double kReportedUncertainty = 0.01, kMaxUncertainty = 0.03;
 
-std::string place(const Box& box) {
+std::string position(const Box& box) {
   const Point3 at = box.middle();
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", mm(at.x), mm(at.y), mm(at.z));
 }
 
 /// Repair notes end with the places of the file's own coordinates, so that they can be found in a modeller.
 /// doubt  of the weld (advice.h)
-void describe_repair(const RepairReport& report, double doubt, const std::string& prefix, std::vector<Note>& notes) {
+void describe_repair(const RepairReport& report, double uncertainty, const std::string& prefix, std::vector<Note>& notes) {
   const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
   if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
   if (report.vertices_welded > 0)
-    note(fmt::format("{} {} at open edges welded to a neighbour within {:.6g} um{}", report.vertices_welded,
-                     report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000,
-                     doubt >= kDoubtTold ? fmt::format(": the volume may be off by {:.2g} %", 100 * doubt) : ""));
+    note(fmt::format(
+        "{} {} at open edges welded to a neighbour within {:.6g} um{}", report.vertices_welded,
+        report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000,
+        uncertainty >= kReportedUncertainty ? fmt::format(": the volume may be off by {:.2g} %", 100 * uncertainty) : ""));
   if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
   if (report.sheets_dropped > 0)
     note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
@@ -44,7 +45,7 @@ void describe_repair(const RepairReport& report, double doubt, const std::string
                      plural(report.flat_facets_dropped, "facet")));
   if (report.openings_capped > 0)
     note(fmt::format("{} capped with {}, the largest {:.3g} mm wide near {}", plural(report.openings_capped, "opening"),
-                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm, place(report.largest_opening)));
+                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm, position(report.largest_opening)));
 }
 
 /// Sides that no other facet shares, over all sides.
@@ -64,29 +65,30 @@ bool is_flat(const Mesh& mesh) {
 
 /// Decides which facets of a file whose length contradicts its header are taken. `found` is kept up to date.
 /// errors  kInput: neither all of them nor those that the header speaks of
-Status settle_doubt(const Source& source, const Doubt& doubt, Mesh& mesh, Census& found, std::vector<Note>& notes) {
+Status settle_warning(const Source& source, const ReadWarning& warning, Mesh& mesh, Census& found,
+                      std::vector<Note>& notes) {
   const std::span<const Triangle> all(mesh.triangles.data(), mesh.triangles.size());
-  if (doubt.claimed == 0 || doubt.claimed >= all.size()) {
-    if (!found.balanced) return source.error(doubt.error);
-    notes.push_back({false, doubt.note});
+  if (warning.claimed == 0 || warning.claimed >= all.size()) {
+    if (!found.balanced) return source.error(warning.error);
+    notes.push_back({false, warning.note});
     return {};
   }
-  const Census first = census(all.first(doubt.claimed), mesh.bounds.middle().z);
+  const Census first = census(all.first(warning.claimed), mesh.bounds.middle().z);
   // Behind a closed mesh, padding with zeros closes too, but encloses nothing.
   const bool rest_counts = std::fabs(found.volume_mm3 - first.volume_mm3) > 1e-9 * std::fabs(first.volume_mm3);
   bool whole = found.balanced && (!first.balanced || rest_counts);
   if (!whole && !first.balanced) {
     // Rubbish fits nowhere; facets fit as well as those before them.
-    whole = open_share(all) <= 1.001 * open_share(all.first(doubt.claimed));
+    whole = open_share(all) <= 1.001 * open_share(all.first(warning.claimed));
     if (whole)
       notes.push_back({true, fmt::format("the header says {} facets, the file holds {}, which fit together: all are read",
-                                         doubt.claimed, all.size())});
+                                         warning.claimed, all.size())});
   } else if (whole) {
-    notes.push_back({true, doubt.note});
+    notes.push_back({true, warning.note});
   }
   if (whole) return {};
-  notes.push_back({false, doubt.rest_left_out});
-  mesh.triangles.resize(doubt.claimed);
+  notes.push_back({false, warning.rest_left_out});
+  mesh.triangles.resize(warning.claimed);
   mesh.bounds = {};
   for (const Triangle& t : mesh.triangles) mesh.bounds.add(t.a), mesh.bounds.add(t.b), mesh.bounds.add(t.c);
   found = census(mesh.triangles, mesh.bounds.middle().z);
@@ -96,8 +98,8 @@ Status settle_doubt(const Source& source, const Doubt& doubt, Mesh& mesh, Census
 /// 5 um goes up to 160 um, or a hundredth of a small mesh's size; any other distance is taken as it is.
 WeldRange weld_range(const LoadOptions& options, const Box& bounds) {
   if (options.weld_nm != kWeldByItself) return options.weld_nm;
-  const auto most = static_cast<std::int64_t>(std::min(160e3, diagonal_nm(bounds) / 100));
-  return {options.weld_nm, std::max(options.weld_nm, most)};
+  const auto maximum = static_cast<std::int64_t>(std::min(160e3, diagonal_nm(bounds) / 100));
+  return {options.weld_nm, std::max(options.weld_nm, maximum)};
 }
 
 /// Closes a mesh by its winding number, after welding and turning facets over.
@@ -105,13 +107,14 @@ WeldRange weld_range(const LoadOptions& options, const Box& bounds) {
 Status close_by_winding(const Source& source, const std::string& prefix, const LoadOptions& options, Mesh& mesh, Census& found,
                         std::vector<Note>& notes) {
   const RepairReport report = repair(mesh, weld_range(options, mesh.bounds), false);
-  describe_repair(report, weld_doubt(mesh, report), prefix, notes);
+  describe_repair(report, weld_uncertainty(mesh, report), prefix, notes);
   found = census(mesh.triangles, mesh.bounds.middle().z);
   if (!found.balanced) {
     const std::size_t facets = mesh.triangles.size();
     const Remeshed remeshed = remesh(mesh);
     found = census(mesh.triangles, mesh.bounds.middle().z);
-    if (!found.balanced) return Error{Fault::kInternal, source.path() + ": remeshing left the mesh open; please report it"};
+    if (!found.balanced)
+      return Error{Fault::kInternal, std::string(source.path()) + ": remeshing left the mesh open; please report it"};
     notes.push_back(
         {true, fmt::format("{}approximate: {} facets became {} where the winding number is a half, found in cells of "
                            "{:.4g} mm; what is thinner may be lost",
@@ -130,23 +133,24 @@ Status close(const Source& source, const std::string& prefix, const LoadOptions&
   const WeldRange range = weld_range(options, bounds);
   const RepairReport report = repair(mesh, range);
   found = census(mesh.triangles, mesh.bounds.middle().z);
-  if (!found.balanced) return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
-  if (std::string why = why_hollow(mesh, report); !why.empty()) {
-    const std::int64_t distance = weld_that_closes(original, bounds, range.most_nm);
-    return source.error(prefix + why +
+  if (!found.balanced)
+    return Error{Fault::kInternal, std::string(source.path()) + ": repair left the mesh open; please report it"};
+  if (const Status solid = check_solid(mesh, report); !solid) {
+    const std::int64_t distance = weld_that_closes(original, bounds, range.max_nm);
+    return source.error(prefix + solid.error().message +
                         (distance > 0 ? fmt::format("; --weld {} closes it", distance / 1000)
                                       : "; export it as a solid, or try --repair winding"));
   }
-  const double doubt = weld_doubt(mesh, report);
-  if (doubt > kMostDoubt && options.weld_nm == kWeldByItself) {
+  const double uncertainty = weld_uncertainty(mesh, report);
+  if (uncertainty > kMaxUncertainty && options.weld_nm == kWeldByItself) {
     const std::int64_t distance = weld_that_closes(original, bounds, report.weld_nm - 1);
     return source.error(
         fmt::format("{}its open edges lie up to {:.6g} um apart: joining them may change its volume by {:.2g} %; "
                     "export it as a solid{}",
-                    prefix, static_cast<double>(report.weld_nm) / 1000, 100 * doubt,
+                    prefix, static_cast<double>(report.weld_nm) / 1000, 100 * uncertainty,
                     distance > 0 ? fmt::format(", or say --weld {} if that will do", distance / 1000) : ""));
   }
-  describe_repair(report, doubt, prefix, notes);
+  describe_repair(report, uncertainty, prefix, notes);
   return {};
 }
 
@@ -166,7 +170,7 @@ Status check_cancelled(const Source& source, const std::string& prefix, const Me
                                          "each two",
                                          prefix, plural(cancelled.shells, "shell"),
                                          plural(cancelled.facets, "facet") + (cancelled.shells == 1 ? " cancels" : " cancel"),
-                                         place(cancelled.box))});
+                                         position(cancelled.box))});
   }
   if ((hardly_any || found.reversed_twins) && enclosed(mesh).nothing())
     return source.error(prefix + "its facets enclose nothing: nothing to print");
@@ -184,8 +188,8 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   for (Note& note : facets.notes) notes.push_back({note.repair, prefix + note.text});
   Census found = census(mesh.triangles, mesh.bounds.middle().z);
-  if (facets.doubt) {
-    const Status settled = settle_doubt(source, *facets.doubt, mesh, found, notes);
+  if (facets.warning) {
+    const Status settled = settle_warning(source, *facets.warning, mesh, found, notes);
     if (!settled) return settled.error();
     mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   }
@@ -210,10 +214,10 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
   mesh.capped_share = capped_share(mesh);
   if (options.repair && turn_over_if_inside_out(mesh)) {
     const std::size_t file = source.path().size() + 2;
-    const std::string told =
+    const std::string reported =
         (name.size() > file ? name.substr(file) : "all of it") + " is inside out and is turned over: its volume is negative";
     // An object that stands turned in several ways is told once.
-    if (std::ranges::none_of(notes, [&](const Note& note) { return note.text == told; })) notes.push_back({true, told});
+    if (std::ranges::none_of(notes, [&](const Note& note) { return note.text == reported; })) notes.push_back({true, reported});
   }
   return mesh;
 }

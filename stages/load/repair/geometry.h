@@ -25,8 +25,8 @@ auto with_doubled_area(const Triangle& t, const Use& use) {
   const Vector u = difference(t.b, t.a), v = difference(t.c, t.a);
   // Products of two numbers of at most 2^30 and a sign, and differences of these, have 62 bits. One test serves all six: a
   // number is within if, 2^30 added, it has no bit above the lowest 31.
-  constexpr std::int64_t kMost = std::int64_t{1} << 30;
-  const std::int64_t bits = (u[0] + kMost) | (u[1] + kMost) | (u[2] + kMost) | (v[0] + kMost) | (v[1] + kMost) | (v[2] + kMost);
+  constexpr std::int64_t kMax = std::int64_t{1} << 30;
+  const std::int64_t bits = (u[0] + kMax) | (u[1] + kMax) | (u[2] + kMax) | (v[0] + kMax) | (v[1] + kMax) | (v[2] + kMax);
   if (bits >> 31 == 0) [[likely]]
     return use(cross(u, v));
   return use(cross(std::array<Int128, 3>{u[0], u[1], u[2]}, std::array<Int128, 3>{v[0], v[1], v[2]}));

@@ -28,7 +28,7 @@ double squared(const Point3& p, const Point3& q) {
 }
 
 /// Square of the distance from a point to a stretch between two others.
-double squared_to_stretch(const Point3& point, const Point3& from, const Point3& to) {
+double squared_to_segment(const Point3& point, const Point3& from, const Point3& to) {
   const Vector along = between(from, to), there = between(from, point);
   const double length = dot(along, along);
   const double at = length > 0 ? std::clamp(dot(along, there) / length, 0.0, 1.0) : 0;
@@ -46,10 +46,10 @@ Vector inward(const Indexed& mesh, const OpenSide& side) {
 }
 
 /// `from` ends of some open sides by the cell that they lie in.
-class Cells {
+class EndCells {
  public:
   /// reach  how far what is found may lie, nm
-  Cells(const Indexed& mesh, std::span<const OpenSide> open, Buffer<std::uint32_t> sides, std::int64_t reach)
+  EndCells(const Indexed& mesh, std::span<const OpenSide> open, Buffer<std::uint32_t> sides, std::int64_t reach)
       : size_(2 * std::max<std::int64_t>(reach, 1)) {
     std::size_t buckets = 1;
     while (buckets < sides.size()) buckets *= 2;
@@ -75,14 +75,14 @@ class Cells {
     const std::int64_t off = std::min(reach, size_ / 2);
     const auto ends = [&](std::int64_t x) { return std::array{cell(x - off), cell(x + off)}; };
     const std::array xs = ends(p.x), ys = ends(p.y), zs = ends(p.z);
-    std::array<std::size_t, 8> seen{};
+    std::array<std::size_t, 8> visited{};
     std::size_t count = 0;
     for (std::int64_t x = xs[0]; x <= xs[1]; ++x) {
       for (std::int64_t y = ys[0]; y <= ys[1]; ++y) {
         for (std::int64_t z = zs[0]; z <= zs[1]; ++z) {
           const std::size_t bucket = hash(x, y, z);
-          if (std::find(seen.begin(), seen.begin() + count, bucket) != seen.begin() + count) continue;
-          seen[count++] = bucket;
+          if (std::find(visited.begin(), visited.begin() + count, bucket) != visited.begin() + count) continue;
+          visited[count++] = bucket;
           for (std::uint32_t i = first_[bucket]; i < first_[bucket + 1]; ++i) visit(side_[i]);
         }
       }
@@ -125,7 +125,7 @@ class Levels {
   /// Calls visit(side) for all sides whose begin may be joined with a vertex, each once, and for some others.
   template <class Visit>
   void near(std::uint32_t vertex, const Visit& visit) const {
-    for (const Cells& cells : cells_) cells.near(mesh_.vertex[vertex], reach(vertex), visit);
+    for (const EndCells& cells : cells_) cells.near(mesh_.vertex[vertex], reach(vertex), visit);
   }
 
  private:
@@ -139,12 +139,12 @@ class Levels {
   const Indexed& mesh_;
   std::span<const float> shortest_;
   std::int64_t distance_;
-  std::vector<Cells> cells_;
+  std::vector<EndCells> cells_;
 };
 
-class Search {
+class MatchSearch {
  public:
-  Search(const Indexed& mesh, std::span<const OpenSide> open, std::span<const float> shortest, std::int64_t distance)
+  MatchSearch(const Indexed& mesh, std::span<const OpenSide> open, std::span<const float> shortest, std::int64_t distance)
       : mesh_(mesh), open_(open), shortest_(shortest), distance_(static_cast<double>(distance)) {}
 
   void from(std::uint32_t i, const Levels& levels, Buffer<Match>& found) const {
@@ -174,16 +174,16 @@ class Search {
   double joint(std::uint32_t one, std::uint32_t other) const {
     if (one == other) return 0;
     const double square = squared(mesh_.vertex[one], mesh_.vertex[other]);
-    const double most = std::min(distance_, 0.5 * static_cast<double>(std::min(shortest_[one], shortest_[other])));
-    return square <= most * most ? square : -1;
+    const double maximum = std::min(distance_, 0.5 * static_cast<double>(std::min(shortest_[one], shortest_[other])));
+    return square <= maximum * maximum ? square : -1;
   }
 
   /// The shorter one ends on the longer one.
   bool runs_back(const OpenSide& side, const OpenSide& other) const {
     const auto& at = mesh_.vertex;
     const double own = squared(at[side.from], at[side.to]), its = squared(at[other.from], at[other.to]);
-    const double off = own < its ? squared_to_stretch(at[side.from], at[other.from], at[other.to])
-                                 : squared_to_stretch(at[other.to], at[side.from], at[side.to]);
+    const double off = own < its ? squared_to_segment(at[side.from], at[other.from], at[other.to])
+                                 : squared_to_segment(at[other.to], at[side.from], at[side.to]);
     return off <= distance_ * distance_ && dot(between(at[side.from], at[side.to]), between(at[other.from], at[other.to])) < 0;
   }
 
@@ -218,7 +218,7 @@ Buffer<OpenSide> open_sides(const Indexed& mesh, std::span<const Side> sides) {
 Buffer<Match> find_matches(const Indexed& mesh, std::span<const OpenSide> open, std::span<const float> shortest,
                            std::int64_t distance_nm) {
   const Levels levels(mesh, open, shortest, distance_nm);
-  const Search search(mesh, open, shortest, distance_nm);
+  const MatchSearch search(mesh, open, shortest, distance_nm);
   tbb::enumerable_thread_specific<Buffer<Match>> found;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, open.size(), 1024), [&](const auto& range) {
     Buffer<Match>& own = found.local();

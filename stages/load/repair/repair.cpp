@@ -6,7 +6,6 @@
 
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
-#include "stages/load/repair/loops.h"
 #include "stages/load/repair/sheets.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/weld.h"
@@ -25,13 +24,13 @@ std::uint64_t imbalance(std::span<const Side> sides) {
 }
 
 /// The mesh under repair: triangles and facets are two views of the same list.
-struct Work {
+struct RepairWork {
   Mesh& mesh;
   Indexed indexed;
   Buffer<Side> sides;
   std::uint64_t unmatched = 0;
 
-  explicit Work(Mesh& to_repair) : mesh(to_repair), indexed(index_mesh(to_repair.triangles)) { refresh(); }
+  explicit RepairWork(Mesh& to_repair) : mesh(to_repair), indexed(index_mesh(to_repair.triangles)) { refresh(); }
   void refresh() {
     sides = {};
     sides = sorted_sides(indexed.facet);
@@ -39,7 +38,7 @@ struct Work {
   }
 };
 
-std::uint64_t drop(Work& work, std::span<const std::uint8_t> unwanted) {
+std::uint64_t drop(RepairWork& work, std::span<const std::uint8_t> unwanted) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < unwanted.size(); ++i) {
     if (unwanted[i]) continue;
@@ -66,7 +65,7 @@ double moved_volume(const Triangle& from, const Triangle& to) {
          6;
 }
 
-void weld(Work& work, const WeldRange& range, RepairReport& report) {
+void weld(RepairWork& work, const WeldRange& range, RepairReport& report) {
   const Welding welding = weld(work.indexed, work.sides, range);
   if (welding.joined == 0) return;
   report.vertices_welded = welding.joined;
@@ -85,17 +84,17 @@ void weld(Work& work, const WeldRange& range, RepairReport& report) {
 }
 
 /// Which facets to turn over so that neighbours agree. Neighbours are the two facets of an edge that has two.
-Buffer<std::uint8_t> find_orientation(const Work& work) {
+Buffer<std::uint8_t> find_orientation(const RepairWork& work) {
   const std::size_t count = work.indexed.facet.size();
   struct Neighbour {
     std::uint32_t facet = UINT32_MAX;
     bool agrees = true;
   };
   Buffer<std::array<Neighbour, 3>> neighbours(count);
-  Buffer<std::uint8_t> used(count), turn(count), seen(count);
+  Buffer<std::uint8_t> used(count), turn(count), visited(count);
   std::fill(used.begin(), used.end(), std::uint8_t{0});
   std::fill(turn.begin(), turn.end(), std::uint8_t{0});
-  std::fill(seen.begin(), seen.end(), std::uint8_t{0});
+  std::fill(visited.begin(), visited.end(), std::uint8_t{0});
   for_each_edge(work.sides, [&](const Side* begin, const Side* end) {
     if (end - begin != 2 || begin[0].facet == begin[1].facet) return;
     const bool agrees = begin[0].forward != begin[1].forward;
@@ -104,10 +103,10 @@ Buffer<std::uint8_t> find_orientation(const Work& work) {
   });
   Buffer<std::uint32_t> component;
   for (std::uint32_t start = 0; start < count; ++start) {
-    if (seen[start]) continue;
+    if (visited[start]) continue;
     component.clear();
     component.push_back(start);
-    seen[start] = 1;
+    visited[start] = 1;
     double kept_area = 0, turned_area = 0;
     bool any_turned = false;
     for (std::size_t i = 0; i < component.size(); ++i) {
@@ -116,8 +115,8 @@ Buffer<std::uint8_t> find_orientation(const Work& work) {
       any_turned = any_turned || turn[facet];
       for (std::size_t k = 0; k < used[facet]; ++k) {
         const Neighbour& next = neighbours[facet][k];
-        if (seen[next.facet]) continue;
-        seen[next.facet] = 1;
+        if (visited[next.facet]) continue;
+        visited[next.facet] = 1;
         turn[next.facet] = next.agrees ? turn[facet] : static_cast<std::uint8_t>(!turn[facet]);
         component.push_back(next.facet);
       }
@@ -129,7 +128,7 @@ Buffer<std::uint8_t> find_orientation(const Work& work) {
 }
 
 /// Turning is undone if it leaves more unmatched than there was (surfaces with one side, crossings of many sheets).
-std::uint64_t orient(Work& work) {
+std::uint64_t orient(RepairWork& work) {
   const Buffer<std::uint8_t> turn = find_orientation(work);
   const auto turned = static_cast<std::uint64_t>(std::count(turn.begin(), turn.end(), std::uint8_t{1}));
   if (turned == 0) return 0;
@@ -148,7 +147,7 @@ std::uint64_t orient(Work& work) {
   return 0;
 }
 
-void cap(Work& work, RepairReport& report) {
+void cap(RepairWork& work, RepairReport& report) {
   const auto& vertex = work.indexed.vertex;
   for_each_loop(work.sides, [&](std::span<const std::uint32_t> loop) {
     Box box;
@@ -173,7 +172,7 @@ RepairReport repair(Mesh& mesh, const WeldRange& range, bool caps) {
   RepairReport report;
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   if (census(mesh.triangles).balanced) return report;
-  Work work(mesh);
+  RepairWork work(mesh);
   if (work.unmatched > 0) report.duplicates_dropped = drop(work, repeats(work.indexed.facet));
   if (work.unmatched > 0 && range.start_nm > 0) weld(work, range, report);
   if (work.unmatched > 0 && report.vertices_welded > 0) report.duplicates_dropped += drop(work, repeats(work.indexed.facet));
@@ -196,6 +195,23 @@ RepairReport repair(Mesh& mesh, const WeldRange& range, bool caps) {
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   if (work.unmatched > 0 && caps) cap(work, report);
   return report;
+}
+
+bool turn_over_if_inside_out(Mesh& mesh) {
+  if (!mesh.closed || mesh.volume_mm3 >= 0) return false;
+  for (Triangle& t : mesh.triangles) std::swap(t.b, t.c);
+  const Census found = census(mesh.triangles, mesh.bounds.middle().z);
+  mesh.fingerprint = found.fingerprint;
+  mesh.volume_mm3 = found.volume_mm3;
+  return true;
+}
+
+double capped_share(const Mesh& mesh) {
+  const std::size_t count = mesh.triangles.size(), own = std::min<std::size_t>(mesh.repaired_from, count);
+  if (own == count) return 0;
+  double area = 0, caps = 0;
+  for (std::size_t i = 0; i < count; ++i) (i < own ? area : caps) += doubled_area_length(mesh.triangles[i]);
+  return caps > 0 ? caps / (area + caps) : 0;
 }
 
 }  // namespace lamina::load

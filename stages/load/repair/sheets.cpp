@@ -72,7 +72,7 @@ StraySheets find_stray_sheets(std::size_t facet_count, std::span<const Side> sid
 namespace {
 
 /// A piece's plane: through a vertex, with the sum of all normals turned to the side of the first.
-struct Piece {
+struct SheetPiece {
   bool open = false, flat = true;
   Point3 at{};
   std::array<double, 3> normal{};
@@ -92,9 +92,9 @@ StraySheets find_flat_pieces(const Indexed& mesh, std::span<const Side> sides, s
     pieces.join(facet[0], facet[1]);
     pieces.join(facet[1], facet[2]);
   }
-  std::vector<Piece> piece(mesh.vertex.size());
+  std::vector<SheetPiece> piece(mesh.vertex.size());
   for (const Indexed::Facet& facet : mesh.facet) {
-    Piece& own = piece[pieces.find(facet[0])];
+    SheetPiece& own = piece[pieces.find(facet[0])];
     own.at = mesh.vertex[facet[0]];
     for (const std::uint32_t corner : facet) own.box.add(mesh.vertex[corner]);
     const auto normal = doubled_normal(mesh, facet);
@@ -105,18 +105,18 @@ StraySheets find_flat_pieces(const Indexed& mesh, std::span<const Side> sides, s
     if (surplus(begin, end) != 0) piece[pieces.find(begin->low)].open = true;
   });
   for (const Indexed::Facet& facet : mesh.facet) {
-    Piece& own = piece[pieces.find(facet[0])];
+    SheetPiece& own = piece[pieces.find(facet[0])];
     const auto& n = own.normal;
     const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     const double width = static_cast<double>(own.box.width()), depth = static_cast<double>(own.box.depth()),
                  height = static_cast<double>(own.box.height());
     const double size = std::sqrt(width * width + depth * depth + height * height);
-    const double most = std::max(static_cast<double>(tolerance_nm), size / 1000) * length;
+    const double maximum = std::max(static_cast<double>(tolerance_nm), size / 1000) * length;
     for (const std::uint32_t corner : facet) {
       const Point3& p = mesh.vertex[corner];
       const double off = n[0] * (static_cast<double>(p.x) - own.at.x) + n[1] * (static_cast<double>(p.y) - own.at.y) +
                          n[2] * (static_cast<double>(p.z) - own.at.z);
-      own.flat = own.flat && std::fabs(off) <= most;
+      own.flat = own.flat && std::fabs(off) <= maximum;
     }
   }
 

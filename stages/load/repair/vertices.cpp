@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "stages/geometry/blocks/pages.h"
-#include "stages/load/diagnosis/chunk_numbers.h"
+#include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/diagnosis/spatial_order.h"
 
 namespace lamina::load {
@@ -49,9 +49,9 @@ struct ChunkGatherer {
 };
 
 /// Points of all chunks, each in one slot, which holds its smallest name and later its number.
-class Table {
+class PointTable {
  public:
-  Table(std::span<const Chunk> chunks, std::size_t slots)
+  PointTable(std::span<const Chunk> chunks, std::size_t slots)
       : chunks_(chunks),
         pages_(slots * sizeof(std::uint32_t)),
         slots_(reinterpret_cast<std::uint32_t*>(pages_.take(slots * sizeof(std::uint32_t))), slots),
@@ -193,10 +193,10 @@ class Numbering {
     // A closed mesh has half as many vertices as facets; where there are more, the table is made anew.
     const std::size_t expected = std::min(points, facets_.size() / 2 + facets_.size() / 16);
     while (2 * slots < 3 * expected) slots *= 2;
-    std::unique_ptr<Table> table;
+    std::unique_ptr<PointTable> table;
     for (;; slots *= 2) {
       table.reset();
-      table = std::make_unique<Table>(chunks_, slots);
+      table = std::make_unique<PointTable>(chunks_, slots);
       std::atomic<bool> all{true};
       for_each_chunk([&](std::uint32_t c) {
         if (all && !table->enter(c, slot_.data() + chunks_[c].before)) all = false;
@@ -245,7 +245,7 @@ class Numbering {
   }
 
   /// Which points of a chunk no earlier one has, and how many.
-  void find_first(std::uint32_t c, Table& table) {
+  void find_first(std::uint32_t c, PointTable& table) {
     Chunk& chunk = chunks_[c];
     for (std::uint32_t i = 0; i < chunk.count; ++i) {
       const bool is = table[slot_[chunk.before + i]] == (c << kNameBits | i);
@@ -253,7 +253,7 @@ class Numbering {
       chunk.numbers_from += is;
     }
   }
-  void number(const Chunk& chunk, Table& table, Buffer<Point3>& vertices) const {
+  void number(const Chunk& chunk, PointTable& table, Buffer<Point3>& vertices) const {
     std::uint32_t next = chunk.numbers_from;
     for (std::uint32_t i = 0; i < chunk.count; ++i) {
       if (first_[chunk.before + i] == 0) continue;
@@ -273,17 +273,17 @@ namespace {
 
 /// Whether a few chunks, spread over a list, have points of their own for most of their facets.
 bool in_disorder(std::span<const Triangle> triangles) {
-  constexpr std::size_t kLooked = 4;
-  if (triangles.size() < kLooked * kChunk) return false;
+  constexpr std::size_t kProbes = 4;
+  if (triangles.size() < kProbes * kChunk) return false;
   const auto worker = std::make_unique<ChunkNumbers>();
   Buffer<Local> facets(kChunk);
   Buffer<Point3> points(3 * kChunk);
   std::size_t count = 0;
-  for (std::size_t i = 0; i < kLooked; ++i) {
-    const std::size_t first = (triangles.size() - kChunk) / (kLooked - 1) * i;
+  for (std::size_t i = 0; i < kProbes; ++i) {
+    const std::size_t first = (triangles.size() - kChunk) / (kProbes - 1) * i;
     count += worker->number(triangles.subspan(first, kChunk), facets.data(), points.data());
   }
-  return 4 * count > 3 * kLooked * kChunk;
+  return 4 * count > 3 * kProbes * kChunk;
 }
 
 }  // namespace

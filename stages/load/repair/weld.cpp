@@ -73,7 +73,7 @@ class Clusters {
   }
 
   /// The middle of a cluster's vertices, rounded down.
-  Point3 place(std::uint32_t representative) const {
+  Point3 position(std::uint32_t representative) const {
     const auto mean = [&](std::size_t k) {
       return static_cast<Nm>(floor_div<std::int64_t>(sum_[representative][k], members_[representative]));
     };
@@ -171,7 +171,7 @@ Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range) {
     if (then.crowded > now.crowded && 8 * (then.crowded - now.crowded) > now.open - std::min(now.open, then.open)) return false;
     if (then.open >= now.open) return true;
     for (std::uint32_t v = 0; v < mesh.vertex.size(); ++v)
-      if (clusters.find(v) == v) mesh.vertex[v] = clusters.place(v);
+      if (clusters.find(v) == v) mesh.vertex[v] = clusters.position(v);
     mesh.facet = std::move(facets);
     sides = std::move(joined);
     now = then;
@@ -180,8 +180,8 @@ Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range) {
     welding.distance_nm = distance;
     return true;
   };
-  while (distance > 0 && now.open > 0 && join_within() && distance < range.most_nm)
-    distance = std::min(2 * distance, range.most_nm);
+  while (distance > 0 && now.open > 0 && join_within() && distance < range.max_nm)
+    distance = std::min(2 * distance, range.max_nm);
   return welding;
 }
 

@@ -10,9 +10,9 @@ namespace lamina::load {
 
 /// Distances to try one after the other: start, twice that, and so on up to `most`; 0 joins nothing.
 struct WeldRange {
-  std::int64_t start_nm = 0, most_nm = 0;
+  std::int64_t start_nm = 0, max_nm = 0;
   WeldRange(std::int64_t only_nm) : WeldRange(only_nm, only_nm) {}  // NOLINT: a distance is a range
-  WeldRange(std::int64_t start, std::int64_t most) : start_nm(start), most_nm(most) {}
+  WeldRange(std::int64_t start, std::int64_t maximum) : start_nm(start), max_nm(maximum) {}
 };
 
 struct Welding {

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
-#include "stages/data/handles/zip.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
+#include "stages/support/late/zip.h"
+#include "stages/support/text/part_name.h"
 
 namespace lamina::load {
 namespace {
@@ -19,31 +21,31 @@ struct CloseEntry {
 
 struct SourceOfZip {
   const Source* source;
-  std::uint64_t* place;
+  std::uint64_t* position;
 };
 
 zip_int64_t read_source(const SourceOfZip& from, void* data, zip_uint64_t count) {
-  const std::uint64_t most = std::min<std::uint64_t>(count, from.source->size() - *from.place);
-  if (!from.source->read(*from.place, static_cast<char*>(data), static_cast<std::size_t>(most))) return -1;
-  *from.place += most;
-  return static_cast<zip_int64_t>(most);
+  const std::uint64_t maximum = std::min<std::uint64_t>(count, from.source->size() - *from.position);
+  if (!from.source->read(*from.position, static_cast<char*>(data), static_cast<std::size_t>(maximum))) return -1;
+  *from.position += maximum;
+  return static_cast<zip_int64_t>(maximum);
 }
 
 /// libzip reads from a Source, on disk or in memory, by these commands.
 zip_int64_t serve_zip(void* user, void* data, zip_uint64_t count, zip_source_cmd_t command) {
   const auto& from = *static_cast<SourceOfZip*>(user);
   switch (command) {
-    case ZIP_SOURCE_OPEN: *from.place = 0; return 0;
+    case ZIP_SOURCE_OPEN: *from.position = 0; return 0;
     case ZIP_SOURCE_CLOSE: return 0;
     case ZIP_SOURCE_READ: return read_source(from, data, count);
-    case ZIP_SOURCE_TELL: return static_cast<zip_int64_t>(*from.place);
+    case ZIP_SOURCE_TELL: return static_cast<zip_int64_t>(*from.position);
     case ZIP_SOURCE_SEEK: {
       zip_error_t error;
       zip_error_init(&error);
-      const zip_int64_t place = zip_source_seek_compute_offset(*from.place, from.source->size(), data, count, &error);
+      const zip_int64_t position = zip_source_seek_compute_offset(*from.position, from.source->size(), data, count, &error);
       zip_error_fini(&error);
-      if (place >= 0) *from.place = static_cast<std::uint64_t>(place);
-      return place < 0 ? -1 : 0;
+      if (position >= 0) *from.position = static_cast<std::uint64_t>(position);
+      return position < 0 ? -1 : 0;
     }
     case ZIP_SOURCE_STAT: {
       auto* const stat = static_cast<zip_stat_t*>(data);
@@ -66,52 +68,17 @@ zip_int64_t serve_zip(void* user, void* data, zip_uint64_t count, zip_source_cmd
   }
 }
 
-int hexadecimal(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
-std::string decoded(std::string_view name) {
-  std::string out;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    const int high = name[i] == '%' && i + 2 < name.size() ? hexadecimal(name[i + 1]) : -1;
-    const int low = high >= 0 ? hexadecimal(name[i + 2]) : -1;
-    char c = name[i];
-    if (low >= 0) c = static_cast<char>(16 * high + low), i += 2;
-    out += c == '\\' ? '/' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return out;
-}
-
 }  // namespace
-
-std::string part_name(std::string_view name, std::string_view folder) {
-  std::string whole = decoded(name);
-  if (!whole.starts_with('/')) whole.insert(0, folder);
-  std::vector<std::string_view> folders;
-  const std::string_view text = whole;
-  for (std::size_t at = 0; at <= text.size();) {
-    const std::size_t end = std::min(text.find('/', at), text.size());
-    const std::string_view one = text.substr(at, end - at);
-    if (one == ".." && !folders.empty()) folders.pop_back();
-    if (!one.empty() && one != "." && one != "..") folders.push_back(one);
-    at = end + 1;
-  }
-  std::string out;
-  for (const std::string_view one : folders) (out += '/') += one;
-  return out;
-}
 
 void Archive::Discard::operator()(zip* archive) const { zip_discard(archive); }
 
 Result<Archive> Archive::open(const Source& source, const LoadOptions& options) {
   if (const Status loaded = load_zip(); !loaded) return loaded.error();
   Archive archive(source, options);
-  archive.place_ = std::make_unique<std::uint64_t>(0);
+  archive.position_ = std::make_unique<std::uint64_t>(0);
   zip_error_t why;
   zip_error_init(&why);
-  auto user = std::make_unique<SourceOfZip>(SourceOfZip{&source, archive.place_.get()});
+  auto user = std::make_unique<SourceOfZip>(SourceOfZip{&source, archive.position_.get()});
   zip_source_t* const from = zip_source_function_create(serve_zip, user.get(), &why);
   if (from != nullptr) {
     static_cast<void>(user.release());  // freed by ZIP_SOURCE_FREE
@@ -148,14 +115,14 @@ Status Archive::list() {
     if (const Status fits = check_sizes(entry.comp_size, entry.size, total); !fits) return fits;
     const std::string_view name = entry.name;
     if (name.ends_with('/') || name.ends_with('\\')) continue;
-    if (!entries_.emplace(part_name(name), Entry{static_cast<std::uint64_t>(i), entry.comp_size}).second)
+    if (!entries_.emplace(part_name(name), PackedFile{static_cast<std::uint64_t>(i), entry.comp_size}).second)
       return source_->error(fmt::format("holds two entries of the name {}; export it again", quoted(name)));
   }
   return {};
 }
 
 Status Archive::read(const std::string& name, const std::function<Status(std::string_view)>& take) {
-  const Entry& entry = entries_.at(name);
+  const PackedFile& entry = entries_.at(name);
   const auto damaged = [&](const char* why) {
     return source_->error(fmt::format("zip entry {} is damaged ({}); copy or export the file again", entry.index + 1, why));
   };

@@ -16,12 +16,6 @@ struct zip;
 
 namespace lamina::load {
 
-/// The name of a part of a package as it is compared: a leading slash, lower case, "%20" decoded, "." and ".." resolved.
-///
-/// folder  where a name without a leading slash is looked for, such as "/3d/"
-/// source  ISO/IEC 29500-2 (Open Packaging Conventions), 6.2 and 6.3
-std::string part_name(std::string_view name, std::string_view folder = "/");
-
 class Archive {
  public:
   /// What entries say of their sizes is checked, against options.expanded_limit and as expansion_is_absurd().
@@ -38,7 +32,7 @@ class Archive {
   Status read(const std::string& name, const std::function<Status(std::string_view)>& take);
 
  private:
-  struct Entry {
+  struct PackedFile {
     std::uint64_t index, packed;
   };
   struct Discard {
@@ -50,9 +44,9 @@ class Archive {
 
   const Source* source_;
   std::uint64_t limit_;
-  std::unique_ptr<std::uint64_t> place_;  // where libzip reads in the source
+  std::unique_ptr<std::uint64_t> position_;  // where libzip reads in the source
   std::unique_ptr<zip, Discard> archive_;
-  std::map<std::string, Entry> entries_;
+  std::map<std::string, PackedFile> entries_;
   std::uint64_t inflated_ = 0;
 };
 

@@ -21,8 +21,8 @@ namespace {
 using Point = std::array<double, 3>;
 
 // What objects that lie side by side need, and a million voids at some 200 looks a point.
-constexpr std::uint64_t kMostWork = std::uint64_t{1} << 28;    // boxes compared
-constexpr std::uint64_t kMostLooked = std::uint64_t{1} << 29;  // facets, and boxes of facets, that points were held against
+constexpr std::uint64_t kMaxWork = std::uint64_t{1} << 28;      // boxes compared
+constexpr std::uint64_t kMaxCompared = std::uint64_t{1} << 29;  // facets, and boxes of facets, that points were held against
 
 struct Extent {
   Point lo, hi;
@@ -113,8 +113,8 @@ class Container {
     }
     tree_.emplace(triangles, Point3{0, 0, 0});
   }
-  bool holds(const Point& point, std::uint64_t& looked_at) const {
-    return tree_ && is_finite(point) && tree_->at(in_steps(point), &looked_at) > 0.75;
+  bool holds(const Point& point, std::uint64_t& inspected) const {
+    return tree_ && is_finite(point) && tree_->at(in_steps(point), &inspected) > 0.75;
   }
 
  private:
@@ -128,9 +128,9 @@ class Container {
   std::optional<WindingTree> tree_;
 };
 
-class Search {
+class CavitySearch {
  public:
-  explicit Search(const ModelPackage& package) : package_(package), volumes_(package.objects.size()) {}
+  explicit CavitySearch(const ModelPackage& package) : package_(package), volumes_(package.objects.size()) {}
 
   bool is_negative(const Leaf& leaf) {
     std::optional<double>& volume = volumes_[leaf.object];
@@ -139,7 +139,7 @@ class Search {
   }
 
   /// Whether there was too much to compare.
-  bool gave_up() const { return work_ > kMostWork || looked_at_ > kMostLooked; }
+  bool gave_up() const { return work_ > kMaxWork || compared_ > kMaxCompared; }
 
   /// The leaves from `first` to `end` are of one item. Solids are met in the order of their left ends and kept up to the right.
   void item(std::vector<Leaf>& leaves, std::uint32_t first, std::uint32_t end) {
@@ -197,7 +197,7 @@ class Search {
     const std::size_t last = object.triangles.size() - 1;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t corner = object.triangles[k * last / 2][k];
-      if (!container.holds(moved(inward, object.vertices[corner]), looked_at_)) return false;
+      if (!container.holds(moved(inward, object.vertices[corner]), compared_)) return false;
     }
     return true;
   }
@@ -206,13 +206,13 @@ class Search {
   std::vector<std::optional<double>> volumes_;     // of objects, six times
   std::map<std::uint32_t, Container> containers_;  // by object
   std::map<std::pair<std::uint32_t, Matrix>, Extent> turned_;
-  std::uint64_t work_ = 0, looked_at_ = 0;
+  std::uint64_t work_ = 0, compared_ = 0;
 };
 
 }  // namespace
 
 void find_cavities(const ModelPackage& package, std::vector<Leaf>& leaves, std::vector<Note>& notes) {
-  Search search(package);
+  CavitySearch search(package);
   for (std::uint32_t begin = 0, end = 0; begin < leaves.size(); begin = end) {
     while (end < leaves.size() && leaves[end].item == leaves[begin].item) ++end;
     search.item(leaves, begin, end);

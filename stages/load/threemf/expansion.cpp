@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stages/load/matrix.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/cavities.h"
 #include "stages/load/threemf/extensions.h"
@@ -75,8 +76,8 @@ bool is_box(const ModelObject& object) {
 /// What is said of an object that lamina cannot plan as the mesh that it holds.
 Status check_content(const Source& source, const ModelPackage& package, const ModelObject& object) {
   const auto refused = [&](std::string_view space, std::string_view what) {
-    return source.error(fmt::format("{} {} the extension {}, which lamina does not read; {}", package.label(object), what,
-                                    extension_name(space), extension_remedy(space)));
+    return source.error(fmt::format("{} {} the extension {}, which lamina does not read; {}", label(package, object), what,
+                                    extension_label(space), extension_remedy(space)));
   };
   const bool has_mesh = !object.triangles.empty();
   if (object.beams > 0 && (package.needs_beams || !has_mesh))
@@ -94,7 +95,7 @@ struct Expansion {
   std::vector<Leaf> leaves;
   std::uint64_t supports = 0, others = 0, modifiers = 0;
   std::uint32_t item = 0;
-  std::vector<bool> told;  // of objects
+  std::vector<bool> reported;  // of objects
 
   Status add(const ObjectReference& reference, const Transform& transform, std::vector<Note>& notes) {
     const std::uint32_t index = reference.object;
@@ -109,14 +110,14 @@ struct Expansion {
       ++(object.type == ModelObject::Type::kSupport ? supports : others);
       return {};
     }
-    if (!told[index]) {
+    if (!reported[index]) {
       if (const Status fits = check_content(source, package, object); !fits) return fits;
       for (const Volume& volume : object.volumes) {
         if (volume.role == Role::kNegative)
           return negative(object, fmt::format("has {},", quoted(std::string_view(volume.name))));
       }
-      tell(object, notes);
-      told[index] = true;
+      report(object, notes);
+      reported[index] = true;
     }
     const double unit = package.files[object.file].unit_mm;
     if (!object.triangles.empty()) {
@@ -134,21 +135,21 @@ struct Expansion {
     return source.error(
         fmt::format("{} {} a negative volume that takes material away, which lamina does not; export it as STL "
                     "from the program that wrote it, which cuts it out",
-                    package.label(object), is));
+                    label(package, object), is));
   }
 
-  void tell(const ModelObject& object, std::vector<Note>& notes) const {
+  void report(const ModelObject& object, std::vector<Note>& notes) const {
     const auto count = std::count_if(object.volumes.begin(), object.volumes.end(),
                                      [](const Volume& volume) { return volume.role == Role::kModifier; });
     if (count > 0)
       notes.push_back(
           {false, fmt::format("{}: {} of its volumes, such as {}, are modifiers or support blockers and are not planned",
-                              package.label(object), count, quoted(std::string_view(object.volumes.front().name)))});
+                              label(package, object), count, quoted(std::string_view(object.volumes.front().name)))});
     if (object.beams > 0)
       notes.push_back(
           {false, fmt::format("{}: {} beams of a lattice, which the file does not require, are not planned; its mesh is",
-                              package.label(object), object.beams)});
-    if (object.sliced) notes.push_back({false, fmt::format("{}: its mesh is planned, not its slices", package.label(object))});
+                              label(package, object), object.beams)});
+    if (object.sliced) notes.push_back({false, fmt::format("{}: its mesh is planned, not its slices", label(package, object))});
   }
 };
 
@@ -175,8 +176,8 @@ Status resolve_references(const Source& source, ModelPackage& package, std::uint
   }
   if (triangles > triangle_limit)
     return source.error(fmt::format("its components expand to more triangles than the limit of {}", triangle_limit));
-  if (objects > kMostObjects)
-    return source.error(fmt::format("its components expand to more than {} objects; export them as one", kMostObjects));
+  if (objects > kMaxObjects)
+    return source.error(fmt::format("its components expand to more than {} objects; export them as one", kMaxObjects));
   package.has_forward_references = refers_forward(package);
   return {};
 }
@@ -187,7 +188,7 @@ Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage&
     const ModelObject& object = package.objects[item.object];
     if (object.type == ModelObject::Type::kOther && object.components.empty())
       return source.error(fmt::format("the build names {}, which is of type \"other\", as 3MF forbids; export it again",
-                                      package.label(object)));
+                                      label(package, object)));
     if (const Status added = expansion.add(item, item.transform, notes); !added) return added.error();
     ++expansion.item;
   }

@@ -9,7 +9,7 @@
 
 namespace lamina::load {
 
-inline constexpr std::uint64_t kMostObjects = 1u << 20;
+inline constexpr std::uint64_t kMaxObjects = 1u << 20;
 inline constexpr std::uint32_t kDeepestComponents = 1000;
 
 /// A mesh that is printed, and what happens to it: from its file's numbers, in the file's unit, to mm.
@@ -24,7 +24,7 @@ struct Leaf {
 /// Finds the objects that build items and components name, and what all of it comes to, before anything is expanded.
 ///
 /// errors  kInput: a name that leads to nothing; an object that contains itself; components nested more than
-///         kDeepestComponents deep; more than kMostObjects objects, or more triangles than the limit, in the build or in one
+///         kDeepestComponents deep; more than kMaxObjects objects, or more triangles than the limit, in the build or in one
 ///         object
 /// cost    linear in components
 Status resolve_references(const Source& source, ModelPackage& package, std::uint64_t triangle_limit);

@@ -1,7 +1,5 @@
 #include "stages/load/threemf/extensions.h"
 
-#include <fmt/core.h>
-
 namespace lamina::load {
 namespace {
 
@@ -55,9 +53,9 @@ Extension extension_of(std::string_view space) {
   return row == nullptr ? Extension::kUnknown : row->kind;
 }
 
-std::string extension_name(std::string_view space) {
+std::string_view extension_name(std::string_view space) {
   const ExtensionRow* const row = find_row(space);
-  return row == nullptr ? std::string(space) : fmt::format("{} ({})", row->name, space);
+  return row == nullptr ? std::string_view() : row->name;
 }
 
 std::string_view extension_remedy(std::string_view space) {

@@ -2,7 +2,6 @@
 // load.
 #pragma once
 
-#include <string>
 #include <string_view>
 
 namespace lamina::load {
@@ -21,8 +20,8 @@ enum class Extension {
 };
 Extension extension_of(std::string_view space);
 
-/// "beam lattice (http://...)", or the namespace alone where it has no name that is known.
-std::string extension_name(std::string_view space);
+/// Its name in the specifications: "beam lattice"; "" where none is known.
+std::string_view extension_name(std::string_view space);
 
 /// What to do about a file that needs it.
 std::string_view extension_remedy(std::string_view space);

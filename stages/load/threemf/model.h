@@ -12,6 +12,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/load/load.h"
+#include "stages/load/threemf/xml.h"
 
 namespace lamina::load {
 
@@ -76,18 +77,38 @@ struct ModelPackage {
   std::uint64_t not_printable = 0;                                                // items that PrusaSlicer would leave out
   std::uint64_t triangles = 0;                                                    // of all objects, once each
   std::map<std::string, std::uint32_t> file_of_name;                              // index in files
-  std::set<std::string> extensions;  // namespaces of elements that were passed over, where these may be geometry
-  std::set<std::string> foreign;     // namespaces of attributes that were passed over
+  std::set<std::string> extensions;   // namespaces of elements that were passed over, where these may be geometry
+  std::set<std::string> unsupported;  // namespaces of attributes that were passed over
   std::vector<Departure> departures;
   bool needs_beams = false;             // the package requires the extension to be understood
   bool has_forward_references = false;  // a component stands before the object that it names
 
-  /// "object 3 "cap"", or with its file where that is not the first one.
-  std::string label(const ModelObject& object) const;
   /// Adds to the departures from a rule.
   void depart(std::string_view rule, std::string_view what);
   /// The index of a file, which is added if it is new.
   std::uint32_t file_of(const std::string& name);
+};
+
+// --- what a model, an object or a build item says about itself; internal to load.
+
+/// The metadata of one element. Names that are not as the specification wants them are told: many programs write such ones, and
+/// readers should pass over them.
+///
+/// source  3MF Consortium, Core Specification 1.3, section 3.4.1
+class Metadata {
+ public:
+  /// A <metadata> begins. errors  it has no name
+  std::string begin(const XmlReader& reader, XmlAttributes attributes, ModelPackage& package);
+  /// What older releases of Cura have instead.
+  void begin_setting(XmlAttributes attributes);
+  /// A piece of its text; what is long matters to nobody.
+  void text(std::string_view piece);
+  /// It ends; an object learns what Cura says of it.
+  void end(ModelObject* object);
+
+ private:
+  std::set<std::string> names_;
+  std::string name_, text_;
 };
 
 }  // namespace lamina::load

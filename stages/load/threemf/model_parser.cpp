@@ -5,9 +5,11 @@
 #include <charconv>
 #include <cstring>
 
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/extensions.h"
+#include "stages/support/text/part_name.h"
 
 namespace lamina::load {
 namespace {
@@ -39,7 +41,7 @@ bool read_whole(std::string_view text, Number& number) {
 
 bool read_decimal(std::string_view text, double& number) { return parse_number(trimmed(text), number); }
 
-constexpr std::size_t kMostTold = 64;  // that are told of
+constexpr std::size_t kMaxReported = 64;  // that are told of
 
 double unit_in_mm(std::string_view unit) {
   constexpr std::pair<std::string_view, double> kUnits[] = {{"micron", 0.001}, {"millimeter", 1}, {"centimeter", 10},
@@ -59,62 +61,63 @@ XmlName ModelParser::attribute_name(const char* name) {
 }
 
 void ModelParser::start(const XmlName& name, XmlAttributes attributes) {
-  if (places_.empty()) return model(name, attributes);
-  const Place around = places_.back();
-  const bool passed = around == Place::kPassedOver || around == Place::kMetadata;
-  places_.push_back(passed ? Place::kPassedOver : place_of(name, attributes));
+  if (elements_.empty()) return model(name, attributes);
+  const Element around = elements_.back();
+  const bool passed = around == Element::kPassedOver || around == Element::kMetadata;
+  elements_.push_back(passed ? Element::kPassedOver : element_of(name, attributes));
 }
 
 void ModelParser::end() {
-  const Place place = places_.back();
-  places_.pop_back();
-  if (place == Place::kMetadata) {
+  const Element position = elements_.back();
+  elements_.pop_back();
+  if (position == Element::kMetadata) {
     reader_->want_text(false);
-    const bool of_object = places_.size() > 1 && places_[places_.size() - 2] == Place::kObject;
+    const bool of_object = elements_.size() > 1 && elements_[elements_.size() - 2] == Element::kObject;
     metadata_.back().end(of_object ? &current() : nullptr);
   }
-  if (place == Place::kMetadataGroup) metadata_.pop_back();
-  if (place == Place::kResources) {
-    if (auto [what, line] = properties_.check_references(); !what.empty()) reader_->refuse(std::move(what), line);
+  if (position == Element::kMetadataGroup) metadata_.pop_back();
+  if (position == Element::kResources) {
+    std::uint64_t line = 0;
+    if (const Status status = properties_.check_references(line); !status) reader_->refuse(status.error().message, line);
   }
 }
 
-ModelParser::Place ModelParser::place_of(const XmlName& name, XmlAttributes attributes) {
-  const Place around = places_.back();
+ModelParser::Element ModelParser::element_of(const XmlName& name, XmlAttributes attributes) {
+  const Element around = elements_.back();
   const bool is_core = name.space == core_ || name.space == kCoreNamespace;
-  if (around == Place::kProperties)
-    return is_core || is_material(name.space) ? property(name.local, attributes) : Place::kPassedOver;
+  if (around == Element::kProperties)
+    return is_core || is_material(name.space) ? property(name.local, attributes) : Element::kPassedOver;
   if (is_core) return in_core(name.local, attributes);
-  if (around == Place::kItem || around == Place::kMetadataGroup) return Place::kPassedOver;
+  if (around == Element::kItem || around == Element::kMetadataGroup) return Element::kPassedOver;
   if (!name.declared) refuse(fmt::format("the prefix of <{}> is not declared; export it again", name.local));
-  return name.space.empty() ? Place::kPassedOver : in_extension(name, attributes);
+  return name.space.empty() ? Element::kPassedOver : in_extension(name, attributes);
 }
 
-ModelParser::Place ModelParser::in_core(std::string_view name, XmlAttributes attributes) {
-  switch (places_.back()) {
-    case Place::kVertices:
+ModelParser::Element ModelParser::in_core(std::string_view name, XmlAttributes attributes) {
+  switch (elements_.back()) {
+    case Element::kVertices:
       if (name != "vertex") break;
       vertex(attributes);
-      return Place::kPassedOver;
-    case Place::kTriangles:
+      return Element::kPassedOver;
+    case Element::kTriangles:
       if (name != "triangle") break;
       triangle(attributes);
-      return Place::kPassedOver;
-    case Place::kComponents:
+      return Element::kPassedOver;
+    case Element::kComponents:
       if (name != "component") break;
       reference(name, attributes, current().components);
-      return Place::kPassedOver;
-    case Place::kBuild:
+      return Element::kPassedOver;
+    case Element::kBuild:
       if (name != "item") break;
       reference(name, attributes, package_.items);
-      return Place::kItem;
-    case Place::kItem:
+      return Element::kItem;
+    case Element::kItem:
       if (name != "metadatagroup") break;
       return metadata_group();
-    case Place::kMetadataGroup:
+    case Element::kMetadataGroup:
       if (name == "metadata" || name == "setting") return metadata(name, attributes);
       break;
-    case Place::kModel: {
+    case Element::kModel: {
       if (name == "metadata") return metadata(name, attributes);
       bool& there = name == "build" ? has_build_ : has_resources_;
       if (name != "build" && name != "resources") break;
@@ -122,58 +125,58 @@ ModelParser::Place ModelParser::in_core(std::string_view name, XmlAttributes att
       there = true;
       pass_over_attributes(attributes);
       // The build of a file that is only referred to does not count.
-      return name == "resources" ? Place::kResources : file_ == 0 ? Place::kBuild : Place::kPassedOver;
+      return name == "resources" ? Element::kResources : file_ == 0 ? Element::kBuild : Element::kPassedOver;
     }
-    case Place::kResources:
+    case Element::kResources:
       if (name == "basematerials") return property(name, attributes);
       if (name != "object") break;
       object(attributes);
-      return Place::kObject;
-    case Place::kObject:
+      return Element::kObject;
+    case Element::kObject:
       if (name == "metadatagroup" || name == "settings") return metadata_group();
       pass_over_attributes(attributes);
-      if (name == "components") return Place::kComponents;
+      if (name == "components") return Element::kComponents;
       if (name != "mesh") break;
       if (!current().vertices.empty()) refuse("a second mesh of an object; export it again");
-      return Place::kMesh;
-    case Place::kMesh:
+      return Element::kMesh;
+    case Element::kMesh:
       pass_over_attributes(attributes);
-      if (name == "vertices") return Place::kVertices;
-      if (name == "triangles") return Place::kTriangles;
+      if (name == "vertices") return Element::kVertices;
+      if (name == "triangles") return Element::kTriangles;
       break;
     default: break;
   }
   return not_known(name, attributes);
 }
 
-ModelParser::Place ModelParser::not_known(std::string_view name, XmlAttributes attributes) {
-  if (places_.back() == Place::kResources) resource(name, attributes);
-  if (places_.back() == Place::kModel && name == "model") refuse("a model within a model; export it again");
+ModelParser::Element ModelParser::not_known(std::string_view name, XmlAttributes attributes) {
+  if (elements_.back() == Element::kResources) resource(name, attributes);
+  if (elements_.back() == Element::kModel && name == "model") refuse("a model within a model; export it again");
   if (core_ == kCoreNamespace) package_.depart("elements that it does not have, which are passed over", name);
-  return Place::kPassedOver;
+  return Element::kPassedOver;
 }
 
 /// Groups of properties, and what stands in them.
-ModelParser::Place ModelParser::property(std::string_view name, XmlAttributes attributes) {
-  const bool is_resource = places_.back() == Place::kResources;
+ModelParser::Element ModelParser::property(std::string_view name, XmlAttributes attributes) {
+  const bool is_resource = elements_.back() == Element::kResources;
   const std::uint64_t id = is_resource ? resource(name, attributes) : Properties::kNoId;
-  if (std::string what = properties_.add(name, attributes, id, reader_->line()); !what.empty()) refuse(std::move(what));
-  return is_resource ? Place::kProperties : Place::kPassedOver;
+  if (const Status status = properties_.add(name, attributes, id, reader_->line()); !status) refuse(status.error().message);
+  return is_resource ? Element::kProperties : Element::kPassedOver;
 }
 
-ModelParser::Place ModelParser::metadata_group() {
+ModelParser::Element ModelParser::metadata_group() {
   metadata_.emplace_back();
-  return Place::kMetadataGroup;
+  return Element::kMetadataGroup;
 }
 
-ModelParser::Place ModelParser::metadata(std::string_view name, XmlAttributes attributes) {
+ModelParser::Element ModelParser::metadata(std::string_view name, XmlAttributes attributes) {
   Metadata& of = metadata_.back();
   if (name == "setting")
     of.begin_setting(attributes);
   else if (std::string what = of.begin(*reader_, attributes, package_); !what.empty())
     refuse(std::move(what));
   reader_->want_text(true);
-  return Place::kMetadata;
+  return Element::kMetadata;
 }
 
 /// Of an element that has no attributes of its own that matter here.
@@ -182,32 +185,32 @@ void ModelParser::pass_over_attributes(XmlAttributes attributes) {
 }
 
 void ModelParser::pass_over_attribute(const XmlName& name) {
-  if (!name.space.empty() && extension_of(name.space) == Extension::kUnknown && package_.foreign.size() < kMostTold)
-    package_.foreign.emplace(name.space);
+  if (!name.space.empty() && extension_of(name.space) == Extension::kUnknown && package_.unsupported.size() < kMaxReported)
+    package_.unsupported.emplace(name.space);
 }
 
-ModelParser::Place ModelParser::in_extension(const XmlName& name, XmlAttributes attributes) {
-  const Place place = places_.back();
+ModelParser::Element ModelParser::in_extension(const XmlName& name, XmlAttributes attributes) {
+  const Element position = elements_.back();
   const Extension kind = extension_of(name.space);
-  if (place == Place::kLattice) {
+  if (position == Element::kLattice) {
     if (name.local == "beam") ++current().beams;
-    return Place::kLattice;
+    return Element::kLattice;
   }
-  if (place == Place::kMesh && kind == Extension::kBeams && name.local == "beamlattice") return Place::kLattice;
-  if (place == Place::kVolumes) {
+  if (position == Element::kMesh && kind == Extension::kBeams && name.local == "beamlattice") return Element::kLattice;
+  if (position == Element::kVolumes) {
     if (name.local == "volume") volume(attributes);
-    return Place::kPassedOver;
+    return Element::kPassedOver;
   }
-  if (place == Place::kMesh && name.local == "volumes" && is_slic3r(name.space)) return Place::kVolumes;
-  if (place == Place::kResources && is_material(name.space)) return property(name.local, attributes);
-  if (place == Place::kResources) resource(name.local, attributes);
-  if (place == Place::kObject && kind == Extension::kUnknown && current().content.empty()) current().content = name.space;
+  if (position == Element::kMesh && name.local == "volumes" && is_slic3r(name.space)) return Element::kVolumes;
+  if (position == Element::kResources && is_material(name.space)) return property(name.local, attributes);
+  if (position == Element::kResources) resource(name.local, attributes);
+  if (position == Element::kObject && kind == Extension::kUnknown && current().content.empty()) current().content = name.space;
   if (kind == Extension::kUnknown) pass_over(name.space);
-  return Place::kPassedOver;
+  return Element::kPassedOver;
 }
 
 void ModelParser::pass_over(std::string_view space) {
-  if (package_.extensions.size() < kMostTold) package_.extensions.emplace(space);
+  if (package_.extensions.size() < kMaxReported) package_.extensions.emplace(space);
 }
 
 void ModelParser::model(const XmlName& name, XmlAttributes attributes) {
@@ -215,7 +218,7 @@ void ModelParser::model(const XmlName& name, XmlAttributes attributes) {
     return refuse(fmt::format("is no 3MF model: it begins with <{}>{}", name.local,
                               name.space.empty() ? "" : fmt::format(" of {}", name.space)));
   core_ = name.space;
-  places_.push_back(Place::kModel);
+  elements_.push_back(Element::kModel);
   for (; *attributes != nullptr; attributes += 2) {
     const std::string_view attribute = attributes[0], value = attributes[1];
     if (attribute == "unit") {
@@ -241,7 +244,7 @@ void ModelParser::require(std::string_view prefixes) {
     const std::string_view space = required.space;
     package_.needs_beams = package_.needs_beams || extension_of(space) == Extension::kBeams;
     if (extension_of(space) == Extension::kUnknown)
-      return refuse(fmt::format("requires the extension {}, which lamina does not read; {}", extension_name(space),
+      return refuse(fmt::format("requires the extension {}, which lamina does not read; {}", extension_label(space),
                                 extension_remedy(space)));
   }
 }

@@ -6,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/load/threemf/metadata.h"
 #include "stages/load/threemf/model.h"
 #include "stages/load/threemf/properties.h"
 #include "stages/load/threemf/xml.h"
@@ -35,7 +34,7 @@ class ModelParser : public XmlHandler {
   bool has_build() const { return has_build_; }
 
  private:
-  enum class Place {
+  enum class Element {
     kModel,
     kResources,
     kProperties,
@@ -53,13 +52,13 @@ class ModelParser : public XmlHandler {
     kPassedOver
   };
 
-  Place place_of(const XmlName& name, XmlAttributes attributes);
-  Place in_core(std::string_view name, XmlAttributes attributes);
-  Place in_extension(const XmlName& name, XmlAttributes attributes);
-  Place not_known(std::string_view name, XmlAttributes attributes);
-  Place property(std::string_view name, XmlAttributes attributes);
-  Place metadata_group();
-  Place metadata(std::string_view name, XmlAttributes attributes);
+  Element element_of(const XmlName& name, XmlAttributes attributes);
+  Element in_core(std::string_view name, XmlAttributes attributes);
+  Element in_extension(const XmlName& name, XmlAttributes attributes);
+  Element not_known(std::string_view name, XmlAttributes attributes);
+  Element property(std::string_view name, XmlAttributes attributes);
+  Element metadata_group();
+  Element metadata(std::string_view name, XmlAttributes attributes);
   void volume(XmlAttributes attributes);
   void pass_over_attributes(XmlAttributes attributes);
   void pass_over_attribute(const XmlName& name);
@@ -81,9 +80,9 @@ class ModelParser : public XmlHandler {
   std::uint32_t file_;
   std::uint64_t triangle_limit_;
   XmlReader* reader_ = nullptr;
-  std::string core_;             // the namespace of <model>
-  std::vector<Place> places_;    // of the elements that are open
-  std::set<std::uint64_t> ids_;  // of all resources of this file
+  std::string core_;               // the namespace of <model>
+  std::vector<Element> elements_;  // of the elements that are open
+  std::set<std::uint64_t> ids_;    // of all resources of this file
   Properties properties_;
   std::vector<Metadata> metadata_{1};  // of the model, and of the group that is open
   bool has_resources_ = false, has_build_ = false;

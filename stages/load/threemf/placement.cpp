@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "stages/load/matrix.h"
+#include "stages/load/messages.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/threemf/snap_mesh.h"
@@ -16,9 +17,9 @@
 namespace lamina::load {
 namespace {
 
-using Range = tbb::blocked_range<std::size_t>;
+using BlockedRange = tbb::blocked_range<std::size_t>;
 
-constexpr std::size_t kMostTried = 8;  // variants that a leaf is compared with before its vertices are snapped
+constexpr std::size_t kMaxTried = 8;  // variants that a leaf is compared with before its vertices are snapped
 
 /// Of the triangles relative to their first corner: equal for copies, whatever their place.
 std::uint64_t relative_hash(const Buffer<Triangle>& triangles) {
@@ -73,8 +74,8 @@ bool moves_within_reach(Nm lo, Nm hi, std::int64_t by) {
 bool is_inside_out(const Facets& facets) {
   const Point3 from = facets.bounds.lo;
   const Int128 volume = tbb::parallel_reduce(
-      Range(0, facets.triangles.size(), 1 << 14), Int128{0},
-      [&](const Range& range, Int128 sum) {
+      BlockedRange(0, facets.triangles.size(), 1 << 14), Int128{0},
+      [&](const BlockedRange& range, Int128 sum) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) sum += sixfold_volume(facets.triangles[i], from);
         return sum;
       },
@@ -86,10 +87,10 @@ bool is_inside_out(const Facets& facets) {
 
 /// Translations that differ by whole nanometres and a rest: no coordinate is rounded otherwise where the rest, and what
 /// arithmetic may add to it, stay below the margin.
-bool Placement::share_known(const Turned& turned, const Axes& translation) {
+bool Placement::share_known(const TurnedObject& turned, const Axes& translation) {
   constexpr double kRounding = 4e-15;  // some 36 units in the last place of the sum of all terms
-  const std::size_t most = std::min(turned.variants.size(), kMostTried);
-  for (std::size_t i = 0; i < most; ++i) {
+  const std::size_t maximum = std::min(turned.variants.size(), kMaxTried);
+  for (std::size_t i = 0; i < maximum; ++i) {
     const Variant& variant = turned.variants[i];
     PlacedObject& object = to_.objects[variant.object];
     const Box& box = object.facets.bounds;
@@ -112,7 +113,7 @@ bool Placement::share_known(const Turned& turned, const Axes& translation) {
   return false;
 }
 
-bool Placement::share_equal(const Turned& turned, const Facets& facets, std::uint64_t hash) {
+bool Placement::share_equal(const TurnedObject& turned, const Facets& facets, std::uint64_t hash) {
   const auto [begin, end] = turned.by_hash.equal_range(hash);
   for (auto at = begin; at != end; ++at) {
     PlacedObject& object = to_.objects[turned.variants[at->second].object];
@@ -124,8 +125,8 @@ bool Placement::share_equal(const Turned& turned, const Facets& facets, std::uin
   return false;
 }
 
-void Placement::tell_once(std::uint32_t object, const char* what) {
-  if (told_.emplace(object, what).second) to_.notes.push_back({false, model_.label(model_.objects[object]) + what});
+void Placement::report_once(std::uint32_t object, const char* what) {
+  if (reports_.emplace(object, what).second) to_.notes.push_back({false, label(model_, model_.objects[object]) + what});
 }
 
 Status Placement::add(std::span<const Leaf> leaves) {
@@ -148,34 +149,34 @@ Status Placement::add(std::span<const Leaf> leaves) {
 /// A mesh of the solid and of what is inside out within it, which is the same for copies of the whole.
 Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std::span<const std::uint32_t> voids) {
   const Transform transform = after(options_.transform, leaf.transform);
-  const std::string label = model_.label(model_.objects[leaf.object]);
-  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], label, transform, options_);
+  const std::string name = label(model_, model_.objects[leaf.object]);
+  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], name, transform, options_);
   if (!mesh) return mesh.error();
   Facets& facets = mesh->facets;
   for (const std::uint32_t index : voids) {
     const Leaf& inner = leaves[index];
     const ModelObject& object = model_.objects[inner.object];
     Result<SnappedMesh> hollow =
-        snap_mesh(source_, object, model_.label(object), after(options_.transform, inner.transform), options_);
+        snap_mesh(source_, object, label(model_, object), after(options_.transform, inner.transform), options_);
     if (!hollow) return hollow.error();
     // What the container lacks is capped afterwards, around the void; a void that is open itself is no void for sure.
     if (!is_inside_out(hollow->facets)) {
       if (const Status added = add_solid(inner); !added) return added;
       continue;
     }
-    tell_once(inner.object, " is inside out within another object of its build item: it is a void, as 3MF has it");
+    report_once(inner.object, " is inside out within another object of its build item: it is a void, as 3MF has it");
     const std::size_t count = facets.triangles.size();
     facets.triangles.resize(count + hollow->facets.triangles.size());
     std::copy(hollow->facets.triangles.begin(), hollow->facets.triangles.end(), facets.triangles.begin() + count);
     facets.bounds.add(hollow->facets.bounds);
     std::move(hollow->facets.notes.begin(), hollow->facets.notes.end(), std::back_inserter(facets.notes));
   }
-  Turned& turned = turns_[{leaf.object, transform.linear, true}];
+  TurnedObject& turned = turns_[{leaf.object, transform.linear, true}];
   const std::uint64_t hash = relative_hash(facets.triangles);
   if (share_equal(turned, facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());
   turned.variants.push_back({to_.objects.size(), {}, {}, {}});
-  to_.objects.push_back({label, std::move(facets), {{0, 0, 0}}});
+  to_.objects.push_back({name, std::move(facets), {{0, 0, 0}}});
   return {};
 }
 
@@ -184,16 +185,16 @@ Status Placement::add_solid(const Leaf& leaf) {
   const Transform transform = after(options_.transform, leaf.transform);
   Axes translation = transform.translation;
   for (double& axis : translation) axis *= 1e6;
-  Turned& turned = turns_[{leaf.object, transform.linear, false}];
+  TurnedObject& turned = turns_[{leaf.object, transform.linear, false}];
   if (share_known(turned, translation)) return {};
-  const std::string label = model_.label(object);
-  Result<SnappedMesh> mesh = snap_mesh(source_, object, label, transform, options_);
+  const std::string name = label(model_, object);
+  Result<SnappedMesh> mesh = snap_mesh(source_, object, name, transform, options_);
   if (!mesh) return mesh.error();
   const std::uint64_t hash = relative_hash(mesh->facets.triangles);
   if (share_equal(turned, mesh->facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());
   turned.variants.push_back({to_.objects.size(), translation, mesh->margin, reach_of(object, transform.linear)});
-  to_.objects.push_back({label, std::move(mesh->facets), {{0, 0, 0}}});
+  to_.objects.push_back({name, std::move(mesh->facets), {{0, 0, 0}}});
   return {};
 }
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "stages/load/reader.h"
 #include "stages/load/threemf/expansion.h"
 #include "stages/load/threemf/model.h"
+#include "stages/load/threemf/threemf.h"
 
 namespace lamina::load {
 
@@ -39,7 +39,7 @@ class Placement {
     Axes margin;         // nm: what may be added to every coordinate before one is rounded otherwise
     Axes reach;          // nm: bound of the terms that add up to a coordinate, translation aside
   };
-  struct Turned {
+  struct TurnedObject {
     std::vector<Variant> variants;
     std::multimap<std::uint64_t, std::size_t> by_hash;  // of variants, by their triangles relative to the first corner
   };
@@ -48,16 +48,16 @@ class Placement {
 
   Status add_solid(const Leaf& leaf);
   Status add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std::span<const std::uint32_t> voids);
-  bool share_known(const Turned& turned, const Axes& translation);
-  bool share_equal(const Turned& turned, const Facets& facets, std::uint64_t hash);
-  void tell_once(std::uint32_t object, const char* what);
+  bool share_known(const TurnedObject& turned, const Axes& translation);
+  bool share_equal(const TurnedObject& turned, const Facets& facets, std::uint64_t hash);
+  void report_once(std::uint32_t object, const char* what);
 
   const Source& source_;
   const ModelPackage& model_;
   const LoadOptions& options_;
   Package& to_;
-  std::map<Turn, Turned> turns_;
-  std::set<std::pair<std::uint32_t, std::string_view>> told_;  // of objects
+  std::map<Turn, TurnedObject> turns_;
+  std::set<std::pair<std::uint32_t, std::string_view>> reports_;  // of objects
 };
 
 }  // namespace lamina::load

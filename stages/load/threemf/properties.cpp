@@ -37,6 +37,8 @@ const char* find_attribute(XmlAttributes attributes, std::string_view name) {
   return nullptr;
 }
 
+Error wrong(std::string what) { return {Fault::kInput, std::move(what) + "; export it again"}; }
+
 /// What is no number leads to nothing.
 std::vector<std::uint64_t> read_ids(std::string_view text) {
   std::vector<std::uint64_t> ids;
@@ -51,61 +53,66 @@ std::vector<std::uint64_t> read_ids(std::string_view text) {
 
 }  // namespace
 
-Properties::Kind Properties::kind_of(std::string_view element) {
-  if (element == "basematerials") return Kind::kMaterials;
-  if (element == "compositematerials") return Kind::kComposites;
-  if (element == "colorgroup") return Kind::kColors;
-  if (element == "texture2d") return Kind::kTexture;
-  if (element == "texture2dgroup") return Kind::kTextureGroup;
-  return element == "multiproperties" ? Kind::kMulti : Kind::kNone;
+Properties::GroupKind Properties::kind_of(std::string_view element) {
+  if (element == "basematerials") return GroupKind::kMaterials;
+  if (element == "compositematerials") return GroupKind::kComposites;
+  if (element == "colorgroup") return GroupKind::kColors;
+  if (element == "texture2d") return GroupKind::kTexture;
+  if (element == "texture2dgroup") return GroupKind::kTextureGroup;
+  return element == "multiproperties" ? GroupKind::kMulti : GroupKind::kNone;
 }
 
-Properties::Kind Properties::kind_of(std::uint64_t id) const {
+Properties::GroupKind Properties::kind_of(std::uint64_t id) const {
   const auto found = kinds_.find(id);
-  return found == kinds_.end() ? Kind::kNone : found->second;
+  return found == kinds_.end() ? GroupKind::kNone : found->second;
 }
 
-std::string Properties::add(std::string_view element, XmlAttributes attributes, std::uint64_t id, std::uint64_t line) {
+Status Properties::add(std::string_view element, XmlAttributes attributes, std::uint64_t id, std::uint64_t line) {
   for (const Required& one : kRequired) {
     if (one.element == element && find_attribute(attributes, one.attribute) == nullptr)
-      return fmt::format("<{}> lacks its {}, which 3MF requires ({}); export it again", element, one.attribute, one.where);
+      return wrong(fmt::format("<{}> lacks its {}, which 3MF requires ({})", element, one.attribute, one.where));
   }
-  const Kind kind = kind_of(element);
-  if (kind == Kind::kNone) return {};
-  if (kind == Kind::kTexture && !std::string_view(find_attribute(attributes, "contenttype")).starts_with("image/"))
-    return "<texture2d>: the content type is neither image/png nor image/jpeg (materials 6); export it again";
+  const GroupKind kind = kind_of(element);
+  if (kind == GroupKind::kNone) return {};
+  if (kind == GroupKind::kTexture && !std::string_view(find_attribute(attributes, "contenttype")).starts_with("image/"))
+    return wrong("<texture2d>: the content type is neither image/png nor image/jpeg (materials 6)");
   if (id != kNoId) kinds_.emplace(id, kind);
-  const char* const to = find_attribute(attributes, kind == Kind::kTextureGroup ? "texid"
-                                                    : kind == Kind::kComposites ? "matid"
-                                                                                : "pids");
+  const char* const to = find_attribute(attributes, kind == GroupKind::kTextureGroup ? "texid"
+                                                    : kind == GroupKind::kComposites ? "matid"
+                                                                                     : "pids");
   if (to != nullptr) references_.push_back({kind, read_ids(to), line});
   return {};
 }
 
-std::string Properties::fault_of(const Reference& reference) const {
-  const auto count = [&](Kind kind) {
+Status Properties::check(const Reference& reference) const {
+  const auto count = [&](GroupKind kind) {
     return std::count_if(reference.to.begin(), reference.to.end(), [&](std::uint64_t id) { return kind_of(id) == kind; });
   };
   switch (reference.from) {
-    case Kind::kTextureGroup:
-      return count(Kind::kTexture) == 1 ? "" : "<texture2dgroup>: its texid leads to no <texture2d> (materials 3)";
-    case Kind::kComposites:
-      return count(Kind::kMaterials) == 1 ? "" : "<compositematerials>: its matid leads to no <basematerials> (materials 4)";
-    case Kind::kMulti:
-      if (reference.to.empty()) return "<multiproperties>: its pids are empty (materials 5)";
-      if (count(Kind::kMulti) > 0) return "<multiproperties> refers to <multiproperties>, which 3MF forbids (materials 5)";
-      if (count(Kind::kMaterials) + count(Kind::kComposites) > 1)
-        return "<multiproperties> refers to more than one group of materials, which 3MF forbids (materials 5)";
-      return count(Kind::kColors) > 1
-                 ? "<multiproperties> refers to more than one <colorgroup>, which 3MF forbids (materials 5)"
-                 : "";
+    case GroupKind::kTextureGroup:
+      if (count(GroupKind::kTexture) != 1) return wrong("<texture2dgroup>: its texid leads to no <texture2d> (materials 3)");
+      return {};
+    case GroupKind::kComposites:
+      if (count(GroupKind::kMaterials) != 1)
+        return wrong("<compositematerials>: its matid leads to no <basematerials> (materials 4)");
+      return {};
+    case GroupKind::kMulti:
+      if (reference.to.empty()) return wrong("<multiproperties>: its pids are empty (materials 5)");
+      if (count(GroupKind::kMulti) > 0)
+        return wrong("<multiproperties> refers to <multiproperties>, which 3MF forbids (materials 5)");
+      if (count(GroupKind::kMaterials) + count(GroupKind::kComposites) > 1)
+        return wrong("<multiproperties> refers to more than one group of materials, which 3MF forbids (materials 5)");
+      if (count(GroupKind::kColors) > 1)
+        return wrong("<multiproperties> refers to more than one <colorgroup>, which 3MF forbids (materials 5)");
+      return {};
     default: return {};
   }
 }
 
-Properties::Fault Properties::check_references() const {
+Status Properties::check_references(std::uint64_t& line) const {
   for (const Reference& reference : references_) {
-    if (std::string what = fault_of(reference); !what.empty()) return {what + "; export it again", reference.line};
+    line = reference.line;
+    if (Status status = check(reference); !status) return status;
   }
   return {};
 }

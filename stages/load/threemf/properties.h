@@ -4,10 +4,10 @@
 
 #include <cstdint>
 #include <map>
-#include <string>
 #include <string_view>
 #include <vector>
 
+#include "stages/data/status.h"
 #include "stages/load/threemf/xml.h"
 
 namespace lamina::load {
@@ -19,31 +19,27 @@ namespace lamina::load {
 class Properties {
  public:
   static constexpr std::uint64_t kNoId = UINT64_MAX;
-  struct Fault {
-    std::string what;  // empty if nothing is wrong
-    std::uint64_t line = 0;
-  };
-
   /// An element of a namespace of 3MF: a resource, or what stands in one.
   /// id  of the resource, or kNoId
-  /// errors  the first thing that it lacks
-  std::string add(std::string_view element, XmlAttributes attributes, std::uint64_t id, std::uint64_t line);
+  /// errors  kInput, without a file or line: the first thing that it lacks
+  Status add(std::string_view element, XmlAttributes attributes, std::uint64_t id, std::uint64_t line);
 
-  /// What refers to the wrong kind of resource, once all of a file are known.
-  Fault check_references() const;
+  /// Once all of a file are known. errors  as add(): what refers to the wrong kind of resource
+  /// line  receives its line
+  Status check_references(std::uint64_t& line) const;
 
  private:
-  enum class Kind { kNone, kMaterials, kComposites, kColors, kTexture, kTextureGroup, kMulti };
+  enum class GroupKind { kNone, kMaterials, kComposites, kColors, kTexture, kTextureGroup, kMulti };
   struct Reference {
-    Kind from;
+    GroupKind from;
     std::vector<std::uint64_t> to;
     std::uint64_t line;
   };
-  static Kind kind_of(std::string_view element);
-  Kind kind_of(std::uint64_t id) const;
-  std::string fault_of(const Reference& reference) const;
+  static GroupKind kind_of(std::string_view element);
+  GroupKind kind_of(std::uint64_t id) const;
+  Status check(const Reference& reference) const;
 
-  std::map<std::uint64_t, Kind> kinds_;  // of resources by their ids
+  std::map<std::uint64_t, GroupKind> kinds_;  // of resources by their ids
   std::vector<Reference> references_;
 };
 

@@ -4,8 +4,10 @@
 
 #include <vector>
 
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/xml.h"
+#include "stages/support/text/part_name.h"
 
 namespace lamina::load {
 namespace {

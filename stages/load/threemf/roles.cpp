@@ -6,6 +6,7 @@
 #include <charconv>
 #include <utility>
 
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/xml.h"
 
@@ -106,7 +107,7 @@ Status take_out_modifiers(const Source& source, const ModelPackage& package, Mod
   for (const Volume& volume : object.volumes) {
     if (volume.first > volume.last || volume.last >= count)
       return source.error(fmt::format("{} has {} triangles, and a volume {} of triangles {} to {}; export it again",
-                                      package.label(object), count, quoted(std::string_view(volume.name)), volume.first,
+                                      label(package, object), count, quoted(std::string_view(volume.name)), volume.first,
                                       volume.last));
     if (volume.role != Role::kModifier) continue;
     for (; next < volume.first; ++next) object.triangles[kept++] = object.triangles[next];

@@ -12,7 +12,7 @@
 namespace lamina::load {
 namespace {
 
-using Range = tbb::blocked_range<std::size_t>;
+using BlockedRange = tbb::blocked_range<std::size_t>;
 
 struct SnappedVertices {
   Buffer<Point3> at;
@@ -20,7 +20,7 @@ struct SnappedVertices {
   std::array<double, 3> margin;
 };
 
-std::array<double, 3> least(const std::array<double, 3>& one, const std::array<double, 3>& other) {
+std::array<double, 3> minimum(const std::array<double, 3>& one, const std::array<double, 3>& other) {
   return {std::min(one[0], other[0]), std::min(one[1], other[1]), std::min(one[2], other[2])};
 }
 
@@ -31,8 +31,8 @@ SnappedVertices snap_vertices(const ModelObject& object, const Transform& transf
   out.at.resize(count);
   out.how.resize(count);
   out.margin = tbb::parallel_reduce(
-      Range(0, count, 1 << 13), std::array<double, 3>{0.5, 0.5, 0.5},
-      [&](const Range& range, std::array<double, 3> margin) {
+      BlockedRange(0, count, 1 << 13), std::array<double, 3>{0.5, 0.5, 0.5},
+      [&](const BlockedRange& range, std::array<double, 3> margin) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const auto& v = object.vertices[i];
           Point3& p = out.at[i];
@@ -47,7 +47,7 @@ SnappedVertices snap_vertices(const ModelObject& object, const Transform& transf
         }
         return margin;
       },
-      least);
+      minimum);
   return out;
 }
 
@@ -72,8 +72,8 @@ Result<SnappedMesh> snap_mesh(const Source& source, const ModelObject& object, c
     return std::max({vertices.how[a], vertices.how[b], vertices.how[c]});
   };
   const GatheredFacets gathered = tbb::parallel_reduce(
-      Range(0, count, 1 << 13), GatheredFacets{},
-      [&](const Range& range, GatheredFacets so_far) {
+      BlockedRange(0, count, 1 << 13), GatheredFacets{},
+      [&](const BlockedRange& range, GatheredFacets so_far) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
           const auto& [a, b, c] = object.triangles[i];
           Triangle& t = triangles[i];

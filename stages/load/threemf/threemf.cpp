@@ -1,7 +1,9 @@
 // stages/load/threemf/threemf.cpp: a package is opened, its models are parsed, and what its build names becomes meshes.
+#include "stages/load/threemf/threemf.h"
+
 #include <fmt/core.h>
 
-#include "stages/load/reader.h"
+#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/expansion.h"
@@ -31,15 +33,15 @@ Status parse_model(const Source& source, Archive& archive, std::uint32_t file, s
 }
 
 /// What was passed over, for a person.
-void tell_of_model(const ModelPackage& model, std::vector<Note>& notes) {
+void report_of_model(const ModelPackage& model, std::vector<Note>& notes) {
   for (const std::string& space : model.extensions) {
     notes.push_back(
         {false, fmt::format("holds elements of the extension {}, which lamina does not read and the file does not require",
-                            extension_name(space))});
+                            extension_label(space))});
   }
-  for (const std::string& space : model.foreign) {
+  for (const std::string& space : model.unsupported) {
     notes.push_back({false, fmt::format("holds attributes of {}, which lamina does not read and the file does not require",
-                                        extension_name(space))});
+                                        extension_label(space))});
   }
   for (const Departure& one : model.departures) {
     const std::string more = one.count > 1 ? fmt::format(" and {} more", one.count - 1) : "";
@@ -71,7 +73,7 @@ Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
   Package package;
   if (const Status given = apply_roles(source, *archive, model, package.notes); !given) return given.error();
   if (const Status known = resolve_references(source, model, options.triangle_limit); !known) return known.error();
-  tell_of_model(model, package.notes);
+  report_of_model(model, package.notes);
   const Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
   if (!leaves) return leaves.error();
   if (leaves->empty()) return source.error("its build items hold no triangles to print");

@@ -11,7 +11,7 @@ namespace lamina::load {
 namespace {
 
 constexpr std::uint32_t kDeepestXml = 256;
-constexpr std::size_t kMostNames = 4096, kMostNamespaces = 64, kLongestName = 1024;
+constexpr std::size_t kMaxNames = 4096, kMaxNamespaces = 64, kLongestName = 1024;
 constexpr std::uint64_t kLongestTag = std::uint64_t{1} << 20;
 
 }  // namespace
@@ -60,13 +60,13 @@ XmlReader::~XmlReader() { XML_ParserFree(parser_); }
 /// Counts different names, by their hashes.
 void XmlReader::meet(std::string_view name) {
   if (name.size() > kLongestName) return refuse(fmt::format("has a name of more than {} bytes; export it again", kLongestName));
-  if (names_.insert(std::hash<std::string_view>()(name)).second && names_.size() > kMostNames)
-    refuse(fmt::format("has more than {} different names of elements and attributes; export it again", kMostNames));
+  if (names_.insert(std::hash<std::string_view>()(name)).second && names_.size() > kMaxNames)
+    refuse(fmt::format("has more than {} different names of elements and attributes; export it again", kMaxNames));
 }
 
 void XmlReader::declare(std::string_view prefix, std::string_view space) {
-  if (bindings_.size() >= kMostNamespaces)
-    return refuse(fmt::format("declares more than {} namespaces; export it again", kMostNamespaces));
+  if (bindings_.size() >= kMaxNamespaces)
+    return refuse(fmt::format("declares more than {} namespaces; export it again", kMaxNamespaces));
   bindings_.push_back({std::string(prefix), std::string(space), depth_});
 }
 

@@ -60,7 +60,7 @@ class XmlReader {
   /// Where the handler's element begins.
   std::uint64_t line() const;
   /// "line 12: ..."; empty if nothing is wrong
-  const std::string& fault() const { return fault_; }
+  std::string_view fault() const { return fault_; }
 
  private:
   struct Callbacks;

@@ -1,4 +1,6 @@
 // stages/load/winding/remesh.cpp: the winding number on a grid, near facets and where it changes, and the surface in it.
+#include "stages/load/winding/remesh.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -19,9 +21,9 @@ constexpr int kBlock = 8, kHalvings = 4;
 constexpr std::array<std::array<int, 4>, 6> kTetrahedra{
     {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}}};
 
-class Grid {
+class LevelGrid {
  public:
-  Grid(const Mesh& mesh, int cells) : mesh_(mesh), tree_({mesh.triangles.data(), mesh.triangles.size()}, mesh.bounds.lo) {
+  LevelGrid(const Mesh& mesh, int cells) : mesh_(mesh), tree_({mesh.triangles.data(), mesh.triangles.size()}, mesh.bounds.lo) {
     const std::array<double, 3> size{static_cast<double>(mesh.bounds.width()), static_cast<double>(mesh.bounds.depth()),
                                      static_cast<double>(mesh.bounds.height())};
     cell_ = std::max(1.0, std::max({size[0], size[1], size[2]}) / cells);
@@ -39,7 +41,7 @@ class Grid {
 
  private:
   std::size_t index(int x, int y, int z) const { return (static_cast<std::size_t>(z) * points_[1] + y) * points_[0] + x; }
-  Point place(std::size_t at) const {
+  Point point_at(std::size_t at) const {
     const auto width = static_cast<std::size_t>(points_[0]), depth = static_cast<std::size_t>(points_[1]);
     const auto nm = [&](std::size_t i) { return (static_cast<double>(i) - 1.2371) * cell_; };
     return {nm(at % width), nm(at / width % depth), nm(at / width / depth)};
@@ -55,11 +57,11 @@ class Grid {
   Buffer<std::uint8_t> blocks_with_facets() const;
   bool changes(int x, int y, int z) const;
 
-  struct Edge {
+  struct CubeEdge {
     std::uint64_t from;  // index of the corner with fewer bits
     std::uint32_t code;  // bits that its other end has more
-    bool operator<(const Edge& other) const { return from != other.from ? from < other.from : code < other.code; }
-    bool operator==(const Edge&) const = default;
+    bool operator<(const CubeEdge& other) const { return from != other.from ? from < other.from : code < other.code; }
+    bool operator==(const CubeEdge&) const = default;
   };
   std::size_t corner(std::size_t first, int bits) const {
     return first + (bits & 1) + (bits & 2 ? points_[0] : 0) +
@@ -67,7 +69,7 @@ class Grid {
   }
   template <class Emit>
   void cut_cell(std::size_t first, const Emit& emit) const;
-  Point3 crossing(const Edge& edge) const;
+  Point3 crossing(const CubeEdge& edge) const;
 
   const Mesh& mesh_;
   WindingTree tree_;
@@ -77,7 +79,7 @@ class Grid {
 };
 
 /// Blocks that a facet may run through: its box meets the block, and so does its plane.
-Buffer<std::uint8_t> Grid::blocks_with_facets() const {
+Buffer<std::uint8_t> LevelGrid::blocks_with_facets() const {
   Buffer<std::uint8_t> meets(static_cast<std::size_t>(blocks_[0]) * blocks_[1] * blocks_[2]);
   std::fill(meets.begin(), meets.end(), std::uint8_t{0});
   const double width = kBlock * cell_, reach = std::sqrt(3.0) / 2 * (width + 2 * cell_);
@@ -118,7 +120,7 @@ Buffer<std::uint8_t> Grid::blocks_with_facets() const {
 }
 
 /// Whether the surface may pass between a block's corners.
-bool Grid::changes(int x, int y, int z) const {
+bool LevelGrid::changes(int x, int y, int z) const {
   bool above = false, below = false;
   for (int bits = 0; bits < 8; ++bits) {
     const float value = value_[index((x + (bits & 1)) * kBlock, (y + (bits >> 1 & 1)) * kBlock, (z + (bits >> 2)) * kBlock)];
@@ -128,10 +130,10 @@ bool Grid::changes(int x, int y, int z) const {
   return above && below;
 }
 
-void Grid::fill() {
+void LevelGrid::fill() {
   const auto evaluate = [&](int x, int y, int z) {
     const std::size_t at = index(x, y, z);
-    value_[at] = at_rim(x, y, z) ? -0.5f : level(place(at));
+    value_[at] = at_rim(x, y, z) ? -0.5f : level(point_at(at));
   };
   const auto each_block = [&](const auto& visit) {
     tbb::parallel_for(0, blocks_[0] * blocks_[1] * blocks_[2], [&](int block) {
@@ -175,13 +177,14 @@ void Grid::fill() {
 
 /// Calls emit(three edges) for each triangle of a cell, outward.
 template <class Emit>
-void Grid::cut_cell(std::size_t first, const Emit& emit) const {
+void LevelGrid::cut_cell(std::size_t first, const Emit& emit) const {
   std::array<bool, 8> inside{};
   int count = 0;
   for (int bits = 0; bits < 8; ++bits) count += inside[static_cast<std::size_t>(bits)] = value_[corner(first, bits)] > 0;
   if (count == 0 || count == 8) return;
   const auto edge = [&](int one, int other) {
-    return Edge{corner(first, one & other), static_cast<std::uint32_t>(one ^ other)};  // one's bits are a subset of the other's
+    return CubeEdge{corner(first, one & other),
+                    static_cast<std::uint32_t>(one ^ other)};  // one's bits are a subset of the other's
   };
   for (const auto& [a, b, c, d] : kTetrahedra) {
     std::array<int, 4> in{}, out{};
@@ -197,7 +200,7 @@ void Grid::cut_cell(std::size_t first, const Emit& emit) const {
     bool even = true;
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t j = i + 1; j < 4; ++j) even ^= position[i] > position[j];
-    const auto facet = [&](const Edge& p, const Edge& q, const Edge& r) { even ? emit(p, q, r) : emit(p, r, q); };
+    const auto facet = [&](const CubeEdge& p, const CubeEdge& q, const CubeEdge& r) { even ? emit(p, q, r) : emit(p, r, q); };
     if (ins == 1) {
       facet(edge(in[0], out[0]), edge(in[0], out[1]), edge(in[0], out[2]));
     } else if (ins == 3) {
@@ -210,9 +213,9 @@ void Grid::cut_cell(std::size_t first, const Emit& emit) const {
 }
 
 /// Where an edge of the grid leaves the solid, by halving it.
-Point3 Grid::crossing(const Edge& edge) const {
+Point3 LevelGrid::crossing(const CubeEdge& edge) const {
   const std::size_t other = corner(edge.from, static_cast<int>(edge.code));
-  Point in = place(edge.from), out = place(other);
+  Point in = point_at(edge.from), out = point_at(other);
   if (value_[edge.from] <= 0) std::swap(in, out);
   Point middle{};
   for (int i = 0; i <= kHalvings; ++i) {
@@ -224,13 +227,13 @@ Point3 Grid::crossing(const Edge& edge) const {
   return {nm(middle[0], mesh_.bounds.lo.x), nm(middle[1], mesh_.bounds.lo.y), nm(middle[2], mesh_.bounds.lo.z)};
 }
 
-Buffer<Triangle> Grid::surface() const {
-  Buffer<std::array<Edge, 3>> facets;
-  Buffer<Edge> edges;
+Buffer<Triangle> LevelGrid::surface() const {
+  Buffer<std::array<CubeEdge, 3>> facets;
+  Buffer<CubeEdge> edges;
   for (int z = 0; z + 1 < points_[2]; ++z) {
     for (int y = 0; y + 1 < points_[1]; ++y) {
       for (int x = 0; x + 1 < points_[0]; ++x) {
-        cut_cell(index(x, y, z), [&](const Edge& p, const Edge& q, const Edge& r) {
+        cut_cell(index(x, y, z), [&](const CubeEdge& p, const CubeEdge& q, const CubeEdge& r) {
           facets.push_back({p, q, r});
           edges.push_back(p), edges.push_back(q), edges.push_back(r);
         });
@@ -245,7 +248,7 @@ Buffer<Triangle> Grid::surface() const {
   triangles.reserve(facets.size() + kTriangleSlack);
   triangles.resize(facets.size());
   tbb::parallel_for(std::size_t{0}, facets.size(), [&](std::size_t i) {
-    const auto at = [&](const Edge& edge) {
+    const auto at = [&](const CubeEdge& edge) {
       return vertex[static_cast<std::size_t>(std::lower_bound(edges.begin(), edges.end(), edge) - edges.begin())];
     };
     triangles[i] = {at(facets[i][0]), at(facets[i][1]), at(facets[i][2])};
@@ -256,7 +259,7 @@ Buffer<Triangle> Grid::surface() const {
 }  // namespace
 
 Remeshed remesh(Mesh& mesh, int cells) {
-  const Grid grid(mesh, cells);
+  const LevelGrid grid(mesh, cells);
   mesh.triangles = grid.surface();
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   mesh.bounds = {};

@@ -80,14 +80,14 @@ std::uint32_t WindingTree::build(std::uint32_t begin, std::uint32_t end) {
   return index;
 }
 
-double WindingTree::at(const Point& point, std::uint64_t* looked_at) const {
+double WindingTree::at(const Point& point, std::uint64_t* inspected) const {
   if (nodes_.empty()) return 0;
   double angles = 0;                      // halves of solid angles
   std::array<std::uint32_t, 64> stack{};  // halving 2^32 facets goes 32 deep
   std::size_t height = 1;
-  std::uint64_t looked = 0;
+  std::uint64_t visits = 0;
   while (height > 0) {
-    ++looked;
+    ++visits;
     const std::uint32_t index = stack[--height];
     const Node& node = nodes_[index];
     const Point off = minus(node.centre, point);
@@ -95,7 +95,7 @@ double WindingTree::at(const Point& point, std::uint64_t* looked_at) const {
     if (square > kFar * kFar * node.radius * node.radius && square > 0) {
       angles += product(node.normal, off) / (2 * square * std::sqrt(square));
     } else if (node.second == 0) {
-      looked += node.end - node.begin;
+      visits += node.end - node.begin;
       for (std::uint32_t i = node.begin; i < node.end; ++i) {
         const Corners& f = facets_[i];
         angles += half_angle(minus(f.a, point), minus(f.b, point), minus(f.c, point));
@@ -105,7 +105,7 @@ double WindingTree::at(const Point& point, std::uint64_t* looked_at) const {
       stack[height++] = index + 1;
     }
   }
-  if (looked_at != nullptr) *looked_at += looked;
+  if (inspected != nullptr) *inspected += visits;
   return angles / (2 * std::numbers::pi);
 }
 

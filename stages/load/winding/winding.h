@@ -24,8 +24,8 @@ class WindingTree {
 
   /// The solid angle of all facets seen from a point, over that of a sphere: 1 within a closed outward surface, 0 outside,
   /// in between near openings. Within some hundredths. Safe from any thread.
-  /// looked_at  boxes and facets that it took are added to it, if given
-  double at(const Point& point, std::uint64_t* looked_at = nullptr) const;
+  /// inspected  boxes and facets that it took are added to it, if given
+  double at(const Point& point, std::uint64_t* inspected = nullptr) const;
 
  private:
   struct Node {
@@ -41,18 +41,5 @@ class WindingTree {
   Buffer<Corners> facets_;
   Buffer<Node> nodes_;
 };
-
-/// What remesh() did.
-struct Remeshed {
-  double cell_mm = 0;  // features below are lost
-};
-
-/// Replaces the triangles by the surface on which the winding number is a half in size, within a thirtieth of a cell where
-/// facets are, found on a grid of so many cells along the longest side. Closed, whatever the facets were. mesh.bounds
-/// follow, mesh.fingerprint does not.
-///
-/// source  marching tetrahedra: Doi, Koide (1991)
-/// cost    some seconds; 100 bytes a triangle and some 50 MB. The same for any number of threads.
-Remeshed remesh(Mesh& mesh, int cells = 128);
 
 }  // namespace lamina::load

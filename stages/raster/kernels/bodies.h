@@ -39,8 +39,8 @@ inline constexpr std::size_t kClustersAhead = 8;
 
 /// The plane in the frame of a mesh, where corners lie; one out of reach of any corner cuts nothing.
 inline Nm plane_in_mesh(Nm plane, const Point3& offset) {
-  constexpr std::int64_t kLeast = std::numeric_limits<Nm>::min(), kMost = std::numeric_limits<Nm>::max();
-  return static_cast<Nm>(std::clamp(std::int64_t{plane} - offset.z, kLeast, kMost));
+  constexpr std::int64_t kMin = std::numeric_limits<Nm>::min(), kMax = std::numeric_limits<Nm>::max();
+  return static_cast<Nm>(std::clamp(std::int64_t{plane} - offset.z, kMin, kMax));
 }
 
 /// The first row at or beyond the point in which the plane meets an edge, decided in integers. The plane is `up` above the tip.
@@ -54,15 +54,15 @@ using FourWords = std::uint32_t __attribute__((vector_size(16)));
 
 /// Writes the crossings of the first four of `left` rows of a segment, or of all. Of four rows all places are moved on, two a
 /// word, before any crossing is written: no load has to wait for the address of a store.
-inline void put_rows(std::uint32_t* crossing, std::uint32_t* place, std::uint32_t left, FourWords value) {
+inline void put_rows(std::uint32_t* crossing, std::uint32_t* position, std::uint32_t left, FourWords value) {
   if (left >= 4) {
     constexpr std::uint64_t kOneEach = std::uint64_t{1} << 32 | 1;  // no place is 2^32 - 1
     constexpr std::uint32_t kSecond = std::endian::native == std::endian::little ? 32 : 0, kFirst = 32 - kSecond;
     std::uint64_t at[2], next[2];
-    std::memcpy(at, place, sizeof at);
+    std::memcpy(at, position, sizeof at);
     next[0] = at[0] + kOneEach;
     next[1] = at[1] + kOneEach;
-    std::memcpy(place, next, sizeof next);
+    std::memcpy(position, next, sizeof next);
     crossing[static_cast<std::uint32_t>(at[0] >> kFirst)] = value[0];
     crossing[static_cast<std::uint32_t>(at[0] >> kSecond)] = value[1];
     crossing[static_cast<std::uint32_t>(at[1] >> kFirst)] = value[2];
@@ -73,10 +73,10 @@ inline void put_rows(std::uint32_t* crossing, std::uint32_t* place, std::uint32_
   const std::uint32_t second = left / 2, third = left - 1;
   std::uint32_t of_row[4];
   std::memcpy(of_row, &value, sizeof of_row);
-  const std::uint32_t at = place[0], at_second = place[second], at_third = place[third];
-  place[0] = at + 1;
-  place[second] = at_second + 1;
-  place[third] = at_third + 1;
+  const std::uint32_t at = position[0], at_second = position[second], at_third = position[third];
+  position[0] = at + 1;
+  position[second] = at_second + 1;
+  position[third] = at_third + 1;
   crossing[at] = of_row[0];
   crossing[at_second] = of_row[second];
   crossing[at_third] = of_row[third];

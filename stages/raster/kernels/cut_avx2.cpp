@@ -201,7 +201,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
   const __m256i first = _mm256_set1_epi32(found.first_of(source.vertex));
   std::uint32_t n = found.size;
   std::size_t i = 0;
-  for (; i < visits.size() && n <= FoundFacets::kRoom - kClusterSize; ++i) {
+  for (; i < visits.size() && n <= FoundFacets::kCapacity - kClusterSize; ++i) {
     const IndexedCluster& cluster = source.at(visits[i]);
     const __m128i up = _mm_sub_epi8(step, four(cluster.steps.low));
     const __m128i met = _mm_cmpeq_epi8(_mm_subs_epu8(up, four(cluster.steps.span)), _mm_setzero_si128());
@@ -212,8 +212,8 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
       const __m256i order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLanesOfEight[of_eight])));
       for (std::uint32_t k = 0; k < 3; ++k) {
         const __m256i number = _mm256_permutevar8x32_epi32(_mm256_cvtepu16_epi32(four(cluster.corner[k] + half)), order);
-        const __m256i place = _mm256_madd_epi16(number, _mm256_set1_epi32(3));  // numbers are below 2^15
-        store(found.corner[k] + n, _mm256_add_epi32(place, first));
+        const __m256i position = _mm256_madd_epi16(number, _mm256_set1_epi32(3));  // numbers are below 2^15
+        store(found.corner[k] + n, _mm256_add_epi32(position, first));
       }
       store(found.facet + n,
             _mm256_add_epi32(order, _mm256_set1_epi32(static_cast<int>(visits[i].cluster * kClusterSize + half))));
@@ -227,7 +227,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
 
 void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset, FoundFacets& found) {
   CutFacets facets;
-  std::uint8_t crossed[CutFacets::kRoom / 8];
+  std::uint8_t crossed[CutFacets::kCapacity / 8];
   std::uint32_t count = 0;
   for (auto& corner : found.corner) store(corner + found.size, _mm256_setzero_si256());  // whole registers are read
   const __m256i z = _mm256_set1_epi32(plane_in_mesh(task.plane, offset));
@@ -242,7 +242,7 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
                 [&](std::uint32_t which, __m256i v) LAMINA_AVX2 { store(facets.number[which] + i, v); });
     store(facets.facet + i, eight(found.facet + i));
   }
-  task.out.make_room(count + 4);  // four are written, whatever counts
+  task.out.ensure_capacity(count + 4);  // four are written, whatever counts
   Cutter cutter = cutter_for(task);
   const __m128i of_instance = _mm_set1_epi32(static_cast<int>(instance));
   for (std::uint32_t i = 0; i < found.size; i += 4) {
@@ -274,7 +274,7 @@ void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
 }
 
 void cut(const CutTask& task, CutFacets& facets) {
-  task.out.make_room(facets.size + 4);
+  task.out.ensure_capacity(facets.size + 4);
   Cutter cutter = cutter_for(task);
   for (std::uint32_t i = 0; i < facets.size; i += 4) {
     const int live = facets.size - i >= 4 ? 15 : (1 << (facets.size - i)) - 1;

@@ -202,13 +202,13 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
   const __m512i first = _mm512_set1_epi32(found.first_of(source.vertex));
   std::uint32_t n = found.size;
   std::size_t i = 0;
-  for (; i < visits.size() && n <= FoundFacets::kRoom - kClusterSize; ++i) {
+  for (; i < visits.size() && n <= FoundFacets::kCapacity - kClusterSize; ++i) {
     const IndexedCluster& cluster = source.at(visits[i]);
     const __mmask16 met = _mm_cmple_epu8_mask(_mm_sub_epi8(step, sixteen(cluster.steps.low)), sixteen(cluster.steps.span));
     for (std::uint32_t k = 0; k < 3; ++k) {
       const __m512i number = _mm512_maskz_compress_epi32(met, _mm512_cvtepu16_epi32(load8(cluster.corner[k])));
-      const __m512i place = _mm512_add_epi32(_mm512_madd_epi16(number, _mm512_set1_epi32(3)), first);  // number < 2^15
-      _mm512_storeu_si512(found.corner[k] + n, place);
+      const __m512i position = _mm512_add_epi32(_mm512_madd_epi16(number, _mm512_set1_epi32(3)), first);  // number < 2^15
+      _mm512_storeu_si512(found.corner[k] + n, position);
     }
     _mm512_storeu_si512(found.facet + n,
                         _mm512_add_epi32(_mm512_maskz_compress_epi32(met, lanes),
@@ -222,7 +222,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
 
 void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset, FoundFacets& found) {
   CutFacets facets;
-  __mmask16 crossed[CutFacets::kRoom / kClusterSize];
+  __mmask16 crossed[CutFacets::kCapacity / kClusterSize];
   std::uint32_t count = 0;
   for (auto& corner : found.corner) _mm512_storeu_si512(corner + found.size, _mm512_setzero_si512());  // whole registers
   const __m512i z = _mm512_set1_epi32(plane_in_mesh(task.plane, offset));
@@ -244,7 +244,7 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
     put(CutFacets::kTipX, _mm512_add_epi32(in_x.tip, _mm512_set1_epi32(offset.x)));
     put(CutFacets::kLeftX, in_x.left), put(CutFacets::kRightX, in_x.right);
   }
-  task.out.make_room(count + kClusterSize);  // 16 are written, whatever counts
+  task.out.ensure_capacity(count + kClusterSize);  // 16 are written, whatever counts
   const __m512i of_instance = _mm512_set1_epi32(static_cast<int>(instance));
   Cutter cutter = cutter_for(task);
   for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {
@@ -282,7 +282,7 @@ void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
 }
 
 void cut(const CutTask& task, CutFacets& facets) {
-  task.out.make_room(facets.size + kClusterSize);
+  task.out.ensure_capacity(facets.size + kClusterSize);
   Cutter cutter = cutter_for(task);
   for (std::uint32_t i = 0; i < facets.size; i += kClusterSize) {
     const unsigned live = facets.size - i >= kClusterSize ? 0xFFFFu : (1u << (facets.size - i)) - 1;

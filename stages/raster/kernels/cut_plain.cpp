@@ -65,8 +65,8 @@ Nm less(Nm a, Nm b) { return static_cast<Nm>(static_cast<std::uint32_t>(a) - sta
 
 /// What floating point says of all facets: the rows that their ends begin, and the lines through both.
 struct Ends {
-  std::int32_t left[CutFacets::kRoom], right[CutFacets::kRoom];
-  double x[CutFacets::kRoom], slope[CutFacets::kRoom];  // nm, where y = 0
+  std::int32_t left[CutFacets::kCapacity], right[CutFacets::kCapacity];
+  double x[CutFacets::kCapacity], slope[CutFacets::kCapacity];  // nm, where y = 0
 };
 
 /// Loops so simple that compilers do two facets at once. An end near a whole number is decided in integers.
@@ -74,7 +74,7 @@ void find_ends(const PixelSampling& sampling, const CutFacets& facets, Ends& end
   const std::uint32_t size = facets.size;
   const double rows_per_nm = sampling.rows_per_nm, near = sampling.near_y;
   const auto& of = facets.number;
-  double row[CutFacets::kRoom], other_row[CutFacets::kRoom];  // + 1 + near; no end lies before the bed
+  double row[CutFacets::kCapacity], other_row[CutFacets::kCapacity];  // + 1 + near; no end lies before the bed
   for (std::uint32_t i = 0; i < size; ++i) {
     const double left_z = of[CutFacets::kLeftZ][i], right_z = of[CutFacets::kRightZ][i];
     const double share = of[CutFacets::kUp][i] / (left_z * right_z);
@@ -113,7 +113,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
   const std::int32_t first = found.first_of(source.vertex);
   std::uint32_t i = found.size;
   std::size_t taken = 0;
-  for (; taken < visits.size() && i <= FoundFacets::kRoom - kClusterSize; ++taken) {
+  for (; taken < visits.size() && i <= FoundFacets::kCapacity - kClusterSize; ++taken) {
     const IndexedCluster& cluster = source.at(visits[taken]);
     const std::uint32_t before = i;
     for (std::uint32_t lanes = facets_met(cluster.steps, source.step); lanes != 0; lanes &= lanes - 1) {
@@ -188,7 +188,7 @@ void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
 
 void cut(const CutTask& task, CutFacets& facets) {
   Segments& out = task.out;
-  out.make_room(facets.size + 1);  // one more is written and not counted
+  out.ensure_capacity(facets.size + 1);  // one more is written and not counted
   Ends ends;
   find_ends(task.sampling, facets, ends);
   double* const column = out.column.data();

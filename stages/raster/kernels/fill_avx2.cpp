@@ -17,7 +17,7 @@ void fill(const FillTask& task) {
   const double* const columns = task.segments.column.data();
   const double* const slopes = task.segments.columns_per_nm.data();
   std::uint32_t* const crossing = task.crossing;
-  std::uint32_t* const places = task.place - task.first_row;
+  std::uint32_t* const positions = task.position - task.first_row;
   const std::size_t size = task.segments.size;
   for (std::size_t i = 0; i < size; ++i) {
     const SegmentRows rows = all_rows[i];
@@ -42,7 +42,7 @@ void fill(const FillTask& task) {
         }
         value = decide_near(task, i, row, left, static_cast<std::uint32_t>(near), value);
       }
-      put_rows(crossing, places + row, left, value);
+      put_rows(crossing, positions + row, left, value);
       if (left <= 4) break;
     }
   }

@@ -18,7 +18,7 @@ void fill(const FillTask& task) {
   const double* const columns = task.segments.column.data();
   const double* const slopes = task.segments.columns_per_nm.data();
   std::uint32_t* const crossing = task.crossing;
-  std::uint32_t* const places = task.place - task.first_row;
+  std::uint32_t* const positions = task.position - task.first_row;
   const std::size_t size = task.segments.size;
   for (std::size_t i = 0; i < size; ++i) {
     const SegmentRows rows = all_rows[i];
@@ -46,9 +46,9 @@ void fill(const FillTask& task) {
         low = decide_near(task, i, row, left, near & 15, low);
         if (left > 4) high = decide_near(task, i, row + 4, left - 4, near >> 4, high);
       }
-      put_rows(crossing, places + row, left, low);
+      put_rows(crossing, positions + row, left, low);
       if (left <= 4) break;
-      put_rows(crossing, places + row + 4, left - 4, high);
+      put_rows(crossing, positions + row + 4, left - 4, high);
       if (left <= 8) break;
     }
   }

@@ -80,7 +80,7 @@ void fill_exactly(const FillTask& task, std::size_t segment) {
   std::uint32_t value = exact_crossing(task, segment, rows.first);
   for (std::uint32_t row = rows.first; row < rows.end(); ++row) {
     if (!rows.is(SegmentRows::kUpright)) value = exact_crossing(task, segment, row);
-    task.crossing[task.place[row - task.first_row]++] = value;
+    task.crossing[task.position[row - task.first_row]++] = value;
   }
 }
 

@@ -42,14 +42,14 @@ struct IndexedSource {
 /// Facets of one instance that a plane may cut, by the places of their corners. Behind each array room for the widest store;
 /// what is fetched early may lie behind the last facet.
 struct alignas(64) FoundFacets {
-  static constexpr std::uint32_t kRoom = 256;
+  static constexpr std::uint32_t kCapacity = 256;
 
-  std::int32_t corner[3][kRoom + kClusterSize] = {};  // where x is, counted from `base`; y and z follow
-  std::uint32_t facet[kRoom + kClusterSize];
+  std::int32_t corner[3][kCapacity + kClusterSize] = {};  // where x is, counted from `base`; y and z follow
+  std::uint32_t facet[kCapacity + kClusterSize];
   const Nm* base = nullptr;  // a vertex of the mesh
   std::uint32_t size = 0;
 
-  bool is_full() const { return size > kRoom - kClusterSize; }
+  bool is_full() const { return size > kCapacity - kClusterSize; }
   /// Whether vertices of a block can be named; counting starts anew where no facet is left.
   bool reaches(const Point3* vertex) {
     if (size == 0) base = &vertex->x;
@@ -62,8 +62,8 @@ struct alignas(64) FoundFacets {
 /// Facets that a plane cuts, on the bed, turned so that the tip is alone on its side of the plane: it cuts the two edges
 /// that start there. A number an array, and behind each room for the widest store.
 struct alignas(64) CutFacets {
-  static constexpr std::uint32_t kRoom = FoundFacets::kRoom;
-  static constexpr std::uint32_t kStride = kRoom + kClusterSize;
+  static constexpr std::uint32_t kCapacity = FoundFacets::kCapacity;
+  static constexpr std::uint32_t kStride = kCapacity + kClusterSize;
 
   /// What is known of a facet. Up is from the tip to the plane; the others are edges from the tip.
   enum Number : std::uint32_t { kTipX, kTipY, kUp, kLeftX, kLeftY, kLeftZ, kRightX, kRightY, kRightZ, kNumbers };
@@ -71,7 +71,7 @@ struct alignas(64) CutFacets {
   std::uint32_t facet[kStride], instance[kStride];
   std::uint32_t size = 0;
 
-  bool is_full() const { return size > kRoom - kClusterSize; }
+  bool is_full() const { return size > kCapacity - kClusterSize; }
 };
 
 /// What of a layer all cuts share.
@@ -89,7 +89,7 @@ struct FillTask {
   std::span<const PlacedMesh> placed;
   Nm plane;
   std::uint32_t first_row;  // of the band
-  std::uint32_t* place;     // of each row, where its next crossing goes
+  std::uint32_t* position;  // of each row, where its next crossing goes
   std::uint32_t* crossing;  // column * 2 + (1 if it enters)
 };
 

@@ -26,7 +26,7 @@ LAMINA_BODY float raised(float x) { return std::bit_cast<float>((std::bit_cast<s
 /// ten operations more, of 2^-24 each, for which 2^-20 is added. A part of at least 2^-6 and of 11 bits is a multiple of 2^-16.
 LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, std::int32_t first, Tents& __restrict tents) {
   constexpr float kRounding = 1.0f / (1 << 21), kUp = 1 + 1.0f / (1 << 20);
-  constexpr float kLeast = 1.0f / (1 << 6);
+  constexpr float kMin = 1.0f / (1 << 6);
   const auto bits = static_cast<int>(shift);
   for (std::uint32_t i = 0; i < kClusterSize; ++i) {
     const Nm za = sides.z[0][i], zb = sides.z[1][i], zc = sides.z[2][i], ya = sides.y[0][i];
@@ -42,7 +42,7 @@ LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, 
     const auto height = static_cast<float>(greater(less(hi, lo), 1));
     const float top = (area + depth * height * kRounding) * kUp;  // times the facet's height
     const auto rises = static_cast<float>(rise), falls = static_cast<float>(fall);
-    const float part = raised(top / (height * (rises * falls)) + kLeast) * static_cast<float>(count);
+    const float part = raised(top / (height * (rises * falls)) + kMin) * static_cast<float>(count);
     tents.begin[i] = begin;
     tents.end[i] = last + 1;
     tents.top[i] = begin + rise;
@@ -62,7 +62,7 @@ inline __m128 two_at(const std::uint16_t* corner, const Point3* vertices) {
 }
 #endif
 
-void look_up(const IndexedCluster& cluster, const Point3* vertices, Sides& sides) {
+void find(const IndexedCluster& cluster, const Point3* vertices, Sides& sides) {
   for (std::uint32_t k = 0; k < 3; ++k) {
 #if defined(__SSE2__)
     for (std::uint32_t i = 0; i < kClusterSize; i += 4) {
@@ -95,9 +95,9 @@ LAMINA_AVX512 void raise_avx512(const Sides& sides, std::uint32_t shift, std::in
 }  // namespace
 
 const TentKernels& tents_for(Isa isa) {
-  static constexpr TentKernels kPlain{look_up, raise_plain};
+  static constexpr TentKernels kPlain{find, raise_plain};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr TentKernels kAvx2{look_up, raise_avx2}, kAvx512{avx512::look_up_sides, raise_avx512};
+  static constexpr TentKernels kAvx2{find, raise_avx2}, kAvx512{avx512::load_sides, raise_avx512};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif

@@ -28,7 +28,7 @@ struct alignas(64) Tents {
 /// The loops for an instruction set.
 struct TentKernels {
   /// Looks up an indexed cluster's corners.
-  void (*look_up)(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+  void (*find)(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
   /// Slabs are 2^shift nm high and counted from `first`, and at most 2^13.
   void (*raise)(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
 };
@@ -38,7 +38,7 @@ const TentKernels& tents_for(Isa isa);
 
 #if defined(LAMINA_WIDE_KERNELS)
 namespace avx512 {
-LAMINA_AVX512 void look_up_sides(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+LAMINA_AVX512 void load_sides(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
 }  // namespace avx512
 #endif
 

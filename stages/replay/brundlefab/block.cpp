@@ -3,7 +3,7 @@
 namespace lamina::replay::brundle {
 namespace {
 
-constexpr int kMostInteger = 32'767;       // int of an ATmega2560
+constexpr int kMaxInteger = 32'767;        // int of an ATmega2560
 constexpr std::size_t kLongestLine = 254;  // GCODE_LINE_MAX, without its end
 constexpr std::size_t kLongestText = 255;  // PATH_MAX, without its end
 
@@ -58,7 +58,7 @@ class LineParser {
   void take_digit(int digit) {
     int& number = mode_ == Mode::kFraction ? fraction_ : whole_;
     if (mode_ == Mode::kNone) return;
-    if (number > (kMostInteger - digit) / 10 || (mode_ == Mode::kFraction && base_ > kMostInteger / 10)) {
+    if (number > (kMaxInteger - digit) / 10 || (mode_ == Mode::kFraction && base_ > kMaxInteger / 10)) {
       overflows_ = true;
       return;
     }
@@ -94,17 +94,18 @@ class LineParser {
 
 }  // namespace
 
-std::string read_block(std::string_view line, float millimetres, Block& block) {
+Status read_block(std::string_view line, float millimetres, Block& block) {
+  const auto wrong = [](const char* what) { return Error{Fault::kVerification, what}; };
   block = {};
   line = line.substr(0, line.find(';'));  // GCode::_line_update
-  if (line.size() > kLongestLine) return "is longer than the 254 characters that the firmware keeps";
+  if (line.size() > kLongestLine) return wrong("is longer than the 254 characters that the firmware keeps");
   LineParser parser(block);
   for (const char c : line) {
-    if (c == '*') return "has a checksum, which no program of this dialect has";
+    if (c == '*') return wrong("has a checksum, which no program of this dialect has");
     parser.take(c);
   }
   parser.finish();
-  if (parser.overflows()) return "has a number that does not fit into the firmware's 16 bits";
+  if (parser.overflows()) return wrong("has a number that does not fit into the firmware's 16 bits");
   for (const char letter : {'X', 'Y', 'Z', 'E', 'F'}) block.value[Block::kLetters.find(letter)] *= millimetres;
   return {};
 }

@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "stages/data/status.h"
+
 namespace lamina::replay::brundle {
 
 /// A command and its words. Words are 32-bit floats; a letter that the firmware does not know, with its number, is skipped.
@@ -26,7 +28,7 @@ struct Block {
 /// Numbers are read as two integers of 16 bits, before and behind the point; the sign belongs to the former alone, so that
 /// -1.5 is -0.5.
 /// millimetres  of a unit, for X, Y, Z, E and F: 1 or 25.4
-/// errors       a text: a number that overflows, a checksum, a line too long; else empty
-std::string read_block(std::string_view line, float millimetres, Block& block);
+/// errors       kVerification: a number that overflows, a checksum, a line too long
+Status read_block(std::string_view line, float millimetres, Block& block);
 
 }  // namespace lamina::replay::brundle

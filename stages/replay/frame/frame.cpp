@@ -11,18 +11,18 @@
 namespace lamina::replay {
 namespace {
 
-using frame::Line;
+using frame::ProgramLine;
 using frame::wrong;
 
 /// What lines of G-code leave behind them.
-struct State {
+struct GcodeState {
   bool millimetres = false, absolute = false;
   std::map<char, double> zeroed;  // axes by G92
   std::map<char, double> at;      // and where they then go
 };
 
 /// Units, modes, zeros and ways; false for any other command.
-bool take(const Line& line, State& state) {
+bool take(const ProgramLine& line, GcodeState& state) {
   if (line.command == "G20" || line.command == "G21") {
     state.millimetres = line.command == "G21";
   } else if (line.command == "G90" || line.command == "G91") {
@@ -37,13 +37,13 @@ bool take(const Line& line, State& state) {
   return true;
 }
 
-Status check_modes(const State& state) {
+Status check_modes(const GcodeState& state) {
   if (!state.millimetres) return wrong("G21 is missing: layers are in mm");
   return state.absolute ? Status() : wrong("G90 is missing: layers go to places");
 }
 
 /// Layers begin with the build vat's axis at 0, or as far above it as the base is high.
-Status check_zero(const Machine& machine, const State& state) {
+Status check_zero(const Machine& machine, const GcodeState& state) {
   const auto& powder = machine.powder;
   const auto zero = state.zeroed.find(powder.build_axis[0]);
   const double want = -powder.build_sign * powder.base_mm();
@@ -54,11 +54,11 @@ Status check_zero(const Machine& machine, const State& state) {
   return {};
 }
 
-Status check_header(const VirtualMachine& machine, const Line& line) {
+Status check_header(const VirtualMachine& machine, const ProgramLine& line) {
   const VirtualMachine::Counts want = machine.counts();
   const std::pair<char, double> words[] = {{'L', machine.layers() > 0 ? machine.layers() : line.value('L')},
                                            {'N', want.nozzles},
-                                           {'W', want.places},
+                                           {'W', want.positions},
                                            {'K', want.steps},
                                            {'Q', std::round(want.step_um * 1e6) / 1e3}};
   for (const auto& [letter, value] : words) {
@@ -73,11 +73,11 @@ Status check_header(const VirtualMachine& machine, const Line& line) {
 Status start_of_gcode(const VirtualMachine& machine, std::string_view text) {
   const Machine& profile = machine.profile();
   const bool nuferbj = profile.dialect == "nuferbj", oasis = profile.dialect == "oasis";
-  State state;
+  GcodeState state;
   bool header = false, homed = false;
   auto lines = frame::lines_of(text);
   if (!lines) return lines.error();
-  for (const Line& line : *lines) {
+  for (const ProgramLine& line : *lines) {
     if (nuferbj && line.command == "M810") {
       if (Status status = check_header(machine, line); !status) return status;
       header = true;
@@ -107,12 +107,12 @@ Status start_of_gcode(const VirtualMachine& machine, std::string_view text) {
 
 /// fab/brundle.py: homed, lifted by 2 mm, filled by a person, the recoater at the feed bin.
 Status start_of_brundlefab(const VirtualMachine& machine, std::string_view text) {
-  State state;
+  GcodeState state;
   bool homed = false, filled = false;
   std::string tool;
   auto lines = frame::lines_of(text);
   if (!lines) return lines.error();
-  for (const Line& line : *lines) {
+  for (const ProgramLine& line : *lines) {
     if (line.command == "G28") {
       if (line.has('X') && line.has('E')) homed = true;
       for (const auto& [letter, value] : line.word) state.at[letter] = 0;
@@ -150,7 +150,7 @@ Status start_of_bytes(const VirtualMachine& machine, std::string_view text) {
   } else {
     numbers = {0x4C04, 7 + grey};
   }
-  numbers.insert(numbers.end(), {1 + grey, machine.layers(), want.nozzles, want.places, want.lines, want.steps,
+  numbers.insert(numbers.end(), {1 + grey, machine.layers(), want.nozzles, want.positions, want.lines, want.steps,
                                  (want.nozzles + per_word - 1) / per_word});
   if (grey != 0) numbers.push_back(want.drop_bits);
   const std::size_t layers = raw ? 2 : 3;
@@ -184,7 +184,7 @@ Status check_end(const VirtualMachine& machine, std::string_view text) {
   const auto own = std::ranges::find(kCommands, dialect, &std::pair<std::string_view, std::string_view>::first);
   auto lines = frame::lines_of(text);
   if (!lines) return lines.error();
-  for (const Line& line : *lines) {
+  for (const ProgramLine& line : *lines) {
     if (own != std::end(kCommands) && frame::has_word(own->second, line.command)) continue;
     return wrong(fmt::format("line {}: '{}' is no command of a program's end", line.number, line.command));
   }

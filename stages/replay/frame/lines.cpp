@@ -9,10 +9,10 @@
 
 namespace lamina::replay::frame {
 
-double Line::value(char letter) const { return has(letter) ? word.at(letter) : std::nan(""); }
+double ProgramLine::value(char letter) const { return has(letter) ? word.at(letter) : std::nan(""); }
 
-Result<std::vector<Line>> lines_of(std::string_view text) {
-  std::vector<Line> lines;
+Result<std::vector<ProgramLine>> lines_of(std::string_view text) {
+  std::vector<ProgramLine> lines;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
     if (end == std::string_view::npos) return wrong(fmt::format("line {}: ends within a line", number));
@@ -21,7 +21,7 @@ Result<std::vector<Line>> lines_of(std::string_view text) {
     left = left.substr(0, left.find(';'));
     while (left.ends_with(' ')) left.remove_suffix(1);
     if (left.empty()) continue;
-    Line line;
+    ProgramLine line;
     line.number = number;
     line.command = left.substr(0, left.find(' '));
     left.remove_prefix(std::min(line.command.size() + 1, left.size()));

@@ -13,7 +13,7 @@ namespace lamina::replay::frame {
 
 inline Error wrong(std::string what) { return {Fault::kVerification, std::move(what)}; }
 
-struct Line {
+struct ProgramLine {
   std::size_t number = 0;  // from 1
   std::string command;
   std::map<char, double> word;
@@ -25,7 +25,7 @@ struct Line {
 
 /// Without comments and empty lines; only G, M and T commands have words, and M117 has text.
 /// errors  kVerification, with the line: a word that is no letter and number, an end within a line
-Result<std::vector<Line>> lines_of(std::string_view text);
+Result<std::vector<ProgramLine>> lines_of(std::string_view text);
 
 /// Whether a word is one of those that blanks part.
 bool has_word(std::string_view words, std::string_view word);

@@ -38,8 +38,8 @@ bool base64(std::string_view text) {
 }
 
 void put(Burst& burst, std::uint32_t nozzle) {
-  const std::uint32_t place = kCartridgeNozzles - 1 - nozzle;
-  burst[place / 64] |= std::uint64_t{1} << (63 - place % 64);
+  const std::uint32_t location = kCartridgeNozzles - 1 - nozzle;
+  burst[location / 64] |= std::uint64_t{1} << (63 - location % 64);
 }
 
 // Buffer.cpp: the overlays. Nozzles of odd primitives are the odd ones (NewNozzleTable.ino), side 0 of the buffer. Place 0 of
@@ -59,27 +59,29 @@ bool nothing(const Burst& burst) {
   return std::ranges::all_of(burst, [](std::uint64_t word) { return word == 0; });
 }
 
+Error wrong(std::string what) { return {Fault::kVerification, std::move(what)}; }
+
 }  // namespace
 
 Controller::Controller(double at_um) : burst_(kBufferSize), position_(kBufferSize), at_um_(at_um), zero_um_(at_um) {}
 
-std::string Controller::execute(std::string_view command, std::string_view rest) {
-  if (command.size() + 1 + rest.size() + 1 > kLongestLine) return "the line is longer than the controller's block";
+Status Controller::execute(std::string_view command, std::string_view rest) {
+  if (command.size() + 1 + rest.size() + 1 > kLongestLine) return wrong("the line is longer than the controller's block");
   const std::size_t blank = rest.find(' ');
   std::string_view small = rest.substr(0, blank);
   const std::string_view raw = blank == std::string_view::npos ? std::string_view() : rest.substr(blank + 1);
   const bool negative = small.starts_with('-');
   if (negative) small.remove_prefix(1);
-  if (!base64(small) || !base64(raw)) return "the controller drops the line: a character is not of base 64";
-  if (small.size() > kLongestNumber) return "a number that the controller cannot hold";
-  if (raw.size() > kRawCharacters) return "more characters than the controller holds";
+  if (!base64(small) || !base64(raw)) return wrong("the controller drops the line: a character is not of base 64");
+  if (small.size() > kLongestNumber) return wrong("a number that the controller cannot hold");
+  if (raw.size() > kRawCharacters) return wrong("more characters than the controller holds");
   std::int32_t value = 0;
   for (const char c : small) value = value * 64 + digit_of(c);
   if (negative) value = -value;
-  tell(command);
+  report(command);
   if (command == "SBR") return add(value, raw);
   if (command == "BCL") {  // BufferClear
-    if (unread() > 0) return fmt::format("{} lines that the head has not come to are cleared", unread());
+    if (unread() > 0) return wrong(fmt::format("{} lines that the head has not come to are cleared", unread()));
     clear_buffer();
     first_ = {true, true};
     update();
@@ -94,44 +96,44 @@ std::string Controller::execute(std::string_view command, std::string_view rest)
   return set(command, value);
 }
 
-void Controller::tell(std::string_view command) {
+void Controller::report(std::string_view command) {
   const auto setting = std::ranges::find(kSettings, command == "SDPI" ? "SDP" : command);
-  if (setting != std::end(kSettings)) told_ |= 1u << (setting - std::begin(kSettings));
+  if (setting != std::end(kSettings)) reports_ |= 1u << (setting - std::begin(kSettings));
 }
 
 std::string_view Controller::unset() const {
-  const auto first = static_cast<std::size_t>(std::countr_one(told_));
+  const auto first = static_cast<std::size_t>(std::countr_one(reports_));
   return first < std::size(kSettings) ? kSettings[first] : std::string_view();
 }
 
-std::string Controller::set(std::string_view command, std::int32_t value) {
+Status Controller::set(std::string_view command, std::int32_t value) {
   if (command == "SEP") {
     set_encoder(value);
   } else if (command == "SER") {
-    if (value < 1 || value > 25'400) return "an encoder of 1 to 25400 counts an inch";
+    if (value < 1 || value > 25'400) return wrong("an encoder of 1 to 25400 counts an inch");
     counts_per_inch_ = value;
     zeroed_ = false;
     raw_zero_ = raw_;
     zero_um_ = at_um_;
   } else if (command == "SDP" || command == "SDPI") {  // DMAPrint::SetDPI
-    if (value < 1 || value > kFullDpi) return "SDP has the nozzles an inch, 1 to 600";
+    if (value < 1 || value > kFullDpi) return wrong("SDP has the nozzles an inch, 1 to 600");
     repeat_ = kFullDpi / value;
   } else if (command == "SDN") {
     density_ = value;
   } else if (command == "SSID") {  // Buffer::SetPrintMode
-    if (value < 0 || value > 2) return "SSID has the rows that fire, A to C";
+    if (value < 0 || value > 2) return wrong("SSID has the rows that fire, A to C");
     print_mode_ = value;
   } else if (command == "BMOD") {
-    if (value != 0) return "BMOD has to be A: lines are read once";
+    if (value != 0) return wrong("BMOD has to be A: lines are read once");
   } else if (command != "SPME" && command != "BRL") {
-    return fmt::format("'{}' is no command of the dialect", command);
+    return wrong(fmt::format("'{}' is no command of the dialect", command));
   }
   return {};
 }
 
 // DMAPrint::ConvertB6RawToBurst, from the last character on, and Buffer::Add.
-std::string Controller::add(std::int32_t position, std::string_view raw) {
-  if (write_left() <= 0) return fmt::format("the controller's buffer is full with {} lines: this one is lost", unread());
+Status Controller::add(std::int32_t position, std::string_view raw) {
+  if (write_left() <= 0) return wrong(fmt::format("the controller's buffer is full with {} lines: this one is lost", unread()));
   Burst burst{};
   std::uint32_t nozzle = 0;
   for (std::size_t character = raw.size(); character-- > 0;) {
@@ -229,8 +231,8 @@ bool Controller::update_side(std::uint32_t s) {
       first_[s] = false;
     }
     required_[s] = ahead - target_[s] >= 0 ? 1 : -1;
-    least_[s] = std::min(ahead, target_[s]);
-    most_[s] = std::max(ahead, target_[s]);
+    min_[s] = std::min(ahead, target_[s]);
+    max_[s] = std::max(ahead, target_[s]);
     target_[s] = ahead;
     next_state_[s] = false;
     changed = true;
@@ -243,7 +245,7 @@ bool Controller::update_side(std::uint32_t s) {
 void Controller::update_burst() {
   bool changed = false;
   for (std::uint32_t s = 0; s < 2; ++s) {
-    const bool on = required_[s] == direction_ && current_[s] > least_[s] && current_[s] < most_[s] && measures_ > 0;
+    const bool on = required_[s] == direction_ && current_[s] > min_[s] && current_[s] < max_[s] && measures_ > 0;
     changed |= on != active_[s];
     active_[s] = on;  // Buffer::SetActive
   }

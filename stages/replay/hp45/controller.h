@@ -9,9 +9,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <string>
 #include <string_view>
 #include <vector>
+
+#include "stages/data/status.h"
 
 namespace lamina::replay::hp45 {
 
@@ -28,8 +29,8 @@ class Controller {
 
   /// Carries out a line, as SerialCommand::Update and SerialExecute do, with the head at rest.
   /// command  letters before the first blank; rest: what follows it
-  /// returns  empty, or why the controller drops the line, does something else or is beyond its limits
-  std::string execute(std::string_view command, std::string_view rest);
+  /// errors  kVerification: the controller drops the line, does something else or is beyond its limits
+  Status execute(std::string_view command, std::string_view rest);
 
   /// What one row of nozzles fires on a way; the rows' positions are true ones along the scan.
   struct Firing {
@@ -62,10 +63,10 @@ class Controller {
 
  private:
   double count_um() const { return 25'400.0 / counts_per_inch_; }
-  std::string set(std::string_view command, std::int32_t value);
-  std::string add(std::int32_t position, std::string_view raw);
+  Status set(std::string_view command, std::int32_t value);
+  Status add(std::int32_t position, std::string_view raw);
   void set_encoder(std::int32_t position_um);
-  void tell(std::string_view command);
+  void report(std::string_view command);
   void update_position();
   void clear_buffer();
   std::int32_t read_left(std::uint32_t side) const;
@@ -87,7 +88,7 @@ class Controller {
   std::array<bool, 2> active_{false, false};
   std::int32_t print_mode_ = 0;
   // HP45_Standalone_V4.ino
-  std::array<std::int32_t, 2> current_{0, 0}, target_{0, 0}, least_{0, 0}, most_{0, 0};
+  std::array<std::int32_t, 2> current_{0, 0}, target_{0, 0}, min_{0, 0}, max_{0, 0};
   std::array<int, 2> required_{0, 0};
   std::array<bool, 2> next_state_{false, false}, first_{true, true};
   std::array<Burst, 2> now_{};  // CurrentBurst, each row's share
@@ -96,7 +97,7 @@ class Controller {
   std::int32_t counts_per_inch_ = 600, raw_ = 0, base_um_ = 0, history_um_ = 0;
   std::uint32_t pulses_ = 0, measures_ = 0;  // since the last measure of speed; measures since the head rested
   int direction_ = 0;
-  std::uint32_t told_ = 0;  // a bit for each command of kSettings
+  std::uint32_t reports_ = 0;  // a bit for each command of kSettings
   // the head
   bool zeroed_ = false;
   double at_um_ = 0, zero_um_ = 0;

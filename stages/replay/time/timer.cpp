@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "stages/replay/bytes.h"
-#include "stages/replay/care/records.h"
+#include "stages/replay/maintenance_records.h"
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {
@@ -54,23 +54,23 @@ void Timer::sweep(double across_mm, bool backward, std::int64_t first, std::int6
   sweeps_.push_back({across_mm, backward, added, first, last, drops, text_.size()});
 }
 
-void Timer::care(std::span<const std::byte> records) {
+void Timer::maintenance(std::span<const std::byte> records) {
   text_.append(reinterpret_cast<const char*>(records.data()), records.size());
 }
 
 Result<Count> Timer::pass(bool all) const {
   Printing printing(*machine_, layer_, Purpose::kTime);
   Passes passes(printing);
-  std::size_t care = 0;
-  const auto care_until = [&](std::size_t end) {
-    ByteReader reader(std::string_view(text_).substr(care, end - care), printing);
-    take_care_records(reader, printing, passes);
+  std::size_t maintenance = 0;
+  const auto maintenance_until = [&](std::size_t end) {
+    ByteReader reader(std::string_view(text_).substr(maintenance, end - maintenance), printing);
+    take_maintenance_records(reader, printing, passes);
     if (!reader.done()) reader.fault("is no record of care");
-    care = end;
+    maintenance = end;
   };
   bool backward = false;
-  for (const Sweep& sweep : sweeps_) {
-    care_until(sweep.care);
+  for (const TimedSweep& sweep : sweeps_) {
+    maintenance_until(sweep.maintenance);
     if (!all && sweep.added) continue;
     // Without the added ones directions alternate anew.
     const bool turned = !all && machine_->profile().motion.both_directions && sweep.backward != backward;
@@ -79,7 +79,7 @@ Result<Count> Timer::pass(bool all) const {
     passes.at(turned ? sweep.first : sweep.last, sweep.drops);
     backward = !backward;
   }
-  care_until(text_.size());
+  maintenance_until(text_.size());
   passes.end();
   if (Status status = printing.status(); !status) return Error{Fault::kInternal, status.error().message};
   return printing.finish();
@@ -95,7 +95,7 @@ Result<Count> Timer::end() {
                                                taken.error().message)};
   }
   const Result<Count> whole = pass(true);
-  if (!whole || std::ranges::none_of(sweeps_, &Sweep::added)) return whole;
+  if (!whole || std::ranges::none_of(sweeps_, &TimedSweep::added)) return whole;
   const Result<Count> without = pass(false);
   if (!without) return without;
   added_microseconds_ = whole->microseconds - without->microseconds;

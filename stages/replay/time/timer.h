@@ -34,27 +34,27 @@ class Timer {
   void sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last, bool added = false,
              std::uint32_t drops = 1);
   /// The same: records of care, before the next sweep and behind the last one.
-  void care(std::span<const std::byte> records);
+  void maintenance(std::span<const std::byte> records);
   /// The layer's time, and its care. errors  kInternal: the machine's reader does not take the program
   Result<Count> end();
   /// How much of it is that of added sweeps; the others are as they would be without them. After end().
   std::int64_t added_microseconds() const { return added_microseconds_; }
 
-  std::uint64_t bytes() const { return text_.capacity() + sweeps_.capacity() * sizeof(Sweep); }
+  std::uint64_t bytes() const { return text_.capacity() + sweeps_.capacity() * sizeof(TimedSweep); }
 
  private:
-  struct Sweep {
+  struct TimedSweep {
     double across_mm;
     bool backward, added;
     std::int64_t first, last;
     std::uint32_t drops;
-    std::size_t care;  // bytes of text_ that come before it
+    std::size_t maintenance;  // bytes of text_ that come before it
   };
   Result<Count> pass(bool all) const;
   const VirtualMachine* machine_;
   Layer layer_{};
   std::string text_;  // of dialects with motion; of others their records of care
-  std::vector<Sweep> sweeps_;
+  std::vector<TimedSweep> sweeps_;
   std::int64_t added_microseconds_ = 0;
 };
 

@@ -11,9 +11,9 @@ namespace {
 
 constexpr double kThinSpeed = 200;  // %: that of repeated stretches
 constexpr double kReached = 0.77;   // of a speed; a stretch that reaches less than 0.75 is warned of
-constexpr double kLeastPoreLength = 0.3, kLeastPore = 0.03;
+constexpr double kMinPoreLength = 0.3, kMinPore = 0.03;
 constexpr Interval kThick{1.0, 2.4}, kGap{-0.02, 0.0195};
-constexpr double kLeastThin = 1.0;
+constexpr double kMinThin = 1.0;
 // Di Nisio 2022, Tables 7 and 8: lengths, and what the spacings leave between the widths of Tables 13 to 15.
 constexpr Interval kMeasuredThick{1.5, 1.5}, kMeasuredThin{1.5, 2.0}, kMeasuredGap{0, 0.01};
 
@@ -37,31 +37,31 @@ Result<DesignLimits> DesignLimits::of(const Extruder& machine, const Calibration
                                      material.shape() == BeadShape::kEllipse ? BeadShape::kEllipse : BeadShape::kStadium);
   limits.speed_mm_s_ = calibration.speed_mm_s;
   limits.acceleration_ = machine.speed.acceleration_mm_s2;
-  limits.most_thin_ = calibration.by_speed.empty() ? 2.0 : stable_distance(calibration, kThinSpeed).value / 2;
-  for (const double extrusion : {limits.extrusion_.least, limits.extrusion_.most}) {
-    const Choice least = limits.nearest({1, extrusion, kThick.least, 0, 0});
-    if (least.thin_mm > limits.most_thin_)
+  limits.max_thin_ = calibration.by_speed.empty() ? 2.0 : stable_distance(calibration, kThinSpeed).value / 2;
+  for (const double extrusion : {limits.extrusion_.minimum, limits.extrusion_.maximum}) {
+    const Choice minimum = limits.nearest({1, extrusion, kThick.minimum, 0, 0});
+    if (minimum.thin_mm > limits.max_thin_)
       return Error{Fault::kUsage, "it accelerates too slowly: thin stretches end before they have reached their speed"};
   }
   return limits;
 }
 
 Choice DesignLimits::nearest(Choice choice) const {
-  choice.continuous = std::clamp<std::uint32_t>(choice.continuous, 1, kMostContinuous);
+  choice.continuous = std::clamp<std::uint32_t>(choice.continuous, 1, kMaxContinuous);
   choice.extrusion = extrusion_.near(choice.extrusion);
   const RepeatedReading widths = repeated_at(*calibration_, choice.extrusion);
   // From the thick speed up and down again: v^2 = v0^2 + a s.
   const double fast = kReached * kThinSpeed / 100 * speed_mm_s_, slow = widths.thick_speed_percent / 100 * speed_mm_s_;
   const double starts = acceleration_ > 0 ? (fast * fast - slow * slow) / acceleration_ : 0;
-  const double least_thin = std::max({kLeastThin, starts, widths.thick_mm + kLeastPoreLength});
-  choice.thin_mm = std::max(std::min(choice.thin_mm, most_thin_), least_thin);
+  const double min_thin = std::max({kMinThin, starts, widths.thick_mm + kMinPoreLength});
+  choice.thin_mm = std::max(std::min(choice.thin_mm, max_thin_), min_thin);
   choice.thick_mm = kThick.near(choice.thick_mm);
-  choice.gap_mm = kGap.near(std::max(choice.gap_mm, kLeastPore - (widths.thick_mm - widths.thin_mm) / 2));
+  choice.gap_mm = kGap.near(std::max(choice.gap_mm, kMinPore - (widths.thick_mm - widths.thin_mm) / 2));
   return choice;
 }
 
-Settings DesignLimits::settings_of(const Choice& choice) const {
-  Settings settings;
+SegmentSettings DesignLimits::settings_of(const Choice& choice) const {
+  SegmentSettings settings;
   settings.on = true;
   settings.continuous = choice.continuous;
   settings.thick_extrusion = rounded(choice.extrusion, 10);
@@ -78,11 +78,11 @@ Settings DesignLimits::settings_of(const Choice& choice) const {
 
 Result<Segmentation> DesignLimits::plan_of(const Choice& choice) const { return plan_of(settings_of(choice)); }
 
-Result<Segmentation> DesignLimits::plan_of(const Settings& settings) const {
+Result<Segmentation> DesignLimits::plan_of(const SegmentSettings& settings) const {
   return resolve(settings, *calibration_, calibration_->width_mm);
 }
 
-Segmentation DesignLimits::laid(Segmentation plan) const {
+Segmentation DesignLimits::deposited(Segmentation plan) const {
   plan.continuous_width_mm = continuous_mm_;
   return plan;
 }

@@ -21,8 +21,8 @@ struct Choice {
 };
 
 struct Interval {
-  double least = 0, most = 0;
-  double near(double value) const { return value < least ? least : value > most ? most : value; }
+  double minimum = 0, maximum = 0;
+  double near(double value) const { return value < minimum ? minimum : value > maximum ? maximum : value; }
 };
 
 /// Bounds of choices for a machine.
@@ -33,7 +33,7 @@ class DesignLimits {
   static Result<DesignLimits> of(const Extruder& machine, const Calibration& calibration);
 
   /// Lines between two segmented ones: those of Di Nisio 2022, Table 8.
-  static constexpr std::uint32_t kMostContinuous = 3;
+  static constexpr std::uint32_t kMaxContinuous = 3;
 
   Interval extrusion() const { return extrusion_; }
   /// The nearest choice that can be laid. Thin stretches are long enough for the machine to come to three quarters of their
@@ -43,14 +43,14 @@ class DesignLimits {
   Choice nearest(Choice choice) const;
 
   /// The key's values, as they are written: lengths to a micrometre, spacings to 0.1 um, percent to 0.1.
-  Settings settings_of(const Choice& choice) const;
+  SegmentSettings settings_of(const Choice& choice) const;
   /// The plan with the widths that the machine's beads will have. errors  of resolve()
   Result<Segmentation> plan_of(const Choice& choice) const;
-  Result<Segmentation> plan_of(const Settings& settings) const;
+  Result<Segmentation> plan_of(const SegmentSettings& settings) const;
 
   /// The plan with the widths that toolpaths are written with: that of continuous lines is of what 100 % lays, not what was
   /// measured. A better model of beads has its place here.
-  Segmentation laid(Segmentation plan) const;
+  Segmentation deposited(Segmentation plan) const;
 
   /// How far a choice is from what was measured, 0 where it was: extrusion, thick, thin, gap; 1 is far.
   std::array<double, 4> beyond(const Choice& choice) const;
@@ -60,7 +60,7 @@ class DesignLimits {
  private:
   const Calibration* calibration_ = nullptr;
   Interval extrusion_;
-  double speed_mm_s_ = 0, acceleration_ = 0, most_thin_ = 0, continuous_mm_ = 0;
+  double speed_mm_s_ = 0, acceleration_ = 0, max_thin_ = 0, continuous_mm_ = 0;
 };
 
 }  // namespace lamina::segment

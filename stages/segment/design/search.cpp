@@ -1,19 +1,20 @@
 #include "stages/segment/design/search.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+
+#include "stages/geometry/least_squares.h"
 
 namespace lamina::segment {
 namespace {
 
-constexpr int kFree = 4, kResiduals = 8;  // four of wishes, four of the way to what was measured
-constexpr double kExact = 1e-3;           // a wish that is missed by so much weighs as much as a length that is far off
-constexpr double kMet = 5e-3;             // of wishes; less than what rounding the keys does
+constexpr std::size_t kFree = 4, kResiduals = 8;  // four of wishes, four of the way to what was measured
+constexpr double kExact = 1e-3;                   // a wish that is missed by so much weighs as much as a length that is far off
+constexpr double kMet = 5e-3;                     // of wishes; less than what rounding the keys does
 constexpr int kSteps = 30;
 
-using Residuals = Eigen::Matrix<double, kResiduals, 1>;
-using Free = Eigen::Matrix<double, kFree, 1>;
+using Residuals = std::array<double, kResiduals>;
+using Free = std::array<double, kFree>;
 
 /// Units of what is free, so that 1 is about as far in each.
 constexpr std::array<double, kFree> kUnit{25, 0.5, 0.5, 0.01};
@@ -26,19 +27,26 @@ Choice choice_of(const Free& at, std::uint32_t continuous) {
   return {continuous, at[0] * kUnit[0], at[1] * kUnit[1], at[2] * kUnit[2], at[3] * kUnit[3]};
 }
 
-/// Logarithms of what a plan is, over what is wished; 0 where nothing is.
-std::array<double, 4> misses(const PoreWish& wish, const Slots& slots, const Pores& pores) {
-  const auto miss = [](const std::optional<double>& wished, double is) {
-    return wished ? std::log(std::max(is, 1e-30) / *wished) : 0.0;
-  };
-  return {miss(wish.porosity, slots.porosity), miss(wish.permeability_m2, slots.permeability_m2),
-          miss(wish.pore_width_mm, pores.width_mm), miss(wish.pore_length_mm, pores.length_mm)};
+template <std::size_t N>
+double squares_of(const std::array<double, N>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value * value;
+  return sum;
 }
 
-class Search {
+/// Logarithms of what a plan is, over what is wished; 0 where nothing is.
+std::array<double, 4> misses(const PoreTarget& target, const Slots& slots, const Pores& pores) {
+  const auto miss = [](const std::optional<double>& requested_range, double is) {
+    return requested_range ? std::log(std::max(is, 1e-30) / *requested_range) : 0.0;
+  };
+  return {miss(target.porosity, slots.porosity), miss(target.permeability_m2, slots.permeability_m2),
+          miss(target.pore_width_mm, pores.width_mm), miss(target.pore_length_mm, pores.length_mm)};
+}
+
+class RatioSearch {
  public:
-  Search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, std::span<const RatioAt> known)
-      : wish_(wish), limits_(limits), ratio_(ratio), known_(known), layer_mm_(limits.calibration().height_mm) {}
+  RatioSearch(const PoreTarget& target, const DesignLimits& limits, const SlotRatio& ratio, std::span<const RatioAt> known)
+      : target_(target), limits_(limits), ratio_(ratio), known_(known), layer_mm_(limits.calibration().height_mm) {}
 
   SlotRatio ratio_at(const Choice& choice) const {
     const Free here = free_of(choice);
@@ -46,7 +54,9 @@ class Search {
            permeability = kFarWeight * std::log(ratio_.permeability);
     for (const RatioAt& at : known_) {
       const double lines = static_cast<double>(choice.continuous) - at.choice.continuous;
-      const double weight = 1 / ((free_of(at.choice) - here).squaredNorm() + lines * lines + kSamePlan);
+      Free way = free_of(at.choice);
+      for (std::size_t i = 0; i < kFree; ++i) way[i] -= here[i];
+      const double weight = 1 / (squares_of(way) + lines * lines + kSamePlan);
       weights += weight;
       porosity += weight * std::log(at.ratio.porosity);
       permeability += weight * std::log(at.ratio.permeability);
@@ -55,7 +65,7 @@ class Search {
   }
 
   Slots corrected(const Segmentation& plan, const SlotRatio& ratio) const {
-    Slots slots = slots_of(limits_.laid(plan), layer_mm_);
+    Slots slots = slots_of(limits_.deposited(plan), layer_mm_);
     slots.porosity *= ratio.porosity;
     slots.permeability_m2 *= ratio.permeability;
     return slots;
@@ -69,8 +79,8 @@ class Search {
     Residuals here = residuals(best);
     double damping = 1e-2;
     for (int step = 0; step < kSteps && damping < 1e8; ++step) {
-      Eigen::Matrix<double, kResiduals, kFree> slope;
-      for (int i = 0; i < kFree; ++i) {
+      std::array<Free, kResiduals> slope{};
+      for (std::size_t i = 0; i < kFree; ++i) {
         // Away from a bound that lies ahead.
         Free aside = at;
         aside[i] += kAside;
@@ -80,16 +90,21 @@ class Search {
           moved = limits_.nearest(choice_of(aside, lines));
         }
         const double way = free_of(moved)[i] - at[i];
-        slope.col(i) = std::abs(way) < kAside / 2 ? Residuals::Zero().eval() : ((residuals(moved) - here) / way).eval();
+        if (std::abs(way) < kAside / 2) continue;
+        const Residuals there = residuals(moved);
+        for (std::size_t k = 0; k < kResiduals; ++k) slope[k][i] = (there[k] - here[k]) / way;
       }
-      const Eigen::Matrix<double, kFree, kFree> square = slope.transpose() * slope;
-      const Free pull = slope.transpose() * here;
+      LeastSquares linear(kFree);
+      for (std::size_t k = 0; k < kResiduals; ++k) linear.add(slope[k], -here[k]);
       for (; damping < 1e8; damping *= 6) {
-        Eigen::Matrix<double, kFree, kFree> damped = square;
-        damped.diagonal() += damping * (square.diagonal() + Free::Constant(1e-6));
-        const Choice tried = limits_.nearest(choice_of(at - damped.ldlt().solve(pull), lines));
+        LeastSquares damped = linear;
+        damped.damp(damping, damping * 1e-6);
+        Free change{};
+        if (!damped.solve(change)) continue;
+        for (std::size_t i = 0; i < kFree; ++i) change[i] += at[i];
+        const Choice tried = limits_.nearest(choice_of(change, lines));
         const Residuals there = residuals(tried);
-        if (there.squaredNorm() >= here.squaredNorm() * (1 - 1e-9)) continue;
+        if (squares_of(there) >= squares_of(here) * (1 - 1e-9)) continue;
         best = tried;
         at = free_of(tried);
         here = there;
@@ -108,7 +123,7 @@ class Search {
     design.ratio = ratio_at(choice);
     design.slots = corrected(design.plan, design.ratio);
     design.pores = predict_pores(design.plan);
-    design.miss = miss_of(wish_, design.slots, design.pores);
+    design.miss = miss_of(target_, design.slots, design.pores);
     for (const double part : limits_.beyond(choice)) design.beyond += part * part;
     design.beyond = std::sqrt(design.beyond);
     return design;
@@ -120,7 +135,7 @@ class Search {
 
   /// Not rounded to what is written.
   Residuals residuals(const Choice& choice) const {
-    Settings settings = limits_.settings_of(choice);
+    SegmentSettings settings = limits_.settings_of(choice);
     settings.thick_extrusion = choice.extrusion;
     settings.thick_mm = choice.thick_mm;
     settings.thin_mm = choice.thin_mm;
@@ -128,18 +143,19 @@ class Search {
     settings.spacing_sc_mm = spacing_for(widths.thick_mm, widths.continuous_mm, choice.gap_mm).segmented;
     settings.spacing_cc_mm = widths.continuous_mm;
     const Result<Segmentation> plan = limits_.plan_of(settings);
-    if (!plan) return Residuals::Constant(1e6);
     Residuals all;
-    const auto wished = misses(wish_, corrected(*plan, ratio_at(choice)), predict_pores(*plan));
+    all.fill(1e6);
+    if (!plan) return all;
+    const auto requested_range = misses(target_, corrected(*plan, ratio_at(choice)), predict_pores(*plan));
     const auto beyond = limits_.beyond(choice);
-    for (int i = 0; i < 4; ++i) {
-      all[i] = wished[static_cast<std::size_t>(i)] / kExact;
-      all[4 + i] = beyond[static_cast<std::size_t>(i)];
+    for (std::size_t i = 0; i < 4; ++i) {
+      all[i] = requested_range[i] / kExact;
+      all[4 + i] = beyond[i];
     }
     return all;
   }
 
-  const PoreWish& wish_;
+  const PoreTarget& target_;
   const DesignLimits& limits_;
   SlotRatio ratio_;
   std::span<const RatioAt> known_;
@@ -154,21 +170,21 @@ bool better(const Design& one, const Design& other) {
 
 }  // namespace
 
-double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores) {
+double miss_of(const PoreTarget& target, const Slots& slots, const Pores& pores) {
   double worst = 0;
-  for (const double miss : misses(wish, slots, pores)) worst = std::max(worst, std::abs(std::expm1(miss)));
+  for (const double miss : misses(target, slots, pores)) worst = std::max(worst, std::abs(std::expm1(miss)));
   return worst;
 }
 
-Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds,
+Design search(const PoreTarget& target, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds,
               std::span<const RatioAt> known) {
-  const Search finder(wish, limits, ratio, known);
+  const RatioSearch finder(target, limits, ratio, known);
   const Interval extrusion = limits.extrusion();
   std::optional<Design> best;
-  for (std::uint32_t lines = bounds.least; lines <= bounds.most; ++lines) {
+  for (std::uint32_t lines = bounds.minimum; lines <= bounds.maximum; ++lines) {
     for (const double share : {0.5, 0.0, 1.0}) {
       for (const double thick : {1.5, 1.1, 2.2}) {
-        const double percent = extrusion.least + share * (extrusion.most - extrusion.least);
+        const double percent = extrusion.minimum + share * (extrusion.maximum - extrusion.minimum);
         const Design design = finder.design_of(finder.descend({lines, percent, thick, 1.6, 0.005}));
         if (!best || better(design, *best)) best = design;
       }

@@ -11,7 +11,7 @@
 namespace lamina::segment {
 
 /// What is wished for: one or two of these. A pore is that of predict_pores().
-struct PoreWish {
+struct PoreTarget {
   std::optional<double> porosity;         // 0 .. 1, all void
   std::optional<double> permeability_m2;  // along z
   std::optional<double> pore_width_mm, pore_length_mm;
@@ -30,12 +30,12 @@ struct RatioAt {
 
 /// How many continuous lines may lie between two segmented ones.
 struct LineBounds {
-  std::uint32_t least = 1, most = DesignLimits::kMostContinuous;
+  std::uint32_t minimum = 1, maximum = DesignLimits::kMaxContinuous;
 };
 
 struct Design {
   Choice choice;
-  Settings settings;  // its keys
+  SegmentSettings settings;  // its keys
   Segmentation plan;
   Slots slots;  // with the ratios
   SlotRatio ratio;
@@ -45,7 +45,7 @@ struct Design {
 };
 
 /// The largest relative miss of what a plan is.
-double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores);
+double miss_of(const PoreTarget& target, const Slots& slots, const Pores& pores);
 
 /// Of all choices within the limits that meet the wish the one nearest to what was measured; where none does, the one that
 /// misses it least (sum of squared logarithms). Nothing is random: least squares (Levenberg and Marquardt, within bounds)
@@ -56,7 +56,7 @@ double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores);
 ///         ACM National Conference, 1968)
 /// source  K. Levenberg, "A method for the solution of certain non-linear problems in least squares", Q. Appl. Math. 2 (1944)
 /// cost    some 10,000 calls of slots_of(), a fifth of a second
-Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds = {},
+Design search(const PoreTarget& target, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds = {},
               std::span<const RatioAt> known = {});
 
 }  // namespace lamina::segment

@@ -7,8 +7,8 @@
 namespace lamina::segment {
 namespace {
 
-constexpr std::size_t kHeights = 32;  // of the upper half of a layer
-constexpr std::size_t kPlaces = 48;   // of half a thin stretch
+constexpr std::size_t kHeights = 32;    // of the upper half of a layer
+constexpr std::size_t kPositions = 48;  // of half a thin stretch
 
 /// Half of a bead's width at a height above the middle of its layer, mm.
 double half_width(double width, double layer, double above) {
@@ -20,13 +20,13 @@ double half_width(double width, double layer, double above) {
 /// A gap that changes with the height.
 struct Channel {
   double area = 0, resistance = 0;  // sums of gap and of 12 / gap^3
-  double least = 1e9;
+  double minimum = 1e9;
 
   void add(double gap) {
     gap = std::max(gap, 0.0);
     area += gap;
     resistance += 12 / (gap * gap * gap);  // infinite where it is closed
-    least = std::min(least, gap);
+    minimum = std::min(minimum, gap);
   }
   double mean_gap() const { return area / kHeights; }
   double conductance() const { return kHeights / resistance; }  // mm3: flow of a mm along the line
@@ -35,13 +35,13 @@ struct Channel {
 }  // namespace
 
 Slots slots_of(const Segmentation& plan, double layer_mm) {
-  std::array<double, kHeights> thick{}, thin{}, room{}, lines{};
+  std::array<double, kHeights> thick{}, thin{}, available{}, lines{};
   for (std::size_t k = 0; k < kHeights; ++k) {
     const double above = layer_mm / 2 * (static_cast<double>(k) + 0.5) / kHeights;
     const double continuous = half_width(plan.continuous_width_mm, layer_mm, above);
     thick[k] = half_width(plan.thick_width_mm, layer_mm, above);
     thin[k] = half_width(plan.thin_width_mm, layer_mm, above);
-    room[k] = plan.spacing_sc_mm - continuous;
+    available[k] = plan.spacing_sc_mm - continuous;
     lines[k] = plan.spacing_cc_mm - 2 * continuous;
   }
   double area = 0, flow = 0;  // mm2 and mm4 of one period's section
@@ -49,17 +49,17 @@ Slots slots_of(const Segmentation& plan, double layer_mm) {
   const auto add = [&](const Channel& channel, double length) {
     area += channel.mean_gap() * length;
     flow += channel.conductance() * length;
-    slots.throat_mm = std::max(slots.throat_mm, channel.least);
+    slots.throat_mm = std::max(slots.throat_mm, channel.minimum);
   };
-  Channel beside_thick;
-  for (std::size_t k = 0; k < kHeights; ++k) beside_thick.add(room[k] - thick[k]);
-  add(beside_thick, 2 * plan.thick_mm);
-  for (std::size_t i = 0; i < kPlaces; ++i) {
-    const double step = plan.thin_mm / 2 / kPlaces, from_end = step * (static_cast<double>(i) + 0.5);
+  Channel next_to_thick;
+  for (std::size_t k = 0; k < kHeights; ++k) next_to_thick.add(available[k] - thick[k]);
+  add(next_to_thick, 2 * plan.thick_mm);
+  for (std::size_t i = 0; i < kPositions; ++i) {
+    const double step = plan.thin_mm / 2 / kPositions, from_end = step * (static_cast<double>(i) + 0.5);
     Channel pore;
     for (std::size_t k = 0; k < kHeights; ++k) {
       const double cap = thick[k] > from_end ? std::sqrt(thick[k] * thick[k] - from_end * from_end) : 0;
-      pore.add(room[k] - std::max(thin[k], cap));
+      pore.add(available[k] - std::max(thin[k], cap));
     }
     add(pore, 4 * step);
   }

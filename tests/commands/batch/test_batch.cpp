@@ -90,8 +90,8 @@ TEST_F(JobsInBatch, ASavedJobIsRunByTheCommandThatSavedIt) {
   EXPECT_EQ(outcome.code, 2) << outcome.err;
   const Json json = summary("out");
   ASSERT_EQ(json["jobs"].size(), 5u);
-  for (const auto& [place, output] : {std::pair{0, "beads.gcode"}, {1, "cuts"}, {2, "images"}, {3, "lines.sml"}}) {
-    const Json& job = json["jobs"][static_cast<std::size_t>(place)];
+  for (const auto& [position, output] : {std::pair{0, "beads.gcode"}, {1, "cuts"}, {2, "images"}, {3, "lines.sml"}}) {
+    const Json& job = json["jobs"][static_cast<std::size_t>(position)];
     EXPECT_EQ(job["outcome"], "done") << job;
     EXPECT_EQ(job["output"], output);
   }
@@ -256,9 +256,9 @@ TEST_F(JobsInBatch, JobsBeginOnlyWhenTheirNeedFitsAndALargerOneRunsAlone) {
   write_text(directory_ / "list.txt", list);
   ASSERT_EQ(lamina({"batch", "list.txt", "-o", "out", "--jobs", "6", "--memory", "120M", "--quiet"}).code, 0);
   const Json json = summary("out");
-  EXPECT_LE(json["most_at_work"], 2);
-  EXPECT_GT(json["most_need_bytes"], 500ull << 20);
-  EXPECT_LT(json["most_need_bytes"], 530ull << 20);                  // alone
+  EXPECT_LE(json["max_running"], 2);
+  EXPECT_GT(json["max_need_bytes"], 500ull << 20);
+  EXPECT_LT(json["max_need_bytes"], 530ull << 20);                   // alone
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow memory counts
   EXPECT_LT(json["peak_resident_bytes"], 120ull << 20);
 #endif

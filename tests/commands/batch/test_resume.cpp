@@ -39,11 +39,11 @@ TEST_F(JobsInBatch, KilledFiveTimesItIsResumedToTheSameBytesAndNothingIsDoneTwic
   };
   // Files that are written again, be it with the same bytes, get another number or time.
   using Stamps = std::map<std::string, std::tuple<ino_t, time_t, long>>;
-  const auto stamps = [&](const std::string& place) {
+  const auto stamps = [&](const std::string& position) {
     Stamps found;
-    for (const std::string& file : files_below(directory_ / place)) {
+    for (const std::string& file : files_below(directory_ / position)) {
       struct stat status {};
-      EXPECT_EQ(::stat((directory_ / (place + "/" + file)).c_str(), &status), 0) << file;
+      EXPECT_EQ(::stat((directory_ / (position + "/" + file)).c_str(), &status), 0) << file;
       found[file] = {status.st_ino, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
     }
     return found;
@@ -97,22 +97,22 @@ TEST_F(JobsInBatch, KilledFiveTimesItIsResumedToTheSameBytesAndNothingIsDoneTwic
 /// A file system of its own, so small that it is soon full.
 class SmallDisk {
  public:
-  explicit SmallDisk(const std::string& place) : place_(place) {
-    fs::create_directories(place_);
-    mounted_ = ::mount("tmpfs", place_.c_str(), "tmpfs", 0, "size=192k") == 0;
+  explicit SmallDisk(const std::string& position) : position_(position) {
+    fs::create_directories(position_);
+    mounted_ = ::mount("tmpfs", position_.c_str(), "tmpfs", 0, "size=192k") == 0;
   }
   ~SmallDisk() {
-    if (mounted_) ::umount2(place_.c_str(), MNT_DETACH);
+    if (mounted_) ::umount2(position_.c_str(), MNT_DETACH);
   }
   bool mounted() const { return mounted_; }
-  bool grow() const { return ::mount("tmpfs", place_.c_str(), "tmpfs", MS_REMOUNT, "size=64m") == 0; }
+  bool grow() const { return ::mount("tmpfs", position_.c_str(), "tmpfs", MS_REMOUNT, "size=64m") == 0; }
 
  private:
-  std::string place_;
+  std::string position_;
   bool mounted_;
 };
 
-TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithRoomItGoesOn) {
+TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithSpaceItContinues) {
   const SmallDisk disk(directory_ / "disk");
   if (!disk.mounted()) GTEST_SKIP() << "NOT RUN: a batch on a full disk; mounting a tmpfs needs root";
   write_boxes(3);

@@ -17,7 +17,7 @@ BatchJob job_of(std::uint32_t number, std::uint64_t need_bytes, const std::strin
   BatchJob job;
   job.number = number;
   job.entry.name = "job " + std::to_string(number);
-  job.call.output = job.output = job.place = output;
+  job.call.output = job.output = job.position = output;
   job.call.run = std::move(run);
   job.need_bytes = need_bytes;
   job.id.low = number;
@@ -37,21 +37,22 @@ TEST(BatchQueue, JobsShareThreadsAndMemoryAndEachIsReportedOnce) {
   std::vector<BatchJob> jobs;
   for (std::uint32_t number = 1; number <= 24; ++number) {
     const std::uint64_t bytes = 10 + number % 5 * 10;
-    jobs.push_back(job_of(number, bytes, directory / ("out" + std::to_string(number)),
-                          [&, number, bytes](const CallSettings& settings, const ProgressCallback& progress, const std::atomic<bool>&) {
-                            const std::uint64_t now = need += bytes;
-                            for (std::uint64_t before = highest; before < now && !highest.compare_exchange_weak(before, now);) {
-                            }
-                            for (std::uint32_t layer = 1; layer <= 5; ++layer) {
-                              progress({ProgressEvent::Stage::kLayers, layer, 5});
-                              std::this_thread::sleep_for(std::chrono::milliseconds(1));
-                            }
-                            std::ofstream(settings.output) << number;
-                            need -= bytes;
-                            BatchResult result;
-                            result.code = number % 6 == 0 ? 3 : 0;
-                            return result;
-                          }));
+    jobs.push_back(
+        job_of(number, bytes, directory / ("out" + std::to_string(number)),
+               [&, number, bytes](const CallSettings& settings, const ProgressCallback& progress, const std::atomic<bool>&) {
+                 const std::uint64_t now = need += bytes;
+                 for (std::uint64_t before = highest; before < now && !highest.compare_exchange_weak(before, now);) {
+                 }
+                 for (std::uint32_t layer = 1; layer <= 5; ++layer) {
+                   progress({ProgressEvent::Stage::kLayers, layer, 5});
+                   std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                 }
+                 std::ofstream(settings.output) << number;
+                 need -= bytes;
+                 BatchResult result;
+                 result.code = number % 6 == 0 ? 3 : 0;
+                 return result;
+               }));
   }
   BatchOptions options;
   options.jobs = 4;
@@ -68,9 +69,9 @@ TEST(BatchQueue, JobsShareThreadsAndMemoryAndEachIsReportedOnce) {
   std::sort(reported.begin(), reported.end());
   ASSERT_EQ(reported.size(), 24u);
   for (std::uint32_t number = 1; number <= 24; ++number) EXPECT_EQ(reported[number - 1], number);
-  EXPECT_LE(summary->most_need_bytes, 100u);
+  EXPECT_LE(summary->max_need_bytes, 100u);
   EXPECT_LE(highest.load(), 100u);
-  EXPECT_LE(summary->most_running, 4u);
+  EXPECT_LE(summary->max_running, 4u);
 
   // The second run continues the record: what is done and unchanged is kept, what failed runs again.
   options.resume = true;

@@ -99,7 +99,7 @@ TEST_F(CalibrateProgram, WidthsThatStillChangeAlongThePartAreToBePrintedAgain) {
       << outcome.err;
 }
 
-TEST_F(CalibrateProgram, WrongTablesAreOneLineThatNamesThePlace) {
+TEST_F(CalibrateProgram, WrongTablesAreOneLineThatNamesThePosition) {
   const auto message = [&](const std::string& text, int code = 3) {
     test::write_text(folder / "widths.csv", text);
     const auto outcome = run({"--measured", "widths.csv", "--machine", "anet-a8", "-o", "own.toml", "--quiet"});

@@ -82,12 +82,12 @@ TEST_F(DosesOnRecord, WhereEachPixelGetsADropBothNumbersAreExact) {
   job.dose.saturation_percent = 70;
   make(job);
   EXPECT_EQ(faults(job), "");
-  const std::uint64_t dosed = number(job, "dosed_pixels"), asked = number(job, "asked_drops");
+  const std::uint64_t dosed = number(job, "dosed_pixels"), requested = number(job, "requested_drops");
   for (const std::uint64_t other : {dosed - 1, dosed + 1, 2 * dosed}) {
     expect_found(with(job, {{"dosed_pixels", other}}), fmt::format("the manifest says dosed_pixels {}", other));
   }
-  for (const std::uint64_t other : {asked - 1, asked + 1, std::uint64_t{0}, 2 * asked}) {
-    expect_found(with(job, {{"asked_drops", other}}), fmt::format("the manifest says asked_drops {}", other));
+  for (const std::uint64_t other : {requested - 1, requested + 1, std::uint64_t{0}, 2 * requested}) {
+    expect_found(with(job, {{"requested_drops", other}}), fmt::format("the manifest says requested_drops {}", other));
   }
 }
 
@@ -97,14 +97,16 @@ TEST_F(DosesOnRecord, WhereFewerFallTheyAreBounded) {
   job.dose.saturation_percent = 5;
   make(job);
   EXPECT_EQ(faults(job), "");
-  const std::uint64_t dosed = number(job, "dosed_pixels"), asked = number(job, "asked_drops");
-  expect_found(with(job, {{"asked_drops", asked + 2}}), "the manifest says asked_drops");
-  expect_found(with(job, {{"dosed_pixels", dosed + 5}}), "the manifest says asked_drops");
-  expect_found(with(job, {{"dosed_pixels", dosed / 4}, {"asked_drops", asked / 4}}), "is the least that its images can have");
-  expect_found(with(job, {{"dosed_pixels", 2 * dosed}, {"asked_drops", 2 * asked}}), "is the most that its parts can have");
+  const std::uint64_t dosed = number(job, "dosed_pixels"), requested = number(job, "requested_drops");
+  expect_found(with(job, {{"requested_drops", requested + 2}}), "the manifest says requested_drops");
+  expect_found(with(job, {{"dosed_pixels", dosed + 5}}), "the manifest says requested_drops");
+  expect_found(with(job, {{"dosed_pixels", dosed / 4}, {"requested_drops", requested / 4}}),
+               "is the least that its images can have");
+  expect_found(with(job, {{"dosed_pixels", 2 * dosed}, {"requested_drops", 2 * requested}}),
+               "is the most that its parts can have");
 }
 
-TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirWishes) {
+TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirTargets) {
   Job job = prism("core");
   job.dose.saturation_percent = 70;
   job.dose.core_saturation_percent = 20;
@@ -112,8 +114,8 @@ TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirWishes) {
   make(job);
   EXPECT_EQ(faults(job), "");
   const std::uint64_t dosed = number(job, "dosed_pixels");
-  expect_found(with(job, {{"asked_drops", 6 * dosed}}), "with 1.5");
-  expect_found(with(job, {{"asked_drops", dosed}}), "to 5.2");
+  expect_found(with(job, {{"requested_drops", 6 * dosed}}), "with 1.5");
+  expect_found(with(job, {{"requested_drops", dosed}}), "to 5.2");
   expect_found(with(job, {{"dosed_pixels", dosed + 1}}), "each pixel gets a drop");
 }
 
@@ -137,7 +139,7 @@ TEST_F(DosesOnRecord, OrdinaryJobsHold) {
   make(own);
   EXPECT_EQ(faults(own), "");
   const std::uint64_t dosed = number(own, "dosed_pixels");
-  expect_found(with(own, {{"asked_drops", 2 * dosed}}), "the manifest says asked_drops");
+  expect_found(with(own, {{"requested_drops", 2 * dosed}}), "the manifest says requested_drops");
 
   for (const std::uint32_t levels : {2u, 4u, 16u}) {
     Job drops = prism(fmt::format("drops{}", levels));
@@ -148,7 +150,8 @@ TEST_F(DosesOnRecord, OrdinaryJobsHold) {
     drops.output += "s";
     make(drops);
     EXPECT_EQ(faults(drops), "") << levels;
-    expect_found(with(drops, {{"asked_drops", number(drops, "asked_drops") * 11 / 10}}), "the manifest says asked_drops");
+    expect_found(with(drops, {{"requested_drops", number(drops, "requested_drops") * 11 / 10}}),
+                 "the manifest says requested_drops");
   }
 }
 

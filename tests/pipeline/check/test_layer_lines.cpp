@@ -32,10 +32,10 @@ class LayerLines : public ::testing::Test {
   void expect_found(const std::string& pattern, const std::string& instead, const std::string& what) const {
     const std::string good = read_text(directory_ / "out/manifest.json");
     SCOPED_TRACE(pattern + " to " + instead);
-    expect_told(std::regex_replace(good, std::regex(pattern), instead, std::regex_constants::format_first_only), what);
+    expect_reported(std::regex_replace(good, std::regex(pattern), instead, std::regex_constants::format_first_only), what);
   }
   /// The same of a whole manifest.
-  void expect_told(const std::string& text, const std::string& what) const {
+  void expect_reported(const std::string& text, const std::string& what) const {
     const std::string good = read_text(directory_ / "out/manifest.json");
     EXPECT_NE(text, good);
     write_text(directory_ / "out/manifest.json", text);
@@ -124,24 +124,24 @@ TEST_F(LayerLines, ThicknessesThatTheJobDoesNotHaveAreFound) {
     const std::string good = read_text(directory_ / "out/manifest.json");
     EXPECT_NE(with_exchanged_layers(good), good) << heights;
     for (const std::size_t layer : {0, 3, 10}) {
-      for (const int by : {-1, 1, -7'000, 20'000}) expect_told(with_moved_boundary(good, layer, by), what);
+      for (const int by : {-1, 1, -7'000, 20'000}) expect_reported(with_moved_boundary(good, layer, by), what);
     }
   }
 }
 
 // Which of the job's thicknesses a layer has, programs tell, and images of a job with a title.
-TEST_F(LayerLines, ThicknessesOfOtherLayersAreFoundByWhatTellsThem) {
+TEST_F(LayerLines, ThicknessesOfOtherLayersAreFoundByWhatDistinguishesThem) {
   const std::string part = "jet " + corpus_file("dental_crown.stl") + " --heights optimal --thickness 0.2,0.3,0.4 --format ";
   for (const char* machine : {"nuferbj", "hp45", "oasis", "reprap-inkjet", "brundlefab", "xaar128-raw", "jet1000"}) {
     make(part + "png --machine " + machine);
-    expect_told(with_exchanged_layers(read_text(directory_ / "out/manifest.json")), "program/00");
+    expect_reported(with_exchanged_layers(read_text(directory_ / "out/manifest.json")), "program/00");
   }
   for (const char* format : {"tiff-g4", "tiff-none"}) {
     make(part + format + " --bed 30,30 --dpi 60 --title layer");
-    expect_told(with_exchanged_layers(read_text(directory_ / "out/manifest.json")), "mm, the manifest says layer ");
+    expect_reported(with_exchanged_layers(read_text(directory_ / "out/manifest.json")), "mm, the manifest says layer ");
   }
   make(part + "tiff-8 --levels 4 --bed 30,30 --dpi 60 --title z");
-  expect_told(with_exchanged_layers(read_text(directory_ / "out/manifest.json")), "mm, the manifest says layer ");
+  expect_reported(with_exchanged_layers(read_text(directory_ / "out/manifest.json")), "mm, the manifest says layer ");
   // Nothing else does.
   make(part + "png --bed 30,30 --dpi 60");
   write_text(directory_ / "out/manifest.json", with_exchanged_layers(read_text(directory_ / "out/manifest.json")));
@@ -152,13 +152,13 @@ TEST_F(LayerLines, TimesOfAddedSweepsAreThoseOfThePrograms) {
   const std::string slow =
       "inherits = \"jet1000-grey\"\n[bed]\nsize_mm = [20, 20]\n[head]\nhighest_frequency_hz = 6000\n[machine]\nname = \"slow\"\n";
   const struct {
-    const char *dialect, *motion, *care;
+    const char *dialect, *motion, *maintenance;
   } rows[] = {{"planes", "", ""},
               {"planes", "both_directions = false\n", ""},
               {"raw", "acceleration_mm_s2 = 3000\n", ""},
-              {"raw", "", "[care]\nspit_layers = 1\nspit_seconds = 5\nspit_drops = 20\nspit_mm = [-40, -10]\n"}};
-  for (const auto& [dialect, motion, care] : rows) {
-    write_text(directory_ / "slow.toml", slow + "dialect = \"" + dialect + "\"\n[motion]\n" + motion + care);
+              {"raw", "", "[maintenance]\nspit_layers = 1\nspit_seconds = 5\nspit_drops = 20\nspit_mm = [-40, -10]\n"}};
+  for (const auto& [dialect, motion, maintenance] : rows) {
+    write_text(directory_ / "slow.toml", slow + "dialect = \"" + dialect + "\"\n[motion]\n" + motion + maintenance);
     make("jet a.stl b.stl --machine slow.toml --layer 0.1 --saturation 90");
     const std::string good = read_text(directory_ / "out/manifest.json");
     std::smatch found;

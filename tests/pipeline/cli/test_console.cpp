@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/console.h"
-#include "pipeline/run/summary.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/report/summary.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -47,7 +47,7 @@ TEST(Console, NumbersAreReadable) {
   EXPECT_EQ(readable_seconds(7500), "2 h 05 min");
 }
 
-TEST(Summary, JsonHoldsWhatTheTextTells) {
+TEST(Summary, JsonHoldsWhatTheTextReports) {
   Summary summary;
   summary.output = "a \"b\"";
   summary.layers_total = summary.layers_planned = 1'234'567;
@@ -91,15 +91,15 @@ TEST(Help, EveryCommandTeachesWithExamplesAndNamesEveryOption) {
   EXPECT_NE(bare.err.find("Commands:"), std::string::npos);
 }
 
-TEST(PreviewCommand, HandsAllArgumentsAndTheExitCodeToTheProgramBesideIt) {
+TEST(PreviewCommand, HandsAllArgumentsAndTheExitCodeToTheProgramNextToIt) {
   const Directory directory;
   std::filesystem::copy_file(LAMINA_PROGRAM, directory / "lamina");
   test::write_text(directory / "lamina-preview", "#!/bin/sh\nprintf '%s|' \"$@\"\nexit 7\n");
   std::filesystem::permissions(directory / "lamina-preview", std::filesystem::perms::owner_all);
   const std::string command =
-      "'" + (directory / "lamina") + "' preview out 'a b' --layers 1:2 > '" + (directory / "told") + "'; exit $?";
+      "'" + (directory / "lamina") + "' preview out 'a b' --layers 1:2 > '" + (directory / "stated") + "'; exit $?";
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 7);
-  EXPECT_EQ(test::read_text(directory / "told"), "out|a b|--layers|1:2|");
+  EXPECT_EQ(test::read_text(directory / "stated"), "out|a b|--layers|1:2|");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ void write_ledge(const Directory& directory) {
   write_box(directory / "high.stl", {0, 0, 0}, {6, 10, 3.05f});
 }
 
-TEST(HeightsCommand, TellsTheTableInEveryForm) {
+TEST(HeightsCommand, ReportsTheTableInEveryForm) {
   const Directory directory;
   write_ledge(directory);
   const std::vector<std::string> call = {"heights", "low.stl", "--heights", "optimal", "--thickness", "0.1..0.3", "--quiet"};
@@ -72,7 +72,7 @@ TEST(HeightsCommand, AppendixBIsPrintedWithItsShrinkFactors) {
   EXPECT_EQ(equal, 58u) << outcome.out;
 }
 
-TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreTold) {
+TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreReported) {
   const Directory directory;
   write_box(directory / "box.stl", {0, 0, 0}, {5, 5, 4.892f});  // 19 layers of 0.254 and 66 um
   const auto heights = [&](std::vector<std::string> more) {
@@ -106,7 +106,7 @@ TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreTold) {
 }
 
 // Pictures are drawn by lamina-preview.
-TEST(HeightsCommand, PreviewDrawsThePlotThatSvgHoldsAndLeavesNothingBeside) {
+TEST(HeightsCommand, PreviewDrawsThePlotThatSvgHoldsAndLeavesNothingElse) {
   const Directory directory;
   write_ledge(directory);
   for (const std::string name : {"plot.svg", "plot.png"}) {
@@ -147,7 +147,7 @@ TEST(HeightsCommand, LayersOfOthersAreMeasuredByTheSameRules) {
 
 // A box of 10 x 10 x 3 mm: 30 layers of 0.1 mm or 10 of 0.3 take 2 s each and 100 mm2 / (0.4 mm x 40 mm/s) = 6.25 s, 247.5
 // and 82.5 s together: 66.7 % saved.
-TEST(HeightsCommand, AComparisonTellsTimeAndWhatIsSavedBesideThinLayers) {
+TEST(HeightsCommand, AComparisonReportsTimeAndWhatIsSavedNextToThinLayers) {
   const Directory directory;
   write_box(directory.path() / "box.stl", {0, 0, 0}, {10, 10, 3});
   const std::vector<std::string> call = {"heights", "box.stl", "--thickness", "0.1,0.3", "--compare", "--quiet"};
@@ -189,13 +189,13 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
       {{"high.stl", "--thickness", "0.178,0.254", "--per-part"}, "0.178 and 0.254 mm meet only every 22.606 mm"},
       {{"--heights", "optimal", "--thickness", "0.000002,0.000003", "--scale", "100"}, "heights.thickness"},
   };
-  for (const auto& [options, told] : calls) {
+  for (const auto& [options, reported] : calls) {
     std::vector<std::string> all = {"heights", "low.stl"};
     all.insert(all.end(), options.begin(), options.end());
     const Outcome outcome = run_lamina(all, directory.path());
-    EXPECT_EQ(outcome.code, 2) << told;
+    EXPECT_EQ(outcome.code, 2) << reported;
     EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
-    EXPECT_NE(outcome.err.find(told), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find(reported), std::string::npos) << outcome.err;
   }
   const Outcome plot = run_lamina({"heights", "low.stl", "--plot", "no/o.png"}, directory.path());
   EXPECT_EQ(plot.code, 4);

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -45,7 +45,7 @@ void expect_words(const std::string& text, std::initializer_list<const char*> wo
   for (const char* const word : words) EXPECT_NE(text.find(word), std::string::npos) << word << " is not in\n" << text;
 }
 
-TEST_F(MachineCommands, CheckTellsWhatFollowsFromAProfile) {
+TEST_F(MachineCommands, CheckReportsWhatFollowsFromAProfile) {
   // 137.1 um at 45 degrees: lines of 96.944 um, 262 dpi; 4250 Hz over them 412 mm/s; 98 mm are 1011 pixels, 8 swaths of 128.
   expect_words(lamina("machines --check nuferbj"),
                {"262.006 dpi", "1.000000 pixels a nozzle", "128 lines, 12.409 mm wide", "1011 x 1011 pixels",
@@ -67,7 +67,7 @@ double number_before(const std::string& text, const std::string& word) {
 
 // Beds of 30 x 24 mm, and of 30 mm: each pixel stops the head (reprap-inkjet), second passes for blocked nozzles (oasis, hp45),
 // ink to be fetched (brundlefab), a round bed (nuferbj).
-TEST_F(MachineCommands, CheckTellsTheTimeThatTheProgramOfAFullLayerTakes) {
+TEST_F(MachineCommands, CheckReportsTheTimeThatTheProgramOfAFullLayerTakes) {
   for (const std::string machine : {"reprap-inkjet", "oasis", "hp45", "brundlefab", "nuferbj"}) {
     const bool round = machine == "nuferbj";
     const double width = 30, depth = round ? 30 : 24;
@@ -100,19 +100,20 @@ TEST_F(MachineCommands, CheckTellsTheTimeThatTheProgramOfAFullLayerTakes) {
     fs::remove_all(at("full"));
     lamina("jet " + at("full.stl") + " --machine " + at("m.toml") + " --layer 0.1 -o " + at("full"));
     const std::string replayed = lamina("verify " + at("full") + " --json");
-    const std::string told = lamina("machines --check " + at("m.toml"));
+    const std::string reported = lamina("machines --check " + at("m.toml"));
     const std::size_t seconds = replayed.find("\"seconds\":"), sweeps = replayed.find("\"sweeps\":");
     ASSERT_NE(seconds, std::string::npos) << replayed;
     ASSERT_NE(sweeps, std::string::npos) << replayed;
-    EXPECT_NEAR(number_before(told, " s a full layer of 0.1 mm"), std::strtod(replayed.c_str() + seconds + 10, nullptr), 0.051)
+    EXPECT_NEAR(number_before(reported, " s a full layer of 0.1 mm"), std::strtod(replayed.c_str() + seconds + 10, nullptr),
+                0.051)
         << machine << "\n"
-        << told;
-    EXPECT_EQ(number_before(told, " sweeps of up to"), std::strtod(replayed.c_str() + sweeps + 9, nullptr)) << machine;
+        << reported;
+    EXPECT_EQ(number_before(reported, " sweeps of up to"), std::strtod(replayed.c_str() + sweeps + 9, nullptr)) << machine;
   }
 }
 
 // Twelve full layers, of which shots are due in three, wipes in two, one of them with a shot: what is told of one is a twelfth.
-TEST_F(MachineCommands, CheckAveragesCareThatIsDueEverySoManyLayers) {
+TEST_F(MachineCommands, CheckAveragesMaintenanceThatIsDueEverySoManyLayers) {
   std::ofstream part(at("full.stl"));
   part << "solid full\n";
   constexpr int kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
@@ -127,13 +128,14 @@ TEST_F(MachineCommands, CheckAveragesCareThatIsDueEverySoManyLayers) {
   part << "endsolid full\n";
   part.close();
   for (const std::string machine : {"xaar128-raw", "hp45"}) {
-    std::ofstream(at("m.toml")) << "inherits = \"" << machine << "\"\n[bed]\nsize_mm = [30, 24]\n[care]\nspit_layers = 4\n"
+    std::ofstream(at("m.toml")) << "inherits = \"" << machine
+                                << "\"\n[bed]\nsize_mm = [30, 24]\n[maintenance]\nspit_layers = 4\n"
                                 << "spit_drops = 9000\nspit_mm = [-60, 5]\nwipe_layers = 6\nwipe_mm = [-60, 20, -60, 60]\n"
                                 << "wipe_speed_mm_s = 7\n";
     fs::remove_all(at("full"));
     lamina("jet " + at("full.stl") + " --machine " + at("m.toml") + " --layer 0.1 -o " + at("full"));
     const std::string replayed = lamina("verify " + at("full") + " --json");
-    const std::string told = lamina("machines --check " + at("m.toml"));
+    const std::string reported = lamina("machines --check " + at("m.toml"));
     const auto number = [&](const std::string& key) {
       const std::size_t found = replayed.find("\"" + key + "\":");
       EXPECT_NE(found, std::string::npos) << key << replayed;
@@ -141,9 +143,9 @@ TEST_F(MachineCommands, CheckAveragesCareThatIsDueEverySoManyLayers) {
     };
     EXPECT_EQ(number("spits"), 4) << "three, and one behind a wipe";
     EXPECT_EQ(number("wipes"), 2);
-    EXPECT_NEAR(number_before(told, " s a full layer of 0.1 mm"), number("seconds") / 12, 0.051) << machine << told;
-    EXPECT_NEAR(number_before(told, " drops, averaged over layers"), number("spat_drops") / 12, 0.51) << told;
-    expect_words(told, {"fired off the bed every 4 layers, wiped every 6 layers: "});
+    EXPECT_NEAR(number_before(reported, " s a full layer of 0.1 mm"), number("seconds") / 12, 0.051) << machine << reported;
+    EXPECT_NEAR(number_before(reported, " drops, averaged over layers"), number("spat_drops") / 12, 0.51) << reported;
+    expect_words(reported, {"fired off the bed every 4 layers, wiped every 6 layers: "});
   }
 }
 
@@ -153,7 +155,7 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
     const std::string out = at(machine);
     lamina("jet " + at("f.stl") + " --machine " + machine + " --layer 1 -o " + out);
     lamina("verify " + out);  // what is printed is the image
-    const auto image = read::image(out + "/layers/000000.tif");
+    const auto image = formats::image(out + "/layers/000000.tif");
     ASSERT_TRUE(image.ok());
     const RunsView runs = image->runs;
     const double width = 25.4 / image->dpi_x, depth = 25.4 / image->dpi_y;
@@ -176,7 +178,7 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
     EXPECT_FALSE(set(12, 3)) << machine << ": no arm at the foot";
     EXPECT_FALSE(set(12, 21)) << machine;
     // The step on top is at the foot: the third layer holds nothing else.
-    const auto top = read::image(out + "/layers/000002.tif");
+    const auto top = formats::image(out + "/layers/000002.tif");
     ASSERT_TRUE(top.ok());
     for (std::uint32_t r = 0; r < runs.rows(); ++r) {
       const bool foot = r > back + static_cast<std::uint32_t>(23.5 / depth);
@@ -206,7 +208,7 @@ TEST_F(MachineCommands, PreviewShowsALayerAtAStepOfASwath) {
                {"--layer 99: the job has layers 0 to "});
 }
 
-TEST_F(MachineCommands, WhatAJobCannotTellOrJetIsSaid) {
+TEST_F(MachineCommands, WhatAJobCannotReportOrJetIsSaid) {
   const std::string nut = std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl ";
   expect_words(lamina("jet " + nut + "--machine jet1000 --layer 4 --core 0 --shell 1 -o " + at("shell")), {"layers"});
   expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 --allow-empty -o " + at("thin")),

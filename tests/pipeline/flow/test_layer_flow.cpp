@@ -22,11 +22,11 @@ using pipeline::Ticket;
 
 /// What layers hold at once, as they do it.
 struct Meter {
-  std::atomic<std::int64_t> now{0}, most{0};
+  std::atomic<std::int64_t> now{0}, maximum{0};
   void add(std::int64_t bytes) {
     const std::int64_t sum = now += bytes;
-    std::int64_t before = most;
-    while (before < sum && !most.compare_exchange_weak(before, sum)) {
+    std::int64_t before = maximum;
+    while (before < sum && !maximum.compare_exchange_weak(before, sum)) {
     }
   }
 };
@@ -43,11 +43,11 @@ struct Layers {
   std::vector<std::uint64_t> first, more, real;
 };
 
-Layers random_layers(std::uint32_t count, std::uint64_t most, std::mt19937& random) {
+Layers random_layers(std::uint32_t count, std::uint64_t maximum, std::mt19937& random) {
   Layers layers;
   for (std::uint32_t i = 0; i < count; ++i) {
     layers.first.push_back(random() % 50);
-    layers.more.push_back(random() % most);
+    layers.more.push_back(random() % maximum);
     layers.real.push_back(layers.more.back() == 0 ? 0 : random() % layers.more.back());
   }
   return layers;
@@ -61,8 +61,8 @@ TEST(LayerFlow, LayersInFlightHoldTheBudgetOrItAndOneLayer) {
     const bool from_work = turn % 2 == 0;
     FlowLimits limits;
     limits.budget_bytes = 1000;
-    limits.most_in_flight = 16;
-    Slots slots(limits.most_in_flight);
+    limits.max_in_flight = 16;
+    Slots slots(limits.max_in_flight);
     Meter meter;
     std::vector<std::uint32_t> order;
     LayerSteps steps;
@@ -101,12 +101,12 @@ TEST(LayerFlow, LayersInFlightHoldTheBudgetOrItAndOneLayer) {
     ASSERT_EQ(order.size(), kLayers);
     EXPECT_TRUE(std::ranges::is_sorted(order));
     const std::uint64_t largest = *std::ranges::max_element(layers.more);
-    EXPECT_LE(meter.most, static_cast<std::int64_t>(limits.budget_bytes + largest));
-    EXPECT_LE(report.most_bytes, limits.budget_bytes + largest);
-    EXPECT_GE(report.most_bytes, static_cast<std::uint64_t>(meter.most));
-    EXPECT_GE(report.most_in_flight, turn % 4 != 0 ? 2u : 1u);
-    ASSERT_EQ(report.step_seconds.size(), 3u);
-    EXPECT_EQ(report.step_seconds[2].first, "record");
+    EXPECT_LE(meter.maximum, static_cast<std::int64_t>(limits.budget_bytes + largest));
+    EXPECT_LE(report.max_bytes, limits.budget_bytes + largest);
+    EXPECT_GE(report.max_bytes, static_cast<std::uint64_t>(meter.maximum));
+    EXPECT_GE(report.max_in_flight, turn % 4 != 0 ? 2u : 1u);
+    ASSERT_EQ(report.nodes.size(), 4u);
+    EXPECT_EQ(report.nodes[3].name, "record");
   }
 }
 
@@ -139,7 +139,7 @@ TEST(LayerFlow, TheFirstFailureInOrderIsTheAnswerWhereverItHappens) {
     steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
     FlowReport report;
     FlowLimits limits;
-    limits.most_in_flight = 8;
+    limits.max_in_flight = 8;
     const std::atomic<bool> cancel{false};
     const Status status = flow_layers(100, steps, limits, cancel, report);
     ASSERT_FALSE(status.ok());
@@ -161,7 +161,7 @@ TEST(LayerFlow, ACancelledFlowRecordsWhatIsInFlight) {
   steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
   FlowReport report;
   FlowLimits limits;
-  limits.most_in_flight = 4;
+  limits.max_in_flight = 4;
   const Status status = flow_layers(1000, steps, limits, cancel, report);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().fault, Fault::kInterrupted);
@@ -169,11 +169,11 @@ TEST(LayerFlow, ACancelledFlowRecordsWhatIsInFlight) {
   EXPECT_LT(recorded, 1000u);
 }
 
-TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsAtMost) {
+TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsNoMoreThan) {
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
   for (const std::uint32_t slow : {0u, 1u, 50u}) {
     FlowLimits limits;
-    limits.most_in_flight = 8;
+    limits.max_in_flight = 8;
     limits.record_slots = 12;
     LayerSteps steps = plain_steps();
     std::atomic<std::uint32_t> stored{0}, recorded{0}, furthest{0};
@@ -205,7 +205,7 @@ TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsAtMost) {
 TEST(LayerFlow, TheOldestLayerIsTakenFirst) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   FlowLimits limits;
-  limits.most_in_flight = 8;
+  limits.max_in_flight = 8;
   limits.record_slots = 16;
   LayerSteps steps = plain_steps();
   std::vector<std::uint32_t> taken;
@@ -224,8 +224,8 @@ TEST(LayerFlow, EstimatesFollowWhatLayersHeld) {
   for (const std::uint64_t held : {8 * kMegabyte, 70 * kMegabyte}) {
     FlowLimits limits;
     limits.budget_bytes = 100 * kMegabyte;
-    limits.most_in_flight = 8;
-    Slots slots(limits.most_in_flight);
+    limits.max_in_flight = 8;
+    Slots slots(limits.max_in_flight);
     Meter meter;
     LayerSteps steps = plain_steps();
     steps.bytes_of = [](std::uint32_t) { return 80 * kMegabyte; };
@@ -241,8 +241,8 @@ TEST(LayerFlow, EstimatesFollowWhatLayersHeld) {
     FlowReport report;
     const std::atomic<bool> cancel{false};
     ASSERT_TRUE(flow_layers(60, steps, limits, cancel, report).ok());
-    EXPECT_LE(meter.most, static_cast<std::int64_t>(limits.budget_bytes));
-    EXPECT_GE(report.most_in_flight, held == 8 * kMegabyte ? 4u : 1u) << "80 MB were charged for 8";
+    EXPECT_LE(meter.maximum, static_cast<std::int64_t>(limits.budget_bytes));
+    EXPECT_GE(report.max_in_flight, held == 8 * kMegabyte ? 4u : 1u) << "80 MB were charged for 8";
     EXPECT_EQ(report.oversized, 0u);
   }
 }
@@ -257,7 +257,7 @@ TEST(LayerFlow, AStepWithoutMemoryFailsItsLayerAndKeepsTheEarlierOnes) {
   steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
   FlowReport report;
   FlowLimits limits;
-  limits.most_in_flight = 8;
+  limits.max_in_flight = 8;
   const std::atomic<bool> cancel{false};
   const Status status = flow_layers(100, steps, limits, cancel, report);
   ASSERT_FALSE(status.ok());
@@ -278,12 +278,179 @@ TEST(LayerFlow, ALongLayerIsGivenUpBetweenItsStepsOnceCancelled) {
   for (int i = 0; i < 20; ++i) steps.steps.push_back({"pause", pause});
   FlowReport report;
   FlowLimits limits;
-  limits.most_in_flight = 4;
+  limits.max_in_flight = 4;
   const Status status = flow_layers(2, steps, limits, cancel, report);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().fault, Fault::kInterrupted);
-  // Layers have 300 ms from the first look at the flag, which is behind a first step at the latest: two steps more.
+  // Layers have 300 ms from the first reading of the flag, which follows a first step at the latest: two steps more.
   EXPECT_LE(made, 2u * 3u);
+}
+
+TEST(LayerFlow, SlotsServeOneLayerAtATimeHoweverShortItsStepsAre) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+  constexpr std::uint32_t kLayers = 20'000;
+  for (const bool from_work : {false, true}) {
+    FlowLimits limits;
+    limits.max_in_flight = 8;
+    limits.record_slots = 12;
+    std::vector<std::atomic<std::uint32_t>> work(limits.max_in_flight), results(limits.record_slots);
+    std::vector<std::uint32_t> order;
+    std::atomic<int> faults{0};
+    LayerSteps steps = plain_steps();
+    const auto begin = [&](const Ticket& ticket) -> Status {
+      work[ticket.work] = results[ticket.record] = ticket.position;
+      return {};
+    };
+    const auto check = [&](const Ticket& ticket) -> Status {
+      faults += work[ticket.work] != ticket.position || results[ticket.record] != ticket.position;
+      return {};
+    };
+    steps.steps = {{"begin", begin}, {"check", check}, {"again", check}};
+    steps.record = [&](const Ticket& ticket) -> Status {
+      faults += results[ticket.record] != ticket.position || (from_work && work[ticket.work] != ticket.position);
+      order.push_back(ticket.position);
+      return {};
+    };
+    steps.records_from_work = from_work;
+    FlowReport report;
+    const std::atomic<bool> cancel{false};
+    ASSERT_TRUE(flow_layers(kLayers, steps, limits, cancel, report).ok());
+    EXPECT_EQ(faults, 0);
+    ASSERT_EQ(order.size(), kLayers);
+    EXPECT_EQ(order.back(), kLayers - 1);
+    EXPECT_TRUE(std::ranges::is_sorted(order));
+  }
+}
+
+TEST(LayerFlow, ARecorderThatFailsEndsTheFlowWithItsError) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+  LayerSteps steps = plain_steps();
+  std::atomic<std::uint32_t> made{0};
+  steps.steps = {{"only", [&](const Ticket&) -> Status { return ++made, Status(); }}};
+  steps.record = [](const Ticket& ticket) -> Status {
+    if (ticket.position == 40) return Error{Fault::kOutput, "full"};
+    return {};
+  };
+  FlowLimits limits;
+  limits.max_in_flight = 8;
+  limits.record_slots = 16;
+  FlowReport report;
+  const std::atomic<bool> cancel{false};
+  const Status status = flow_layers(10'000, steps, limits, cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().message, "full");
+  EXPECT_LE(made, 40u + 2 * limits.record_slots) << "layers that cannot be recorded are not made";
+}
+
+TEST(LayerFlow, ACancelledFlowEndsWhileLayersWaitForBytes) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+  LayerSteps steps = plain_steps();
+  std::atomic<bool> cancel{false};
+  steps.bytes_of = [](std::uint32_t position) { return position % 3 == 0 ? 900 : 10; };
+  const auto pause = [&](const Ticket& ticket) -> Status {
+    if (ticket.position == 30) cancel = true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return {};
+  };
+  const auto needs = [](const Ticket&) -> Result<std::uint64_t> { return std::uint64_t{400}; };
+  steps.steps = {{"first", pause}, {"second", pause, needs}, {"third", pause, needs}};
+  FlowLimits limits;
+  limits.budget_bytes = 1000;
+  limits.max_in_flight = 8;
+  FlowReport report;
+  const auto start = std::chrono::steady_clock::now();
+  const Status status = flow_layers(1'000'000, steps, limits, cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kInterrupted);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+}
+
+/// Layers that are decided while they are made: `layers` of at most 1000.
+struct Decided {
+  std::uint32_t layers = 0;
+  std::atomic<std::uint32_t> calls{0}, ended{0}, made{0}, recorded{0};
+  LayerSteps steps = plain_steps();
+  explicit Decided(std::uint32_t count) : layers(count) {
+    steps.decide = [this](std::uint32_t position) {
+      EXPECT_EQ(position, calls++) << "in order";
+      return position < layers;
+    };
+    steps.decided = [this]() -> Status {
+      EXPECT_EQ(recorded, 0u);
+      return ++ended, Status();
+    };
+    steps.steps = {{"only", [this](const Ticket& ticket) -> Status {
+                      EXPECT_LT(ticket.position, calls);
+                      return ++made, Status();
+                    }}};
+    steps.record = [this](const Ticket& ticket) -> Status {
+      EXPECT_EQ(ended, 1u) << "nothing is recorded before all are decided";
+      EXPECT_EQ(ticket.position, recorded);
+      return ++recorded, Status();
+    };
+  }
+  Status flow(const std::atomic<bool>& cancel, FlowReport& report) const {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+    FlowLimits limits;
+    limits.max_in_flight = 4;
+    limits.record_slots = 8;
+    return flow_layers(1000, steps, limits, cancel, report);
+  }
+};
+
+TEST(LayerFlow, LayersAreMadeWhileOthersAreDecided) {
+  for (const std::uint32_t layers : {0u, 1u, 5u, 300u, 1000u}) {
+    Decided job(layers);
+    // The last ones are not decided before a layer is made.
+    const auto decide = job.steps.decide;
+    job.steps.decide = [&](std::uint32_t position) {
+      for (int i = 0; position == 5 && i < 2000 && job.made == 0; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return decide(position);
+    };
+    FlowReport report;
+    const std::atomic<bool> cancel{false};
+    ASSERT_TRUE(job.flow(cancel, report).ok());
+    EXPECT_EQ(job.recorded, layers);
+    EXPECT_EQ(job.ended, 1u);
+    EXPECT_EQ(report.nodes[0].name, "heights");
+  }
+}
+
+TEST(LayerFlow, AFlowCancelledWhileLayersAreDecidedRecordsNone) {
+  Decided job(1000);
+  std::atomic<bool> cancel{false};
+  const auto decide = job.steps.decide;
+  job.steps.decide = [&](std::uint32_t position) {
+    if (position == 20) cancel = true;
+    return decide(position);
+  };
+  FlowReport report;
+  const Status status = job.flow(cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kInterrupted);
+  EXPECT_EQ(job.recorded, 0u);
+  EXPECT_EQ(job.ended, 0u);
+}
+
+TEST(LayerFlow, AnErrorOnceAllAreDecidedIsTheFirst) {
+  Decided job(100);
+  job.steps.decided = []() -> Status { return Error{Fault::kOutput, "no manifest"}; };
+  FlowReport report;
+  const std::atomic<bool> cancel{false};
+  const Status status = job.flow(cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().message, "no manifest");
+  EXPECT_EQ(job.recorded, 0u);
+}
+
+TEST(LayerFlow, AFlowWithoutLayersIsDone) {
+  LayerSteps steps = plain_steps();
+  steps.steps = {{"only", [](const Ticket&) -> Status { return Error{Fault::kUsage, "no layer"}; }}};
+  FlowReport report;
+  const std::atomic<bool> cancel{false};
+  EXPECT_TRUE(flow_layers(0, steps, {}, cancel, report).ok());
+  EXPECT_EQ(report.max_in_flight, 0u);
 }
 
 }  // namespace

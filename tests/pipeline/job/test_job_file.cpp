@@ -12,7 +12,7 @@ using test::Directory;
 
 FillChanges changes_of(std::string_view table) {
   FillChanges changes;
-  Place at;
+  TextPosition at;
   EXPECT_EQ(read_fill_changes(*read_toml_value(table), changes, at), "");
   return changes;
 }
@@ -73,7 +73,7 @@ Job unusual_job(const Directory& directory) {
   job.dose.dithered = false;
   job.levels = 4;
   job.inspect = true;
-  job.least_wall_mm = 0.35;
+  job.min_wall_mm = 0.35;
   job.allow_unbound = true;
   job.output = directory / "out";
   job.engine = Engine::kBoth;
@@ -170,35 +170,6 @@ TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
   EXPECT_EQ(canonical_job_text(job, Product::kImages), text);
 }
 
-// Jobs that were kept before a key came go on where their bytes are still the same.
-TEST(JobFile, CanonicalTextLacksYoungerKeysAtTheirDefaultsWhereBytesAreThoseOfBefore) {
-  const auto says = [](const Job& job, Product product) {
-    const std::string text = canonical_job_text(job, product);
-    const bool cusp = text.find("cusp_of") != text.npos, peaks = text.find("\npeaks") != text.npos;
-    EXPECT_EQ(cusp, peaks);
-    return cusp && peaks && text.find("cover_top = false") != text.npos;
-  };
-  Job job;
-  job.parts.emplace_back();
-  EXPECT_FALSE(says(job, Product::kImages));
-  EXPECT_FALSE(says(job, Product::kContours));
-  EXPECT_TRUE(says(job, Product::kMoves)) << "G-code has a skirt and a tolerance";
-  job.heights.mode = heights::Mode::kAngle;
-  EXPECT_FALSE(says(job, Product::kImages));
-  job.parts[0].shrink = {1.007, 1.007, 1};
-  EXPECT_TRUE(says(job, Product::kImages)) << "angles are those of the nominal part";
-  job = Job();
-  job.slice.format = "cli-binary";
-  EXPECT_TRUE(says(job, Product::kContours)) << "$$UNITS/1.000000";
-  EXPECT_FALSE(says(job, Product::kImages));
-  job.slice.format = "svg";
-  job.slice.tolerance_um = 20;
-  EXPECT_TRUE(says(job, Product::kContours)) << "points are left out after the offset";
-  job = Job();
-  job.heights.cover_top = true;
-  EXPECT_NE(canonical_job_text(job, Product::kImages).find("cover_top = true"), std::string::npos);
-}
-
 TEST(JobFile, EveryKeyThatDecidesBytesChangesTheCanonicalText) {
   const Directory directory;
   const Job usual, unusual = unusual_job(directory);
@@ -258,13 +229,13 @@ TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
       {"[bed\n", ":1:"},
       {"[image]\nformat = 'tif'\n", ":2:10: image.format: 'tif' is none of"},
   };
-  for (const auto& [text, told] : jobs) {
+  for (const auto& [text, reported] : jobs) {
     test::write_text(directory / "job.toml", text);
     Job job;
     const Status status = read_job(directory / "job.toml", job);
     ASSERT_FALSE(status.ok()) << text;
     EXPECT_EQ(status.error().fault, Fault::kUsage) << text;
-    EXPECT_NE(status.error().message.find("job.toml" + std::string(told)), std::string::npos) << status.error().message;
+    EXPECT_NE(status.error().message.find("job.toml" + std::string(reported)), std::string::npos) << status.error().message;
     EXPECT_EQ(status.error().message.find('\n'), std::string::npos) << text;
   }
 }
@@ -287,7 +258,7 @@ TEST(JobFile, ContoursAndMovesAreDecidedByTheirOwnKeys) {
   EXPECT_EQ(canonical_job_text(back, Product::kContours), contours);
 }
 
-TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePlace) {
+TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePosition) {
   const Directory directory;
   const std::string begin = "[[fill.range]]\nfrom_mm = 2.7\nto_mm = 3\n";
   const auto read = [&](const std::string& text, Job& job) {
@@ -308,7 +279,6 @@ TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePlace) {
   EXPECT_EQ(job.parts[0].fill.values.walls, 2u);
   EXPECT_EQ(job.parts[0].material_ranges.at(0).material, "tin");
   EXPECT_EQ(job.extrude.machine.at(0).first, "fan.from_layer");
-  EXPECT_TRUE(job.notes.empty());
   const std::pair<std::string, const char*> wrong[] = {
       {begin + "gapp_mm = 0\n", ":4:11: fill.range: 2.7:3: gapp_mm: no such key; did you mean 'gap_mm'?"},
       {begin + "gap_mm = 'x'\n", ":4:10: fill.range: 2.7:3: gap_mm: 'x' is not a finite number"},
@@ -319,48 +289,28 @@ TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePlace) {
       {"[fill]\ngap_by_height = [[0, 0.75], [0, 0.1]]\n", ":2:29: fill.gap_by_height: [0, 0.1]: heights have to increase"},
       {"[[part]]\npath = 'a'\nfill = { gap_mm = 1, distance_mm = 1 }\n", "both say how far lines lie from each other"},
   };
-  for (const auto& [text, told] : wrong) {
+  for (const auto& [text, reported] : wrong) {
     Job bad;
     const Status status = read(text, bad);
     ASSERT_FALSE(status.ok()) << text;
-    EXPECT_NE(status.error().message.find(told), std::string::npos) << status.error().message;
+    EXPECT_NE(status.error().message.find(reported), std::string::npos) << status.error().message;
   }
 }
 
-TEST(JobFile, StringsOfOldJobsAreReadWithANoteAndSavedAsTables) {
-  const Directory directory;
-  test::write_text(directory / "job.toml",
-                   "[fill]\nby_height = '2.7:3 gap_mm=0 angle_deg=90; 5.7:6 pattern=contour'\n"
-                   "gap_by_height = '0:0.75, 6:0.1'\n[segment]\nby_height = '0:2.7 thin_mm=2'\n"
-                   "[extrude]\nset = 'fan.from_layer=2; bed.corner_mm=-110,-110'\n"
-                   "[[part]]\npath = 'a'\nfill = 'gap_mm=0.1,0.2 walls=2'\nmaterial = 'tin'\n"
-                   "material_by_height = '2:4 bronze; 4:6 steel'\n");
-  Job job;
-  const Status status = read_job(directory / "job.toml", job);
-  ASSERT_TRUE(status.ok()) << status.error().message;
-  EXPECT_EQ(job.notes.size(), 6u);
-  for (const std::string& note : job.notes) EXPECT_NE(note.find("job.toml:"), std::string::npos) << note;
-  ASSERT_EQ(job.fill.ranges.size(), 2u);
-  EXPECT_EQ(job.fill.ranges[1].changes.values.pattern, infill::Pattern::kContour);
-  EXPECT_EQ(job.fill.all.gap_by_height, (std::vector<std::array<double, 2>>{{0, 0.75}, {6, 0.1}}));
-  EXPECT_EQ(job.parts[0].fill.values.gap_mm, (std::vector<double>{0.1, 0.2}));
-  EXPECT_EQ(job.parts[0].material_ranges.at(1).material, "steel");
-  EXPECT_EQ(job.extrude.machine.at(0).second, "-110,-110");
-  ASSERT_TRUE(save_job(directory / "new.toml", job).ok());
-  const std::string saved = test::read_text(directory / "new.toml");
-  for (const char* old : {"by_height = \"", "set = ", "material_by_height", "fill = \"gap"}) {
-    EXPECT_EQ(saved.find(old), std::string::npos) << old;
+TEST(JobFile, RenamedKeyNamesTheNewOne) {
+  for (const auto& [assignment, renamed] : {std::pair{"fill.by_height=2.7:3 gap_mm=0", "is now fill.range"},
+                                            {"segment.by_height=2.7:3 thin_mm=2", "is now segment.range"},
+                                            {"part.material_by_height=2:4 bronze", "is now part.material_range"},
+                                            {"extrude.set=fan.from_layer=2", "is now extrude.machine"},
+                                            {"run.least_wall_mm=1", "is now run.min_wall_mm"},
+                                            {"segment.least_end_mm=1", "is now segment.min_end_mm"},
+                                            {"place.gap_mm=1", "is now [placement]"}}) {
+    Job job;
+    job.parts.emplace_back();
+    const Status status = set_key(job, assignment);
+    ASSERT_FALSE(status.ok()) << assignment;
+    EXPECT_NE(status.error().message.find(renamed), std::string::npos) << status.error().message;
   }
-  Job back;
-  ASSERT_TRUE(read_job(directory / "new.toml", back).ok());
-  EXPECT_TRUE(back.notes.empty());
-  EXPECT_EQ(all_of(back), all_of(job));
-  Job set;
-  ASSERT_TRUE(set_key(set, "fill.by_height=2.7:3 gap_mm=0").ok());
-  ASSERT_EQ(set.notes.size(), 1u);
-  EXPECT_TRUE(set.notes[0].starts_with("--set fill.by_height: ")) << set.notes[0];
-  ASSERT_TRUE(set_key(set, "fill.range=[{ from_mm = 1, to_mm = 2, walls = 1 }]").ok());
-  EXPECT_EQ(set.fill.ranges.at(0).to_mm, 2);
 }
 
 TEST(JobFile, SetTakesValuesAsFilesAndOptionsDo) {

@@ -1,7 +1,7 @@
 // The extrusion printer of a job: what the job changes, and where its widths come from.
 #include <gtest/gtest.h>
 
-#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 
 namespace lamina {
 namespace {

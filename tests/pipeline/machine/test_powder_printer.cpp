@@ -1,5 +1,5 @@
 // What a job asks for, and what follows from it and from its machine.
-#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using Mm = std::array<double, 2>;
 
-TEST(PowderPrinter, WithoutAMachineTheBedIsTheAskedOneOrTheBareOne) {
+TEST(PowderPrinter, WithoutAMachineTheBedIsTheRequestedOneOrTheBareOne) {
   Job job;
   const auto bare = resolve_powder_printer(job);
   ASSERT_TRUE(bare.ok());
@@ -21,16 +21,16 @@ TEST(PowderPrinter, WithoutAMachineTheBedIsTheAskedOneOrTheBareOne) {
   EXPECT_EQ(bare->grid.x.dpi(), 1200);
   job.bed_mm = {100, 50};
   job.dpi = {600, 300};
-  const auto asked = resolve_powder_printer(job);
-  ASSERT_TRUE(asked.ok());
-  EXPECT_EQ(asked->bed.size_mm, (Mm{100, 50}));
-  EXPECT_EQ(asked->grid.x.dpi(), 600);
-  EXPECT_EQ(asked->grid.y.dpi(), 300);
+  const auto requested = resolve_powder_printer(job);
+  ASSERT_TRUE(requested.ok());
+  EXPECT_EQ(requested->bed.size_mm, (Mm{100, 50}));
+  EXPECT_EQ(requested->grid.x.dpi(), 600);
+  EXPECT_EQ(requested->grid.y.dpi(), 300);
   job.machine.blocked = {{3}};
   EXPECT_FALSE(resolve_powder_printer(job).ok());
 }
 
-TEST(PowderPrinter, AMachineDecidesTheBedAndTheJobStaysAsItWasAsked) {
+TEST(PowderPrinter, AMachineDecidesTheBedAndTheJobStaysAsRequested) {
   Job job;
   job.machine.profile = "nuferbj";
   const auto resolved = resolve(job, Product::kImages);
@@ -51,7 +51,7 @@ TEST(PowderPrinter, AMachineDecidesTheBedAndTheJobStaysAsItWasAsked) {
   EXPECT_TRUE(other.error().message.starts_with("bed.size_mm: the bed of nuferbj is ")) << other.error().message;
 }
 
-TEST(PowderPrinter, ToolpathsStandOnTheBedOfTheExtruder) {
+TEST(PowderPrinter, ToolpathsAreOnTheBedOfTheExtruder) {
   const auto resolved = resolve(Job(), Product::kMoves);
   ASSERT_TRUE(resolved.ok());
   EXPECT_TRUE(resolved->bed.of_machine);

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/machine/powder_printer.h"
-
 namespace lamina::pipeline {
 namespace {
 
@@ -14,13 +12,13 @@ TEST(ShippedProfiles, AreTheTenThatTheDocumentsNameAndTheirTextReadsBackTheSame)
     const auto machine = read_machine(shipped.text, std::string(shipped.name));
     ASSERT_TRUE(machine.ok()) << machine.error().message;
     EXPECT_EQ(machine->name, shipped.name);
-    const std::string text = read::machine_text(*machine);
+    const std::string text = pipeline::machine_text(*machine);
     const auto again = read_machine(text, "text");
     ASSERT_TRUE(again.ok()) << again.error().message;
-    EXPECT_EQ(read::machine_text(*again), text);
-    const auto kept = read_machine(read::kept_machine_text(*machine), "kept");
+    EXPECT_EQ(pipeline::machine_text(*again), text);
+    const auto kept = read_machine(pipeline::kept_machine_text(*machine), "kept");
     ASSERT_TRUE(kept.ok()) << kept.error().message;
-    EXPECT_EQ(read::machine_text(*kept), text) << "what the kept text leaves out has its default";
+    EXPECT_EQ(pipeline::machine_text(*kept), text) << "what the kept text leaves out has its default";
     EXPECT_TRUE(resolve_profile(*machine).ok()) << resolve_profile(*machine).error().message;
   }
 }
@@ -40,7 +38,7 @@ TEST(Profiles, AreFoundByNameAndErrorsNameLineAndColumn) {
 }
 
 // Without voids each saturation would be one that drops do not reach.
-TEST(Profiles, OfPowderWithoutVoidsAreToldByThatKey) {
+TEST(Profiles, OfPowderWithoutVoidsAreReportedByThatKey) {
   for (const char* packing : {"1", "0.995", "0"}) {
     const auto solid = read_machine("[machine]\nname = \"x\"\n[powder]\npacking = " + std::string(packing) + "\n", "x.toml");
     ASSERT_FALSE(solid.ok()) << packing;
@@ -54,10 +52,10 @@ TEST(Profiles, ExtrusionPrintersReadBackTheSameAndHaveTheirCalibrationOrThePubli
     const auto profile = read_extruder(shipped.text, std::string(shipped.name));
     ASSERT_TRUE(profile.ok()) << profile.error().message;
     EXPECT_FALSE(profile->calibration.by_speed.empty()) << shipped.name;
-    const std::string text = read::extruder_text(*profile);
+    const std::string text = pipeline::extruder_text(*profile);
     const auto again = read_extruder(text, "text");
     ASSERT_TRUE(again.ok()) << again.error().message;
-    EXPECT_EQ(read::extruder_text(*again), text);
+    EXPECT_EQ(pipeline::extruder_text(*again), text);
     EXPECT_EQ(again->own_calibration, profile->own_calibration);
   }
   const auto powder = read_extruder("[head]\nnozzles = 3\n", "x.toml");

@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "pipeline/output/directory.h"
-#include "stages/write/file.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -20,14 +20,14 @@ struct LoadingMeanwhile : testing::Test {
     std::filesystem::create_directories(job.output + "/layers");
   }
   std::string refusal() {
-    write::MadeFolders made;
+    MadeFolders made;
     const auto claim = prepare_output(job, made);
     return claim ? "" : claim.error().message;
   }
 };
 
 TEST_F(LoadingMeanwhile, AShardThatIsWritingKeepsItsDirectoryEvenFromOverwrite) {
-  const auto shard = write::File::open(job.output + "/manifest-1-of-2.json", {.keep_part = true});
+  const auto shard = File::open(job.output + "/manifest-1-of-2.json", {.keep_part = true});
   ASSERT_TRUE(shard.ok());
   EXPECT_NE(refusal(), "");
   job.overwrite = true;
@@ -50,10 +50,10 @@ TEST(LayerFiles, AreThoseOfNamesThatLaminaWrites) {
     EXPECT_FALSE(read_layer_file_name(name, index, partial)) << name;
 }
 
-TEST(LayerFiles, WhatAKilledJobLeftBesideThemGoesAndNothingElse) {
+TEST(LayerFiles, WhatAKilledJobLeftNextToThemGoesAndNothingElse) {
   const test::Directory directory;
   std::filesystem::create_directories(directory.path() / "program");
-  const std::string ours = write::temporary_name("start.gcode"), theirs = write::temporary_name("notes.txt");
+  const std::string ours = temporary_name("start.gcode"), theirs = temporary_name("notes.txt");
   for (const std::string& name : {ours, theirs, std::string("start.gcode"), std::string("start.gcode.part")}) {
     test::write_text(directory.path() / "program" / name, "x");
   }
@@ -72,7 +72,7 @@ TEST_F(LoadingMeanwhile, AnotherSplitIsRefused) {
   EXPECT_NE(refusal().find("split otherwise"), std::string::npos);
 }
 
-TEST_F(LoadingMeanwhile, NobodyElseIsNoError) { EXPECT_EQ(refusal(), ""); }
+TEST_F(LoadingMeanwhile, NoOtherRunIsNoError) { EXPECT_EQ(refusal(), ""); }
 
 }  // namespace
 }  // namespace lamina::pipeline

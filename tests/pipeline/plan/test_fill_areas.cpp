@@ -8,8 +8,9 @@
 #include <random>
 
 #include "pipeline/job/file.h"
+#include "stages/formats/slice_format.h"
+#include "stages/formats/svg/svg.h"
 #include "stages/geometry/clipping.h"
-#include "stages/write/slice_format.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
 #include "tests/slice/contour_laws.h"
@@ -36,22 +37,23 @@ struct Placed {
 };
 
 /// Every bead of area `a` lies inside `room`: its centre, and half its width to all sides.
-void expect_within(const Sections::Work& work, std::size_t a, const ContoursView& room, Nm width, PathKind kind) {
+void expect_within(const Sections::Work& work, std::size_t a, const ContoursView& capacity, Nm width, PathKind kind) {
   const ToolpathsView paths = work.paths;
-  std::size_t seen = 0;
+  std::size_t detected = 0;
   for (std::uint32_t p = work.path_area[a]; p < work.path_area[a + 1]; ++p) {
     for (std::uint32_t i = paths.offset[p]; i + 1 < paths.offset[p + 1]; ++i) {
       EXPECT_EQ(paths.width[i], width);
-      seen += paths.kind[i] == kind ? 1 : 0;
+      detected += paths.kind[i] == kind ? 1 : 0;
       for (int k = 0; k <= 8; ++k) {
         const double x = paths.point[i].x + (static_cast<double>(paths.point[i + 1].x) - paths.point[i].x) * k / 8;
         const double y = paths.point[i].y + (static_cast<double>(paths.point[i + 1].y) - paths.point[i].y) * k / 8;
-        ASSERT_EQ(winding_about(room, {static_cast<Nm>(std::llround(x)), static_cast<Nm>(std::llround(y))}), 1) << "area " << a;
-        ASSERT_GE(distance_to(room, x, y), width / 2 - 2) << "area " << a;
+        ASSERT_EQ(winding_about(capacity, {static_cast<Nm>(std::llround(x)), static_cast<Nm>(std::llround(y))}), 1)
+            << "area " << a;
+        ASSERT_GE(distance_to(capacity, x, y), width / 2 - 2) << "area " << a;
       }
     }
   }
-  EXPECT_GT(seen, 3u) << "area " << a;
+  EXPECT_GT(detected, 3u) << "area " << a;
 }
 
 /// A prism over a star-shaped outline around the origin, in mm.
@@ -117,7 +119,7 @@ TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
   expect_within(work, 1, rectangle(40, 20, 60, 40), 600'000, PathKind::kContour);
 }
 
-TEST_F(FillAreas, SharedRoomBelongsToTheFirstPart) {
+TEST_F(FillAreas, SharedSpaceBelongsToTheFirstPart) {
   const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "{ pattern = 'raster', width_mm = 0.4, gap_mm = 0.3 }"},
                              {{30, 25, 0}, {20, 20, 4}, "{ pattern = 'contour+raster', width_mm = 0.5 }"},
                              {{25, 35, 0}, {8, 30, 4}, "{ pattern = 'honeycomb', width_mm = 0.3, cell_mm = 3 }"}});
@@ -147,8 +149,8 @@ std::array<double, 2> charged_and_needed(const Sections& plan) {
   const std::uint64_t before = work.bytes();
   EXPECT_TRUE(plan.fill(2, work).ok());
   EXPECT_LE(work.bytes(), before + *own);
-  const auto encoder = write::make_svg_encoder();
-  write::SliceHead head;
+  const auto encoder = formats::make_svg_encoder();
+  formats::SliceHead head;
   head.parts.assign(work.contours.body.size() - 1, "part");
   head.bounds = plan.bounds();
   Buffer<char> text, outlines_alone;
@@ -181,9 +183,9 @@ TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
     // A star-shaped prism of random corners and a random one beside it, turned any way by its corners.
     const auto corners = static_cast<int>(between(3, turn % 3 == 0 ? 400 : 30));
     std::vector<std::array<double, 2>> outline;
-    const double least = between(0.05, 1);
+    const double minimum = between(0.05, 1);
     for (int i = 0; i < corners; ++i) {
-      const double angle = (i + between(0, 0.5)) * 2 * std::numbers::pi / corners, radius = 12 * between(least, 1);
+      const double angle = (i + between(0, 0.5)) * 2 * std::numbers::pi / corners, radius = 12 * between(minimum, 1);
       outline.push_back({radius * std::cos(angle), radius * std::sin(angle)});
     }
     const std::string path = directory_ / ("star" + std::to_string(turn) + ".stl");

@@ -6,14 +6,14 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "stages/data/text/toml.h"
+#include "stages/support/text/toml.h"
 
 namespace lamina::test {
 namespace {
 
 pipeline::FillChanges changes_of(std::string_view table) {
   pipeline::FillChanges changes;
-  Place at;
+  TextPosition at;
   EXPECT_EQ(pipeline::read_fill_changes(*read_toml_value(table), changes, at), "");
   return changes;
 }
@@ -37,7 +37,7 @@ TEST(FillPlan, HeightsAndPartsChangeTheFilling) {
   EXPECT_TRUE(plan->fills());
 }
 
-TEST(FillPlan, TheOneWayToGiveDistancesTakesThePlaceOfTheOneThatHeld) {
+TEST(FillPlan, TheOneDirectionToGiveDistancesReplacesTheOneThatHeld) {
   using namespace pipeline;
   FillRequest request;
   apply(changes_of("{ pattern = 'raster', distance_mm = [0.5, 0.7] }"), request.all);

@@ -103,27 +103,29 @@ TEST(Containment, StepsOfContoursLieInsideOrOutsideOfBothSectionsOfALayer) {
   const Result<Plan> outside = plan_of(job);
   ASSERT_TRUE(across.ok() && inside.ok() && outside.ok());
   ASSERT_EQ(inside->sections->layers().size(), across->sections->layers().size());
-  Sections::Work middle, least, most;
-  double least_mm3 = 0, middle_mm3 = 0, most_mm3 = 0;
+  Sections::Work middle, minimum, maximum;
+  double min_mm3 = 0, middle_mm3 = 0, max_mm3 = 0;
   for (std::uint32_t i = 0; i < across->sections->layers().size(); ++i) {
-    ASSERT_TRUE(across->sections->layer(i, middle) && inside->sections->layer(i, least) && outside->sections->layer(i, most));
+    ASSERT_TRUE(across->sections->layer(i, middle) && inside->sections->layer(i, minimum) &&
+                outside->sections->layer(i, maximum));
     const double thickness = mm(across->sections->layers()[i].layer.thickness);
-    least_mm3 += area(least.contours.contours) * thickness;
+    min_mm3 += area(minimum.contours.contours) * thickness;
     middle_mm3 += area(middle.contours.contours) * thickness;
-    most_mm3 += area(most.contours.contours) * thickness;
+    max_mm3 += area(maximum.contours.contours) * thickness;
     // What both sections share lies within what either has, to the nanometre that new corners are rounded by.
-    const Result<Contours> rest = subtract_contours(least.contours.contours, most.contours.contours);
+    const Result<Contours> rest = subtract_contours(minimum.contours.contours, maximum.contours.contours);
     ASSERT_TRUE(rest.ok());
     EXPECT_LT(area(*rest), 1e-4) << "layer " << i;
     // Their sum is that of the two sections.
-    slice::LayerScratch scratch;
+    slice::SectionScratch scratch;
     slice::LayerContours low, high;
     ASSERT_TRUE(inside->sections->slicer().layer(inside->sections->layers()[i].low, scratch, low).ok());
     ASSERT_TRUE(inside->sections->slicer().layer(inside->sections->layers()[i].high, scratch, high).ok());
-    EXPECT_NEAR(area(least.contours.contours) + area(most.contours.contours), area(low.contours) + area(high.contours), 1e-3);
+    EXPECT_NEAR(area(minimum.contours.contours) + area(maximum.contours.contours), area(low.contours) + area(high.contours),
+                1e-3);
   }
-  EXPECT_LT(least_mm3, 0.99 * middle_mm3);
-  EXPECT_GT(most_mm3, 1.01 * middle_mm3);
+  EXPECT_LT(min_mm3, 0.99 * middle_mm3);
+  EXPECT_GT(max_mm3, 1.01 * middle_mm3);
 }
 
 }  // namespace

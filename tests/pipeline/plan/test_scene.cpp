@@ -40,7 +40,7 @@ TEST(Scene, EqualFilesWithEqualTransformsAreLoadedOnce) {
   EXPECT_NE(scene.parts[0].fingerprint, scene.parts[2].fingerprint);
 }
 
-TEST(Scene, PartsStandWhereAskedWhereverTheirFilePutsThem) {
+TEST(Scene, PartsArePlacedAsRequestedWhereverTheirFilePutsThem) {
   const Directory directory;
   for (const float origin : {0.f, -300.f, 1500.f, -2000.f, 2000.f}) {
     test::write_box(directory / "a.stl", {origin, -origin, origin}, {origin + 8, -origin + 16, origin + 4});
@@ -73,7 +73,7 @@ TEST(Scene, FarAwayPartReachesTheFarCornerWithoutOverflow) {
   EXPECT_EQ(box_of(scene, 2).lo, (Point3{2'141'000'000, 2'146'000'000, 0}));
 }
 
-TEST(Scene, OverlapsOfAskedPositionsAreNoted) {
+TEST(Scene, OverlapsOfRequestedPositionsAreNoted) {
   const Directory directory;
   test::write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 10});
   Job job;

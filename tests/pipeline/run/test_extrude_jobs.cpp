@@ -141,10 +141,10 @@ TEST_F(ExtrudeProgram, PointsOfFukudaAre346InEachOf79Layers) {
   EXPECT_EQ(json["layers_planned"], 79);
   EXPECT_EQ(json["segments"]["points_first_layer"], 346);
   EXPECT_EQ(json["segments"]["points"], 27334);
-  EXPECT_EQ(json["segments"]["stretches"], 79 * 324);
+  EXPECT_EQ(json["segments"]["intervals"], 79 * 324);
 }
 
-TEST_F(ExtrudeProgram, PeakMemoryThatIsToldIsThatOfTheProgramNotOfItsCaller) {
+TEST_F(ExtrudeProgram, PeakMemoryThatIsReportedIsThatOfTheProgramNotOfItsCaller) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer's shadow is counted too";
 #endif
@@ -162,7 +162,7 @@ TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
 #endif
   // The system's count of a process's pages errs by some hundred kilobytes, as much as 2 % of a program that holds ten
   // megabytes: the parts have sides of many facets, so that jobs hold three times that. The middle of each, of runs in turn.
-  const auto share = [&](const std::string& job, const std::string& segments, double least_text) {
+  const auto share = [&](const std::string& job, const std::string& segments, double min_text) {
     std::vector<double> plain, segmented;
     for (int turn = 0; turn < 5; ++turn) {
       for (auto* peaks : {&plain, &segmented}) {
@@ -174,7 +174,7 @@ TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
       }
     }
     EXPECT_GE(static_cast<double>(fs::file_size(file("segmented.gcode"))),
-              least_text * static_cast<double>(fs::file_size(file("plain.gcode"))));
+              min_text * static_cast<double>(fs::file_size(file("plain.gcode"))));
     for (auto* peaks : {&plain, &segmented}) std::nth_element(peaks->begin(), peaks->begin() + 2, peaks->end());
     EXPECT_GE(plain[2], 24e6);
     return segmented[2] / plain[2];
@@ -200,7 +200,7 @@ TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
     EXPECT_EQ(json["layers_planned"], 1);
     EXPECT_EQ(json["segments"]["lines"], lines);
     EXPECT_EQ(json["segments"]["thin"], lines);
-    EXPECT_EQ(json["segments"]["stretches"], 3 * lines);
+    EXPECT_EQ(json["segments"]["intervals"], 3 * lines);
     EXPECT_NE(json["warnings"].dump().find("at most 4.45 mm"), std::string::npos);
     // Thick, thin, thick at 15 and 30 mm/s, all in one direction.
     const test::GcodeFile gcode = test::read_gcode(text_of(file("a.gcode")));
@@ -216,7 +216,7 @@ TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
   }
 }
 
-TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
+TEST_F(ExtrudeProgram, VolumesPositionsAndLayersOfAFileAreThoseOfThePlan) {
   const std::string part = block(30, 20, 2.4, 6);
   for (const std::string machine : {"anet-a8", "marlin", "klipper", "reprapfirmware"}) {
     const Outcome result = run("extrude --overwrite " + part + " --machine " + machine +
@@ -252,7 +252,7 @@ TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
   }
 }
 
-TEST_F(ExtrudeProgram, ADryRunTellsTheTimeAndTheMaterialOfTheRunAndWritesNothing) {
+TEST_F(ExtrudeProgram, ADryRunReportsTheTimeAndTheMaterialOfTheRunAndWritesNothing) {
   const std::string call = "extrude " + block(12, 9, 1.2, 2) + " --machine marlin --layer 0.3 --quiet --json";
   const auto dry = run(call + " --dry-run"), real = run(call + " -o " + file("a.gcode"));
   ASSERT_EQ(dry.code, 0) << dry.err;
@@ -266,21 +266,21 @@ TEST_F(ExtrudeProgram, ADryRunTellsTheTimeAndTheMaterialOfTheRunAndWritesNothing
   EXPECT_FALSE(fs::exists(file("b.gcode")));
 }
 
-TEST_F(ExtrudeProgram, ADryRunCountsThePoresOfTheRunAndTellsThemOnce) {
+TEST_F(ExtrudeProgram, ADryRunCountsThePoresOfTheRunAndReportsThemOnce) {
   const std::string call = "extrude " + block(12, 9, 1.2, 2) + " --machine anet-a8 --layer 0.3 --fill segmented";
-  const auto pores_told = [&](const Outcome& outcome) {
-    std::vector<std::string> told;
+  const auto reported_pores = [&](const Outcome& outcome) {
+    std::vector<std::string> reported;
     for (std::size_t at = outcome.err.find("pores "); at != std::string::npos; at = outcome.err.find("pores ", at + 1)) {
-      if (at == 0 || outcome.err[at - 1] == '\n') told.push_back(outcome.err.substr(at, outcome.err.find('\n', at) - at));
+      if (at == 0 || outcome.err[at - 1] == '\n') reported.push_back(outcome.err.substr(at, outcome.err.find('\n', at) - at));
     }
-    return told;
+    return reported;
   };
-  const auto dry = pores_told(run(call + " --dry-run"));
+  const auto dry = reported_pores(run(call + " --dry-run"));
   EXPECT_EQ(dry.size(), 1u);
-  EXPECT_EQ(dry, pores_told(run(call + " -o " + file("a.gcode"))));
+  EXPECT_EQ(dry, reported_pores(run(call + " -o " + file("a.gcode"))));
 }
 
-TEST_F(ExtrudeProgram, PoresAreCountedByRangeAlsoWherePartsStandAtDifferentHeights) {
+TEST_F(ExtrudeProgram, PoresAreCountedByRangeAlsoWherePartsAreAtDifferentHeights) {
   const std::string part = "[[part]]\npath = \"" + block(20, 20, 6, 0) + "\"\nbottom_mm = ";
   const auto pores = [&](const std::string& parts) {
     std::ofstream(file("job.toml")) << "[layers]\nthickness_mm = 0.3\n[machine]\nprofile = \"anet-a8\"\n[fill]\nangle_deg = 0\n"
@@ -313,7 +313,7 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   ASSERT_EQ(gcode.error, "");
   ASSERT_EQ(gcode.layers.size(), 4);
   double filament = 0;
-  std::uint64_t thin_stretches = 0, segmented = 0;
+  std::uint64_t thin_intervals = 0, segmented = 0;
   for (const auto& layer : gcode.layers) {
     for (const auto& bead : layer.beads) filament += bead.filament;
     const bool first = &layer == &gcode.layers.front();  // all as fast as the first layer may be, or slower
@@ -328,26 +328,26 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
       if (start.type.find("perimeter") != std::string::npos || start.type.find("wall") != std::string::npos) continue;
       EXPECT_NEAR(beads.back().x1, start.x0, 1e-9);
       EXPECT_NEAR(beads.back().y1, start.y0, 1e-9);
-      std::vector<std::pair<double, double>> stretches;  // speed, length
+      std::vector<std::pair<double, double>> intervals;  // speed, length
       double depth = 1e9;
       for (const auto& bead : beads) {
-        if (stretches.empty() || stretches.back().first != bead.feed) stretches.push_back({bead.feed, 0});
-        stretches.back().second += std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
+        if (intervals.empty() || intervals.back().first != bead.feed) intervals.push_back({bead.feed, 0});
+        intervals.back().second += std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
         depth = std::min(
             {depth, 15 - std::abs(bead.x0 - 110), 10 - std::abs(bead.y0 - 110), std::hypot(bead.x0 - 110, bead.y0 - 110) - 4});
       }
-      if (stretches.size() == 1) continue;
+      if (intervals.size() == 1) continue;
       ++segmented;
-      const double thick = stretches.front().first, fast = stretches[1].first;
+      const double thick = intervals.front().first, fast = intervals[1].first;
       EXPECT_NEAR(fast / thick, 200. / 75, 1e-6);
-      ASSERT_EQ(stretches.size() % 2, 1) << "begins and ends thick";
-      for (std::size_t k = 0; k < stretches.size(); ++k) {
-        ASSERT_EQ(stretches[k].first, k % 2 == 0 ? thick : fast);
+      ASSERT_EQ(intervals.size() % 2, 1) << "begins and ends thick";
+      for (std::size_t k = 0; k < intervals.size(); ++k) {
+        ASSERT_EQ(intervals[k].first, k % 2 == 0 ? thick : fast);
         if (k % 2 == 1) {
-          ++thin_stretches;
-          ASSERT_NEAR(stretches[k].second, 1.5, 0.01);  // coordinates are rounded to 1 um
+          ++thin_intervals;
+          ASSERT_NEAR(intervals[k].second, 1.5, 0.01);  // coordinates are rounded to 1 um
         } else {
-          ASSERT_GE(stretches[k].second, (k == 0 || k + 1 == stretches.size() ? 0.75 : 1.5) - 0.01);
+          ASSERT_GE(intervals[k].second, (k == 0 || k + 1 == intervals.size() ? 0.75 : 1.5) - 0.01);
         }
       }
       if (!first) {
@@ -355,14 +355,14 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
       }
     }
   }
-  EXPECT_EQ(json["segments"]["thin"], thin_stretches);
+  EXPECT_EQ(json["segments"]["thin"], thin_intervals);
   EXPECT_EQ(json["segments"]["pieces"], segmented);
   EXPECT_GE(segmented, 4 * 2 * 3);
   const double volume = filament * std::numbers::pi / 4 * 1.75 * 1.75;
   EXPECT_NEAR(volume / json["volume_mm3"].get<double>(), 1, 1e-5);
 }
 
-TEST_F(ExtrudeProgram, AFileIsNotReplacedUnaskedItsManifestVouchesForItAndWhatIsInterruptedGoesOn) {
+TEST_F(ExtrudeProgram, AFileIsNotReplacedUnrequestedItsManifestVouchesForItAndWhatIsInterruptedContinues) {
   const std::string job = block(20, 20, 3, 0) + " --machine anet-a8 --layer 0.3 --walls 1 --quiet -o ";
   ASSERT_EQ(run("extrude " + job + file("a.gcode")).code, 0);
   const std::string whole = test::read_text(file("a.gcode")), manifest = test::read_text(file("a.gcode.json"));
@@ -445,7 +445,7 @@ TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
   EXPECT_NE(message("--fill raster --set run.shard=1/2").find("run.shard: shards are of images"), std::string::npos);
 }
 
-TEST_F(ExtrudeProgram, SmlHasItsReportBesideItWithTheLayersThatItLays) {
+TEST_F(ExtrudeProgram, SmlHasItsReportNextToItWithTheLayersThatItDeposits) {
   const Outcome result = run("extrude --overwrite " + block(20, 20, 2.54, 0) +
                              " --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster --quiet --json -o " + file("a.sml"));
   ASSERT_EQ(result.code, 0) << result.err;

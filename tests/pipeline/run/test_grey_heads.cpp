@@ -3,13 +3,12 @@
 
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
@@ -27,7 +26,7 @@ nozzles = 64
 pitch_um = 100
 highest_frequency_hz = 350
 drop_pl = 100
-most_drops = 7
+max_drops = 7
 [motion]
 scan_speed_mm_s = 10
 travel_speed_mm_s = 200
@@ -54,7 +53,7 @@ class GreyHeads : public test::JobFolder {
 constexpr const char* kBox = "jet box.stl --machine seven.toml --layer 0.1 --saturation 100 ";
 
 // 5 drops are 3 and 2. The second sweep goes 19 steps of 0.1 mm and two ramps at 10 mm/s, and the head comes back at 200.
-TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndTellWhatThatAdds) {
+TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndReportWhatThatAdds) {
   constexpr double kWay = 19 * 0.1 + 2 * 5;
   for (const char* how : {"--dry-run", "-o out"}) {
     const auto json = facts(kBox + std::string(how));
@@ -62,17 +61,17 @@ TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndTellWhatThatAdds) {
     EXPECT_EQ(jetting["head_drops"], 7);
     EXPECT_EQ(jetting["sweep_drops"], 3);
     EXPECT_EQ(jetting["pixel_drops"], 5);
-    EXPECT_EQ(jetting["sweeps_a_place"], 2);
+    EXPECT_EQ(jetting["sweeps_per_position"], 2);
     EXPECT_EQ(jetting["added_sweeps"], 2);
     EXPECT_NEAR(jetting["added_seconds"].get<double>(), 2 * (kWay / 10 + kWay / 200), 1e-5);
-    EXPECT_EQ(json["saturation"]["most_jetted_drops"], 5);
+    EXPECT_EQ(json["saturation"]["max_jetted_drops"], 5);
   }
-  const test::Outcome told = lamina(kBox + std::string("--dry-run"));
-  EXPECT_NE(
-      told.err.find("2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
-                    "at 5.0 mm/s; that adds 2 sweeps, 2.5 s"),
-      std::string::npos)
-      << told.err;
+  const test::Outcome reported = lamina(kBox + std::string("--dry-run"));
+  EXPECT_NE(reported.err.find(
+                "2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
+                "at 5.0 mm/s; that adds 2 sweeps, 2.5 s"),
+            std::string::npos)
+      << reported.err;
   const auto records = records_of("out");
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].program.sweeps, 2u);
@@ -89,14 +88,14 @@ TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndTellWhatThatAdds) {
   // At half of the speed all of them fit, as the line says.
   const auto slow = facts(kBox + std::string("--scan-speed 5 -o slow"));
   EXPECT_EQ(slow["jetting"]["added_sweeps"], 0);
-  EXPECT_EQ(slow["jetting"]["sweeps_a_place"], 1);
+  EXPECT_EQ(slow["jetting"]["sweeps_per_position"], 1);
   EXPECT_EQ(records_of("slow")[0].program.sweeps, 1u);
   done("verify slow --quiet");
 }
 
 TEST_F(GreyHeads, DropsOfAPixelAreBoundBySweeps) {
   std::string text = kHead;
-  text.insert(text.find("most_drops"), "most_drop_sweeps = 1\n");
+  text.insert(text.find("max_drops"), "max_drop_sweeps = 1\n");
   test::write_text(folder_ / "once.toml", text);
   const auto json = facts("jet box.stl --machine once.toml --layer 0.1 --saturation 100 --dry-run");
   EXPECT_EQ(json["jetting"]["pixel_drops"], 3);
@@ -115,7 +114,7 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
     const bool png = format == std::string("png-8");
     const std::string file = folder_ / (std::string(format) + "/layers/000001" + (png ? ".png" : ".tif"));
     Levels levels;
-    const auto image = read::levels(file, 15, levels);
+    const auto image = formats::levels(file, 15, levels);
     ASSERT_TRUE(image.ok()) << image.error().message;
     EXPECT_EQ(levels.level.size(), 30u);
     for (const std::uint8_t level : levels.level) EXPECT_EQ(level, 5);
@@ -124,7 +123,7 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
     const auto records = records_of(format);
     EXPECT_EQ(records[1].set_pixels, 600u);
     EXPECT_EQ(records[1].drops, 3000u);
-    EXPECT_EQ(records[1].most_drops, 5u);
+    EXPECT_EQ(records[1].max_drops, 5u);
     done(job + "other --threads 1 --engine contours");
     EXPECT_TRUE(tree("other") == tree(format));
     std::filesystem::remove_all(folder_.path() / "other");
@@ -137,7 +136,7 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
     EXPECT_EQ(lamina(std::string("verify --quiet ") + format).code, 5);
     const auto resumed = facts(job + format + " --resume");
     EXPECT_EQ(resumed["jetting"]["added_sweeps"], 2);
-    EXPECT_EQ(resumed["saturation"]["most_jetted_drops"], 5);
+    EXPECT_EQ(resumed["saturation"]["max_jetted_drops"], 5);
     EXPECT_EQ(test::read_text(file), test::read_text(folder_ / "kept"));
     test::expect_refused(std::string("jet ") + format + " --dpi 254 --bed 5x5 -o none", 3, "drops of a pixel as grey", folder_);
   }
@@ -145,7 +144,7 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
                        "tells up to 15 drops of a pixel, the job has 25; choose tiff-8", folder_);
   done("jet box.stl --machine seven.toml --layer 0.1 --saturation 500 --format tiff-8 -o many --quiet");
   done("verify many --quiet");
-  EXPECT_EQ(records_of("many")[0].most_drops, 25u);
+  EXPECT_EQ(records_of("many")[0].max_drops, 25u);
   done("jet box.stl --machine nuferbj --layer 0.1 --saturation 5 --format png-8 -o one --quiet");
   done("verify one --quiet");
 }
@@ -157,7 +156,7 @@ TEST_F(GreyHeads, TakeLevelsAsDrops) {
     const std::string output = "of" + std::to_string(levels);
     const auto json = facts(job + "--levels " + std::to_string(levels) + " -o " + output);
     EXPECT_EQ(json["jetting"]["pixel_drops"], levels - 1);
-    EXPECT_EQ(json["jetting"]["sweeps_a_place"], (levels - 1 + 2) / 3);
+    EXPECT_EQ(json["jetting"]["sweeps_per_position"], (levels - 1 + 2) / 3);
     const auto records = records_of(output);
     ASSERT_EQ(records.size(), 3u);
     EXPECT_EQ(records[0].drops, 600u * (levels - 1));
@@ -168,11 +167,11 @@ TEST_F(GreyHeads, TakeLevelsAsDrops) {
 }
 
 // A hundredth of a thousandth more than 5 drops: planned are 6, and a pixel gets 5.
-TEST_F(GreyHeads, TellTheMostDropsThatAreJetted) {
+TEST_F(GreyHeads, ReportTheMaxDropsThatAreJetted) {
   test::write_box(folder_ / "dot.stl", {0, 0, 0}, {0.1f, 0.1f, 0.1f});
   const auto json = facts("jet dot.stl --machine seven.toml --layer 0.1 --saturation 100.001 --dry-run");
-  EXPECT_EQ(json["saturation"]["most_drops"], 6);
-  EXPECT_EQ(json["saturation"]["most_jetted_drops"], 5);
+  EXPECT_EQ(json["saturation"]["max_drops"], 6);
+  EXPECT_EQ(json["saturation"]["max_jetted_drops"], 5);
 }
 
 TEST_F(GreyHeads, AreTheShippedOneToo) {
@@ -183,7 +182,7 @@ TEST_F(GreyHeads, AreTheShippedOneToo) {
 }
 
 // What jet tells of all layers, merge and report tell from the manifests.
-TEST_F(GreyHeads, TellTheSweepsThatAreAddedAfterAMergeToo) {
+TEST_F(GreyHeads, ReportTheSweepsThatAreAddedAfterAMergeToo) {
   const test::Outcome whole = lamina(kBox + std::string("-o whole"));
   ASSERT_EQ(whole.code, 0) << whole.err;
   const std::size_t from = whole.err.find("; that adds ");

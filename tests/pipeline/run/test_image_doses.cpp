@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/manifest/manifest.h"
 #include "tests/commands/program.h"
 
 namespace lamina {

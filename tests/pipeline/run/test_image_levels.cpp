@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "tests/commands/program.h"
 
 namespace lamina {
@@ -27,7 +27,7 @@ size_mm = [100, 50]
 build_height_mm = 50
 [head]
 drop_pl = 80
-most_drop_sweeps = 8
+max_drop_sweeps = 8
 [mounting]
 dpi = 254
 [powder]
@@ -55,7 +55,7 @@ class ImageLevels : public testing::Test {
   }
   Levels levels(const std::string& file, std::uint8_t full) const {
     Levels levels;
-    const auto image = read::levels(folder_ / file, full, levels);
+    const auto image = formats::levels(folder_ / file, full, levels);
     EXPECT_TRUE(image.ok()) << image.error().message;
     return levels;
   }
@@ -115,7 +115,7 @@ TEST_F(ImageLevels, BecomeTheDropsOfTheMesh) {
 }
 
 // Beside a mesh the larger share counts: with itself, nothing changes; with another one, both are there.
-TEST_F(ImageLevels, AreUnitedWithMeshesByTheLargerShare) {
+TEST_F(ImageLevels, AreMergedWithMeshesByTheLargerShare) {
   const std::string part = test::corpus_file("dental_crown.stl");
   const std::string rest = " --layer 0.7 --dpi 120 --bed 40x20 --levels 16 --format tiff-8";
   done("jet " + part + rest + " --at 1,1 -o one");
@@ -136,9 +136,9 @@ TEST_F(ImageLevels, AreUnitedWithMeshesByTheLargerShare) {
   for (const LayerRecord& record : manifest("one").layers) {
     const std::string file = layer_file_name(record.layer.index, ".tif");
     const Levels a = levels("one/" + file, 15), b = levels("moved/" + file, 15), c = levels("overlap/" + file, 15);
-    for (std::uint8_t least = 1; least <= 15; ++least) {
+    for (std::uint8_t minimum = 1; minimum <= 15; ++minimum) {
       Runs in_a, in_b, in_c;
-      at_least(a, least, in_a), at_least(b, least, in_b), at_least(c, least, in_c);
+      threshold_levels(a, minimum, in_a), threshold_levels(b, minimum, in_b), threshold_levels(c, minimum, in_c);
       std::vector<bool> expected(in_a.columns);
       for (std::uint32_t r = 0; r < in_a.view().rows(); ++r) {
         expected.assign(in_a.columns, false);
@@ -194,8 +194,8 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
       for (const LayerRecord& record : shares.layers) {
         const auto full = static_cast<std::uint8_t>(std::stoi(levels) - 1);
         Runs set;
-        at_least(this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
-                 static_cast<std::uint8_t>((full + 1) / 2), set);
+        threshold_levels(this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
+                    static_cast<std::uint8_t>((full + 1) / 2), set);
         EXPECT_EQ(half.layers[record.layer.index].set_pixels, set_pixels(set));
       }
       forget({"shares", "half", "rounded"});
@@ -221,8 +221,8 @@ TEST_F(ImageLevels, ConvertToTheirFormatsAndBack) {
   for (const std::string& file : test::files_below(folder_.path() / "bits")) {
     const std::string stem = fs::path(file).stem().string();
     Runs full;
-    at_least(levels("two/" + stem + ".tif", 1), 1, full);
-    EXPECT_EQ(set_pixels(full), set_pixels(read::image(folder_ / ("bits/" + stem + ".bmp"))->runs));
+    threshold_levels(levels("two/" + stem + ".tif", 1), 1, full);
+    EXPECT_EQ(set_pixels(full), set_pixels(formats::image(folder_ / ("bits/" + stem + ".bmp"))->runs));
   }
   test::expect_refused("convert as4 -o no --format tiff-g4 --levels 4", 2, "--levels: is of grey formats", folder_);
   test::expect_refused("convert as4 -o no --format tiff-4 --levels 256", 2, "give 2, 4 or 16", folder_);
@@ -346,13 +346,13 @@ TEST_F(ImageCosts, FollowTheDropsOfEachPart) {
   EXPECT_EQ(use["parts"][1]["drops"], 120'000);
 }
 
-TEST_F(ImageLevels, AreToldByInfo) {
+TEST_F(ImageLevels, AreReportedByInfo) {
   test::write_box(folder_ / "box.stl", {0, 0, 0}, {2, 3, 0.25f});
   done(
       "jet box.stl --layer 0.1 --dpi 254x127 --bed 9x8 --at 1,1 --bottom 0.4 --layers 4:7 --levels 16 --format tiff-8 -o grey");
-  const test::Outcome told = test::run_lamina({"info", "--json", "grey"}, folder_.path());
-  ASSERT_EQ(told.code, 0) << told.err;
-  const auto json = nlohmann::json::parse(told.out);
+  const test::Outcome reported = test::run_lamina({"info", "--json", "grey"}, folder_.path());
+  ASSERT_EQ(reported.code, 0) << reported.err;
+  const auto json = nlohmann::json::parse(reported.out);
   EXPECT_EQ(json["images"], 3);
   EXPECT_EQ(json["bits"], 8);
   EXPECT_EQ(json["format"], "TIFF");

@@ -2,10 +2,10 @@
 // a printer and beside meshes.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,7 +52,7 @@ class ImageParts : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(ImageParts, GiveTheBytesOfTheMeshesThatTheyWereMadeOfInEveryFormatThatTellsItsResolution) {
+TEST_F(ImageParts, GiveTheBytesOfTheMeshesThatTheyWereMadeOfInEveryFormatThatReportsItsResolution) {
   const std::string mesh = part("parameter_quality_nut.stl");
   for (const char* grid : {"--bed 31x29.3 --dpi 150", "--bed 40x37 --dpi 203x127"}) {
     for (const char* format : {"tiff-g4", "tiff-packbits", "tiff-none", "png", "bmp", "pbm"}) {
@@ -66,7 +66,7 @@ TEST_F(ImageParts, GiveTheBytesOfTheMeshesThatTheyWereMadeOfInEveryFormatThatTel
   }
 }
 
-TEST_F(ImageParts, AreResumedSharedOutAndUnitedWithMeshes) {
+TEST_F(ImageParts, AreResumedSharedOutAndMergedWithMeshes) {
   const std::string mesh = part("parameter_quality_nut.stl"), rest = " --layer 0.9 --bed 60x40 --dpi 100";
   done("jet " + mesh + rest + " --at 2,3 -o slices");
   done("jet slices" + rest + " -o whole");

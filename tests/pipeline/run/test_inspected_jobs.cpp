@@ -68,7 +68,7 @@ class InspectedJobs : public testing::Test {
   }
   /// A profile of nuferbj with more lines, which stand within [powder], or begin with [mounting] and stand there.
   std::string profile(const std::string& lines) const {
-    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "pipeline/machine/shipped/printers/nuferbj.toml");
     std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
     const std::string mounting = "[mounting]\n";
     if (lines.starts_with(mounting)) {
@@ -80,12 +80,12 @@ class InspectedJobs : public testing::Test {
     return (folder_ / "machine.toml").string();
   }
   /// Exit code, and the codes of warnings and what is said where it fails.
-  struct Told {
+  struct Reported {
     int code = 0;
     std::set<std::string> warnings;
     std::string said;
   };
-  Told jet(const std::string& arguments) const {
+  Reported jet(const std::string& arguments) const {
     const fs::path said = folder_ / "said.txt";
     const std::string command = std::string(LAMINA_PROGRAM) + " jet --json --quiet " + arguments + " -o " +
                                 (folder_ / "jet").string() + " --overwrite 2> " + said.string();
@@ -93,11 +93,11 @@ class InspectedJobs : public testing::Test {
     FILE* pipe = popen(command.c_str(), "r");
     char buffer[4096];
     for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) out.append(buffer, n);
-    Told told{WEXITSTATUS(pclose(pipe)), {}, {}};
+    Reported reported{WEXITSTATUS(pclose(pipe)), {}, {}};
     std::ifstream file(said);
-    told.said.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
-    if (told.code == 0) told.warnings = codes(nlohmann::json::parse(out));
-    return told;
+    reported.said.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    if (reported.code == 0) reported.warnings = codes(nlohmann::json::parse(out));
+    return reported;
   }
   static std::set<std::string> codes(const nlohmann::json& summary) {
     std::set<std::string> codes;
@@ -108,12 +108,12 @@ class InspectedJobs : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(InspectedJobs, EachPlantedFaultIsToldAndSoundPartsAreNot) {
+TEST_F(InspectedJobs, EachPlantedFaultIsReportedAndSoundPartsAreNot) {
   const PlantedBox block{{0, 0, 0}, {10, 10, 5}};
   const struct {
     const char* name;
     std::vector<PlantedBox> boxes;
-    std::set<std::string> told;
+    std::set<std::string> reported;
     const char* options = "";
   } cases[] = {
       {"a block", {block}, {}},
@@ -130,18 +130,18 @@ TEST_F(InspectedJobs, EachPlantedFaultIsToldAndSoundPartsAreNot) {
       {"a body that falls off", {block, {{20, 0, 2}, {22, 2, 4}}}, {"islands", "loose"}},
       {"a closed hollow", {block, {{3, 3, 1}, {6, 6, 3}, true}}, {"hollows"}},
       {"a hollow open at the side", {block, {{-1, 3, 1}, {6, 6, 3}, true}}, {}, "--fill-rule positive"},
-      {"a fin", {block, {{9, 4.9, 0}, {16, 5.2, 5}}}, {"thin"}, "--least-wall 0.5"},
-      {"the same fin where that holds", {block, {{9, 4.9, 0}, {16, 5.2, 5}}}, {}, "--least-wall 0.25"},
+      {"a fin", {block, {{9, 4.9, 0}, {16, 5.2, 5}}}, {"thin"}, "--min-wall 0.5"},
+      {"the same fin where that holds", {block, {{9, 4.9, 0}, {16, 5.2, 5}}}, {}, "--min-wall 0.25"},
       {"a block at the edge", {block}, {"bed-edge"}, "--at 0,15"},
   };
-  for (const auto& [name, boxes, told, options] : cases) {
-    EXPECT_EQ(codes(inspect(stl("part.stl", boxes) + " " + options)), told) << name;
-    EXPECT_EQ(codes(inspect(stl("part.stl", boxes) + " --dry-run " + options)), told) << name;
+  for (const auto& [name, boxes, reported, options] : cases) {
+    EXPECT_EQ(codes(inspect(stl("part.stl", boxes) + " " + options)), reported) << name;
+    EXPECT_EQ(codes(inspect(stl("part.stl", boxes) + " --dry-run " + options)), reported) << name;
   }
 }
 
 // What can go wrong with powder, binder and head: each is refused with exit code 2 and a line, or done and told by a warning.
-TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
+TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsReportedOrRefused) {
   const std::string block = stl("block.stl", {{{0, 0, 0}, {10, 10, 2}}}), other = stl("other.stl", {{{0, 0, 0}, {10, 10, 2}}}),
                     fin = stl("fin.stl", {{{0, 0, 0}, {10, 1, 2}}}),
                     rib = stl("rib.stl", {{{0, 0, 0}, {10, 10, 2}}, {{12, 0, 0}, {12.5, 10, 1}}}),
@@ -149,13 +149,13 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
                     tall = stl("tall.stl", {{{0, 0, 0}, {10, 10, 200}}});
   std::string all = "0";
   for (int nozzle = 1; nozzle < 128; ++nozzle) all += "," + std::to_string(nozzle);
-  const std::string care = "[care]\nspit_layers = 1\nspit_mm = [-40, 5]\n";
+  const std::string maintenance = "[maintenance]\nspit_layers = 1\nspit_mm = [-40, 5]\n";
   const std::string two = block + " " + other + " --material steel,bronze";
   const struct {
     const char* name;
     std::string lines, arguments;
     int code;
-    std::string told;  // a warning's code, or what is said; empty: nothing
+    std::string reported;  // a warning's code, or what is said; empty: nothing
   } rows[] = {
       {"nothing wrong", "", block, 0, ""},
       {"two powders in a layer", "", two, 2, "mix powders"},
@@ -165,26 +165,27 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
       {"the same, filled in a pause", "vat_depth_mm = [2.4, 0]\nrefill = \"pause\"\n", block, 0, ""},
       {"a vat that just lasts", "vat_depth_mm = [2.5, 0]\n", block, 0, ""},
       {"a base that no vat holds", "vat_depth_mm = [3, 0]\nbase_layers = 30\n", block, 2, "holds less than this layer takes"},
-      {"too little binder to bind", "least_saturation_percent = 50\n", block, 2, "or --allow-unbound"},
-      {"the same, allowed", "least_saturation_percent = 50\n", block + " --allow-unbound", 0, "saturation"},
+      {"too little binder to bind", "min_saturation_percent = 50\n", block, 2, "or --allow-unbound"},
+      {"the same, allowed", "min_saturation_percent = 50\n", block + " --allow-unbound", 0, "saturation"},
       {"more drops than a sweep and the profile allow", "", block + " --saturation 900", 0, "saturation"},
       {"a part that the bleed eats", "", fin + " --bleed 300", 0, "bleed"},
       {"a blocked nozzle", "", block + " --blocked 70", 0, "lost-pixels"},
-      {"shots over the bed", "[care]\nspit_layers = 1\nspit_mm = [65, 12]\n", block, 2, "nozzles are over the bed"},
+      {"shots over the bed", "[maintenance]\nspit_layers = 1\nspit_mm = [65, 12]\n", block, 2, "nozzles are over the bed"},
       {"a wall that the bleed eats, of a part that it leaves", "", rib + " --bleed 300", 0, "vanished"},
       {"the same wall, and a bleed that leaves it", "", rib + " --bleed 150", 0, ""},
       {"edges that grow beyond the bed", "", plate + " --bleed -4000 --dry-run", 2, "outside of the bed"},
-      {"shots without a place", "[care]\nspit_layers = 1\n", block, 2, "care.spit_mm: is missing"},
-      {"a place to fire, and no shot", "[care]\nspit_mm = [-40, 5]\n", block, 0, "care"},
-      {"wiping that never comes", "[care]\nwipe_mm = [-40, 20, -40, 60]\n", block, 0, "care"},
-      {"a wiper without a way", "[care]\nwipe_layers = 5\n", block, 2, "care.wipe_mm: is missing"},
-      {"a cap and no pause", care + "cap_mm = [-40, 5]\n", block, 0, "care"},
-      {"a cap over the bed", "dry_s = 5\n[care]\ncap_mm = [60, 20]\n", block, 2, "care.cap_mm: nozzles are over the bed"},
+      {"shots without a place", "[maintenance]\nspit_layers = 1\n", block, 2, "maintenance.spit_mm: is missing"},
+      {"a place to fire, and no shot", "[maintenance]\nspit_mm = [-40, 5]\n", block, 0, "maintenance"},
+      {"wiping that never comes", "[maintenance]\nwipe_mm = [-40, 20, -40, 60]\n", block, 0, "maintenance"},
+      {"a wiper without a way", "[maintenance]\nwipe_layers = 5\n", block, 2, "maintenance.wipe_mm: is missing"},
+      {"a cap and no pause", maintenance + "cap_mm = [-40, 5]\n", block, 0, "maintenance"},
+      {"a cap over the bed", "dry_s = 5\n[maintenance]\ncap_mm = [60, 20]\n", block, 2,
+       "maintenance.cap_mm: nozzles are over the bed"},
       {"a lamp without a pause", "dry_on_lines = [\"M106 S255\"]\n", block, 2, "there is no pause to dry"},
-      {"a lamp that stays on", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\n", block, 0, "care"},
+      {"a lamp that stays on", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\n", block, 0, "maintenance"},
       {"the same, switched off", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\ndry_off_lines = [\"M107\"]\n", block, 0, ""},
-      {"a pause longer than nozzles may wait", "dry_s = 90\n" + care + "spit_seconds = 60\n", block, 0, "care"},
-      {"the same under a cap", "dry_s = 90\n" + care + "spit_seconds = 60\ncap_mm = [-40, 5]\n", block, 0, ""},
+      {"a pause longer than nozzles may wait", "dry_s = 90\n" + maintenance + "spit_seconds = 60\n", block, 0, "maintenance"},
+      {"the same under a cap", "dry_s = 90\n" + maintenance + "spit_seconds = 60\ncap_mm = [-40, 5]\n", block, 0, ""},
       {"a pause to fill vats of no depth", "refill = \"pause\"\n", block, 2, "pauses need powder.vat_depth_mm"},
       {"joints that shift by a whole swath", "[mounting]\njoint_shift_lines = 128\n", block, 0, "joints"},
       {"the same by less", "[mounting]\njoint_shift_lines = 48\n", block, 0, ""},
@@ -192,21 +193,22 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
       {"nozzles that are faster than they fire", "", block + " --scan-speed 900", 2, "fires a nozzle"},
       {"a head all of whose nozzles are blocked", "", block + " --blocked " + all, 2, "one at least has to fire"},
       {"a powder that no vat holds", "materials = [\"steel\", \"bronze\"]\n", block + " --material zinc", 2, "zinc"},
-      {"a clock that no sweep keeps", "[care]\nspit_seconds = 0.5\nspit_mm = [-40, 5]\n", block, 2, "a sweep ends up to"},
+      {"a clock that no sweep keeps", "[maintenance]\nspit_seconds = 0.5\nspit_mm = [-40, 5]\n", block, 2,
+       "a sweep ends up to"},
   };
-  for (const auto& [name, lines, arguments, code, told] : rows) {
-    const Told found = jet("--machine " + profile(lines) + " --layer 0.1 " + arguments + (code == 0 ? " --dry-run" : ""));
+  for (const auto& [name, lines, arguments, code, reported] : rows) {
+    const Reported found = jet("--machine " + profile(lines) + " --layer 0.1 " + arguments + (code == 0 ? " --dry-run" : ""));
     EXPECT_EQ(found.code, code) << name << found.said;
     if (code == 0) {
-      EXPECT_EQ(found.warnings, told.empty() ? std::set<std::string>() : std::set{told}) << name;
+      EXPECT_EQ(found.warnings, reported.empty() ? std::set<std::string>() : std::set{reported}) << name;
     } else {
-      EXPECT_NE(found.said.find(told), std::string::npos) << name << ": " << found.said;
+      EXPECT_NE(found.said.find(reported), std::string::npos) << name << ": " << found.said;
       EXPECT_FALSE(fs::exists(folder_ / "jet")) << name;
     }
   }
 }
 
-TEST_F(InspectedJobs, NumbersAndPlacesAreThoseOfThePlantedBoxes) {
+TEST_F(InspectedJobs, NumbersAndPositionsAreThoseOfThePlantedBoxes) {
   const auto summary = inspect(
       stl("part.stl",
           {{{0, 0, 0}, {10, 10, 5}}, {{2, 2, 1}, {4, 5, 3}, true}, {{6, 6, 2}, {7, 7, 3}, true}, {{12, 0, 2}, {13, 3, 2.5}}}) +
@@ -227,17 +229,17 @@ TEST_F(InspectedJobs, NumbersAndPlacesAreThoseOfThePlantedBoxes) {
 }
 
 // A wall of one pixel beside a block, by the width that is asked for.
-TEST_F(InspectedJobs, AWiderLeastWallFindsAllThatANarrowerOneFinds) {
+TEST_F(InspectedJobs, AWiderMinWallFindsAllThatANarrowerOneFinds) {
   const std::string part = stl("wall.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.1, 1}}, {{3, 10, 0}, {3.4, 15, 1}}});
   std::uint64_t before = 0;
-  for (const char* least : {"0.1", "0.15", "0.2", "0.3", "0.4", "0.5", "0.8", "1.5", "2", "4", "8"}) {
-    const auto thin = inspect(part + " --dry-run --least-wall " + least)["inspection"]["thin"];
+  for (const char* minimum : {"0.1", "0.15", "0.2", "0.3", "0.4", "0.5", "0.8", "1.5", "2", "4", "8"}) {
+    const auto thin = inspect(part + " --dry-run --min-wall " + minimum)["inspection"]["thin"];
     const std::uint64_t count = thin["count"];
-    EXPECT_GE(count, before) << least;
+    EXPECT_GE(count, before) << minimum;
     before = count;
-    const double width = std::stod(least);
-    EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << least;
-    EXPECT_EQ(count > 0 ? thin["places"].size() : 0, count / 10) << "each wall is one place";
+    const double width = std::stod(minimum);
+    EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << minimum;
+    EXPECT_EQ(count > 0 ? thin["locations"].size() : 0, count / 10) << "each wall is one place";
   }
   // Two pixels are enough where nothing else is asked for.
   EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{});
@@ -245,7 +247,7 @@ TEST_F(InspectedJobs, AWiderLeastWallFindsAllThatANarrowerOneFinds) {
 }
 
 // Layers of random bits as a part: bodies without number, told as what was not looked at, and the job is done all the same.
-TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsToldAndTheJobGoesOn) {
+TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsReportedAndTheJobContinues) {
   fs::create_directories(folder_ / "noise");
   std::uint32_t state = 12345;
   for (const int layer : {0, 1, 2, 3}) {
@@ -267,8 +269,9 @@ TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsToldAndTheJobGoesOn) {
   EXPECT_LT(tight["peak_layer_bytes"], whole["peak_layer_bytes"]);
   // What it asks for is enough.
   const std::string text = tight["warnings"].back()["text"], give = "give --memory ";
-  const std::string asked = text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());
-  EXPECT_GT(inspect(job + " --memory " + asked)["inspection"]["layers"].get<int>(), 1) << text;
+  const std::string requested =
+      text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());
+  EXPECT_GT(inspect(job + " --memory " + requested)["inspection"]["layers"].get<int>(), 1) << text;
 }
 
 TEST_F(InspectedJobs, PartsThatGrowTogetherAreNamed) {
@@ -286,9 +289,9 @@ TEST_F(InspectedJobs, PartsThatGrowTogetherAreNamed) {
   EXPECT_EQ(codes(job(10, 10, 2)), std::set<std::string>{"touching"});  // within each other
   EXPECT_EQ(codes(job(5, 5, 5)), std::set<std::string>{"touching"});    // one upon the other
   EXPECT_EQ(codes(job(5, 5, 5.2)), std::set<std::string>{});            // powder between them
-  const auto beside = job(15, 8, 0)["inspection"]["touching"][0]["at"];
-  EXPECT_NEAR(beside["x_mm"].get<double>(), 15, 0.2) << beside.dump();
-  EXPECT_NEAR(beside["y_mm"].get<double>(), 11.5, 0.2) << "from 8 to 15";
+  const auto neighbour = job(15, 8, 0)["inspection"]["touching"][0]["at"];
+  EXPECT_NEAR(neighbour["x_mm"].get<double>(), 15, 0.2) << neighbour.dump();
+  EXPECT_NEAR(neighbour["y_mm"].get<double>(), 11.5, 0.2) << "from 8 to 15";
   const auto summary = job(5, 5, 5);
   EXPECT_EQ(summary["inspection"]["touching"].size(), 1u);
   EXPECT_EQ(summary["inspection"]["touching"][0]["at"]["layer"], 50);

@@ -4,7 +4,7 @@
 #include <iostream>
 
 #include "pipeline/job/file.h"
-#include "pipeline/run/image_maker.h"
+#include "pipeline/run/layer_imager.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
 
@@ -12,7 +12,7 @@ namespace lamina::pipeline {
 namespace {
 
 struct TakenBytes {
-  double told = 0, used = 0;
+  double reported = 0, used = 0;
 };
 
 TakenBytes expect_layers_take_no_more(const std::vector<std::string>& parts, const std::vector<std::string>& keys) {
@@ -23,13 +23,13 @@ TakenBytes expect_layers_take_no_more(const std::vector<std::string>& parts, con
     job.parts.back().path = std::string(LAMINA_TEST_DIR "/corpus/") + part;
   }
   job.layer_mm = 0.1;
-  std::string told;
+  std::string reported;
   for (const std::string& key : keys) {
     const Status status = set_key(job, key);
     EXPECT_TRUE(status.ok()) << status.error().message;
-    told += " " + key;
+    reported += " " + key;
   }
-  SCOPED_TRACE(parts.front() + told);
+  SCOPED_TRACE(parts.front() + reported);
   const Result<Plan> plan = test::plan_of(job, Product::kImages);
   EXPECT_TRUE(plan.ok()) << plan.error().message;
   if (!plan) return sum;
@@ -47,16 +47,16 @@ TakenBytes expect_layers_take_no_more(const std::vector<std::string>& parts, con
     EXPECT_EQ(pixels > 0 && !plan->images->dose.parts_pixels(), false);
     EXPECT_TRUE(imager.bleed(layer, work, notes).ok());
     EXPECT_TRUE(imager.dose(layer, work, record).ok());
-    const std::uint64_t told_bytes = imager.bytes_of(layer, pixels);
-    EXPECT_LE(work.bytes(), told_bytes) << "layer " << i;
-    EXPECT_LE(told_bytes, imager.bytes_of(layer, LayerImager::kUnknown)) << "layer " << i;
+    const std::uint64_t reported_bytes = imager.bytes_of(layer, pixels);
+    EXPECT_LE(work.bytes(), reported_bytes) << "layer " << i;
+    EXPECT_LE(reported_bytes, imager.bytes_of(layer, LayerImager::kUnknown)) << "layer " << i;
     const dose::DropBound drops = imager.drops_bound(layer, pixels);
     EXPECT_LE(work.runs.change.size(), drops.changes) << "layer " << i;
     EXPECT_LE(work.drops.levels.level.size(), drops.changes) << "layer " << i;
     std::uint64_t changes = 0;
     for (const Runs& plane : work.drops.planes) changes += plane.change.size();
     EXPECT_LE(changes, drops.changes_of_all) << "layer " << i;
-    sum.told += static_cast<double>(told_bytes), sum.used += static_cast<double>(work.bytes());
+    sum.reported += static_cast<double>(reported_bytes), sum.used += static_cast<double>(work.bytes());
   }
   return sum;
 }
@@ -66,12 +66,12 @@ constexpr const char* kNut = "parameter_quality_nut.stl";
 const std::string kOneDropHead = "machine.profile=jet1000", kGreyHead = "machine.profile=jet1000-grey",
                   kBed = "bed.size_mm=[60,60]";
 
-TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAFifthOfItAtLeast) {
+TEST(LayerBytes, OfLevelsAreNoMoreThanWhatIsReportedAndAFifthOfItNoLessThan) {
   TakenBytes all;
   for (const char* part : {kCrown, kNut, "nist_part_feature_open.stl"}) {
     for (const char* levels : {"dose.levels=2", "dose.levels=4", "dose.levels=16"}) {
       const TakenBytes fine = expect_layers_take_no_more({part}, {kBed, "bed.dpi=900", levels});
-      all.told += fine.told, all.used += fine.used;
+      all.reported += fine.reported, all.used += fine.used;
       expect_layers_take_no_more({part}, {kBed, "bed.dpi=250", "layers.thickness_mm=0.3", levels});
       expect_layers_take_no_more({part}, {kBed, "bed.dpi=300", levels, "dose.dithered=false"});
       expect_layers_take_no_more({part}, {kBed, "bed.dpi=300", levels, "image.format=tiff-8"});
@@ -80,17 +80,17 @@ TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAFifthOfItAtLeast) {
       expect_layers_take_no_more({part}, {kGreyHead, levels, "dose.dithered=false"});
     }
   }
-  EXPECT_LT(all.told, 5 * all.used);
-  std::cout << "levels are told with " << all.told / all.used << " times what they take\n";
+  EXPECT_LT(all.reported, 5 * all.used);
+  std::cout << "levels are told with " << all.reported / all.used << " times what they take\n";
 }
 
-TEST(LayerBytes, OfDropsAreAtMostWhatIsToldAndAFifthOfItAtLeast) {
+TEST(LayerBytes, OfDropsAreNoMoreThanWhatIsReportedAndAFifthOfItNoLessThan) {
   TakenBytes all;
   for (const char* part : {kCrown, kNut, "quad_knot.obj"}) {
     for (const char* drops :
          {"dose.saturation_percent=40", "dose.saturation_percent=350", "dose.saturation_percent=40+x", "dose.core=0.4"}) {
       const TakenBytes plain = expect_layers_take_no_more({part}, {kOneDropHead, drops});
-      all.told += plain.told, all.used += plain.used;
+      all.reported += plain.reported, all.used += plain.used;
       expect_layers_take_no_more({part}, {kOneDropHead, drops, "dose.bleed_um=[100,100]", "image.mirror=x"});
       expect_layers_take_no_more({part}, {kOneDropHead, drops, "dose.bleed_um=[-100,-50]"});
       expect_layers_take_no_more({part}, {kOneDropHead, drops, "heights.containment=inside"});
@@ -103,8 +103,8 @@ TEST(LayerBytes, OfDropsAreAtMostWhatIsToldAndAFifthOfItAtLeast) {
       expect_layers_take_no_more({part, kCrown}, {kOneDropHead, drops, "part.saturation_percent=123", "dose.levels=4"});
     }
   }
-  EXPECT_LT(all.told, 5 * all.used);
-  std::cout << "drops are told with " << all.told / all.used << " times what they take\n";
+  EXPECT_LT(all.reported, 5 * all.used);
+  std::cout << "drops are told with " << all.reported / all.used << " times what they take\n";
 }
 
 }  // namespace

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/run/image_maker.h"
+#include "pipeline/manifest/manifest.h"
+#include "pipeline/run/layer_imager.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
@@ -34,11 +34,11 @@ TEST(Levels, OfEachLayerComeFromThePlan) {
   const Result<Plan> plan = plan_of_levels(folder / "box.stl", 4);
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   const LayerImager imager(*plan);
-  cover::LayerScratch scratch;
+  coverage::CoverageScratch scratch;
   Levels image;
   double volume = 0;
   for (std::uint32_t i = 0; i < plan->layer_count; ++i) {
-    const cover::LayerReport report = imager.levels(plan->layer(i), scratch, image);
+    const coverage::CoverageReport report = imager.levels(plan->layer(i), scratch, image);
     volume += report.volume_mm3;
     EXPECT_EQ(image.view().rows(), plan->images->grid.rows());
     // Twenty by thirty voxels: full ones have level 3, those of half a layer round(1.5) = 2.
@@ -78,7 +78,7 @@ TEST_F(LevelJobs, GiveEachVoxelDropsByItsShare) {
     ASSERT_EQ(records.size(), 3u);
     EXPECT_EQ(records[0].set_pixels, 600u);
     EXPECT_EQ(records[2].dosed_pixels, full);
-    EXPECT_EQ(records[2].asked_drops, full);
+    EXPECT_EQ(records[2].requested_drops, full);
     EXPECT_EQ(records[2].drops, records[2].set_pixels);
     EXPECT_NEAR(static_cast<double>(records[2].drops), full, 12);
     done("verify " + output + " --quiet");
@@ -92,7 +92,7 @@ TEST_F(LevelJobs, GiveEachVoxelDropsByItsShare) {
   EXPECT_EQ(records_of("plain")[1].hash, records_of("rounded")[1].hash);
 }
 
-TEST_F(LevelJobs, TellHowFarHalvesAreFromTheBitmap) {
+TEST_F(LevelJobs, ReportHowFarHalvesAreFromTheBitmap) {
   const test::Outcome outcome = lamina("jet " + test::corpus_file("dental_crown.stl") +
                                        " --layer 0.3 --dpi 300 --bed 20x20 --levels 2 --no-dither --json --quiet -o crown");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -125,7 +125,7 @@ TEST_F(LevelJobs, WriteLevelsAsGreyInFormatsThatCarryThem) {
     Levels levels;
     const std::string top =
         folder_ / (std::string(format) + "/layers/000002" + (format == std::string("png-8") ? ".png" : ".tif"));
-    const auto image = read::levels(top, 15, levels);
+    const auto image = formats::levels(top, 15, levels);
     ASSERT_TRUE(image.ok()) << image.error().message;
     ASSERT_EQ(levels.level.size(), 30u);
     EXPECT_EQ(levels.change[0], 20u);

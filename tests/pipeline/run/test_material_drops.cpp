@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
@@ -27,7 +27,7 @@ nozzles = 64
 pitch_um = 100
 highest_frequency_hz = 350
 drop_pl = 100
-most_drops = 3
+max_drops = 3
 [motion]
 scan_speed_mm_s = 10
 travel_speed_mm_s = 200
@@ -62,12 +62,13 @@ class MaterialDrops : public test::JobFolder {
   }
 
   /// What the images of one material, or of a job without any, come to. They are nested, or the test fails.
-  DropPixels drops_of(const std::string& output, std::uint32_t layer, const std::string& material, std::uint32_t most) const {
+  DropPixels drops_of(const std::string& output, std::uint32_t layer, const std::string& material,
+                      std::uint32_t maximum) const {
     DropPixels drops;
-    for (std::uint32_t k = 1; k <= most; ++k) {
-      const std::string drop = most > 1 ? "drop" + std::to_string(k) : "";
+    for (std::uint32_t k = 1; k <= maximum; ++k) {
+      const std::string drop = maximum > 1 ? "drop" + std::to_string(k) : "";
       const std::string name = material + (material.empty() || drop.empty() ? "" : "-") + drop;
-      const auto image = read::image(folder_ / (output + "/" + layer_file_name(layer, ".tif", name)));
+      const auto image = formats::image(folder_ / (output + "/" + layer_file_name(layer, ".tif", name)));
       EXPECT_TRUE(image.ok()) << (image.ok() ? "" : image.error().message);
       if (!image.ok()) return drops;
       const RunsView runs = image->runs.view();
@@ -133,13 +134,13 @@ TEST_F(MaterialDrops, AddUpToThoseOfTheJobWithoutMaterials) {
     done("jet --job one.toml --quiet -o " + one);
     done("verify --quiet " + two);
     const Manifest of_two = manifest(two), of_one = manifest(one);
-    const std::uint32_t most = of_one.head.most_drops;
-    ASSERT_GT(most, 1u);
-    ASSERT_EQ(of_two.head.most_drops, most);
+    const std::uint32_t maximum = of_one.head.max_drops;
+    ASSERT_GT(maximum, 1u);
+    ASSERT_EQ(of_two.head.max_drops, maximum);
     ASSERT_EQ(of_two.layers.size(), of_one.layers.size());
     for (std::uint32_t layer = 0; layer < of_one.layers.size(); ++layer) {
-      const DropPixels steel = drops_of(two, layer, "steel", most), bronze = drops_of(two, layer, "bronze", most),
-                       all = drops_of(one, layer, "", most);
+      const DropPixels steel = drops_of(two, layer, "steel", maximum), bronze = drops_of(two, layer, "bronze", maximum),
+                       all = drops_of(one, layer, "", maximum);
       DropPixels sum = steel;
       std::uint32_t met = 0;
       for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += bronze[p], met += steel[p] > 0 && bronze[p] > 0 ? 1 : 0;
@@ -148,9 +149,9 @@ TEST_F(MaterialDrops, AddUpToThoseOfTheJobWithoutMaterials) {
       both += met;
       const LayerRecord &record = of_two.layers[layer], &plain = of_one.layers[layer];
       EXPECT_EQ(record.drops, plain.drops);
-      EXPECT_EQ(record.asked_drops, plain.asked_drops);
+      EXPECT_EQ(record.requested_drops, plain.requested_drops);
       EXPECT_EQ(record.set_pixels, plain.set_pixels) << i << " layer " << layer;
-      EXPECT_EQ(record.most_drops, plain.most_drops);
+      EXPECT_EQ(record.max_drops, plain.max_drops);
       EXPECT_EQ(record.drops_of(0, 2), sum_of_drops(steel));
       EXPECT_EQ(record.drops_of(1, 2), sum_of_drops(bronze));
       EXPECT_EQ(record.program.drops, plain.program.drops);
@@ -161,18 +162,18 @@ TEST_F(MaterialDrops, AddUpToThoseOfTheJobWithoutMaterials) {
 }
 
 // Each material gets what is wished for its parts: 40 % are 2 drops of 5, and 66 % are 3.3.
-TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsWish) {
-  test::write_text(folder_ / "wish.toml",
+TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsTarget) {
+  test::write_text(folder_ / "target.toml",
                    text_of_two_parts("[dose]\nsaturation_percent = 40\n", "saturation_percent = 66\n", 4, true));
   for (const char* how : {"--dry-run", "-o out"}) {
-    const auto json = facts("jet --job wish.toml " + std::string(how));
+    const auto json = facts("jet --job target.toml " + std::string(how));
     ASSERT_EQ(json["materials"].size(), 2u);
-    const double pixels[] = {30 * 40 * 8, 30 * 40 * 12}, wish[] = {2, 3.3};
+    const double pixels[] = {30 * 40 * 8, 30 * 40 * 12}, goal[] = {2, 3.3};
     double drops = 0;
     for (std::size_t m = 0; m < 2; ++m) {
       const auto& material = json["materials"][m];
       EXPECT_EQ(material["set_pixels"].get<double>(), pixels[m]);
-      EXPECT_NEAR(material["drops"].get<double>(), pixels[m] * wish[m], 0.001 * pixels[m] * wish[m]) << m;
+      EXPECT_NEAR(material["drops"].get<double>(), pixels[m] * goal[m], 0.001 * pixels[m] * goal[m]) << m;
       EXPECT_NEAR(material["binder_ml"].get<double>(), material["drops"].get<double>() * 100e-9, 1e-12);
       drops += material["drops"].get<double>();
     }
@@ -180,13 +181,14 @@ TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsWish) {
   }
   const test::Outcome verified = lamina("verify out --json --quiet");
   ASSERT_EQ(verified.code, 0) << verified.err;
-  const auto seen = nlohmann::json::parse(verified.out)["use"]["materials"];
-  ASSERT_EQ(seen.size(), 2u);
-  const auto told = facts("jet --job wish.toml --dry-run")["materials"];
+  const auto detected = nlohmann::json::parse(verified.out)["use"]["materials"];
+  ASSERT_EQ(detected.size(), 2u);
+  const auto reported = facts("jet --job target.toml --dry-run")["materials"];
   for (std::size_t m = 0; m < 2; ++m) {
-    for (const char* key : {"name", "set_pixels", "drops", "binder_ml"}) EXPECT_EQ(seen[m][key], told[m][key]) << key;
+    for (const char* key : {"name", "set_pixels", "drops", "binder_ml"}) EXPECT_EQ(detected[m][key], reported[m][key]) << key;
   }
-  EXPECT_NE(lamina("jet --job wish.toml --dry-run").err.find(" of steel: 19 200 drops, 0.002 ml of binder"), std::string::npos);
+  EXPECT_NE(lamina("jet --job target.toml --dry-run").err.find(" of steel: 19 200 drops, 0.002 ml of binder"),
+            std::string::npos);
 }
 
 // A voxel at the seam is three tenths of steel and seven tenths of bronze, and so are its drops over many voxels.
@@ -196,11 +198,12 @@ TEST_F(MaterialDrops, OfSharedVoxelsFollowTheShares) {
   test::write_box(folder_ / "low.stl", {0, 0, 0}, {3.03f, 4, 1.2f});
   done("jet --job seam.toml --quiet -o seam");
   done("verify --quiet seam");
-  const std::uint32_t most = manifest("seam").head.most_drops;
-  ASSERT_EQ(most, 4u);
+  const std::uint32_t maximum = manifest("seam").head.max_drops;
+  ASSERT_EQ(maximum, 4u);
   std::uint64_t steel = 0, bronze = 0;
   for (std::uint32_t layer = 0; layer < 12; ++layer) {
-    const DropPixels of_steel = drops_of("seam", layer, "steel", most), of_bronze = drops_of("seam", layer, "bronze", most);
+    const DropPixels of_steel = drops_of("seam", layer, "steel", maximum),
+                     of_bronze = drops_of("seam", layer, "bronze", maximum);
     for (std::size_t r = 0; r < 100; ++r) steel += of_steel[r * 160 + 40], bronze += of_bronze[r * 160 + 40];
   }
   const double voxels = 40 * 12, share = 4.0 / 15;  // level 4 of 15 (0.3 is a tie that float edges end), 11 are left
@@ -238,20 +241,20 @@ TEST_F(MaterialDrops, AreGreyImagesToo) {
       done(kTwoMaterials + dose + " --quiet -o grey --overwrite --format " + std::string(format));
       done("verify --quiet grey");
       const Manifest grey = manifest("grey");
-      const std::uint32_t most = grey.head.most_drops;
-      ASSERT_EQ(most, bits.head.most_drops);
+      const std::uint32_t maximum = grey.head.max_drops;
+      ASSERT_EQ(maximum, bits.head.max_drops);
       for (std::uint32_t layer = 0; layer < grey.layers.size(); ++layer) {
         for (std::size_t m = 0; m < 2; ++m) {
           const std::string name = m == 0 ? "steel" : "bronze";
           Levels levels;
           const auto image =
-              read::levels(folder_ / ("grey/" + layer_file_name(layer, ".tif", name)), grey_level_of(most), levels);
+              formats::levels(folder_ / ("grey/" + layer_file_name(layer, ".tif", name)), grey_level_of(maximum), levels);
           ASSERT_TRUE(image.ok()) << image.error().message;
-          EXPECT_EQ(sum_of_levels(levels), sum_of_drops(drops_of("bits", layer, name, most))) << name << layer;
+          EXPECT_EQ(sum_of_levels(levels), sum_of_drops(drops_of("bits", layer, name, maximum))) << name << layer;
           EXPECT_EQ(grey.layers[layer].drops_of(m, 2), sum_of_levels(levels));
         }
         EXPECT_EQ(grey.layers[layer].set_pixels, bits.layers[layer].set_pixels);
-        EXPECT_EQ(grey.layers[layer].most_drops, bits.layers[layer].most_drops);
+        EXPECT_EQ(grey.layers[layer].max_drops, bits.layers[layer].max_drops);
         EXPECT_EQ(grey.layers[layer].program.hash, bits.layers[layer].program.hash);
       }
     }
@@ -320,7 +323,7 @@ TEST_F(MaterialDrops, AreReplayedPlaneByPlane) {
 TEST_F(MaterialDrops, HaveNumbersOfTheirLayerThatAreVerified) {
   done(kTwoMaterials + "--saturation 66 --levels 16 --quiet -o out");
   const std::string path = folder_ / "out/manifest.json", text = test::read_text(path);
-  for (const char* key : {"\"most_drops\": ", "\"set_pixels\": ", "\"unfed_pixels\": "}) {
+  for (const char* key : {"\"max_drops\": ", "\"set_pixels\": ", "\"unfed_pixels\": "}) {
     std::string changed = text;
     std::size_t at = changed.find(key, changed.find("\n{\"index\": 3,")) + std::string(key).size();
     changed[at] = changed[at] == '9' ? '8' : static_cast<char>(changed[at] + 1);
@@ -331,9 +334,9 @@ TEST_F(MaterialDrops, HaveNumbersOfTheirLayerThatAreVerified) {
 
 // Which parts pay for which drops.
 TEST_F(MaterialDrops, AreSharedOutAmongParts) {
-  test::write_text(folder_ / "wish.toml",
+  test::write_text(folder_ / "target.toml",
                    text_of_two_parts("[dose]\nsaturation_percent = 40\n", "saturation_percent = 66\n", 4.5, true));
-  done("jet --job wish.toml --quote quote.csv --quiet -o out");
+  done("jet --job target.toml --quote quote.csv --quiet -o out");
   done("verify --quiet out");
   for (const LayerRecord& record : manifest("out").layers) {
     ASSERT_EQ(record.part_drops.size(), 2u);
@@ -346,7 +349,7 @@ TEST_F(MaterialDrops, AreCarriedByTheProgramsOfMachinesWithTwoVats) {
   const std::string parts = "jet low.stl high.stl --material steel,bronze --layer 0.1 --saturation 46 --quiet ";
   done(parts + "--machine nuferbj --vat-rule both -o gcode");
   done("verify --quiet gcode");
-  EXPECT_GT(manifest("gcode").head.most_drops, 2u);
+  EXPECT_GT(manifest("gcode").head.max_drops, 2u);
   for (const char* dialect : {"raw", "planes"}) {
     std::string text = kTwoVats;
     text.replace(text.find("\"planes\""), 8, "\"" + std::string(dialect) + "\"");

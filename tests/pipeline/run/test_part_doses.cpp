@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -11,8 +10,8 @@
 #include "pipeline/run/run.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
-#include "stages/read/image.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -37,14 +36,14 @@ Job job_of_boxes(const test::Directory& folder, const std::string& out, double g
 }
 
 Runs layer_of(const Job& job, const std::string& name) {
-  auto read = read::image(job.output + "/layers/" + name);
+  auto read = formats::image(job.output + "/layers/" + name);
   EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
   return read.ok() ? std::move(read->runs) : Runs();
 }
 
 bool same(const Runs& a, const Runs& b) { return a.row_offset == b.row_offset && a.change == b.change; }
 
-Runs united(const Runs& a, const Runs& b) {
+Runs merged(const Runs& a, const Runs& b) {
   Runs both;
   combine(a, b, SetOperation::kUnion, both);
   return both;
@@ -86,7 +85,7 @@ TEST(PartDoses, AreThoseOfJobsWithThePartAlone) {
   for (const std::string layer : {"000000", "000003"}) {
     for (const std::string drop : {"-drop1.tif", "-drop2.tif", "-drop3.tif"}) {
       const Runs first = layer_of(alone[0], layer + drop), second = layer_of(alone[1], layer + drop);
-      EXPECT_TRUE(same(layer_of(both, layer + drop), united(first, second))) << layer << drop;
+      EXPECT_TRUE(same(layer_of(both, layer + drop), merged(first, second))) << layer << drop;
     }
   }
 }
@@ -160,7 +159,7 @@ TEST(PartDoses, RecordedDropsAreComparedWithTheImages) {
   ASSERT_TRUE(run_part_doses(job).ok());
   const std::string path = job.output + "/manifest.json";
   std::string manifest = test::read_text(path);
-  const std::size_t drops = manifest.rfind("\"asked_drops\"");
+  const std::size_t drops = manifest.rfind("\"requested_drops\"");
   const std::size_t at = manifest.rfind("\"drops\":", drops);
   ASSERT_NE(at, std::string::npos);
   const std::size_t digit = manifest.find_first_of("0123456789", at);
@@ -183,7 +182,7 @@ TEST(PartDoses, RoundedDropsAreThoseOfOneDose) {
     if (zones) job.parts[1].hole_bleed_um = {1, 1};  // moves nothing
     const auto summary = run_part_doses(job);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
-    drops.push_back((*summary->facts)["saturation"]["drops"]);
+    drops.push_back(summary->facts["saturation"]["drops"].get<std::uint64_t>());
   }
   EXPECT_EQ(drops[0], drops[1]);
 }
@@ -200,7 +199,7 @@ TEST(PartDoses, SharesOfVoxelsStayWhereNoEdgeMoves) {
     job.dose.bleed_um = {um, um};
     const auto summary = run_part_doses(job);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
-    full.push_back((*summary->facts)["voxels"]["full_voxels"]);
+    full.push_back(summary->facts["voxels"]["full_voxels"].get<std::uint64_t>());
   }
   EXPECT_EQ(full[0], full[1]);
   EXPECT_LT(full[2], full[1]);
@@ -219,7 +218,7 @@ TEST(PartDoses, SharesOfVoxelsAreSharedOutAmongPartsAndVerified) {
     const auto summary = run_part_doses(job);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
     expect_replayed(job);
-    const auto& use = (*summary->facts)["use"];
+    const auto& use = summary->facts["use"];
     std::uint64_t drops = 0;
     for (const auto& part : use["parts"]) drops += part["drops"].get<std::uint64_t>();
     EXPECT_EQ(drops, use["drops"].get<std::uint64_t>());

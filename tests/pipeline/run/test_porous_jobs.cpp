@@ -10,9 +10,9 @@
 
 #include "pipeline/plan/layer_cut.h"
 #include "stages/dose/edges/erode.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
 #include "stages/raster/raster.h"
-#include "stages/read/image.h"
 #include "stages/segment/expand.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
@@ -40,7 +40,7 @@ class PorousJob : public testing::Test {
       const std::string file =
           folder / (name + "/layers/" + std::string(6 - std::to_string(i).size(), '0') + std::to_string(i) + ".pbm");
       if (!fs::exists(file)) return images;
-      auto image = read::image(file);
+      auto image = formats::image(file);
       EXPECT_TRUE(image.ok()) << (image.ok() ? "" : image.error().message);
       images.push_back(std::move(image->runs));
     }
@@ -196,7 +196,7 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       const pipeline::Beads& beads = *plan->images->beads;
       const auto work = std::make_unique<pipeline::BeadWork>(grid);
       ASSERT_TRUE(plan->sections->layer(layer.index, work->sections).ok());
-      ASSERT_TRUE(beads.lay(layer, *work).ok());
+      ASSERT_TRUE(beads.deposit(layer, *work).ok());
       beads.apply(image, scratch, *work);
       const auto bytes = work->bytes();
       EXPECT_LE(bytes, beads.bytes_expected(layer.index));
@@ -207,12 +207,12 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       request.all.thick_width_mm = request.all.continuous_width_mm = 0.4;
       const auto segments = pipeline::plan_segments(request, segment::Calibration(), fill);
       ASSERT_TRUE(segments.ok());
-      const auto& room = plan->sections->areas().at(0);
-      const auto cut = pipeline::layer_cut(segments->base, plan->sections->filling(room, layer), layer, room.box);
+      const auto& capacity = plan->sections->areas().at(0);
+      const auto cut = pipeline::layer_cut(segments->base, plan->sections->filling(capacity, layer), layer, capacity.box);
       ASSERT_TRUE(cut.ok());
       cl::Clipper clipper;
       int thin = 0;
-      segment::for_each_stretch(work->sections.paths, *cut, [&](const Stretch& s) {
+      segment::for_each_interval(work->sections.paths, *cut, [&](const PathInterval& s) {
         const double w = s.thickness == Thickness::kThin ? 75e3 : 200e3;
         thin += s.thickness == Thickness::kThin ? 1 : 0;
         const double dx = s.to.x - s.from.x, dy = s.to.y - s.from.y, length = std::hypot(dx, dy), ux = dx / length,
@@ -242,11 +242,11 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       cl::Path outline;
       for (const Point2 p : work->sections.contours.contours.point) outline.emplace_back(p.x, p.y);
       clipper.AddPath(outline, cl::ptClip, true);
-      cl::Paths united;
-      ASSERT_TRUE(clipper.Execute(cl::ctIntersection, united, cl::pftNonZero, cl::pftNonZero));
+      cl::Paths merged;
+      ASSERT_TRUE(clipper.Execute(cl::ctIntersection, merged, cl::pftNonZero, cl::pftNonZero));
       const double pixel = 25.4e6 / 1200;
       double area = 0, edge = 0;
-      for (const cl::Path& path : united) {
+      for (const cl::Path& path : merged) {
         area += cl::Area(path);
         edge += 1;
         for (std::size_t i = 0; i < path.size(); ++i) {

@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/check/verify.h"
 #include "pipeline/machine/profiles.h"
@@ -22,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A number of a summary that only images have.
-std::uint64_t fact(const Summary& summary, const char* key) { return (*summary.facts)[key]; }
+std::uint64_t fact(const Summary& summary, const char* key) { return summary.facts[key].get<std::uint64_t>(); }
 
 class PrintJobs : public ::testing::Test {
  protected:
@@ -119,23 +118,25 @@ TEST_F(PrintJobs, WhatSurroundsTheLayersAndThePowderCycleAreVerifiedToo) {
     std::ofstream(path, std::ios::binary) << text;
     return report.ok() && report->faults.size() == 1 ? report->faults[0] : std::string("not one fault");
   };
-  const auto tells = [](const std::string& fault, const std::string& what) {
+  const auto contains_text = [](const std::string& fault, const std::string& what) {
     EXPECT_NE(fault.find(what), std::string::npos) << fault;
   };
   const fs::path layer = program / "000001.gcode";
-  tells(fault_with(program / "start.gcode", "G21", "G20"), "program/start.gcode: G21 is missing: layers are in mm");
-  tells(fault_with(layer, "Z3.0000", "Z2.5000"),
-        "layer 1, powder cycle: powder is spread with the build vat at 2.5 mm and 1.875 mm fed, not 3 and 1.875");
-  tells(fault_with(layer, "G1 A1.8750", "G1 A0.8750"),
-        "layer 1, powder cycle: powder is spread with the build vat at 3 mm and 0.875 mm fed, not 3 and 1.875");
-  tells(fault_with(layer, "G1 U260.0000", "G1 U100.0000"), "layer 1, powder cycle: the roller does not reach its far end");
-  tells(fault_with(layer, "G1 U0.0000", "G1 U9.0000"),
-        "layer 1, powder cycle: the head moves while the roller is at 9 mm, not at 0");
+  contains_text(fault_with(program / "start.gcode", "G21", "G20"), "program/start.gcode: G21 is missing: layers are in mm");
+  contains_text(fault_with(layer, "Z3.0000", "Z2.5000"),
+                "layer 1, powder cycle: powder is spread with the build vat at 2.5 mm and 1.875 mm fed, not 3 and 1.875");
+  contains_text(fault_with(layer, "G1 A1.8750", "G1 A0.8750"),
+                "layer 1, powder cycle: powder is spread with the build vat at 3 mm and 0.875 mm fed, not 3 and 1.875");
+  contains_text(fault_with(layer, "G1 U260.0000", "G1 U100.0000"),
+                "layer 1, powder cycle: the roller does not reach its far end");
+  contains_text(fault_with(layer, "G1 U0.0000", "G1 U9.0000"),
+                "layer 1, powder cycle: the head moves while the roller is at 9 mm, not at 0");
   const std::string text = text_of(layer);
   const std::size_t scan = text.find("G1 Y") != std::string::npos ? text.find("G1 Y") : text.find("G1 X");
   ASSERT_NE(scan, std::string::npos);
   const std::string line = text.substr(scan, text.find('\n', scan) - scan);
-  tells(fault_with(layer, line, line.substr(0, line.find(" F")) + " F60000"), ": scans at 1000 mm/s, where nozzles fire");
+  contains_text(fault_with(layer, line, line.substr(0, line.find(" F")) + " F60000"),
+                ": scans at 1000 mm/s, where nozzles fire");
   fs::remove(program / "end.gcode");
   const auto report = verify(made.output, {});
   ASSERT_TRUE(report.ok());
@@ -160,7 +161,7 @@ TEST_F(PrintJobs, AJobThatReplacesAnotherLeavesNoneOfItsPrograms) {
   EXPECT_FALSE(fs::exists(fs::path(made.output) / "program"));
 }
 
-TEST_F(PrintJobs, APixelThatAWorkingNozzleLeavesOutIsToldWhereverOthersAreBlocked) {
+TEST_F(PrintJobs, APixelThatAWorkingNozzleLeavesOutIsReportedWhereverOthersAreBlocked) {
   for (const char* const rule : {"report", "neighbour"}) {
     Job made = job("dental_crown.stl", 2, "nuferbj", rule);
     std::ofstream profile(directory_ / (std::string(rule) + ".toml"));
@@ -292,7 +293,7 @@ TEST_F(PrintJobs, WhatTheMachineCannotDoIsRefusedInOneLine) {
   refused([](Job& j) { j.machine.blocked = std::vector<std::uint32_t>{128}; }, "there is no nozzle 128");
 }
 
-TEST_F(PrintJobs, LayersThatEndBetweenStepsOfTheBuildVatAreTold) {
+TEST_F(PrintJobs, LayersThatEndBetweenStepsOfTheBuildVatAreReported) {
   Job made = job("parameter_quality_nut.stl", 1, "nuferbj", "steps");
   made.dry_run = true;
   made.layer_mm = 0.2;

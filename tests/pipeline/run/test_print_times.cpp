@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/check/verify.h"
 #include "pipeline/machine/profiles.h"
@@ -36,7 +35,7 @@ class PrintTimes : public ::testing::Test {
     const auto summary = run(
         job, Product::kImages, [](const ProgressEvent&) {}, cancel);
     EXPECT_TRUE(summary.ok()) << job.machine.profile << ": " << (summary.ok() ? "" : summary.error().message);
-    return summary.ok() ? (*summary->facts)["print_seconds"].get<double>() : 0;
+    return summary.ok() ? summary->facts["print_seconds"].get<double>() : 0;
   }
   /// Leaves the time of layer 1 out of the manifest, as builds did that did not know it.
   static void forget_a_time(const Job& job) {
@@ -153,24 +152,24 @@ TEST_F(PrintTimes, PausesAndSpreadingByTheProfileByHand) {
   EXPECT_NEAR(ten, 10 * (13.123 - 12.023 + 9 + 4), 0.002 * ten);
 }
 
-TEST_F(PrintTimes, APrismsTimeIsLinearInItsHeightOnEveryMachineHoweverItIsTold) {
+TEST_F(PrintTimes, APrismsTimeIsLinearInItsHeightOnEveryMachineHoweverItIsStated) {
   for (const ShippedProfile& shipped : shipped_machines()) {
     const std::string name(shipped.name);
     SCOPED_TRACE(name);
     const Job once = prism({12, 8, 2}, {30, 40}, name, 1, name + "-1");
-    const double told = dry_seconds(once);
-    EXPECT_GT(told, 2);
+    const double reported = dry_seconds(once);
+    EXPECT_GT(reported, 2);
     EXPECT_FALSE(fs::exists(once.output)) << "a dry run writes nothing";
     for (const int times : {2, 7}) {
       Job more = prism({12, 8, 2.0f * static_cast<float>(times)}, {30, 40}, name, 1, name + "-n");
-      EXPECT_NEAR(dry_seconds(more), times * told, 1e-6 * times * told) << times;
+      EXPECT_NEAR(dry_seconds(more), times * reported, 1e-6 * times * reported) << times;
     }
-    EXPECT_EQ(print_seconds(once), told);
-    EXPECT_EQ(replayed_seconds(once), told);
+    EXPECT_EQ(print_seconds(once), reported);
+    EXPECT_EQ(replayed_seconds(once), reported);
   }
 }
 
-TEST_F(PrintTimes, SharesAddUpToTheWholeAndResumedRunsTellAllOfIt) {
+TEST_F(PrintTimes, SharesAddUpToTheWholeAndResumedRunsReportAllOfIt) {
   Job whole = prism({12, 8, 9}, {30, 40}, "nuferbj-31", 1, "whole");
   const double all = print_seconds(whole);
   EXPECT_EQ(replayed_seconds(whole), all);
@@ -200,11 +199,11 @@ TEST_F(PrintTimes, SharesAddUpToTheWholeAndResumedRunsTellAllOfIt) {
   const auto resumed = run(
       whole, Product::kImages, [](const ProgressEvent&) {}, cancel);
   ASSERT_TRUE(resumed.ok());
-  EXPECT_FALSE(resumed->facts->contains("print_seconds"));
+  EXPECT_FALSE(resumed->facts.contains("print_seconds"));
 }
 
-TEST_F(PrintTimes, AManifestThatTellsAnotherTimeIsAFault) {
-  const Job job = prism({12, 8, 3}, {30, 40}, "xaar128-raw", 1, "told");
+TEST_F(PrintTimes, AManifestThatStatesAnotherTimeIsAFault) {
+  const Job job = prism({12, 8, 3}, {30, 40}, "xaar128-raw", 1, "stated");
   print_seconds(job);
   const fs::path manifest = fs::path(job.output) / "manifest.json";
   std::string text = test::read_text(manifest);

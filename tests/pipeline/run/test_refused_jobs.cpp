@@ -98,13 +98,13 @@ TEST_F(RefusedJobs, LayersOfOtherRunsAreNotWarnedOf) {
 
 TEST_F(RefusedJobs, PausesForVatsAreThoseOfTheLayersThatAreMade) {
   save("low.toml", "inherits = \"nuferbj\"\n[machine]\nname = \"low\"\n[powder]\nvat_depth_mm = [1, 1]\nrefill = \"pause\"\n");
-  const auto told = [&](const std::string& how) {
+  const auto reported = [&](const std::string& how) {
     return lamina("jet box.stl --layer 0.1 --machine low.toml --dry-run " + how).err;
   };
-  const std::string all = told("");
+  const std::string all = reported("");
   ASSERT_NE(all.find("pauses before layers 8, 16, 24 and 32 "), std::string::npos) << all;
-  EXPECT_NE(told("--layers 10:20").find("pauses before layer 16 "), std::string::npos) << told("--layers 10:20");
-  EXPECT_EQ(told("--layers 1:8").find("pauses"), std::string::npos);
+  EXPECT_NE(reported("--layers 10:20").find("pauses before layer 16 "), std::string::npos) << reported("--layers 10:20");
+  EXPECT_EQ(reported("--layers 1:8").find("pauses"), std::string::npos);
 }
 
 }  // namespace

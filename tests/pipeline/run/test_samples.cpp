@@ -68,16 +68,16 @@ std::vector<std::vector<GcodeBead>> lines_of(const test::GcodeLayer& layer, bool
 /// Every line with thin stretches begins and ends with thick ones, and all such lines are laid the same way.
 void expect_thick_ends(const test::GcodeLayer& layer, double thin_feed, const std::string& name) {
   std::size_t segmented = 0;
-  std::set<bool> ways;
+  std::set<bool> paths;
   for (const auto& line : lines_of(layer, true)) {
     if (std::ranges::none_of(line, [&](const GcodeBead& b) { return b.feed == thin_feed; })) continue;
     ++segmented;
     EXPECT_NE(line.front().feed, thin_feed) << name;
     EXPECT_NE(line.back().feed, thin_feed) << name;
-    ways.insert(line.back().y1 > line.front().y0);
+    paths.insert(line.back().y1 > line.front().y0);
   }
   EXPECT_GT(segmented, 0) << name;
-  EXPECT_EQ(ways.size(), 1) << name;
+  EXPECT_EQ(paths.size(), 1) << name;
 }
 
 /// Nothing is fitted: 100 % is 0.85 of the rectangle of bead and layer, as the document prints its flow.
@@ -133,7 +133,7 @@ TEST_F(Samples, SpeedsOfTable3AndExtrusionsOfTable4GoFromLineToLine) {
   }
 }
 
-TEST_F(Samples, RepeatedStretchesOfTables5To7HaveTheirSpeedsExtrusionsAndSpacings) {
+TEST_F(Samples, RepeatedIntervalsOfTables5To7HaveTheirSpeedsExtrusionsAndSpacings) {
   struct Kind {
     std::string job;
     int extrusion, thick_speed;
@@ -156,14 +156,14 @@ TEST_F(Samples, RepeatedStretchesOfTables5To7HaveTheirSpeedsExtrusionsAndSpacing
     ASSERT_EQ(sample.gcode.layers.size(), std::lround(kind.height / 0.3)) << kind.job;
     const auto& layer = sample.gcode.layers[0];
     expect_thick_ends(layer, 1800, kind.job);
-    std::vector<double> places;
+    std::vector<double> positions;
     double reference = 0;
     for (const auto& line : lines_of(layer, true)) {
       if (length(line[0]) > 20) reference = line[0].filament / length(line[0]);
     }
     ASSERT_GT(reference, 0) << kind.job;
     for (const auto& line : lines_of(layer, true)) {
-      places.push_back(line[0].x0);
+      positions.push_back(line[0].x0);
       if (line.size() < 3) continue;
       for (const GcodeBead& b : line) {
         EXPECT_TRUE(b.feed == 1800 || b.feed == kind.thick_speed * 9) << kind.job << ' ' << b.feed;
@@ -175,8 +175,9 @@ TEST_F(Samples, RepeatedStretchesOfTables5To7HaveTheirSpeedsExtrusionsAndSpacing
         }
       }
     }
-    std::ranges::sort(places);
-    for (std::size_t i = 1; i < places.size(); ++i) EXPECT_NEAR(places[i] - places[i - 1], kind.spacing, 0.002) << kind.job;
+    std::ranges::sort(positions);
+    for (std::size_t i = 1; i < positions.size(); ++i)
+      EXPECT_NEAR(positions[i] - positions[i - 1], kind.spacing, 0.002) << kind.job;
   }
 }
 
@@ -193,11 +194,11 @@ TEST_F(Samples, CylindersOfTable8Have85LayersAndTheirSpacings) {
     const auto lines = lines_of(sample.gcode.layers[40], true);
     const double sc = number(row, "spacing_sc_mm"), cc = row.at("spacing_cc_mm") == "-" ? sc : number(row, "spacing_cc_mm");
     const auto continuous = static_cast<std::size_t>(number(row, "continuous_lines"));
-    std::vector<std::pair<double, bool>> places;  // of lines, and whether they are segmented
+    std::vector<std::pair<double, bool>> positions;  // of lines, and whether they are segmented
     for (const auto& line : lines) {
       const bool thin = std::ranges::any_of(line, [](const GcodeBead& b) { return b.feed == 1800; });
       if (line.size() == 1 && length(line[0]) < 5) continue;  // near the sides: thick all along
-      places.emplace_back(line[0].x0, thin);
+      positions.emplace_back(line[0].x0, thin);
       for (const GcodeBead& b : line) {
         if (b.feed == 1800) {
           EXPECT_NEAR(length(b), number(row, "thin_length_mm"), 0.002) << name;
@@ -207,13 +208,15 @@ TEST_F(Samples, CylindersOfTable8Have85LayersAndTheirSpacings) {
         }
       }
     }
-    std::ranges::sort(places);
+    std::ranges::sort(positions);
     std::size_t segmented = 0, last = 0;
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t i = 0; i < positions.size(); ++i) {
       if (i > 0) {
-        EXPECT_NEAR(places[i].first - places[i - 1].first, places[i].second || places[i - 1].second ? sc : cc, 0.002) << name;
+        EXPECT_NEAR(positions[i].first - positions[i - 1].first, positions[i].second || positions[i - 1].second ? sc : cc,
+                    0.002)
+            << name;
       }
-      if (!places[i].second) continue;
+      if (!positions[i].second) continue;
       if (segmented++ > 0) {
         EXPECT_EQ(i - last, continuous + 1) << name;
       }
@@ -235,39 +238,40 @@ TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90D
     const auto& layer = sample.gcode.layers[n];
     const auto along_y = lines_of(layer, true), along_x = lines_of(layer, false);
     const auto longest = [](const auto& lines) {
-      double most = 0;
+      double maximum = 0;
       for (const auto& line : lines)
-        most = std::max(most, std::hypot(line.back().x1 - line[0].x0, line.back().y1 - line[0].y0));
-      return most;
+        maximum = std::max(maximum, std::hypot(line.back().x1 - line[0].x0, line.back().y1 - line[0].y0));
+      return maximum;
     };
     if (n % 10 == 9) {
       EXPECT_GT(longest(along_x), 13) << n;
       EXPECT_LT(longest(along_y), 2) << n;
-      std::vector<double> places;
+      std::vector<double> positions;
       for (const auto& line : along_x) {
         EXPECT_EQ(line[0].feed, 900);
-        if (length(line[0]) > 5) places.push_back(line[0].y0);
+        if (length(line[0]) > 5) positions.push_back(line[0].y0);
       }
-      std::ranges::sort(places);
-      for (std::size_t i = 1; i < places.size(); ++i) EXPECT_NEAR(places[i] - places[i - 1], 0.4, 0.002);
+      std::ranges::sort(positions);
+      for (std::size_t i = 1; i < positions.size(); ++i) EXPECT_NEAR(positions[i] - positions[i - 1], 0.4, 0.002);
       continue;
     }
     EXPECT_GT(longest(along_y), 13) << n;
     expect_thick_ends(layer, 1800, "tomography");
-    std::vector<double> places;
+    std::vector<double> positions;
     std::set<double> feeds;
     for (const auto& line : along_y) {
-      if (line.size() > 1 || length(line[0]) > 5) places.push_back(line[0].x0);
+      if (line.size() > 1 || length(line[0]) > 5) positions.push_back(line[0].x0);
       for (const GcodeBead& b : line) feeds.insert(b.feed);
     }
-    std::ranges::sort(places);
-    for (std::size_t i = 1; i < places.size(); ++i) EXPECT_NEAR(places[i] - places[i - 1], spacings[n / 10], 0.002) << n;
+    std::ranges::sort(positions);
+    for (std::size_t i = 1; i < positions.size(); ++i)
+      EXPECT_NEAR(positions[i] - positions[i - 1], spacings[n / 10], 0.002) << n;
     EXPECT_EQ(feeds, (std::set<double>{thick_feeds[n / 10], 900, 1800})) << n;
   }
 }
 
 /// The thin stretches of the first layer, along x or y, that meet one of the second, which is turned.
-void expect_crossed_as_told(const test::GcodeFile& gcode, const nlohmann::json& told) {
+void expect_crossed_as_reported(const test::GcodeFile& gcode, const nlohmann::json& reported) {
   const auto is_thin = [](const GcodeBead& b) { return b.feed == 1800 && b.type == "Internal infill"; };
   const auto between = [](double a, double at, double b) { return std::min(a, b) <= at && at <= std::max(a, b); };
   int thin = 0, meet = 0;
@@ -281,8 +285,8 @@ void expect_crossed_as_told(const test::GcodeFile& gcode, const nlohmann::json& 
                      : between(a.y0, b.y0, a.y1) && between(b.x0, a.x0, b.x1);
     });
   }
-  EXPECT_EQ(told["crossing"], thin);
-  EXPECT_EQ(told["crossed"], meet);
+  EXPECT_EQ(reported["crossing"], thin);
+  EXPECT_EQ(reported["crossed"], meet);
   // One in (thick + thin) / distance of segmented lines meets one, and the outermost have fewer to meet.
   EXPECT_GT(meet, thin / 5);
   EXPECT_LT(meet, thin * 2 / 5);
@@ -305,7 +309,7 @@ TEST_F(Samples, PoresOfLayersTurnedBy90DegreesLieOverEachOther) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto gcode = test::read_gcode(test::read_text(folder / "a.gcode"));
   ASSERT_EQ(gcode.error, "");
-  expect_crossed_as_told(gcode, nlohmann::json::parse(outcome.out, nullptr, false)["pores"][0]);
+  expect_crossed_as_reported(gcode, nlohmann::json::parse(outcome.out, nullptr, false)["pores"][0]);
   // Middles of thin stretches lie on the segmented lines of the other layer, which are 1 mm apart.
   const auto thin_of = [&](std::size_t layer) {
     std::vector<std::array<double, 2>> middles;

@@ -4,16 +4,15 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "pipeline/check/verify.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/run/run.h"
 #include "stages/data/runs.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
@@ -38,15 +37,15 @@ class FormulaJobs : public test::JobFolder {
     return run(
         job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   }
-  nlohmann::ordered_json facts_of(const Job& job) const {
+  Json facts_of(const Job& job) const {
     const auto summary = run_job(job);
     EXPECT_TRUE(summary.ok()) << (summary.ok() ? "" : summary.error().message);
     const auto report = verify(job.output, {});
     EXPECT_TRUE(report.ok() && report->ok()) << (report.ok() && !report->faults.empty() ? report->faults[0] : "");
-    return summary.ok() ? *summary->facts : nlohmann::ordered_json();
+    return summary.ok() ? summary->facts : Json();
   }
   Runs image(const Job& job, const std::string& name) const {
-    auto read = read::image(job.output + "/layers/" + name);
+    auto read = formats::image(job.output + "/layers/" + name);
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
     return read.ok() ? std::move(read->runs) : Runs();
   }
@@ -64,14 +63,14 @@ TEST_F(FormulaJobs, CountFromTheBedOrFromThePart) {
   job.dose.saturation_percent = Saturation::of("20+5*x");
   job.parts[1].saturation_percent = Saturation::of("60-4*x");
   const auto facts = facts_of(job)["saturation"];
-  EXPECT_NEAR(facts["asked_percent"].get<double>(), 67, 0.067);
-  EXPECT_NEAR(facts["reached_percent"].get<double>(), facts["asked_percent"].get<double>(), 0.067);
+  EXPECT_NEAR(facts["requested_percent"].get<double>(), 67, 0.067);
+  EXPECT_NEAR(facts["reached_percent"].get<double>(), facts["requested_percent"].get<double>(), 0.067);
   // Moved as a whole, the second one gets the same.
   Job moved = job_of_boxes("moved", 9);
   moved.parts.erase(moved.parts.begin());
   moved.dose.saturation_percent = 20;
   moved.parts[0].saturation_percent = Saturation::of("60-4*x");
-  EXPECT_NEAR(facts_of(moved)["saturation"]["asked_percent"].get<double>(), 44, 0.05);
+  EXPECT_NEAR(facts_of(moved)["saturation"]["requested_percent"].get<double>(), 44, 0.05);
 }
 
 TEST_F(FormulaJobs, OfOneNumberAreThoseOfTheNumber) {
@@ -85,8 +84,8 @@ TEST_F(FormulaJobs, OfOneNumberAreThoseOfTheNumber) {
   formula.dose.saturation_percent = Saturation::of("62.5+0*x*y*z");
   const auto one = facts_of(number)["saturation"], other = facts_of(formula)["saturation"];
   EXPECT_EQ(one["drops"], other["drops"]);
-  EXPECT_EQ(one["asked_percent"], other["asked_percent"]);
-  EXPECT_EQ(one["most_drops"], other["most_drops"]);
+  EXPECT_EQ(one["requested_percent"], other["requested_percent"]);
+  EXPECT_EQ(one["max_drops"], other["max_drops"]);
   for (const char* layer : {"000000", "000003"}) {
     for (const char* drop : {"-drop1.tif", "-drop2.tif"})
       EXPECT_TRUE(alike(image(number, std::string(layer) + drop), image(formula, std::string(layer) + drop))) << layer << drop;
@@ -108,8 +107,8 @@ TEST_F(FormulaJobs, ThatGiveNoNumberOrDoNotBindAreRefused) {
   test::expect_refused(job + "1,2", 2, "gives 2 numbers", folder_);
   test::expect_refused(job + "x-14", 2, "% in layer 0 at x 9.948", folder_);
   test::expect_refused(job + "60/(z-z)", 2, "is inf % in layer 0", folder_);
-  const std::string shipped = test::read_text(LAMINA_TEST_DIR "/../stages/write/machines/nuferbj.toml");
-  test::write_text(folder_ / "binds.toml", shipped + "least_saturation_percent = 30\n");
+  const std::string shipped = test::read_text(LAMINA_TEST_DIR "/../pipeline/machine/shipped/printers/nuferbj.toml");
+  test::write_text(folder_ / "binds.toml", shipped + "min_saturation_percent = 30\n");
   const std::string binds = "jet box.stl --machine binds.toml --at 40,40 --layer 0.1 --quiet -o out --saturation ";
   test::expect_refused(binds + "x-15", 2, "binds from 30 % on", folder_);
   done(binds + "x-9");
@@ -164,8 +163,8 @@ TEST_F(FormulaJobs, SharesOfPartsWithDosesAreThoseOfThePartsAlone) {
   EXPECT_EQ(facts["saturation"]["drops"].get<std::uint64_t>(), drops);
   for (const std::string layer : {"000000", "000003"}) {
     for (const std::string drop : {"-drop1.tif", "-drop2.tif"}) {
-      const Runs united = both(image(alone[0], layer + drop), image(alone[1], layer + drop), SetOperation::kUnion);
-      EXPECT_TRUE(alike(image(job, layer + drop), united)) << layer << drop;
+      const Runs merged = both(image(alone[0], layer + drop), image(alone[1], layer + drop), SetOperation::kUnion);
+      EXPECT_TRUE(alike(image(job, layer + drop), merged)) << layer << drop;
     }
   }
 }
@@ -185,7 +184,7 @@ TEST_F(FormulaJobs, SharesOfPartsThatTouchComeToAFullVoxel) {
 }
 
 // Even-odd over all parts: what lies in two of them is empty, whatever their doses.
-TEST_F(FormulaJobs, EvenOddLooksAtPartsOfAllDoses) {
+TEST_F(FormulaJobs, EvenOddConsidersPartsOfAllDoses) {
   Job zones = job_of_boxes("zones", -3), plain = job_of_boxes("plain", -3);
   for (Job* of : {&zones, &plain}) of->fill_rule = FillRule::kEvenOdd;
   zones.parts[1].hole_bleed_um = {{1, 1}};  // moves nothing

@@ -12,7 +12,7 @@
 namespace lamina::test {
 namespace {
 
-// The hosts' readers are those of tests/write/test_slice_hosts.cpp; here the areas are compared.
+// The hosts' readers are those of tests/formats/test_slice_hosts.cpp; here the areas are compared.
 TEST(SliceContours, PolygonsAndShortCommandsHoldTheAreasOfTheOthers) {
   const Directory directory;
   std::map<std::string, std::string> files;
@@ -126,7 +126,7 @@ TEST(SliceContours, SvgHasOnePathForEachOuterContourWithItsHoles) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto manifest = nlohmann::json::parse(read_text(directory.path() / "out/manifest.json"));
   const std::string svg = read_text(directory.path() / "out" / manifest["file"].get<std::string>());
-  std::size_t holes = 0, most_paths = 0;
+  std::size_t holes = 0, max_paths = 0;
   for (const auto& layer : manifest["layers"]) {
     const std::string text = svg.substr(layer["offset"].get<std::size_t>(), layer["bytes"].get<std::size_t>());
     double area = 0;
@@ -155,11 +155,11 @@ TEST(SliceContours, SvgHasOnePathForEachOuterContourWithItsHoles) {
       EXPECT_NEAR(std::stod(text.substr(said)), own, 1e-3);
       area += own;
     }
-    most_paths = std::max(most_paths, paths);
+    max_paths = std::max(max_paths, paths);
     EXPECT_NEAR(area, layer["area_mm2"].get<double>(), 1e-4);
   }
   EXPECT_GT(holes, 50u);
-  EXPECT_GT(most_paths, 5u);
+  EXPECT_GT(max_paths, 5u);
 }
 
 TEST(SliceContours, AnOffsetThatLeavesNothingIsSaid) {
@@ -176,7 +176,7 @@ TEST(SliceContours, AnOffsetThatLeavesNothingIsSaid) {
 }
 
 /// Parts that are further apart than twice the offset before it, and meet after it.
-TEST(SliceContours, PartsThatMeetOnlyAfterTheOffsetAreUnited) {
+TEST(SliceContours, PartsThatMeetOnlyAfterTheOffsetAreMerged) {
   const Directory directory;
   write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 1});
   write_text(directory / "j.toml",
@@ -203,7 +203,7 @@ TEST(SliceContours, ClosedGapsAreCountedWithTheLargest) {
       << outcome.err;
 }
 
-TEST(SliceContours, OpenMeshesAreReportedWithTheirFirstPlace) {
+TEST(SliceContours, OpenMeshesAreReportedWithTheirFirstPosition) {
   const Directory directory;
   const Outcome outcome = run_lamina(
       {"slice", corpus_file("broken/cube_missing_corner.stl"), "--no-repair", "--bridge", "0", "--layer", "5", "-o", "out"},

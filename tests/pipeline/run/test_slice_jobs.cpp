@@ -83,7 +83,7 @@ TEST(SliceProgram, SameBytesForEveryPatternFormatThreadsAndMemory) {
   }
 }
 
-TEST(SliceProgram, AnEarlierJobIsNotReplacedUnasked) {
+TEST(SliceProgram, AnEarlierJobIsNotReplacedUnrequested) {
   const Directory directory;
   const std::vector<std::string> arguments = {
       "slice", corpus_file("parameter_quality_nut.stl"), "--layer", "2", "--quiet", "-o", "out"};

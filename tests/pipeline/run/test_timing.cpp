@@ -13,9 +13,9 @@
 #include <thread>
 
 #include "pipeline/cli/console.h"
-#include "pipeline/run/timing.h"
-#include "stages/write/file.h"
-#include "stages/write/temporary.h"
+#include "pipeline/report/timing.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -24,8 +24,8 @@ namespace {
 const std::atomic<bool> never{false};
 
 /// So much to write that nobody sees the end of it, in files of 1 MB.
-write::Floor endless_floor() {
-  write::Floor floor;
+formats::Floor endless_floor() {
+  formats::Floor floor;
   floor.bytes_written = std::uint64_t{1} << 50;
   floor.files = std::uint64_t{1} << 30;
   return floor;
@@ -36,7 +36,7 @@ template <class GiveUp>
 bool wait_for_temporary(const test::Directory& folder, const std::string& target, const GiveUp& give_up) {
   for (;;) {
     for (const std::string& name : test::files_below(folder.path())) {
-      if (write::named_by_temporary(name) == target) return true;
+      if (named_by_temporary(name) == target) return true;
     }
     if (give_up()) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -51,8 +51,8 @@ int ended_while_measuring(const test::Directory& folder, int signal) {
     ::setrlimit(RLIMIT_CORE, &none);
     for (const int one : {SIGHUP, SIGINT, SIGQUIT}) std::signal(one, SIG_DFL);  // not as the tests were started
     handle_signals();
-    write::Floor floor = endless_floor();
-    static_cast<void>(write::measure_floor({}, folder / "part.gcode", never, floor));
+    formats::Floor floor = endless_floor();
+    static_cast<void>(formats::measure_floor({}, folder / "part.gcode", never, floor));
     ::_exit(1);
   }
   int result = 0;
@@ -64,7 +64,7 @@ int ended_while_measuring(const test::Directory& folder, int signal) {
   return WIFSIGNALED(result) ? WTERMSIG(result) : 0;
 }
 
-TEST(Timing, ARunTellsEachStepAndWhatTheLimitReadsAndWrites) {
+TEST(Timing, ARunReportsEachStepAndWhatTheLimitReadsAndWrites) {
   const test::Directory folder;
   const std::string part = test::corpus_file("dental_crown.stl");
   const std::vector<std::string> job = {"jet",     part,  "--bed",  "30x30",   "--dpi", "600",
@@ -79,9 +79,9 @@ TEST(Timing, ARunTellsEachStepAndWhatTheLimitReadsAndWrites) {
   const nlohmann::json &timing = timed["timing"], &limit = timing["limit"];
   double steps = 0;
   for (const char* step : {"raster", "dose", "encode", "store", "record"}) {
-    EXPECT_GT(timing["steps"][step]["processor"], 0) << step;
-    EXPECT_GT(timing["steps"][step]["busy"], 0) << step;
-    steps += timing["steps"][step]["processor"].get<double>();
+    EXPECT_GT(timing["nodes"][step]["processor"], 0) << step;
+    EXPECT_GT(timing["nodes"][step]["busy"], 0) << step;
+    steps += timing["nodes"][step]["processor"].get<double>();
   }
   EXPECT_LE(steps, timing["phases"]["layers"]["processor"]) << "steps are parts of the phase";
   EXPECT_EQ(limit["read_bytes"], std::filesystem::file_size(part));
@@ -107,11 +107,11 @@ TEST(Timing, TheShareOfOneThreadFollowsFromWallAndProcessor) {
 TEST(Timing, TheLimitReadsThePartsAndLeavesNothing) {
   const test::Directory folder;
   test::write_text(folder / "part.stl", std::string(1000, 'x'));
-  write::Floor floor;
+  formats::Floor floor;
   floor.bytes_written = 1001;
   floor.files = 3;
   floor.crossings = 100;
-  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
+  const Status status = formats::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
   ASSERT_TRUE(status.ok()) << status.error().message;
   EXPECT_EQ(floor.bytes_read, 1000u);
   EXPECT_GT(floor.write, 0);
@@ -129,7 +129,7 @@ TEST(Timing, ASignalWhileTheLimitIsMeasuredLeavesNothing) {
 TEST(Timing, WhatAKilledRunLeavesGoesWithTheNextThatWritesTheFile) {
   const test::Directory folder;
   ASSERT_EQ(ended_while_measuring(folder, SIGKILL), SIGKILL);
-  ASSERT_TRUE(write::write_file(folder / "part.gcode", "whole").ok());
+  ASSERT_TRUE(write_file(folder / "part.gcode", "whole").ok());
   const std::vector<std::string> files = test::files_below(folder.path());
   EXPECT_EQ(files, std::vector<std::string>{"part.gcode"});
 }
@@ -139,8 +139,8 @@ TEST(Timing, AMeasurementThatIsCancelledEndsAndLeavesNothing) {
   std::atomic<bool> cancel{false};
   Status status;
   std::thread measures([&] {
-    write::Floor floor = endless_floor();
-    status = write::measure_floor({}, folder / "part.gcode", cancel, floor);
+    formats::Floor floor = endless_floor();
+    status = formats::measure_floor({}, folder / "part.gcode", cancel, floor);
   });
   wait_for_temporary(folder, "part.gcode", [] { return false; });
   cancel = true;
@@ -160,10 +160,10 @@ TEST(Timing, InterruptedCallsGoOn) {
   sigaction(SIGALRM, &action, &before);
   const itimerval often{{0, 100}, {0, 100}}, off{};
   ::setitimer(ITIMER_REAL, &often, nullptr);
-  write::Floor floor;
+  formats::Floor floor;
   floor.bytes_written = 50 << 20;
   floor.files = 5;
-  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
+  const Status status = formats::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
   ::setitimer(ITIMER_REAL, &off, nullptr);
   sigaction(SIGALRM, &before, nullptr);
   ASSERT_TRUE(status.ok()) << status.error().message;
@@ -175,17 +175,17 @@ TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
   timing.phases = {{"layers", {2, 3}}};
   timing.floor.bytes_written = 10;
   const test::Directory folder;
-  timing.not_measured = write::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
+  timing.not_measured = formats::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
   EXPECT_NE(timing.not_measured.find("missing.stl: "), std::string::npos);
-  const nlohmann::ordered_json limit = timing_json(timing)["limit"];
-  EXPECT_EQ(limit.size(), 1u) << limit;
-  EXPECT_EQ(limit.value("not_measured", ""), timing.not_measured);
-  bool told = false;
+  const Json limit = timing_json(timing)["limit"];
+  EXPECT_EQ(limit.size(), 1u) << json_text(limit);
+  EXPECT_EQ(limit["not_measured"], timing.not_measured);
+  bool reported = false;
   for (const auto& [label, line] : timing_lines(timing)) {
-    told |= line.find("not measured: ") != std::string::npos;
+    reported |= line.find("not measured: ") != std::string::npos;
     EXPECT_EQ(line.find("times the limit"), std::string::npos) << line;
   }
-  EXPECT_TRUE(told);
+  EXPECT_TRUE(reported);
 }
 
 }  // namespace

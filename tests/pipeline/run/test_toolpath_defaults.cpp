@@ -113,24 +113,24 @@ TEST(ToolpathDefaults, ASkirtFillsTheNozzleThoughTheFirstLayerHoldsNoBead) {
   const Extruded needle = extruded(directory, "needle.stl --layer 0.2 --walls 1 --allow-empty");
   EXPECT_EQ(needle.summary["moves"], 0);
   EXPECT_GT(needle.summary["skirt"]["bead_mm"], 0);
-  const auto told = [&](const std::string& options) {
+  const auto reported = [&](const std::string& options) {
     return run_lamina(words_of("extrude " + options + " --layer 0.2 --walls 1 --overwrite -o a.gcode"), directory.path()).err;
   };
-  EXPECT_NE(told("head.stl --layers 1:3").find("--layers leaves the first layer out"), std::string::npos);
+  EXPECT_NE(reported("head.stl --layers 1:3").find("--layers leaves the first layer out"), std::string::npos);
   write_box(directory / "bed.stl", {0, 0, 0}, {220, 220, 0.4f});
-  EXPECT_NE(told("bed.stl").find("none: no room on the bed"), std::string::npos);
+  EXPECT_NE(reported("bed.stl").find("none: no room on the bed"), std::string::npos);
 }
 
-TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
+TEST(ToolpathDefaults, LeaveOutPointsUnlessRequestedAndTheSameInAJobFile) {
   const Directory directory;
   const std::string job = kToothFile + " --layer 0.2 --walls 2 --fill raster --bead-gap 1 --skirt 0";
-  const Extruded unasked = extruded(directory, job), asked = extruded(directory, job + " --tolerance 10");
+  const Extruded unrequested = extruded(directory, job), requested = extruded(directory, job + " --tolerance 10");
   const Extruded all = extruded(directory, job + " --tolerance 0");
-  EXPECT_EQ(unasked.summary["tolerance_um"], 10);
+  EXPECT_EQ(unrequested.summary["tolerance_um"], 10);
   EXPECT_EQ(all.summary["tolerance_um"], 0);
-  EXPECT_TRUE(unasked.text == asked.text);
-  EXPECT_LT(unasked.summary["moves"].get<double>(), 0.5 * all.summary["moves"].get<double>());
-  EXPECT_NEAR(unasked.summary["volume_mm3"].get<double>() / all.summary["volume_mm3"].get<double>(), 1, 0.01);
+  EXPECT_TRUE(unrequested.text == requested.text);
+  EXPECT_LT(unrequested.summary["moves"].get<double>(), 0.5 * all.summary["moves"].get<double>());
+  EXPECT_NEAR(unrequested.summary["volume_mm3"].get<double>() / all.summary["volume_mm3"].get<double>(), 1, 0.01);
   // The saved job does it again, and says what was asked.
   const Outcome saved = run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
   ASSERT_EQ(saved.code, 0) << saved.err;
@@ -138,7 +138,7 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   EXPECT_NE(read_text(directory / "job.toml").find("lamina extrude --job FILE\n"), std::string::npos);
   const Outcome again = run_lamina(words_of("extrude --job job.toml --quiet -o c.gcode"), directory.path());
   ASSERT_EQ(again.code, 0) << again.err;
-  EXPECT_TRUE(read_text(directory / "c.gcode") == unasked.text);
+  EXPECT_TRUE(read_text(directory / "c.gcode") == unrequested.text);
   // Contours keep their points.
   const Outcome sliced = run_lamina(words_of("slice " + kToothFile + " --layer 1 --quiet -o out"), directory.path());
   ASSERT_EQ(sliced.code, 0) << sliced.err;
@@ -146,8 +146,9 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   EXPECT_EQ(read_text(directory / "out/job.toml").find("\ntolerance_um"), std::string::npos);
   // A job means in each command what that command does unasked; what was asked stays.
   EXPECT_EQ(extruded(directory, "--job out/job.toml --layer 0.2 --walls 1").summary["tolerance_um"], 10);
-  for (const auto& [asked_um, kept] : {std::pair{"0", "\ntolerance_um = 0\n"}, {"25", "\ntolerance_um = 25\n"}}) {
-    const std::string save = std::string(" --layer 1 --overwrite --save-job kept.toml --quiet -o out --tolerance ") + asked_um;
+  for (const auto& [requested_um, kept] : {std::pair{"0", "\ntolerance_um = 0\n"}, {"25", "\ntolerance_um = 25\n"}}) {
+    const std::string save =
+        std::string(" --layer 1 --overwrite --save-job kept.toml --quiet -o out --tolerance ") + requested_um;
     const Outcome outcome = run_lamina(words_of("slice " + kToothFile + save), directory.path());
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_NE(read_text(directory / "kept.toml").find(kept), std::string::npos);
@@ -167,30 +168,30 @@ double to_nearest_bead(const GcodeLayer& layer, const std::string& type, double 
   return nearest;
 }
 
-TEST(ToolpathDefaults, WallsKeepTheirDepthWithinTheToleranceTold) {
+TEST(ToolpathDefaults, WallsKeepTheirDepthWithinTheToleranceReported) {
   const Directory directory;
   const std::string job = kToothFile + " --layer 0.4 --walls 2 --skirt 0";
   const Extruded less = extruded(directory, job), all = extruded(directory, job + " --tolerance 0");
   ASSERT_EQ(less.file.layers.size(), all.file.layers.size());
-  const double most = less.summary["tolerance_um"].get<double>() / 1000 + 0.0015;  // files have three decimals
-  std::size_t places = 0, beyond = 0;
+  const double maximum = less.summary["tolerance_um"].get<double>() / 1000 + 0.0015;  // files have three decimals
+  std::size_t positions = 0, beyond = 0;
   for (std::size_t k = 0; k < less.file.layers.size(); ++k) {
     const GcodeLayer& full = all.file.layers[k];
     for (const GcodeBead& bead : less.file.layers[k].beads) {
       for (const double share : {0.0, 0.5}) {
         const double x = bead.x0 + share * (bead.x1 - bead.x0), y = bead.y0 + share * (bead.y1 - bead.y0);
-        ++places;
-        beyond += to_nearest_bead(full, bead.type, x, y) > most ? 1 : 0;
+        ++positions;
+        beyond += to_nearest_bead(full, bead.type, x, y) > maximum ? 1 : 0;
         if (bead.type != "Perimeter") continue;
-        EXPECT_GE(to_nearest_bead(full, "External perimeter", x, y), bead.width - most) << "layer " << k;
+        EXPECT_GE(to_nearest_bead(full, "External perimeter", x, y), bead.width - maximum) << "layer " << k;
       }
     }
   }
-  EXPECT_GT(places, 1000u);
-  EXPECT_LT(beyond, places / 200) << "tips, which move along themselves";
+  EXPECT_GT(positions, 1000u);
+  EXPECT_LT(beyond, positions / 200) << "tips, which move along themselves";
 }
 
-TEST(ToolpathDefaults, AJobFileIsToldWhatItLeavesToThePrinter) {
+TEST(ToolpathDefaults, AJobFileIsGivenWhatItLeavesToThePrinter) {
   const Directory directory;
   write_text(directory / "job.toml", "[[part]]\npath = '" + kToothFile + "'\n");
   const auto said = [&](const std::string& more) {
@@ -222,7 +223,7 @@ TEST(ToolpathDefaults, OfALibrariesJobAreThePrintersOnlyIfItLeavesThem) {
   EXPECT_EQ(resolved->job.fill.all.walls, 0u);
 }
 
-TEST(ToolpathDefaults, SkirtComesFirstAndIsToldApart) {
+TEST(ToolpathDefaults, SkirtComesFirstAndIsDistinguished) {
   for (const std::string machine : {"anet-a8", "marlin"}) {  // absolute and relative extrusion
     SCOPED_TRACE(machine);
     const Directory directory;
@@ -240,10 +241,10 @@ TEST(ToolpathDefaults, SkirtComesFirstAndIsToldApart) {
       lowest = std::min(lowest, bead.x0);
     }
     EXPECT_GE(lowest, 0);
-    const nlohmann::json& told = with.summary["skirt"];
-    EXPECT_EQ(told["moves"], with.file.skirt.size());
-    EXPECT_NEAR(told["bead_mm"].get<double>(), length, 0.01);
-    EXPECT_NEAR(told["filament_mm"].get<double>(), filament_of(with.file.skirt), 1e-4);
+    const nlohmann::json& reported = with.summary["skirt"];
+    EXPECT_EQ(reported["moves"], with.file.skirt.size());
+    EXPECT_NEAR(reported["bead_mm"].get<double>(), length, 0.01);
+    EXPECT_NEAR(reported["filament_mm"].get<double>(), filament_of(with.file.skirt), 1e-4);
     EXPECT_EQ(without.summary["skirt"]["moves"], 0);
     // Of the parts nothing changes; the filament of the file holds both.
     EXPECT_EQ(with.summary["moves"], without.summary["moves"]);
@@ -252,7 +253,7 @@ TEST(ToolpathDefaults, SkirtComesFirstAndIsToldApart) {
       EXPECT_NEAR(with.summary[name].get<double>() / without.summary[name].get<double>(), 1, 1e-9) << name;
     }
     EXPECT_NEAR(with.summary["filament_mm"].get<double>() - without.summary["filament_mm"].get<double>(),
-                told["filament_mm"].get<double>(), 1e-6);
+                reported["filament_mm"].get<double>(), 1e-6);
     double fed = filament_of(with.file.skirt);
     for (const GcodeLayer& layer : with.file.layers) fed += filament_of(layer.beads);
     EXPECT_NEAR(fed, with.summary["filament_mm"].get<double>(), 1e-5 * static_cast<double>(with.file.layers.size()));

@@ -10,20 +10,19 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "pipeline/check/verify.h"
 #include "pipeline/job/keys.h"
+#include "pipeline/job/profiles/printer.h"
 #include "pipeline/machine/materials.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/toml.h"
+#include "stages/formats/images/image.h"
 #include "stages/raster/materials.h"
-#include "stages/read/image.h"
-#include "stages/read/profiles/printer.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/toml.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -31,8 +30,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The set pixels of a summary, all of them or of one material.
-std::uint64_t set_pixels_of(const Summary& summary) { return (*summary.facts)["set_pixels"]; }
-std::uint64_t set_pixels_of(const Summary& summary, std::size_t i) { return (*summary.facts)["materials"][i]["set_pixels"]; }
+std::uint64_t set_pixels_of(const Summary& summary) { return summary.facts["set_pixels"].get<std::uint64_t>(); }
+std::uint64_t set_pixels_of(const Summary& summary, std::size_t i) {
+  return summary.facts["materials"][i]["set_pixels"].get<std::uint64_t>();
+}
 
 class TwoPowders : public ::testing::Test {
  protected:
@@ -61,7 +62,7 @@ class TwoPowders : public ::testing::Test {
   }
   /// A profile like a shipped one with other lines in [powder].
   std::string profile(const std::string& powder) const {
-    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "pipeline/machine/shipped/printers/nuferbj.toml");
     std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
     const std::string path = (directory_ / "mine.toml").string();
     std::ofstream(path) << text << powder << "\n";
@@ -79,7 +80,7 @@ class TwoPowders : public ::testing::Test {
     EXPECT_EQ(report->replayed, report->layers);
   }
   static Runs image(const Job& job, std::uint32_t layer, const std::string& material = "") {
-    auto read = read::image(job.output + "/" + layer_file_name(layer, ".tif", material));
+    auto read = formats::image(job.output + "/" + layer_file_name(layer, ".tif", material));
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
     return read.ok() ? std::move(read->runs) : Runs();
   }
@@ -102,15 +103,15 @@ void expect_same(const Runs& a, const Runs& b, const std::string& what) {
   EXPECT_EQ(a.change, b.change) << what;
 }
 
-TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsStand) {
-  const std::array<std::array<double, 2>, 3> places[] = {{{{20, 30}, {55, 40}, {30, 60}}},   // apart
-                                                         {{{30, 30}, {35, 33}, {40, 36}}},   // all over each other
-                                                         {{{30, 30}, {30, 30}, {30, 30}}}};  // inside of each other
+TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsAre) {
+  const std::array<std::array<double, 2>, 3> positions[] = {{{{20, 30}, {55, 40}, {30, 60}}},   // apart
+                                                            {{{30, 30}, {35, 33}, {40, 36}}},   // all over each other
+                                                            {{{30, 30}, {30, 30}, {30, 30}}}};  // inside of each other
   int variant = 0;
-  for (const auto& place : places) {
+  for (const auto& position : positions) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 1, "steel"), part("dental_crown.stl", 2, "bronze"),
                                       part("rabbit_9_overlapping_shells.obj", 1, "steel")};
-    for (std::size_t p = 0; p < parts.size(); ++p) parts[p].at_mm = place[p];
+    for (std::size_t p = 0; p < parts.size(); ++p) parts[p].at_mm = position[p];
     const auto changed = [&](Job made) {
       made.mirror = variant == 1 ? Mirror::kX : Mirror::kNone;
       if (variant == 2) made.dose.bleed_um = {120, 80}, made.dose.shell_mm = 0.8, made.dose.core = 0.6;
@@ -127,7 +128,7 @@ TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsSt
     ASSERT_TRUE(one.ok() && alone.ok());
     ASSERT_EQ(summary->layers_total, one->layers_total);
     EXPECT_EQ(set_pixels_of(*summary), set_pixels_of(*one));
-    ASSERT_EQ((*summary->facts)["materials"].size(), 2u);
+    ASSERT_EQ(summary->facts["materials"].size(), 2u);
     EXPECT_EQ(set_pixels_of(*summary, 0) + set_pixels_of(*summary, 1), set_pixels_of(*summary));
     EXPECT_GT(set_pixels_of(*summary, 1), 0u);
     for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
@@ -174,10 +175,10 @@ TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) 
     EXPECT_GT(mixed, 0u);
     EXPECT_GT(single, 0u);
     // Whose binder falls into the other powder is told.
-    const auto told = std::ranges::find(summary->warnings, "mixed-powders", &Warning::code);
-    EXPECT_EQ(told == summary->warnings.end(), rule == "both") << rule;
+    const auto reported = std::ranges::find(summary->warnings, "mixed-powders", &Warning::code);
+    EXPECT_EQ(reported == summary->warnings.end(), rule == "both") << rule;
     if (rule == "first" || rule == "second") {
-      EXPECT_NE(told->text.find(fmt::format(" in {} layers", mixed)), std::string::npos) << told->text;
+      EXPECT_NE(reported->text.find(fmt::format(" in {} layers", mixed)), std::string::npos) << reported->text;
     }
   }
 }
@@ -239,19 +240,14 @@ TEST_F(TwoPowders, PixelsInTheOtherPowderAreInManifestAndVerify) {
     layers += mixed;
   }
   EXPECT_GT(unfed, 0u);
-  EXPECT_EQ((*summary->facts)["materials"][1]["unfed_pixels"], unfed);
-  EXPECT_EQ((*summary->facts)["materials"][1]["unfed_layers"], layers);
+  EXPECT_EQ(summary->facts["materials"][1]["unfed_pixels"], unfed);
+  EXPECT_EQ(summary->facts["materials"][1]["unfed_layers"], layers);
   auto report = verify(made.output, {});
   ASSERT_TRUE(report.ok() && report->ok());
   ASSERT_EQ(report->unfed.size(), 2u);
   EXPECT_EQ(report->unfed[1].pixels, unfed);
   EXPECT_EQ(report->unfed[1].layers, layers);
-  // A manifest of an older build has no such key; one that tells another number is at fault.
   const std::string path = made.output + "/manifest.json", whole = text(path);
-  std::ofstream(path) << std::regex_replace(whole, std::regex(", \"unfed_pixels\": [0-9]+"), "");
-  report = verify(made.output, {});
-  ASSERT_TRUE(report.ok()) << report.error().message;
-  EXPECT_TRUE(report->ok());
   std::ofstream(path) << std::regex_replace(whole, std::regex("(\"unfed_pixels\": [1-9][0-9]*)"), "$017");
   report = verify(made.output, {});
   ASSERT_TRUE(report.ok());
@@ -265,7 +261,7 @@ TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.5, "steel"), part("dental_crown.stl", 2, "bronze")};
     Job made = job(parts, machine);
     // Shipped machines of one vat, with a second one.
-    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / ("stages/write/machines/" + machine + ".toml"));
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / ("pipeline/machine/shipped/printers/" + machine + ".toml"));
     std::string profile{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
     if (profile.find("vats = 2") == std::string::npos) {
       if (profile.find("[powder]") == std::string::npos) profile += "\n[powder]\n";
@@ -389,10 +385,10 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   refused({"a", "b"}, "hp45", "the parts are of 2 materials (a, b), hp45 has one vat");
   refused({"a", ""}, "nuferbj", "has none; name that of every part, or of none");
   refused({"a"}, profile("materials = [\"bronze\"]"), "powder.materials: 1 names for 2 vats");
-  EXPECT_NE(read::check_material("a/b").find("is no name of a material"), std::string::npos);
+  EXPECT_NE(pipeline::check_material("a/b").find("is no name of a material"), std::string::npos);
   const auto wrong_ranges = [](const char* text) {
     std::vector<MaterialRange> ranges;
-    Place at;
+    TextPosition at;
     return read_material_ranges(*read_toml_value(text), ranges, at);
   };
   EXPECT_NE(wrong_ranges("[{ from_mm = 4, to_mm = 2, material = 'bronze' }]").find("ends at or below its start"),
@@ -424,14 +420,14 @@ TEST_F(TwoPowders, NamesWhoseFilesAreOneOrReadLikeADropAreRefused) {
   }
   refused(job({steel}, "refused", profile("materials = [\"steel\", \"STEEL\"]")), (directory_ / "mine.toml").string());
   for (const char* name : {"drop1", "Drop12", "steel-drop2", "a-b-DROP0"}) {
-    EXPECT_NE(read::check_material(name).find(std::string("'") + name + "' reads like a drop"), std::string::npos) << name;
+    EXPECT_NE(pipeline::check_material(name).find(std::string("'") + name + "' reads like a drop"), std::string::npos) << name;
     Job named = job({steel}, "refused");
     EXPECT_EQ(set_materials(name, named).error().fault, Fault::kUsage) << name;
     named.parts[0].material = name;
     EXPECT_NE(check_job(named).error().message.find("part.material: '"), std::string::npos) << check_job(named).error().message;
   }
   for (const char* name : {"drop", "drops2", "raindrop1", "drop-1x", "drop1-steel", "drop_1", "steel-drop"}) {
-    EXPECT_EQ(read::check_material(name), "") << name;
+    EXPECT_EQ(pipeline::check_material(name), "") << name;
   }
 }
 

@@ -26,7 +26,7 @@ struct Made {
 class Listener final : public Console {
  public:
   Status print(std::string_view text) override { return said += text, Status(); }
-  Status give(const nlohmann::ordered_json& value) override { return said += value.dump(), Status(); }
+  Status give(const Json& value) override { return said += json_text(value), Status(); }
   std::string said;
 };
 
@@ -55,11 +55,11 @@ void expect_one_volume(const nlohmann::json& json, const Extruder& machine, cons
   const double filament = std::numbers::pi / 4 * material.filament_mm * material.filament_mm;
   const double by_e = json["filament_mm"].get<double>() * filament * material.feed_ratio;
   const double by_porosity = (1 - json["porosity"]["by_extrusion"].get<double>()) * json["solid_mm3"].get<double>();
-  const double beside = json["skirt"]["volume_mm3"].get<double>();
+  const double neighbour = json["skirt"]["volume_mm3"].get<double>();
   ASSERT_GT(by_grams, 1) << what;
   EXPECT_NEAR(by_e / by_grams, 1, 1e-6) << what;
-  EXPECT_NEAR((by_grams - beside) / by_porosity, 1, 1e-6) << what;
-  EXPECT_NEAR((json["volume_mm3"].get<double>() + beside) / by_grams, 1, 1e-6) << what;
+  EXPECT_NEAR((by_grams - neighbour) / by_porosity, 1, 1e-6) << what;
+  EXPECT_NEAR((json["volume_mm3"].get<double>() + neighbour) / by_grams, 1, 1e-6) << what;
 }
 
 /// Walls are told, and so drawn by a preview, as wide as a stadium of what E feeds: to the micrometre of a tag.
@@ -125,7 +125,7 @@ TEST_F(Volume, ADeclaredErrorOfTheMachineChangesEAndNothingElse) {
 TEST_F(Volume, AProfileWithAFlowAloneMeansAShareOfAStadium) {
   const auto old = find_extruder("marlin");
   ASSERT_TRUE(old.ok());
-  std::string text = read::extruder_text(*old);
+  std::string text = pipeline::extruder_text(*old);
   const auto take = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
   take("bead_area = \"stadium\"\n", "");
   take("flow = 1\n", "flow = 0.9\n");
@@ -145,7 +145,7 @@ TEST_F(Volume, AProfileWithAFlowAloneMeansAShareOfAStadium) {
 }
 
 // 10 mm at 0.3: the 34th plane is at 10.05. 92 mm at 0.254: the 363rd layer would end at 92.202, its middle is at 92.075.
-TEST_F(Volume, AnEmptyLayerAtTheTopIsNotLaidAndIsTold) {
+TEST_F(Volume, AnEmptyLayerAtTheTopIsNotDepositedAndIsReported) {
   for (const auto& [height, layer, count] : {std::tuple{10.0f, "0.3", 33}, {92.0f, "0.254", 362}, {9.9f, "0.3", 33}}) {
     test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, height});
     const Made made = extrude(std::string("--fill none --walls 1 --layer ") + layer, folder / "cube.stl");
@@ -172,7 +172,7 @@ TEST_F(Volume, StepsInsideLeaveOutALayerThatEndsAboveTheParts) {
   EXPECT_EQ(tall.json["layers_left_out"], 0) << "the last one ends at the top";
 }
 
-TEST_F(Volume, ALayerThatCoversTheTopIsLaidAlsoIfItsMiddleLiesAboveThePart) {
+TEST_F(Volume, ALayerThatCoversTheTopIsDepositedAlsoIfItsMiddleLiesAboveThePart) {
   test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1.05f});
   const std::string walls = "--fill none --walls 1 ", job = walls + "--heights angle --cover-top --thickness ";
   const Made covered = extrude(job + "0.2", folder / "cube.stl");
@@ -242,7 +242,7 @@ TEST_F(Volume, StepsInsideAndACoveredTopExcludeEachOther) {
   EXPECT_EQ(warned(thin), "");
 }
 
-TEST_F(Volume, PoresToldAreThoseThatAreLaid) {
+TEST_F(Volume, PoresReportedAreThoseThatAreDeposited) {
   const std::string examples = std::string(LAMINA_TEST_DIR) + "/../docs/examples/dinisio2022/";
   test::write_box(folder / "speed.stl", {0, 0, 0}, {62, 50, 0.3f});
   const Made speed = extrude("--job " + examples + "speed.toml", folder / "speed.stl");

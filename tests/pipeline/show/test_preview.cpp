@@ -6,11 +6,11 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "stages/write/file.h"
-#include "stages/write/manifest/manifest.h"
-#include "tests/write/images.h"
+#include "pipeline/manifest/manifest.h"
+#include "stages/support/io/file.h"
+#include "tests/formats/images.h"
 
-namespace lamina::write {
+namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
@@ -97,7 +97,7 @@ TEST_F(Preview, MakesAContactSheetOfTheWantedWidthAndTheSameBytesEachTime) {
   EXPECT_EQ(testing::load(sheet()), bytes);
 }
 
-TEST_F(Preview, ASingleLayerIsNeverWiderThanAskedFor) {
+TEST_F(Preview, ASingleLayerIsNeverWiderThanRequested) {
   for (const char* options : {"--layer 0 --width 300", "--layer 19 --whole-bed --width 2000", "--every 7", "--count 1"}) {
     const Outcome outcome = preview(directory() + " -o " + sheet() + " " + options);
     ASSERT_EQ(outcome.code, 0) << outcome.output;
@@ -165,4 +165,4 @@ TEST_F(Preview, APictureThatCannotBeWrittenIsExitCodeFour) {
 }
 
 }  // namespace
-}  // namespace lamina::write
+}  // namespace lamina::pipeline

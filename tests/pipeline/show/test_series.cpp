@@ -95,12 +95,12 @@ TEST(PreviewGcode, FilamentAndLayerHeightAreForGcodeAndNotesAreSaid) {
   ASSERT_EQ(wide.code, 0) << wide.err;
   EXPECT_EQ((wide.out + wide.err).find("beads are"), std::string::npos) << wide.err;
   EXPECT_NE((wide.out + wide.err).find("layer 0 of 1 "), std::string::npos) << wide.err;
-  for (const auto& [line, told] : std::vector<std::pair<std::string, std::string>>{
+  for (const auto& [line, reported] : std::vector<std::pair<std::string, std::string>>{
            {"thick.gcode -o c.png --filament 0", "--filament 0: "},
            {"thick.gcode -o c.png --filament thick", "--filament thick: "},
            {"thick.gcode -o c.png --layer-height 1e9", "--layer-height 1e9: "},
            {". -o c.png --filament 2.85", "--filament, --layer-height: are for G-code files"}}) {
-    test::expect_refused("preview " + line, 2, told, directory);
+    test::expect_refused("preview " + line, 2, reported, directory);
   }
 }
 

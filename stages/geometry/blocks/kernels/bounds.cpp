@@ -85,7 +85,7 @@ LAMINA_BODY void index_body(std::span<const Cluster> clusters, const std::uint16
     extremes_of_facets(cluster.z, lowest, highest);
     const Sixteen below = highest - 1, low = lowest >> static_cast<Nm>(shift);
     const SixteenSteps apart = (SixteenSteps)((lowest < below ? below : lowest) >> static_cast<Nm>(shift)) - (SixteenSteps)low;
-    const SixteenSteps most = SixteenSteps{} + 255, span = apart < most ? apart : most;
+    const SixteenSteps maximum = SixteenSteps{} + 255, span = apart < maximum ? apart : maximum;
     const SixteenBytes low_bytes = __builtin_convertvector((SixteenSteps)low, SixteenBytes),
                        span_bytes = __builtin_convertvector(span, SixteenBytes);
     std::memcpy(out->steps.low, &low_bytes, sizeof low_bytes);

@@ -21,14 +21,14 @@ LAMINA_INLINE __m256i load_shorts(const std::uint16_t* from) {
 
 /// Where the z of corners lie: 96 numbers further for each cluster before them. Times 43691 / 2^21 is divided by 48, exactly
 /// below 2^16.
-LAMINA_INLINE __m256i places_of(__m256i corner) {
+LAMINA_INLINE __m256i slots_of(__m256i corner) {
   const __m256i cluster = _mm256_srli_epi32(_mm256_mulhi_epu16(corner, _mm256_set1_epi32(43691)), 5);
   return _mm256_add_epi32(corner, _mm256_add_epi32(_mm256_slli_epi32(cluster, 6), _mm256_slli_epi32(cluster, 5)));
 }
 
-LAMINA_INLINE __m256i unlike(const Nm* own, __m256i place, const Nm* coordinates) {
+LAMINA_INLINE __m256i unlike(const Nm* own, __m256i position, const Nm* coordinates) {
   return _mm256_xor_si256(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(own)),
-                          _mm256_i32gather_epi32(coordinates, place, 4));
+                          _mm256_i32gather_epi32(coordinates, position, 4));
 }
 
 LAMINA_INLINE unsigned bits_of(__m256i mask) { return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(mask))); }
@@ -54,10 +54,10 @@ void match(const SortedBlock& block, CornerMatches& matches) {
       const __m256i slot = _mm256_and_si256(load_shorts(block.hash.data() + i), _mm256_set1_epi32(CornerMatches::kSlots - 1));
       const __m256i first = _mm256_and_si256(_mm256_i32gather_epi32(reinterpret_cast<const int*>(matches.slot.data()), slot, 2),
                                              _mm256_set1_epi32(0xFFFF));
-      const __m256i place = places_of(first), own = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(i)));
+      const __m256i position = slots_of(first), own = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(i)));
       const __m256i difference =
-          _mm256_or_si256(_mm256_or_si256(unlike(corner, place, base), unlike(corner + kY, place, base + kY)),
-                          unlike(corner + kX, place, base + kX));
+          _mm256_or_si256(_mm256_or_si256(unlike(corner, position, base), unlike(corner + kY, position, base + kY)),
+                          unlike(corner + kX, position, base + kX));
       const __m256i packed = _mm256_permute4x64_epi64(_mm256_packus_epi32(first, first), 0x08);
       _mm_storeu_si128(reinterpret_cast<__m128i*>(matches.first.data() + i), _mm256_castsi256_si128(packed));
       const unsigned other = bits_of(_mm256_cmpeq_epi32(difference, _mm256_setzero_si256())) ^ 0xFF;

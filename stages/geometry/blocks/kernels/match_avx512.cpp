@@ -38,13 +38,13 @@ LAMINA_INLINE __m512i gather_shorts(const std::uint16_t* table, __m512i index) {
 
 /// Where the z of corners lie: 96 numbers further for each cluster before them. Times 43691 / 2^21 is divided by 48, exactly
 /// below 2^16.
-LAMINA_INLINE __m512i places_of(__m512i corner) {
+LAMINA_INLINE __m512i slots_of(__m512i corner) {
   const __m512i cluster = _mm512_srli_epi32(_mm512_mulhi_epu16(corner, _mm512_set1_epi32(43691)), 5);
   return _mm512_add_epi32(corner, _mm512_add_epi32(_mm512_slli_epi32(cluster, 6), _mm512_slli_epi32(cluster, 5)));
 }
 
-LAMINA_INLINE __mmask16 other_than(const Nm* own, __m512i place, const Nm* coordinates) {
-  return _mm512_cmpneq_epi32_mask(_mm512_loadu_si512(own), _mm512_i32gather_epi32(place, coordinates, 4));
+LAMINA_INLINE __mmask16 other_than(const Nm* own, __m512i position, const Nm* coordinates) {
+  return _mm512_cmpneq_epi32_mask(_mm512_loadu_si512(own), _mm512_i32gather_epi32(position, coordinates, 4));
 }
 
 /// Where the numbers of 16 vertices in a row come from, 16 at a time: x and y are lanes 0 to 15 and 16 to 31 of two registers.
@@ -73,9 +73,10 @@ void match(const SortedBlock& block, CornerMatches& matches) {
     const Nm* corner = corner_at(block, i);
     for (std::uint32_t k = 0; k < 3; ++k, i += kLanes, corner += kLanes) {
       const __m512i slot = _mm512_and_si512(load_shorts(block.hash.data() + i), _mm512_set1_epi32(CornerMatches::kSlots - 1));
-      const __m512i first = gather_shorts(matches.slot.data(), slot), place = places_of(first), own = lanes_from(i);
-      const auto other = static_cast<__mmask16>(other_than(corner, place, base) | other_than(corner + kY, place, base + kY) |
-                                                other_than(corner + kX, place, base + kX));
+      const __m512i first = gather_shorts(matches.slot.data(), slot), position = slots_of(first), own = lanes_from(i);
+      const auto other =
+          static_cast<__mmask16>(other_than(corner, position, base) | other_than(corner + kY, position, base + kY) |
+                                 other_than(corner + kX, position, base + kX));
       store_shorts(matches.first.data() + i, first);
       store_shorts(matches.rest.data() + rest, _mm512_maskz_compress_epi32(other, own));
       rest += static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(other)));
@@ -109,9 +110,9 @@ void write(const SortedBlock& block, const CornerMatches& matches, std::uint32_t
   for (std::uint32_t v = 0; v < count; v += kLanes) {
     const std::uint32_t here = std::min(count - v, kLanes);
     const auto used = static_cast<__mmask16>((1u << here) - 1);  // behind them nothing is set
-    const __m512i place = places_of(_mm512_maskz_mov_epi32(used, load_shorts(matches.vertex.data() + v)));
-    const __m512i x = _mm512_i32gather_epi32(place, base + kX, 4), y = _mm512_i32gather_epi32(place, base + kY, 4),
-                  z = _mm512_i32gather_epi32(place, base, 4);
+    const __m512i position = slots_of(_mm512_maskz_mov_epi32(used, load_shorts(matches.vertex.data() + v)));
+    const __m512i x = _mm512_i32gather_epi32(position, base + kX, 4), y = _mm512_i32gather_epi32(position, base + kY, 4),
+                  z = _mm512_i32gather_epi32(position, base, 4);
     const std::uint64_t numbers = (std::uint64_t{1} << 3 * here) - 1;
     for (std::uint32_t part = 0; part < 3; ++part) {
       const __m512i xy = _mm512_permutex2var_epi32(x, _mm512_load_si512(kWeave.of_xy[part]), y);

@@ -26,8 +26,8 @@ struct Heights {
   std::uint64_t sum = 0;                       // of the facets' own heights
 };
 
-LAMINA_BODY Nm least(const Four& v) { return std::min(std::min(v[0], v[1]), std::min(v[2], v[3])); }
-LAMINA_BODY Nm most(const Four& v) { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
+LAMINA_BODY Nm minimum(const Four& v) { return std::min(std::min(v[0], v[1]), std::min(v[2], v[3])); }
+LAMINA_BODY Nm maximum(const Four& v) { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
 
 LAMINA_BODY void see_one(const Triangle& t, std::uint32_t i, Heights& heights) {
   const Nm lo = std::min(t.a.z, std::min(t.b.z, t.c.z)), hi = std::max(t.a.z, std::max(t.b.z, t.c.z));
@@ -67,8 +67,8 @@ LAMINA_BODY void see(std::span<const Triangle> block, Heights& heights) {
     back = y > back ? y : back;
     sum += __builtin_convertvector((FourHeights)hi - (FourHeights)lo, FourSums);
   }
-  heights.lowest = least(lowest), heights.highest = most(highest);
-  heights.front = least(front), heights.back = most(back);
+  heights.lowest = minimum(lowest), heights.highest = maximum(highest);
+  heights.front = minimum(front), heights.back = maximum(back);
   heights.sum = sum[0] + sum[1] + sum[2] + sum[3];
   for (std::uint32_t i = whole; i < count; ++i) see_one(block[i], i, heights);
 }
@@ -105,18 +105,18 @@ struct BlockOrder {
 template <class Out>
 LAMINA_BODY void sort_by_byte(const std::uint32_t* key, std::uint32_t count, std::uint32_t shift, Out* out) {
   constexpr std::uint32_t kQuarters = 4;
-  std::uint16_t place[kQuarters][256] = {};
+  std::uint16_t position[kQuarters][256] = {};
   const std::uint32_t quarter = count / kQuarters;
   const auto each = [&](auto&& visit) __attribute__((always_inline)) {
     for (std::uint32_t i = 0; i < quarter; ++i) {
-      for (std::uint32_t q = 0; q < kQuarters; ++q) visit(place[q], key[q * quarter + i]);
+      for (std::uint32_t q = 0; q < kQuarters; ++q) visit(position[q], key[q * quarter + i]);
     }
-    for (std::uint32_t i = kQuarters * quarter; i < count; ++i) visit(place[kQuarters - 1], key[i]);
+    for (std::uint32_t i = kQuarters * quarter; i < count; ++i) visit(position[kQuarters - 1], key[i]);
   };
   each([&](std::uint16_t* of, std::uint32_t one) { ++of[one >> shift & 255]; });
   std::uint16_t total = 0;
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
-    for (auto& of : place) {
+    for (auto& of : position) {
       const std::uint16_t here = of[byte];
       of[byte] = total;
       total = static_cast<std::uint16_t>(total + here);
@@ -155,14 +155,14 @@ LAMINA_BODY void sort_at_once(const std::uint32_t* key, std::uint32_t count, std
 LAMINA_BODY void order_body(std::span<const Triangle> block, std::uint16_t* order) {
   Heights heights;
   see(block, heights);
-  const BlockOrder place(heights, block.size());
+  const BlockOrder position(heights, block.size());
   std::array<std::uint32_t, kBlockSize> key;  // the number of the triangle behind it
   const auto count = static_cast<std::uint32_t>(block.size());
   for (std::uint32_t i = 0; i < count; ++i) {
-    key[i] = static_cast<std::uint32_t>(place.key(heights.middle[i], heights.y[i])) << 16 | i;
+    key[i] = static_cast<std::uint32_t>(position.key(heights.middle[i], heights.y[i])) << 16 | i;
   }
   // No key is greater than that of the greatest of both, for each grows with its own.
-  const auto values = static_cast<std::uint32_t>(place.key(heights.highest, heights.back)) + 1;
+  const auto values = static_cast<std::uint32_t>(position.key(heights.highest, heights.back)) + 1;
   if (values <= kFewValues) return sort_at_once(key.data(), count, values, order);
   std::array<std::uint32_t, kBlockSize> half_sorted;
   sort_by_byte(key.data(), count, 16, half_sorted.data());

@@ -1,0 +1,177 @@
+// Only this file depends on the command line library.
+#include "pipeline/cli/terminal/arguments.h"
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <deque>
+
+#include "pipeline/cli/terminal/slicer_aliases.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/names.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/terminal.h"
+
+namespace lamina::pipeline {
+
+namespace {
+
+constexpr std::size_t kMeaningColumn = 28;
+constexpr char kNoBreak = '\1';  // a blank at which no line ends
+
+/// Appends words in lines of `columns`; the text stands in column `at`, and following lines begin at `indent`.
+void wrap(std::string_view words, std::size_t indent, std::size_t columns, std::size_t at, std::string& text) {
+  for (std::string_view line = words; !line.empty();) {
+    const std::size_t end = std::min(line.find_first_of(" \n"), line.size());
+    const std::string_view word = line.substr(0, end);
+    line.remove_prefix(std::min(end + 1, line.size()));
+    if (word.empty()) continue;
+    if (at > indent && at + 1 + word.size() > columns) {
+      text += "\n" + std::string(indent, ' ');
+      at = indent;
+    } else if (at > indent) {
+      text += ' ';
+      ++at;
+    }
+    text += word;
+    std::ranges::replace(text.end() - static_cast<std::ptrdiff_t>(word.size()), text.end(), kNoBreak, ' ');
+    at += word.size();
+  }
+  text += '\n';
+}
+
+/// A term, and its meaning beside it or, where the term is too long, below it.
+void add_entry(const std::string& term, const std::string& meaning, std::size_t columns, std::string& text) {
+  const std::size_t indent = columns < 2 * kMeaningColumn ? 6 : kMeaningColumn;
+  text += "  " + term;
+  if (term.size() + 4 > indent) {
+    text += "\n" + std::string(indent, ' ');
+  } else {
+    text += std::string(indent - term.size() - 2, ' ');
+  }
+  wrap(meaning, indent, columns, indent, text);
+}
+
+std::string meaning_of(const OptionSpec& option) {
+  return option.preset.empty() ? option.meaning : fmt::format("{} (default{}{})", option.meaning, kNoBreak, option.preset);
+}
+
+}  // namespace
+
+const OptionSpec* CommandSpec::find(std::string_view flag) const {
+  for (const OptionSpec& option : options) {
+    if (const auto flags = split(option.flag, ","); std::ranges::find(flags, flag) != flags.end()) return &option;
+  }
+  return nullptr;
+}
+
+Status at_option(std::string_view flag, const std::string& wrong) {
+  if (wrong.empty()) return {};
+  return Error{Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), wrong)};
+}
+
+bool Arguments::has(std::string_view flag) const {
+  return std::ranges::any_of(options, [&](const auto& option) { return option.first == flag; });
+}
+
+std::vector<std::string> Arguments::all(std::string_view flag) const {
+  std::vector<std::string> values;
+  for (const auto& [name, value] : options) {
+    if (name == flag) values.push_back(value);
+  }
+  return values;
+}
+
+std::string Arguments::text(std::string_view flag) const {
+  const auto values = all(flag);
+  return values.empty() ? std::string() : values.back();
+}
+
+Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments) {
+  const auto wrong = [&](const std::string& what) {
+    const std::string line = one_line(what);
+    if (line.ends_with('?')) return Error{Fault::kUsage, line};
+    return Error{Fault::kUsage, fmt::format("{}; see lamina {} --help", line, spec.name)};
+  };
+  CLI::App app("", "lamina " + spec.name);
+  app.allow_extras();
+
+  Arguments read;
+  read.given = arguments;
+  std::vector<std::string_view> known = {"--help"};
+  std::deque<std::vector<std::string>> values;  // addresses must not change
+  std::vector<CLI::Option*> options;
+  for (const OptionSpec& option : spec.options) {
+    std::vector<std::string>& texts = values.emplace_back();
+    options.push_back(
+        option.value.empty()
+            ? app.add_flag(option.flag)
+            : app.add_option(option.flag, texts)->type_name(option.value)->expected(1)->allow_extra_args(false)->take_all());
+    for (const std::string_view name : split(option.flag, ",")) known.push_back(name);
+  }
+  if (!spec.operand.empty()) {
+    app.add_option(spec.operand, read.operands)->type_name("")->expected(0, 1 << 29);
+  }
+  try {
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  } catch (const CLI::CallForHelp&) {
+    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120));
+    return read;
+  } catch (const CLI::Error& error) {
+    return wrong(error.what());
+  }
+  for (const std::string& extra : app.remaining()) {
+    if (extra == "--") continue;
+    const std::string_view name = std::string_view(extra).substr(0, extra.find('='));
+    for (const auto& [flag, why] : spec.absent) {
+      if (name == flag) return wrong(fmt::format("{}: {}", flag, why));
+    }
+    if (!extra.starts_with('-')) return wrong(fmt::format("'{}': not expected here", extra));
+    const std::string hint = slicer_alias(name, spec);
+    return wrong(fmt::format("{}: no such option{}", name, hint.empty() ? suggest(name, known) : hint));
+  }
+  for (std::size_t i = 0; i < options.size(); ++i) {
+    const std::string& flag = spec.options[i].flag;
+    if (spec.options[i].value.empty()) {
+      if (options[i]->count() > 0) read.options.emplace_back(flag, "");
+      continue;
+    }
+    for (std::string& text : values[i]) {
+      // -o --resume: an option without its value.
+      if (std::ranges::find(known, std::string_view(text)) != known.end()) {
+        return wrong(fmt::format("{}: needs a value, {}, before {}", options[i]->get_name(), spec.options[i].value, text));
+      }
+      read.options.emplace_back(flag, std::move(text));
+    }
+  }
+  return read;
+}
+
+std::string help_text(const CommandSpec& spec, int columns) {
+  const auto width = static_cast<std::size_t>(std::max(columns, 20));
+  std::string text;
+  wrap(spec.summary, 0, width, 0, text);
+  text += fmt::format("\nUsage: lamina {} [OPTIONS]{}\n", spec.name,
+                      spec.operand.empty() ? "" : fmt::format(" [{}...]", spec.operand));
+  if (!spec.operand.empty()) {
+    text += '\n';
+    add_entry(spec.operand, spec.operand_meaning, width, text);
+  }
+  text += "\nOptions:\n";
+  add_entry("-h, --help", "this text", width, text);
+  std::string_view group;
+  for (const OptionSpec& option : spec.options) {
+    if (option.group != group) text += fmt::format("\n{}:\n", option.group);
+    group = option.group;
+    const std::string flags = fmt::format("{}", fmt::join(split(option.flag, ","), ", "));
+    add_entry(option.value.empty() ? flags : flags + " " + option.value, meaning_of(option), width, text);
+  }
+  if (const std::string end = spec.end(); !end.empty()) text += "\n" + end + "\n";
+  return text;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,74 @@
+// pipeline/cli/terminal/arguments.h: the options of a command, and the arguments of one call.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "stages/data/status.h"
+#include "stages/support/text/value.h"
+
+namespace lamina::pipeline {
+
+/// One option of a command. A switch takes no value.
+struct OptionSpec {
+  std::string flag;   // "-o,--output"
+  std::string value;  // "MM"; empty for a switch
+  std::string meaning;
+  std::string preset;                        // shown in the help; empty if there is none
+  std::string group;                         // heading in the help
+  std::vector<std::string_view> words = {};  // that it takes; of static storage
+};
+
+/// The arguments of a command: the source of help, manual pages, shell completion and the documentation's tests.
+struct CommandSpec {
+  std::string name, brief, summary;             // brief: on one line
+  std::string operand, operand_meaning;         // "PART", "..."; any number
+  std::vector<std::string_view> operand_words;  // that it takes; of static storage
+  std::vector<OptionSpec> options;
+  std::string closing;                                                // examples, at the end of the help
+  std::string (*more)() = nullptr;                                    // the same, made only when the help is read
+  std::vector<std::pair<std::string_view, std::string_view>> absent;  // other commands' options, and why they are missing here
+
+  /// The option named by `flag`, "--output" or "-o", or nullptr.
+  const OptionSpec* find(std::string_view flag) const;
+  /// The end of the help, complete.
+  std::string end() const { return more == nullptr ? closing : closing + more(); }
+};
+
+/// The message of a reader (value.h, number_text.h) after the option's name; "" means no error.
+/// errors  kUsage
+Status at_option(std::string_view flag, const std::string& wrong);
+
+/// The arguments of a call, as text.
+struct Arguments {
+  std::vector<std::string> operands;
+  std::vector<std::pair<std::string, std::string>> options;  // (spec flag, text); switches with an empty text
+  std::optional<std::string> help;                           // set by --help: show it and do nothing else
+  std::vector<std::string> given;                            // all words as typed
+
+  bool has(std::string_view flag) const;
+  std::string text(std::string_view flag) const;  // last one given, or ""
+  std::vector<std::string> all(std::string_view flag) const;
+
+  /// Sets a value from an option's text, if present. errors  kUsage: "--jobs: ...", out of range or invalid
+  template <class T>
+  Status read(std::string_view flag, const Limits& limits, T& value) const {
+    return has(flag) ? at_option(flag, read_value(text(flag), limits, value)) : Status();
+  }
+  template <class T>
+  Status read(std::string_view flag, std::string (*reader)(std::string_view, T&), T& value) const {
+    return has(flag) ? at_option(flag, reader(text(flag), value)) : Status();
+  }
+};
+
+/// The help of a command, in lines of `columns`; notes and examples stay as they are.
+std::string help_text(const CommandSpec& spec, int columns);
+
+/// Parses the arguments after the command's name.
+/// errors  kUsage: unknown option (with the nearest name), missing value
+Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,20 @@
+// pipeline/cli/terminal/pages.h: manual pages and pages in Markdown, made from the definitions of the commands.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "pipeline/cli/terminal/arguments.h"
+
+namespace lamina::pipeline {
+
+/// The manual page of the program.
+std::string man_page(std::span<const CommandSpec> commands);
+/// The manual page of a command.
+std::string man_page(const CommandSpec& command);
+
+/// The page of a command in docs/commands: synopsis, operands, every option with meaning and default, examples, and links to
+/// further documentation.
+std::string markdown_page(const CommandSpec& command);
+
+}  // namespace lamina::pipeline

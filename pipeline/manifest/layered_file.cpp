@@ -1,0 +1,238 @@
+#include "pipeline/manifest/layered_file.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cstdio>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "pipeline/manifest/kept.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/io/temporary.h"
+
+namespace lamina {
+namespace {
+
+bool is_there(const std::string& path) { return ::access(path.c_str(), F_OK) == 0; }
+
+/// XXH3-128 of a layer's bytes, piece by piece.
+class Hasher {
+ public:
+  Hasher() { XXH3_128bits_reset(state_.get()); }
+  void add(std::string_view text) { XXH3_128bits_update(state_.get(), text.data(), text.size()); }
+  /// The hash, and begins anew.
+  Hash128 take() {
+    const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
+    XXH3_128bits_reset(state_.get());
+    return {hash.high64, hash.low64};
+  }
+
+ private:
+  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_{XXH3_createState(), &XXH3_freeState};
+};
+
+}  // namespace
+
+struct LayeredFile::State {
+  LayeredFileOptions options;
+  std::optional<File> file;
+  std::optional<ManifestWriter> manifest;  // absent where the file is streamed
+  std::vector<LayerRecord> kept;
+  bool finished = false;
+  std::uint64_t layer_begin = 0, size = 0;
+  Hasher hasher;
+
+  /// Adds a layer to the manifest, after its text: a kill loses neither.
+  Status note(const LayerRecord& record) {
+    if (!manifest) return {};
+    if (Status status = file->flush(); !status) return status;
+    return manifest->append(record);
+  }
+
+  /// Opens the file, behind the kept layers or with `start`.
+  Status open_file(std::string_view start) {
+    FileOptions how{.stream = options.stream, .hash = true, .keep_part = true};
+    how.replace = options.replace || options.resume;
+    if (options.sync == Sync::kOff) how.durable = Durable::kNo;
+    auto opened = kept.empty() ? File::open(options.file, how) : File::reopen(options.file, size, how);
+    if (!opened) return opened.error();
+    file.emplace(std::move(*opened));
+    if (kept.empty()) {
+      if (Status status = file->append(start); !status) return status;
+      size = start.size();
+    }
+    layer_begin = size;
+    return {};
+  }
+
+  Status sync() {
+    const Status status = file->flush();
+    return status ? file->sync() : status;
+  }
+};
+
+LayeredFile::LayeredFile() : state_(std::make_unique<State>()) {}
+LayeredFile::LayeredFile(LayeredFile&&) noexcept = default;
+LayeredFile& LayeredFile::operator=(LayeredFile&&) noexcept = default;
+LayeredFile::~LayeredFile() = default;
+
+namespace {
+
+/// A run that was killed between its last two names has left a whole file and the whole record of it.
+void take_last_name(const std::string& manifest, const std::string& target) {
+  const std::string record = part_of(manifest);
+  const auto begun = read_manifest(record);
+  if (!begun || begun->file.bytes == 0) return;
+  const auto digest = digest_file(target, begun->file.bytes);
+  if (digest && digest->hash == begun->file.hash) std::rename(record.c_str(), manifest.c_str());
+}
+
+/// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one. A begun file
+/// may stand beside a finished one of another job, which it was to replace.
+Status find_kept(const LayeredFile::LayeredFileOptions& options, const ManifestHead& head, std::string_view start,
+                 const std::string& target, std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
+  if (!options.resume) return {};
+  const std::string begun_file = part_of(target), begun_record = part_of(options.manifest);
+  const bool begun = has_manifest_head(begun_record);
+  if (begun && !is_there(begun_file) && is_there(target) && !is_there(options.manifest))
+    take_last_name(options.manifest, target);
+  if (is_there(options.manifest)) {
+    auto finished = read_manifest(options.manifest);
+    if (!finished && !begun) return finished.error();
+    const Status same = finished ? check_same_job(options.manifest, *finished, head) : Status(finished.error());
+    if (!same && !begun) return same;
+    const auto digest = same && is_there(target) ? digest_file(target) : FileDigest();
+    if (same && digest && digest->bytes > 0 && digest->hash == finished->file.hash) {
+      for (const std::string& left : {begun_file, begun_record}) remove_or_note(left);
+      kept = std::move(finished->layers);
+      whole_size = digest->bytes;
+      return {};
+    }
+  }
+  if (!begun) return {};
+  auto earlier = read_manifest(begun_record);
+  if (!earlier) return earlier.error();
+  if (Status status = check_same_job(begun_record, *earlier, head); !status) return status;
+  if (is_there(begun_file)) kept = records_that_hold(begun_file, earlier->layers, start);
+  return {};
+}
+
+}  // namespace
+
+Status LayeredFile::check_part(const std::string& file, const std::string& manifest) {
+  const auto target = find_target(file);
+  if (!target || target->file.empty() || has_manifest_head(part_of(manifest))) return {};
+  const std::string part = part_of(target->file);
+  struct stat status {};
+  if (::lstat(part.c_str(), &status) != 0) return {};
+  return Error{Fault::kUsage, fmt::format("{}: is there already, without a record of lamina beside it; remove it, or name "
+                                          "another file",
+                                          part)};
+}
+
+Result<LayeredFile> LayeredFile::open(LayeredFileOptions options, const ManifestHead& head, std::string_view start,
+                                      std::optional<Claim> claim) {
+  LayeredFile made;
+  State& state = *made.state_;
+  state.options = std::move(options);
+  const std::string &path = state.options.file, &manifest_path = state.options.manifest;
+  const auto target = find_target(path);
+  if (!target) return target.error();
+  const bool streams = target->file.empty();
+  if (!streams) {
+    if (!claim) {
+      auto taken = Claim::take(manifest_path, path);
+      if (!taken) return taken.error();
+      claim.emplace(std::move(*taken));
+    }
+    if (Status status = check_begun_manifest(part_of(manifest_path)); !status) return status.error();
+    if (Status status = check_part(path, manifest_path); !status) return status.error();
+    // A file without any record is none of an interrupted job.
+    state.options.resume = state.options.resume && has_record(manifest_path);
+    if (!state.options.resume && !state.options.replace && is_there(target->file)) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: another run has written it meanwhile; name another file, or use --overwrite", path)};
+    }
+    std::uint64_t whole = 0;
+    if (Status status = find_kept(state.options, head, start, target->file, state.kept, whole); !status) return status.error();
+    state.finished = whole > 0;
+    state.size = whole;
+    if (state.finished) return made;
+  }
+  state.size = state.kept.empty() ? 0 : state.kept.back().offset + state.kept.back().bytes;
+  // First the record: a NAME.part without one is somebody else's.
+  if (!streams) {
+    auto manifest = ManifestWriter::open(manifest_path, head, state.kept,
+                                         {state.options.sync, true, [&state] { return state.sync(); }}, std::move(claim));
+    if (!manifest) return manifest.error();
+    state.manifest.emplace(std::move(*manifest));
+  }
+  if (Status status = state.open_file(start); !status) {
+    if (state.manifest && state.kept.empty()) state.manifest->discard();
+    return status.error();
+  }
+  return made;
+}
+
+const std::vector<LayerRecord>& LayeredFile::kept() const { return state_->kept; }
+bool LayeredFile::finished() const { return state_->finished; }
+std::uint64_t LayeredFile::size() const { return state_->size; }
+
+Status LayeredFile::append(std::string_view text, LayerRecord& record) {
+  State& state = *state_;
+  record.offset = state.size;
+  state.layer_begin = state.size += text.size();
+  if (Status status = state.file->append(text); !status) return status;
+  return state.note(record);
+}
+
+Status LayeredFile::append_piece(std::string_view text) {
+  state_->hasher.add(text);
+  state_->size += text.size();
+  return state_->file->append(text);
+}
+
+Status LayeredFile::end_pieces(LayerRecord& record) {
+  State& state = *state_;
+  record.offset = state.layer_begin;
+  record.bytes = state.size - state.layer_begin;
+  record.hash = state.hasher.take();
+  state.layer_begin = state.size;
+  return state.note(record);
+}
+
+Result<std::uint64_t> LayeredFile::finish(std::string_view end, const std::function<Status()>& names) {
+  State& state = *state_;
+  if (state.finished) return state.size;
+  if (Status status = state.file->append(end); !status) return status.error();
+  state.size += end.size();
+  const auto take_names = [&]() -> Status {
+    if (Status status = names ? names() : Status(); !status) return status;
+    const auto digest = state.file->finish();
+    return digest ? Status() : Status(digest.error());
+  };
+  if (Status status = state.file->flush(); !status) return status.error();
+  const Status status = state.manifest ? state.manifest->finish(state.file->digest(), take_names) : take_names();
+  return status ? Result<std::uint64_t>(state.size) : status.error();
+}
+
+Status LayeredFile::keep() {
+  State& state = *state_;
+  if (state.file) {
+    if (Status status = state.file->flush(); !status) return status;
+  }
+  return state.manifest ? state.manifest->flush() : Status();
+}
+
+void LayeredFile::discard() {
+  if (state_->file) state_->file->discard();
+  if (state_->manifest) state_->manifest->discard();
+}
+
+}  // namespace lamina

@@ -1,0 +1,58 @@
+// pipeline/pores/bead_voxels.h: what a toolpath file lays, as voxels of a window: for all who ask what its pores are like.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "stages/bead/deposition.h"
+#include "stages/data/mesh.h"  // Box
+#include "stages/data/status.h"
+#include "stages/data/voxels.h"
+#include "stages/formats/gcode/read_gcode.h"
+
+namespace lamina::pipeline {
+
+/// A box of a print, cut into voxels.
+struct Window {
+  Box box;                               // nm: on the bed, z of the nozzle
+  std::array<std::uint32_t, 3> count{};  // voxels along x, y, z; they need not be cubes
+  std::array<bool, 3> periodic{};
+
+  std::uint64_t voxels() const { return std::uint64_t{count[0]} * count[1] * count[2]; }
+};
+
+/// Layers that beads of a file fill, one upon the other.
+struct Pile {
+  struct PileLayer {
+    std::uint32_t index;     // in the file
+    std::int64_t low, high;  // nm
+  };
+  std::vector<PileLayer> layers;
+  std::uint32_t skipped = 0;  // layers with beads that do not lie above those before
+};
+/// cost  reads the file once; 24 bytes a layer
+Result<Pile> pile_of(const formats::GcodeFile& file);
+
+/// Cuts the voxels whose centres lie in a bead.
+/// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h, contacts.h); heights are those of
+/// the pile.
+///         None: a bead is a stadium, as high as its layer and as wide as the file tells, with round ends; one that is narrower
+///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap
+/// left_out  by rules, the share of what is laid about the window that finds no room beside its neighbours, and is left out
+/// errors  kUsage: a layer cannot be read; kInput: 2^32 runs and more
+/// cost    O(runs) and reading the window's layers; 8 bytes a run. By rules, 150 bytes for each 20 um of line about the window.
+/// y of the voxels rises as that of the bed does
+Result<VoxelStack> bead_voxels(const formats::GcodeFile& file, const Pile& pile, const Window& window,
+                               const bead::DepositionRules* rules = nullptr, double* left_out = nullptr);
+
+/// What of a plan repeats, around a place where it does.
+struct Repeat {
+  std::array<std::int64_t, 2> length{};  // nm along x and y; 0: not found
+  std::uint32_t layers = 0;              // after so many a layer is as it was; 0: not found
+};
+/// Looks at a square of 9 mm, or what there is of the part, in the middle layer, and at up to eight layers above it.
+/// errors  of bead_voxels
+Result<Repeat> find_repeat(const formats::GcodeFile& file, const Pile& pile, Point2 middle, std::size_t layer);
+
+}  // namespace lamina::pipeline

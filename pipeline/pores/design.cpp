@@ -1,0 +1,273 @@
+#include "pipeline/pores/design.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "pipeline/job/file.h"
+#include "pipeline/machine/profiles.h"
+#include "pipeline/pores/design_page.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/toml.h"
+
+namespace lamina::pipeline {
+namespace {
+
+constexpr double kNoNearer = 0.02;
+constexpr double kMinNear = 0.01;  // walls fall between voxels
+
+/// The last comment before the keys.
+constexpr std::string_view kDesignedJobRuns = "# lamina extrude PART.stl --job FILE.toml -o PART.gcode\n\n";
+
+std::string segment_text(const segment::SegmentSettings& keys) {
+  return fmt::format(
+      "on = true\nrule = \"aligned\"\nthick_mm = {}\nthin_mm = {}\ncontinuous_lines = {}\nspacing_sc_mm = {}\n"
+      "spacing_cc_mm = {}\nthick_extrusion_percent = {}\nthick_speed_percent = {}\nthin_speed_percent = {}\n",
+      number_text(keys.thick_mm), number_text(keys.thin_mm), keys.continuous, number_text(*keys.spacing_sc_mm),
+      number_text(*keys.spacing_cc_mm), number_text(keys.thick_extrusion), number_text(*keys.thick_speed),
+      number_text(keys.thin_speed));
+}
+
+/// The keys of a job that fills with segmented lines, as a person would write them.
+/// machine  as --machine takes it
+std::string designed_job_text(const std::string& machine, const ExtruderProfile& used, const segment::SegmentSettings& keys) {
+  const Calibration& calibration = used.calibration;
+  std::string profile = machine;
+  if (machine.ends_with(".toml") || machine.find('/') != std::string::npos)
+    profile = std::filesystem::absolute(machine).string();
+  const std::string speed = used.machine.speed.print_mm_s == calibration.speed_mm_s
+                                ? std::string()
+                                : fmt::format("[extrude]\nprint_mm_s = {}\n\n", number_text(calibration.speed_mm_s));
+  return speed + fmt::format(
+                     "[layers]\nthickness_mm = {}\n\n[machine]\nprofile = {}\n\n"
+                     "[fill]\npattern = \"raster\"\nwidth_mm = {}\nwalls = 1\nangle_deg = 90\nangle_step_deg = 0\n\n"
+                     "[segment]\n{}",
+                     number_text(calibration.height_mm), toml_string(profile), number_text(calibration.width_mm),
+                     segment_text(keys));
+}
+
+/// What fills a part between two heights.
+struct DesignRange {
+  double from_mm = 0, to_mm = 0;
+  segment::SegmentSettings keys;
+};
+
+/// The same with ranges of heights; what lies above them is filled as the last one.
+/// ranges  not empty
+std::string designed_job_text(const std::string& machine, const ExtruderProfile& used, const std::vector<DesignRange>& ranges) {
+  std::string text = designed_job_text(machine, used, ranges.back().keys);
+  for (const DesignRange& range : ranges) {
+    text += fmt::format("\n[[segment.range]]\nfrom_mm = {}\nto_mm = {}\n{}", number_text(range.from_mm),
+                        number_text(range.to_mm), segment_text(range.keys));
+  }
+  return text;
+}
+
+/// Of the wish that a forward run meets worst: relative.
+double miss_of(const segment::PoreTarget& target, const ForwardRun& forward) {
+  segment::Slots slots{forward.porosity, forward.permeability_m2, 0};
+  segment::Pores pores{};
+  pores.width_mm = forward.pore_width_mm;
+  pores.length_mm = forward.pore_length_mm;
+  return segment::miss_of(target, slots, pores);
+}
+
+/// What of a choice lies beyond what was measured, one line each.
+std::vector<std::string> outside_of(const segment::DesignLimits& limits, const segment::Choice& choice) {
+  const auto beyond = limits.beyond(choice);
+  std::vector<std::string> lines;
+  const auto add = [&](std::size_t i, std::string text) {
+    if (std::abs(beyond[i]) > 0.02) lines.push_back(std::move(text));
+  };
+  add(0, fmt::format("extrusion {:.1f} % lies between those measured", choice.extrusion));
+  add(1, fmt::format("thick stretches of {:.2f} mm; 1.5 were measured", choice.thick_mm));
+  add(2, fmt::format("thin stretches of {:.2f} mm; 1.5 to 2 were measured", choice.thin_mm));
+  add(3, fmt::format("thick beads {:+.4f} mm from their neighbours; 0 to 0.01 were measured", choice.gap_mm));
+  return lines;
+}
+
+}  // namespace
+
+Result<ExtruderProfile> designable_extruder(const std::string& machine) {
+  auto profile = find_extruder(machine);
+  if (!profile) return Error{profile.error().fault, "--machine: " + profile.error().message};
+  if (profile->machine.format != "gcode")
+    return Error{Fault::kUsage, fmt::format("--machine: {} writes {}; pores are designed for machines of G-code",
+                                            one_line(machine), profile->machine.format)};
+  // As the job is written: beads as wide as the nozzle, at the speed of the published tables, that short stretches reach.
+  Job job;
+  job.fill.all.width_mm = profile->machine.material.nozzle_mm;
+  job.layer_mm = std::round(job.fill.all.width_mm * 750) / 1000;
+  ExtruderProfile slow = *profile;
+  slow.machine.speed.print_mm_s = profile->calibration.speed_mm_s;
+  predict_calibration(job, slow);
+  profile->calibration = slow.calibration;
+  profile->predicted_calibration = slow.predicted_calibration;
+  return profile;
+}
+
+Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& report) {
+  const auto profile = designable_extruder(request.machine);
+  if (!profile) return profile.error();
+  const Calibration& calibration = profile->calibration;
+  const auto limits = segment::DesignLimits::of(profile->machine, calibration);
+  if (!limits) return Error{limits.error().fault, fmt::format("--machine {}: {}", request.machine, limits.error().message)};
+  std::vector<segment::RatioAt> known = request.known;
+  std::vector<std::string> tries;
+  std::optional<DesignedJob> best;
+  while (tries.size() < request.max_runs) {
+    DesignedJob tried;
+    tried.design = segment::search(request.target, *limits, request.ratio, request.lines, known);
+    // Out of reach, and no run to come is nearer.
+    if (best && tried.design.miss > request.tolerance && tried.design.miss > best->miss - kNoNearer) break;
+    tried.toml = designed_job_text(request.machine, *profile, tried.design.settings);
+    if (std::ranges::find(tries, tried.toml) != tries.end()) break;
+    Job job;
+    if (const Status status = read_job_text(tried.toml, "the job", job); !status) return status.error();
+    const double done = static_cast<double>(tries.size());
+    const auto forward = run_forward(job, request.machine, tried.design.plan, request.grid,
+                                     [&](double share) { return report((done + share) / request.max_runs); });
+    if (!forward) return forward.error();
+    tries.push_back(tried.toml);
+    tried.forward = *forward;
+    tried.miss = miss_of(request.target, *forward);
+    tried.met = tried.miss <= request.tolerance;
+    tried.outside = outside_of(*limits, tried.design.choice);
+    if (profile->predicted_calibration)
+      tried.outside.insert(tried.outside.begin(), "nothing was measured on this printer: its widths are the model's");
+    // The slots without the ratios of before.
+    const segment::Design& design = tried.design;
+    const double flow = design.slots.permeability_m2 / design.ratio.permeability;
+    const double void_share = design.slots.porosity / design.ratio.porosity;
+    tried.model_ratio = flow > 0 ? forward->permeability_m2 / flow : 1;
+    if (flow > 0 && void_share > 0 && forward->permeability_m2 > 0 && forward->porosity > 0)
+      known.push_back({design.choice, {forward->porosity / void_share, forward->permeability_m2 / flow}});
+    if (!best || tried.miss < best->miss) best = std::move(tried);
+    if (best->miss <= request.near) break;
+  }
+  best->runs = static_cast<std::uint32_t>(tries.size());
+  best->known = std::move(known);
+  best->widths = one_line(calibration.source);
+  best->toml.insert(0, "# Made by lamina design. By its forward run: " + predicted_lines(best->forward) + ".\n" +
+                           std::string(kDesignedJobRuns));
+  return *best;
+}
+
+namespace {
+
+/// Of one step: with the number of lines that all share, or where that misses with any.
+Result<DesignedJob> design_step(DesignRequest request, const segment::TargetStep& step, std::uint32_t lines,
+                                const std::function<bool(double)>& report) {
+  request.target = step.target;
+  if (lines == 0) return design_job(request, report);
+  request.lines = {lines, lines};
+  auto shared = design_job(request, report);
+  if (!shared || shared->met) return shared;
+  request.lines = {};
+  request.known = shared->known;
+  auto own = design_job(request, report);
+  if (!own) return own;
+  own->runs += shared->runs;
+  if (own->miss < shared->miss) return own;
+  shared->runs = own->runs;
+  return shared;
+}
+
+/// Neighbouring regions are not taken for each other: a quarter of the way from one wish to the next is near enough.
+double near_of(const std::vector<segment::TargetStep>& steps, double maximum) {
+  const auto way = [](const std::optional<double>& one, const std::optional<double>& next) {
+    return one && next ? std::abs(*next / *one - 1) : 0.0;
+  };
+  double minimum = 4 * maximum;
+  for (std::size_t i = 0; i + 1 < steps.size(); ++i) {
+    const segment::PoreTarget &one = steps[i].target, &next = steps[i + 1].target;
+    minimum =
+        std::min(minimum, std::max({way(one.porosity, next.porosity), way(one.permeability_m2, next.permeability_m2),
+                                    way(one.pore_width_mm, next.pore_width_mm), way(one.pore_length_mm, next.pore_length_mm)}));
+  }
+  return std::max(kMinNear, minimum / 4);
+}
+
+/// Within the layer in the middle of a step.
+double middle_of(const segment::TargetStep& step, double layer_mm) {
+  const double layers = std::round((step.to_mm - step.from_mm) / layer_mm);
+  return step.from_mm + (std::floor(layers / 2) + 0.5) * layer_mm;
+}
+
+/// What the one file of all regions says takes the place of what the steps' own runs said.
+Status check_together(const DesignRequest& request, double layer_mm, GradientJob& all,
+                      const std::function<bool(double)>& report) {
+  Job job;
+  if (const Status status = read_job_text(all.toml, "the job", job); !status) return status.error();
+  std::vector<ForwardRegion> regions;
+  for (const GradientStep& one : all.steps) {
+    regions.push_back({one.found.design.plan, middle_of(one.step, layer_mm), heights_text(one.step.from_mm, one.step.to_mm)});
+  }
+  const auto forward = run_forward(job, request.machine, all.steps.back().step.to_mm, regions, request.grid, report);
+  if (!forward) return forward.error();
+  const double height = all.steps.back().step.to_mm;
+  double resistance = 0;
+  for (std::size_t i = 0; i < all.steps.size(); ++i) {
+    GradientStep& one = all.steps[i];
+    one.found.forward = forward->at(i);
+    one.found.miss = miss_of(one.step.target, one.found.forward);
+    one.found.met = one.found.miss <= request.tolerance;
+    const double share = (one.step.to_mm - one.step.from_mm) / height;
+    all.porosity += share * one.found.forward.porosity;
+    resistance += share / std::max(one.found.forward.permeability_m2, 1e-30);
+  }
+  all.permeability_m2 = 1 / resistance;
+  all.runs += static_cast<std::uint32_t>(all.steps.size());
+  return {};
+}
+
+}  // namespace
+
+Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
+                                    const std::function<bool(double)>& report) {
+  const auto profile = designable_extruder(request.machine);
+  if (!profile) return profile.error();
+  const auto limits = segment::DesignLimits::of(profile->machine, profile->calibration);
+  if (!limits) return Error{limits.error().fault, fmt::format("--machine {}: {}", request.machine, limits.error().message)};
+  const std::uint32_t lines = segment::common_lines(steps, *limits, request.ratio, request.tolerance);
+  const double parts = static_cast<double>(steps.size()) + 1;
+  DesignRequest next = request;
+  next.near = near_of(steps, request.near);
+  GradientJob all;
+  std::vector<DesignRange> ranges;
+  for (const segment::TargetStep& step : steps) {
+    const double done = static_cast<double>(all.steps.size());
+    auto found = design_step(next, step, lines, [&](double share) { return report((done + share) / parts); });
+    if (!found) return found.error();
+    next.known = found->known;
+    all.runs += found->runs;
+    ranges.push_back({step.from_mm, step.to_mm, found->design.settings});
+    all.steps.push_back({step, std::move(*found)});
+  }
+  all.toml = designed_job_text(request.machine, *profile, ranges);
+  const double layer_mm = profile->calibration.height_mm;
+  if (const Status status =
+          check_together(request, layer_mm, all, [&](double share) { return report((parts - 1 + share) / parts); });
+      !status)
+    return status.error();
+  std::string head = "# Made by lamina design. By one forward run of all regions:\n";
+  all.met = true;
+  all.lines = all.steps.front().found.design.settings.continuous;
+  for (const auto& [step, found] : all.steps) {
+    head += fmt::format("# {}: {}\n", heights_text(step.from_mm, step.to_mm), predicted_lines(found.forward));
+    all.met = all.met && found.met;
+    all.miss = std::max(all.miss, found.miss);
+    if (found.design.settings.continuous != all.lines) all.lines = 0;
+  }
+  all.toml.insert(0, head + std::string(kDesignedJobRuns));
+  return all;
+}
+
+std::string heights_text(double from_mm, double to_mm) {
+  return fmt::format("{} to {} mm", number_text(from_mm), number_text(to_mm));
+}
+
+}  // namespace lamina::pipeline

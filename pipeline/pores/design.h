@@ -1,0 +1,83 @@
+// pipeline/pores/design.h: the job of segmented lines whose pores are as requested, the same everywhere or changing with
+// height.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pipeline/pores/forward_run.h"
+#include "stages/data/extruder.h"
+#include "stages/data/status.h"
+#include "stages/segment/design/gradient.h"
+
+namespace lamina::pipeline {
+
+struct DesignRequest {
+  std::string machine;  // as --machine takes it
+  segment::PoreTarget target;
+  double tolerance = 0.05;  // of what the forward run says of each wish, relative
+  std::uint32_t max_runs = 20;
+  ForwardGrid grid;
+  double near = 0.04;                   // a run that misses the wish by so little ends the search
+  segment::SlotRatio ratio{1, 0.85};    // as most plans have it: where the search begins
+  std::vector<segment::RatioAt> known;  // of forward runs with the same machine and grid
+  segment::LineBounds lines;
+};
+
+struct DesignedJob {
+  segment::Design design;  // as the corrected model says
+  ForwardRun forward;      // of this design
+  double miss = 0;         // of the wish that the forward run meets worst: relative
+  bool met = false;        // within the tolerance
+  std::uint32_t runs = 0;
+  std::vector<segment::RatioAt> known;  // what forward runs said, of earlier searches too
+  double model_ratio = 1;               // k1 of the forward run / of the slots alone
+  std::vector<std::string> outside;     // what of the choice lies beyond what was measured, one line each
+  std::string widths;                   // where the widths of beads come from
+  std::string toml;                     // of the job file
+};
+
+/// The printer, if pores are designed for it. errors  kUsage, of --machine
+Result<ExtruderProfile> designable_extruder(const std::string& machine);
+
+/// Searches by slots (segment/design/slots.h), runs the plan forward, corrects the slots by what that says, and searches again
+/// until every wish is met, or the corrected slots say that none within the machine's limits meets them.
+/// returns  the best that was run forward, whether it meets the wish or not
+/// tell     is told how far it is, 0 .. 1; false stops
+/// errors   kUsage: no such machine, or no calibration of segmented lines; of run_forward(); kInterrupted
+/// cost     of up to max_runs forward runs
+Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& advance);
+
+struct GradientStep {
+  segment::TargetStep step;
+  DesignedJob found;  // its forward run, miss and met are of the one file of all regions
+};
+
+struct GradientJob {
+  std::vector<GradientStep> steps;  // from the bottom up
+  double miss = 0;                  // of the step that misses its wish by most
+  bool met = false;                 // all of them
+  std::uint32_t lines = 0;          // continuous ones in all regions; 0: not the same ones
+  std::uint32_t runs = 0;           // forward runs, of the one file one for each region
+  double porosity = 0;              // mean over the height
+  double permeability_m2 = 0;       // along z, regions in series; what is lost where they meet is left out
+  std::string toml;                 // of the job file: ranges of heights
+};
+
+/// Designs each step as design_job() does, with what the runs of the steps below told of the slots, writes one job with a range
+/// of heights for each, plans a block as high as all of them with it, and looks at one period in the middle of each region of
+/// that one file.
+/// request  its wish counts for nothing
+/// steps    of segment::steps_of(), in whole layers of the machine's calibration
+/// returns  the nearest of steps that cannot be met
+/// errors   those of design_job() and run_forward()
+/// cost     of design_job() for each step, and of a forward run for each
+Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
+                                    const std::function<bool(double)>& advance);
+
+/// "3 to 5.7 mm", as a summary names the pores of a range.
+std::string heights_text(double from_mm, double to_mm);
+
+}  // namespace lamina::pipeline

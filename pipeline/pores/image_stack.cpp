@@ -1,0 +1,178 @@
+#include "pipeline/pores/image_stack.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "pipeline/check/job_files.h"
+#include "pipeline/job/file.h"
+#include "stages/data/levels.h"
+#include "stages/formats/images/image.h"
+#include "stages/pores/coarser.h"
+#include "stages/support/text/readable.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMaxSlices = 4'000'000;
+
+/// The first thing that a manifest of lamina tells is which lamina wrote it.
+bool begun_by_lamina(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string head;
+  for (char c = 0; head.size() < 10 && file.get(c);)
+    if (c != ' ' && c != '\n' && c != '\r') head += c;
+  return head == "{\"lamina\":";
+}
+
+/// Voxels along z: as thick as the thinnest layer, from the bottom of the first to the top of the last.
+void slice_layers(const std::vector<LayerRecord>& layers, ImageStack& stack) {
+  Nm thinnest = layers.front().layer.thickness;
+  for (const LayerRecord& record : layers) thinnest = std::min(thinnest, record.layer.thickness);
+  const std::int64_t low = layers.front().layer.bottom;
+  const std::int64_t height = std::int64_t{layers.back().layer.bottom} + layers.back().layer.thickness - low;
+  thinnest = static_cast<Nm>(std::max<std::int64_t>({thinnest, 1, height / kMaxSlices}));
+  for (std::uint32_t l = 0; l < layers.size(); ++l) {
+    const std::int64_t top = std::int64_t{layers[l].layer.bottom} + layers[l].layer.thickness;
+    while (low + (2 * static_cast<std::int64_t>(stack.layer_of.size()) + 1) * thinnest / 2 < top) stack.layer_of.push_back(l);
+  }
+  stack.size[2] = static_cast<std::uint32_t>(stack.layer_of.size());
+  stack.edge[2] = thinnest;
+}
+
+/// Pixels that get no drop because drops are few are no pores. errors  kInput: the images leave some out
+Status check_all_filled(const std::string& folder, const Manifest& manifest) {
+  const ManifestHead& head = manifest.head;
+  if (head.full_level() > 0 && !head.grey_drops()) return {};  // shares of voxels
+  Job job;
+  const bool known = read_job_text(head.job_toml, folder + "/manifest.json", job).ok();
+  std::uint64_t without = 0, filled = 0;
+  for (const LayerRecord& record : manifest.layers) {
+    filled += record.filled_pixels();
+    if (record.filled_pixels() > record.set_pixels) without += record.filled_pixels() - record.set_pixels;
+  }
+  const bool thinned = known && job.dose.core < 1;
+  const bool rounded = known && head.levels > 0 && !job.dose.dithered && !job.dose.saturation_percent;
+  const bool shares = head.levels > 0 && !rounded;  // of which full voxels are counted, and any is set that has a drop
+  if (!thinned && !shares && (without == 0 || rounded)) return {};
+  const std::string what =
+      thinned  ? fmt::format("{:.4g} % of the pixels of its cores get no drop (--core)", 100 * (1 - job.dose.core))
+      : shares ? "shares of voxels are drops here and there (--levels)"
+               : fmt::format("{} of {} pixels that are to be filled get no drop (--saturation)", without, filled);
+  const std::string as_they_are =
+      head.named_images() > 0
+          ? ""
+          : fmt::format(", or name {}/layers with --pixel, --layer-um and --dark to take its pixels as they are",
+                        one_line(folder));
+  return Error{Fault::kInput,
+               fmt::format("{}: {}, which is no pore; plan the job again without that{}", one_line(folder), what, as_they_are)};
+}
+
+/// The solid of a layer: of shares of voxels those that are half full or more.
+Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head, const LayerRecord& record) {
+  auto picture = picture_of_layer(folder, head, record);
+  if (!picture) return picture.error();
+  const std::uint8_t full = head.full_level();
+  if (full == 0 || head.grey_drops()) return std::move(picture->front());
+  Levels levels;
+  auto image = formats::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
+  if (!image) return image.error();
+  threshold_levels(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
+  return std::move(image->runs);
+}
+
+Result<ImageStack> stack_of_job(const std::string& folder) {
+  auto manifest = read_manifest(folder + "/manifest.json");
+  if (!manifest) return Error{Fault::kInput, manifest.error().message};
+  const auto job = std::make_shared<const Manifest>(std::move(*manifest));
+  const ManifestHead& head = job->head;
+  if (head.product != Product::kImages || head.extension.empty() || job->layers.empty())
+    return Error{Fault::kInput, folder + ": its job wrote no images; name a folder of lamina jet, or of images"};
+  if (Status status = check_all_filled(folder, *job); !status) return status.error();
+  ImageStack stack;
+  stack.path = folder;
+  slice_layers(job->layers, stack);
+  stack.size = {head.grid.columns(), head.grid.rows(), stack.size[2]};
+  stack.edge = {1 / head.grid.x.pixels_per_nm(), 1 / head.grid.y.pixels_per_nm(), stack.edge[2]};
+  stack.part = stack.size;
+  if (!head.parts.empty() && !head.parts.front().bounds.empty()) {
+    const Box& box = head.parts.front().bounds;
+    const std::int64_t bottom = job->layers.front().layer.bottom;
+    const std::array<std::int64_t, 3> low{box.lo.x, box.lo.y, box.lo.z - bottom}, high{box.hi.x, box.hi.y, box.hi.z - bottom};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto voxel = [&](std::int64_t nm) {
+        return static_cast<std::uint32_t>(
+            std::clamp(std::round(static_cast<double>(nm) / stack.edge[a]), 0.0, 1.0 * stack.size[a]));
+      };
+      stack.part_low[a] = voxel(low[a]);
+      stack.part[a] = voxel(high[a]) - stack.part_low[a];
+    }
+  }
+  stack.read = [job, folder](std::uint32_t layer) -> Result<Runs> {
+    return solid_of_layer(folder, job->head, job->layers[layer]);
+  };
+  return stack;
+}
+
+}  // namespace
+
+bool has_manifest(const std::string& folder) {
+  return begun_by_lamina(folder + "/manifest.json") || begun_by_lamina(folder + "/manifest.json.part");
+}
+
+Result<ImageStack> open_stack(const std::string& folder, const StackRequest& request) {
+  if (begun_by_lamina(folder + "/manifest.json")) return stack_of_job(folder);
+  if (has_manifest(folder)) return Error{Fault::kInput, folder + ": the job is not finished; end it with --resume first"};
+  return formats::stack_of_images(folder, request);
+}
+
+Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection,
+                                    const std::array<bool, 3>& periodic) {
+  std::array<std::uint32_t, 3> factor{}, low{}, count{}, twice{};
+  std::uint64_t voxels = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double edge = stack.edge[a], part_mm = stack.part[a] * edge * 1e-6;
+    factor[a] = static_cast<std::uint32_t>(std::clamp(std::round(1e3 * selection.voxel_um / edge), 1.0, 1000.0));
+    const double requested_mm = selection.size_mm[a] > 0 ? selection.size_mm[a] : std::min(2.0, part_mm);
+    const auto wanted = static_cast<std::uint32_t>(std::min(4e9, std::round(requested_mm * 1e6 / edge)));
+    if (wanted > stack.part[a])
+      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the images have: {:.3f} mm",
+                                              requested_mm, "xyz"[a], part_mm)};
+    // Whole blocks of those that the error is taken from.
+    twice[a] = wanted >= 2 * factor[a] ? 2 : 1;
+    count[a] = wanted / (twice[a] * factor[a]) * (twice[a] * factor[a]);
+    if (count[a] == 0)
+      return Error{Fault::kUsage, fmt::format("--window: holds no voxel of {:.4g} um along {}; take a larger one or a smaller "
+                                              "--voxel",
+                                              factor[a] * edge * 1e-3, "xyz"[a])};
+    low[a] = stack.part_low[a] + (stack.part[a] - count[a]) / 2;
+    voxels *= count[a];
+  }
+  if (voxels > std::uint64_t{1} << 31)
+    return Error{Fault::kUsage, "--window: has more than 2^31 voxels of the images; take a smaller one"};
+  Result<VoxelStack> box = formats::cut_box(stack, low, count);
+  if (!box) return box.error();
+  box->periodic = periodic;
+  StackWindow window;
+  window.fine = factor == std::array<std::uint32_t, 3>{1, 1, 1} ? std::move(*box) : pores::coarser(*box, factor);
+  window.coarse = pores::coarser(window.fine, twice);
+  window.choice.window.count = window.fine.view().size();
+  window.choice.window.periodic = periodic;
+  window.choice.first_layer = stack.layer_of[low[2]];
+  window.choice.layers = stack.layer_of[low[2] + count[2] - 1] - window.choice.first_layer + 1;
+  const auto corner = [&](const std::array<std::uint32_t, 3>& more) {
+    const auto at = [&](std::size_t a) { return static_cast<Nm>(std::llround((low[a] + more[a]) * stack.edge[a])); };
+    return Point3{at(0), at(1), at(2)};
+  };
+  window.choice.window.box.add(corner({}));
+  window.choice.window.box.add(corner(count));
+  return window;
+}
+
+}  // namespace lamina::pipeline

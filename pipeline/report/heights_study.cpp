@@ -1,0 +1,205 @@
+#include "pipeline/report/heights_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using heights::Evaluation;
+using heights::FlatHit;
+using heights::LayerFacts;
+using heights::Mode;
+using heights::Study;
+
+std::string part_name(const StudiedParts& parts, std::uint32_t part) {
+  return part < parts.paths.size() ? std::filesystem::path(parts.paths[part]).filename().string() : "-";
+}
+
+// Whether Dolenc and Makela's rule took a layer back because the surface changes above its bottom.
+bool stepped_back(const Study& study, std::size_t layer) {
+  return !study.plan.stepped_back.empty() && study.plan.stepped_back[layer];
+}
+std::size_t stepped_back_count(const Study& study) {
+  return static_cast<std::size_t>(std::ranges::count(study.plan.stepped_back, true));
+}
+
+std::string signed_mm(std::int64_t nm) { return fmt::format("{:+.4f} mm", mm(nm)); }
+
+double rounded(double value, int decimals) {
+  const double unit = std::pow(10, decimals);
+  return std::round(value * unit) / unit;
+}
+
+std::string flats_line(const Study& study) {
+  const Evaluation& e = study.evaluation;
+  if (e.flats_missed == 0) return fmt::format("{} of {} hit", e.flats.size(), e.flats.size());
+  return fmt::format("{} of {} hit, {} missed by up to {:.4f} mm", e.flats.size() - e.flats_missed, e.flats.size(),
+                     e.flats_missed, mm(e.largest_miss));
+}
+
+}  // namespace
+
+std::string text_of(const heights::Settings& settings, double layer_mm) {
+  std::string text = fmt::format("of {} mm", settings.thickness_mm.empty() ? number_text(layer_mm) : settings.thickness_mm);
+  if (settings.mode == Mode::kUniform) return text;
+  text += fmt::format(", {}", mode_name(settings.mode));
+  if (settings.mode == Mode::kAngle) return text + fmt::format(", from {} degrees", number_text(settings.adapt_angle_deg));
+  return text + fmt::format(", steps up to {} mm", number_text(settings.cusp_mm));
+}
+
+std::string small_peaks_text(const heights::Plan& plan, double min_flat_mm2) {
+  if (plan.small_peaks == 0) return {};
+  return fmt::format(
+      "{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
+      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(min_flat_mm2),
+      plan.small_peaks == 1 ? "is" : "are", plan.small_peaks == 1 ? "" : "s");
+}
+
+std::string_view reason(const Study& study, std::size_t layer) {
+  return study.reasons.empty() ? "given" : reason_name(study.reasons[layer]);
+}
+
+double angle(const Study& study, std::size_t layer) {
+  return heights::angle_of(study.plan.inspected.empty() ? study.evaluation.layers[layer].flattest
+                                                        : study.plan.inspected[layer]);
+}
+
+std::string study_page(const StudiedParts& parts, const Study& study) {
+  const Evaluation& e = study.evaluation;
+  std::string text;
+  const auto line = [&](std::string_view name, const std::string& what) { text += fmt::format("{:<10}{}\n", name, what); };
+  line("layers", fmt::format("{} {}", readable_count(study.layers()), study.reasons.empty() ? study.name : parts.way));
+  line("height", fmt::format("{:.4f} mm, the parts {:.4f} mm ({})", mm(study.boundaries.back()), mm(parts.height),
+                             signed_mm(e.top_miss)));
+  line("steps", fmt::format("up to {:.4f} mm (layer {}), {:.4f} mm on average over the surface", mm(e.largest_cusp),
+                            e.largest_cusp_layer + 1, e.mean_cusp * 1e-6));
+  if (e.above_limit > 0 && !study.reasons.empty() && study.options.mode != Mode::kUniform &&
+      study.options.mode != Mode::kAngle) {
+    line("", fmt::format("{} layers of the least thickness have a step above the limit of {} mm; thinner ones would help",
+                         e.above_limit, number_text(mm(study.options.cusp))));
+  }
+  if (const std::size_t back = stepped_back_count(study); back > 0) {
+    line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
+  }
+  line("flats", flats_line(study));
+  if (const std::string small = small_peaks_text(study.plan, study.options.min_flat_mm2); !small.empty()) line("peaks", small);
+  if (study.plan.one_less_reaches >= 0) {
+    line("proof", fmt::format("{} that keeps these steps and flats gets higher than {:.4f} mm",
+                              study.options.time.on() ? "no table of less time" : "no table of a layer less",
+                              mm(study.plan.one_less_reaches)));
+  }
+  if (study.options.time.on()) line("time", readable_seconds(e.seconds));
+  for (const FlatHit& hit : e.flats) {
+    text +=
+        fmt::format("  flat at {:9.4f} mm  {:10.2f} mm2 up {:10.2f} mm2 down  {}{}\n", mm(hit.flat.height), hit.flat.up_mm2,
+                    hit.flat.down_mm2,
+                    hit.miss > study.options.surface.flat_tolerance ? fmt::format("missed by {:.4f} mm", mm(hit.miss)) : "hit",
+                    hit.flat.end ? ", end of a part" : "");
+  }
+  text += fmt::format("\n{:>6} {:>10} {:>9}  {:<8} {:>6} {:>8}  {}\n", "layer", "bottom", "thickness", "reason", "angle",
+                      "step", "decided by");
+  for (std::size_t i = 0; i < study.layers(); ++i) {
+    text += fmt::format("{:>6} {:>10.4f} {:>9.4f}  {:<8} {:>6.2f} {:>8.4f}  {}\n", i + 1, mm(study.boundaries[i]),
+                        mm(study.thickness(i)), reason(study, i), angle(study, i), mm(e.layers[i].cusp),
+                        part_name(parts, e.layers[i].part));
+  }
+  return text;
+}
+
+std::string study_csv(const StudiedParts& parts, const std::vector<Study>& studies) {
+  std::string text = "table,layer,bottom_mm,thickness_mm,reason,angle_deg,cusp_mm,hits_flat,stepped_back,part\n";
+  const auto quoted = [](std::string name) {
+    for (std::size_t at = 0; (at = name.find('"', at)) != std::string::npos; at += 2) name.insert(at, 1, '"');
+    return '"' + name + '"';
+  };
+  for (const Study& study : studies) {
+    for (std::size_t i = 0; i < study.layers(); ++i) {
+      const LayerFacts& layer = study.evaluation.layers[i];
+      text += fmt::format("{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{},{}\n", quoted(study.name), i + 1, mm(study.boundaries[i]),
+                          mm(study.thickness(i)), reason(study, i), angle(study, i), mm(layer.cusp), layer.hits_flat ? 1 : 0,
+                          stepped_back(study, i) ? 1 : 0, quoted(part_name(parts, layer.part)));
+    }
+  }
+  return text;
+}
+
+std::string study_json(const StudiedParts& parts, const std::vector<Study>& studies) {
+  Json all = {{"height_mm", mm(parts.height)}, {"parts", Json::array()}, {"cusp_limit_mm", parts.cusp_limit_mm}};
+  for (const std::string& path : parts.paths) all["parts"].push_back(path);
+  for (const Study& study : studies) {
+    const Evaluation& e = study.evaluation;
+    Json table = {{"name", study.name},
+                  {"layers", study.layers()},
+                  {"top_mm", mm(study.boundaries.back())},
+                  {"top_miss_mm", mm(e.top_miss)},
+                  {"largest_cusp_mm", mm(e.largest_cusp)},
+                  {"mean_cusp_mm", rounded(e.mean_cusp * 1e-6, 6)},
+                  {"layers_above_limit", e.above_limit},
+                  {"flats", e.flats.size()},
+                  {"flats_missed", e.flats_missed},
+                  {"largest_miss_mm", mm(e.largest_miss)}};
+    if (study.plan.small_peaks > 0) table["small_peaks"] = study.plan.small_peaks;
+    if (study.plan.one_less_reaches >= 0) table["one_less_reaches_mm"] = mm(study.plan.one_less_reaches);
+    if (e.seconds > 0) table["seconds"] = rounded(e.seconds, 3);
+    table["flat"] = Json::array();
+    table["layer"] = Json::array();
+    for (const FlatHit& hit : e.flats) {
+      table["flat"].push_back({{"height_mm", mm(hit.flat.height)},
+                               {"up_mm2", rounded(hit.flat.up_mm2, 4)},
+                               {"down_mm2", rounded(hit.flat.down_mm2, 4)},
+                               {"end", hit.flat.end},
+                               {"miss_mm", mm(hit.miss)}});
+    }
+    for (std::size_t i = 0; i < study.layers(); ++i) {
+      const LayerFacts& layer = e.layers[i];
+      table["layer"].push_back({{"bottom_mm", mm(study.boundaries[i])},
+                                {"thickness_mm", mm(study.thickness(i))},
+                                {"reason", reason(study, i)},
+                                {"angle_deg", rounded(angle(study, i), 2)},
+                                {"cusp_mm", mm(layer.cusp)},
+                                {"hits_flat", layer.hits_flat},
+                                {"stepped_back", stepped_back(study, i)},
+                                {"part", layer.part < parts.paths.size() ? Json(layer.part) : Json()}});
+    }
+    all["tables"].push_back(std::move(table));
+  }
+  return json_line(all);
+}
+
+std::string comparison_page(const std::vector<Study>& studies) {
+  const Study& first = studies.front();
+  const double whole = first.evaluation.seconds;
+  const bool saves = first.options.estimates_time;  // beside the first
+  std::string text = fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step",
+                                 "mean step", "flats missed", "largest miss", "top",
+                                 saves       ? "        time    saved"
+                                 : whole > 0 ? "        time"
+                                             : "");
+  for (const Study& study : studies) {
+    const Evaluation& e = study.evaluation;
+    text += fmt::format("{:<24} {:>7} {:>9.4f} mm {:>7.4f} mm {:>12} {:>9.4f} mm {:>+7.3f} mm", study.name, study.layers(),
+                        mm(e.largest_cusp), e.mean_cusp * 1e-6, fmt::format("{} of {}", e.flats_missed, e.flats.size()),
+                        mm(e.largest_miss), mm(e.top_miss));
+    if (whole > 0) text += fmt::format(" {:>11}", readable_seconds(e.seconds));
+    if (saves) text += fmt::format(" {:>6.1f} %", 100 * (1 - e.seconds / whole));
+    text += '\n';
+  }
+  if (saves) {
+    const heights::TimeModel& time = first.options.time.on() ? first.options.time : heights::kPlainTime;
+    text += fmt::format("time: {:g} s a layer and {:g} s a mm2 of its section{}; saved: beside {}\n", time.seconds_per_layer,
+                        time.seconds_per_mm2,
+                        first.options.time.on() ? "" : ", as beads of 0.4 mm at 40 mm/s fill it; --time-model S,S for others",
+                        first.name);
+  }
+  return text;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,19 @@
+// pipeline/report/move_observers.h: what an extrusion job counts, layer by layer, for its summary.
+#pragma once
+
+#include "pipeline/plan/plan.h"
+#include "pipeline/report/observer.h"
+
+namespace lamina::pipeline {
+
+/// Whether layers can have several segmented ranges of heights: parts stand at different heights, or layers continue above
+/// the top of one.
+bool has_ranges_by_layer(const Plan& plan);
+
+/// In the order of their lines. The plan must outlive them. sums  of all layers so far, which the caller adds up
+void observe_moves(const Plan& plan, const PathFacts& sums, Observers<void>& observers);
+
+/// Adds what is known before the first move: the printer, its bead and the tolerance.
+void report_move_plan(const Plan& plan, Summary& summary);
+
+}  // namespace lamina::pipeline

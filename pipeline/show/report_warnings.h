@@ -1,0 +1,46 @@
+// pipeline/show/report_warnings.h: the sanity pass of a finished job, from its files.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/scene.h"
+#include "pipeline/show/report_bleed.h"
+#include "stages/checks/tally.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+class ReportWarnings {
+ public:
+  /// machine  null without one
+  /// scene    the parts; null: their boxes as the manifest has them, without volumes. Manifest and machine must outlive this
+  ///          object.
+  ReportWarnings(const Manifest& manifest, const Job& job, const Machine* machine, const Scene* scene);
+
+  /// An image as in its file; from many threads at once.
+  void inspect(const Layer& layer, const RunsView& image);
+
+  /// set  pixels of each layer. returns  none for a job of some layers only
+  std::vector<Warning> report(const std::vector<std::uint64_t>& set) const;
+
+ private:
+  void plan_again(const Machine* machine, const Scene& scene);
+  void plan_paths_again();
+  void inspect_records();
+
+  const Manifest& manifest_;
+  Job job_;
+  std::vector<Warning> reports_;        // by the plan and the records of layers, as lamina jet tells them
+  std::unique_ptr<ReportBleed> bleed_;  // null: it takes nothing, or the parts are not there
+  std::unique_ptr<checks::Tally> tally_;
+  std::vector<std::uint8_t> crossed_;                       // by layer: whether it may not be empty
+  std::function<Result<double>(std::uint32_t)> union_mm3_;  // of a group; empty without the parts
+};
+
+}  // namespace lamina::pipeline

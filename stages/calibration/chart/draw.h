@@ -1,0 +1,35 @@
+// stages/calibration/chart/draw.h: charts, and a stated number of drops, as images.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/data/chart.h"
+#include "stages/data/machine.h"
+#include "stages/data/program.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+
+namespace lamina::calibration {
+
+/// The image of a chart. cost  O(rows of all boxes)
+Runs draw(const Chart& chart);
+
+/// Layers that hold a stated number of drops together: all but the last hold a full layer's. Whole swaths are filled, so that
+/// every nozzle fires about as often.
+struct DropLayers {
+  std::uint64_t drops = 0, a_layer = 0;
+  std::uint32_t layers = 0;
+  ChartBox box;  // of a full layer
+};
+
+/// drops   at least 1
+/// errors  kUsage: no room on the bed, or more than a thousand layers
+Result<DropLayers> layout_drops(const Machine& machine, const HeadGrid& grid, std::uint64_t drops);
+
+/// Layer `layer` of them: full from its first row on, its last row as far as the drops go.
+Runs draw_drops(const DropLayers& wanted, const HeadGrid& grid, std::uint32_t layer);
+
+/// Volume of a drop in pl from the mass of many. mass in mg, density in g/ml
+constexpr double drop_pl_of(double mass_mg, double density, double drops) { return mass_mg / density / drops * 1e6; }
+
+}  // namespace lamina::calibration

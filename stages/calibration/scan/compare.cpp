@@ -1,0 +1,438 @@
+#include "stages/calibration/scan/compare.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
+
+#include "stages/calibration/scan/robust.h"
+#include "stages/geometry/least_squares.h"
+
+namespace lamina::calibration {
+namespace {
+
+constexpr double kMaxTurnDeg = 6;
+constexpr double kMinMissingMm = 0.2;
+constexpr double kAwayMm = 0.5, kMinMm2 = 1, kMinShare = 0.5;  // of extra ink; the last of full ink
+constexpr double kMaxCells = 2000;                             // along an axis of the image that is searched
+
+/// The layer in cells as large as pixels of the photograph: the share of each that is set.
+struct LayerCells {
+  cv::Mat share;             // CV_32F
+  double left = 0, top = 0;  // mm
+  double side = 0;           // mm
+  Spot middle(int x, int y) const { return {left + (x + 0.5) * side, top + (y + 0.5) * side}; }
+};
+
+LayerCells cells_of(const ExpectedLayer& layer) {
+  LayerCells cells;
+  const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6, margin = 2;
+  std::uint32_t left = UINT32_MAX, right = 0, top = UINT32_MAX, bottom = 0;
+  for (std::uint32_t r = 0; r < layer.image.rows(); ++r) {
+    const auto row = layer.image.row(r);
+    if (row.empty()) continue;
+    left = std::min(left, row.front());
+    right = std::max(right, row.back());
+    top = std::min(top, r);
+    bottom = r + 1;
+  }
+  if (right <= left) return cells;
+  cells.side = layer.photo_um * 1e-3;
+  cells.left = left * px - margin;
+  cells.top = top * py - margin;
+  const int columns = static_cast<int>(((right - left) * px + 2 * margin) / cells.side) + 1;
+  const int rows = static_cast<int>(((bottom - top) * py + 2 * margin) / cells.side) + 1;
+  if (std::int64_t{columns} * rows > (1 << 26)) return cells;
+  cells.share = cv::Mat::zeros(rows, columns, CV_32F);
+  const auto overlap = [](double begin, double end, int cell) {
+    return std::max(0.0, std::min(end, cell + 1.0) - std::max(begin, static_cast<double>(cell)));
+  };
+  for (std::uint32_t r = top; r < bottom; ++r) {
+    const double t = (r * py - cells.top) / cells.side, b = ((r + 1) * py - cells.top) / cells.side;
+    const auto row = layer.image.row(r);
+    for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+      const double l = (row[i] * px - cells.left) / cells.side, e = (row[i + 1] * px - cells.left) / cells.side;
+      for (int y = static_cast<int>(t); y < b && y < rows; ++y) {
+        auto* to = cells.share.ptr<float>(y);
+        const double high = overlap(t, b, y);
+        for (int x = static_cast<int>(l); x < e && x < columns; ++x) to[x] += static_cast<float>(high * overlap(l, e, x));
+      }
+    }
+  }
+  return cells;
+}
+
+/// What is left without slow changes of the light. wide  of them, pixels
+cv::Mat without_shade(const cv::Mat& image, double wide) {
+  cv::Mat slow;
+  cv::GaussianBlur(image, slow, {}, wide, wide, cv::BORDER_REPLICATE);
+  return image - slow;
+}
+
+/// The best place of a picture in a larger one, and how alike they are there, by correlation.
+struct PictureMatch {
+  double likeness = -1, turn_deg = 0, scale = 1;
+  cv::Point2d at;  // of the middle of the cells, pixels of the photograph
+};
+
+PictureMatch best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<double>& turns,
+                        const std::vector<double>& scales) {
+  const int side =
+      cv::getOptimalDFTSize(std::max({photo.cols, photo.rows, cells.cols, cells.rows}) + std::max(cells.cols, cells.rows) / 2);
+  cv::Mat padded = cv::Mat::zeros(side, side, CV_32F), photo_waves;
+  photo.copyTo(padded(cv::Rect(0, 0, photo.cols, photo.rows)));
+  cv::dft(padded, photo_waves);
+  const double photo_energy = cv::norm(photo);
+  PictureMatch best;
+  for (const double turn : turns) {
+    for (const double scale : scales) {
+      cv::Mat to = cv::getRotationMatrix2D(
+          {0.5f * static_cast<float>(cells.cols - 1), 0.5f * static_cast<float>(cells.rows - 1)}, -turn, scale);
+      to.at<double>(0, 2) += 0.5 * (side - cells.cols);
+      to.at<double>(1, 2) += 0.5 * (side - cells.rows);
+      cv::Mat turned, waves, product;
+      cv::warpAffine(cells, turned, to, {side, side}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+      const double energy = cv::norm(turned);
+      cv::dft(turned, waves);
+      cv::mulSpectrums(photo_waves, waves, product, 0, true);
+      cv::idft(product, product, cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+      double maximum = 0;
+      cv::Point at;
+      cv::minMaxLoc(product, nullptr, &maximum, nullptr, &at);
+      const double likeness = maximum / std::max(photo_energy * energy, 1e-9);
+      if (likeness <= best.likeness) continue;
+      const auto wrapped = [&](int shift) { return shift > side / 2 ? shift - side : shift; };
+      best = {likeness, turn, scale, {wrapped(at.x) + 0.5 * (side - 1), wrapped(at.y) + 0.5 * (side - 1)}};
+    }
+  }
+  return best;
+}
+
+/// Turns and scales from coarse to fine, on small copies.
+View first_view(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer, double& likeness) {
+  const double small = std::min(1.0, 220.0 / std::max({photo.cols, photo.rows, cells.cols, cells.rows}));
+  cv::Mat few, little;
+  cv::resize(photo, few, {}, small, small, cv::INTER_AREA);
+  cv::resize(cells, little, {}, small, small, cv::INTER_AREA);
+  std::vector<double> turns, scales;
+  for (double turn = -kMaxTurnDeg; turn <= kMaxTurnDeg; turn += 1) turns.push_back(turn);
+  PictureMatch match = best_match(few, little, turns, {0.97, 1.0, 1.03});
+  turns.clear();
+  for (double turn = -0.75; turn <= 0.75; turn += 0.25) turns.push_back(match.turn_deg + turn);
+  match = best_match(few, little, turns, {match.scale - 0.015, match.scale, match.scale + 0.015});
+  likeness = match.likeness;
+  // Pixel centres of small copies: (i + 0.5) / small - 0.5.
+  const Spot at{(match.at.x + 0.5) / small - 0.5, (match.at.y + 0.5) / small - 0.5};
+  const double c = std::cos(match.turn_deg * std::numbers::pi / 180) * match.scale / layer.side,
+               s = std::sin(match.turn_deg * std::numbers::pi / 180) * match.scale / layer.side;
+  View view;
+  view.middle = {layer.left + 0.5 * cells.cols * layer.side, layer.top + 0.5 * cells.rows * layer.side};
+  view.unit = 0.5 * std::max(cells.cols, cells.rows) * layer.side;
+  view.photo_middle = {0.5 * (photo.cols - 1), 0.5 * (photo.rows - 1)};
+  view.radius = std::hypot(photo.cols, photo.rows) / 2;
+  view.h = {c * view.unit, -s * view.unit, at.x, s * view.unit, c * view.unit, at.y, 0, 0};
+  return view;
+}
+
+/// Moves the view until edges lie on edges: least squares of photo(view(place)) - gain * layer(place), by Gauss and Newton.
+void refine(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer, View& view) {
+  struct Sample {
+    Spot position;
+    double value;
+  };
+  cv::Mat dx, dy, slope_x, slope_y;
+  cv::Sobel(cells, dx, CV_32F, 1, 0);
+  cv::Sobel(cells, dy, CV_32F, 0, 1);
+  cv::Sobel(photo, slope_x, CV_32F, 1, 0, 3, 1.0 / 8);
+  cv::Sobel(photo, slope_y, CV_32F, 0, 1, 3, 1.0 / 8);
+  std::vector<Sample> samples;
+  double steepest = 0;
+  cv::Mat steep;
+  cv::magnitude(dx, dy, steep);
+  cv::minMaxLoc(steep, nullptr, &steepest);
+  for (int y = 0; y < cells.rows; ++y) {
+    for (int x = 0; x < cells.cols; ++x) {
+      if (static_cast<double>(steep.at<float>(y, x)) > 0.15 * steepest)
+        samples.push_back({layer.middle(x, y), static_cast<double>(cells.at<float>(y, x))});
+    }
+  }
+  const std::size_t step = samples.size() / 20'000 + 1;
+  for (int round = 0; round < 15; ++round) {
+    LeastSquares linear(9);
+    double vv = 1e-9, pv = 0;
+    for (std::size_t i = 0; i < samples.size(); i += step) {
+      const Spot p = view.at(samples[i].position.x, samples[i].position.y);
+      pv += darkness_at(photo, p.x, p.y) * samples[i].value;
+      vv += samples[i].value * samples[i].value;
+    }
+    const double gain = pv / vv;
+    for (std::size_t i = 0; i < samples.size(); i += step) {
+      const Spot& m = samples[i].position;
+      const Spot p = view.at(m.x, m.y);
+      if (p.x < 1 || p.y < 1 || p.x > photo.cols - 2 || p.y > photo.rows - 2) continue;
+      const double gx = darkness_at(slope_x, p.x, p.y), gy = darkness_at(slope_y, p.x, p.y);
+      const double u = (m.x - view.middle.x) / view.unit, v = (m.y - view.middle.y) / view.unit,
+                   w = 1 + view.h[6] * u + view.h[7] * v;
+      const double g = -(gx * p.x + gy * p.y);
+      const std::array<double, 9> slope{gx * u / w, gx * v / w, gx / w,    gy * u / w,       gy * v / w,
+                                        gy / w,     g * u / w,  g * v / w, -samples[i].value};
+      linear.add(slope, gain * samples[i].value - darkness_at(photo, p.x, p.y));
+    }
+    linear.damp(1e-9, 0);
+    std::array<double, 9> change{};
+    if (!linear.solve(change)) return;
+    for (std::size_t i = 0; i < 8; ++i) view.h[i] += change[i];
+    if (std::ranges::all_of(change.begin(), change.begin() + 6, [](double one) { return std::abs(one) < 1e-4; })) return;
+  }
+}
+
+/// The photograph in the cells of the layer.
+cv::Mat in_cells(const cv::Mat& image, const LayerCells& layer, const View& view) {
+  cv::Mat detected(layer.share.size(), CV_32F);
+  for (int y = 0; y < detected.rows; ++y) {
+    for (int x = 0; x < detected.cols; ++x) {
+      const Spot m = layer.middle(x, y), p = view.at(m.x, m.y);
+      const bool inside = p.x >= 0 && p.y >= 0 && p.x < image.cols - 1 && p.y < image.rows - 1;
+      detected.at<float>(y, x) = inside ? static_cast<float>(darkness_at(image, p.x, p.y)) : -1.0f;
+    }
+  }
+  return detected;
+}
+
+/// Darkness against the light of blank cells, to which a surface of second degree is fitted. In further rounds those that are
+/// darker by it than `most` are left out. light  CV_32F, below 0 where it is not known: dark is 0 there
+cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank, int rounds, double maximum) {
+  const auto terms = [&](int x, int y) {
+    const double u = 2.0 * x / light.cols - 1, v = 2.0 * y / light.rows - 1;
+    return std::array{1.0, u, v, u * u, u * v, v * v};
+  };
+  cv::Mat dark = cv::Mat::zeros(light.size(), CV_32F);
+  for (int round = 0; round < rounds; ++round) {
+    LeastSquares linear(6);
+    for (int y = 0; y < light.rows; y += 2) {
+      for (int x = 0; x < light.cols; x += 2) {
+        const double value = static_cast<double>(light.at<float>(y, x));
+        if (value < 0 || blank.at<std::uint8_t>(y, x) == 0 || static_cast<double>(dark.at<float>(y, x)) > maximum) continue;
+        linear.add(terms(x, y), value);
+      }
+    }
+    linear.damp(0, 1e-9);
+    std::array<double, 6> surface{};
+    if (!linear.solve(surface)) return dark;
+    for (int y = 0; y < light.rows; ++y) {
+      for (int x = 0; x < light.cols; ++x) {
+        const double value = static_cast<double>(light.at<float>(y, x));
+        const auto at = terms(x, y);
+        const double blank_light = std::inner_product(at.begin(), at.end(), surface.begin(), 0.0);
+        dark.at<float>(y, x) = value < 0 ? 0.0f : static_cast<float>(1 - value / std::max(blank_light, 1e-3));
+      }
+    }
+  }
+  return dark;
+}
+
+/// Stripes of cells along the scan that are much brighter than ink. full  cells that are to be printed, away from edges
+std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full, const LayerCells& layer, bool along_x,
+                                       double ink) {
+  constexpr int kMinCells = 15;
+  const int count = along_x ? dark.rows : dark.cols, length = along_x ? dark.cols : dark.rows;
+  std::vector<double> ratio(static_cast<std::size_t>(count), 1);
+  for (int i = 0; i < count; ++i) {
+    double sum = 0;
+    int cells = 0;
+    for (int k = 0; k < length; ++k) {
+      const int x = along_x ? k : i, y = along_x ? i : k;
+      if (full.at<std::uint8_t>(y, x) == 0) continue;
+      sum += static_cast<double>(dark.at<float>(y, x));
+      ++cells;
+    }
+    if (cells >= kMinCells) ratio[static_cast<std::size_t>(i)] = sum / cells / ink;
+  }
+  std::vector<MissingBand> bands;
+  const double start = along_x ? layer.top : layer.left;
+  for (int i = 0; i < count; ++i) {
+    if (ratio[static_cast<std::size_t>(i)] > 0.7) continue;
+    int first = i, last = i;
+    while (first > 0 && ratio[static_cast<std::size_t>(first - 1)] < 0.93) --first;
+    while (last + 1 < count && ratio[static_cast<std::size_t>(last + 1)] < 0.93) ++last;
+    double missing = 0;
+    for (int k = first; k <= last; ++k) missing += (1 - ratio[static_cast<std::size_t>(k)]) * layer.side;
+    if (missing >= kMinMissingMm) bands.push_back({start + first * layer.side, start + (last + 1) * layer.side, missing});
+    i = last;
+  }
+  return bands;
+}
+
+std::vector<BodyReading> bodies_of(const cv::Mat& dark, const LayerCells& layer, double ink) {
+  cv::Mat labels, near, grown = layer.share > 0.5;
+  const int count = cv::connectedComponents(grown, labels, 8);
+  std::vector<BodyReading> bodies(static_cast<std::size_t>(std::max(count - 1, 0)));
+  std::vector<double> cells(bodies.size(), 0);
+  // Each body with what lies up to three cells around it and nearer to no other one.
+  for (int round = 0; round < 3; ++round) {
+    cv::Mat wider = labels.clone();
+    for (int y = 1; y + 1 < labels.rows; ++y) {
+      for (int x = 1; x + 1 < labels.cols; ++x) {
+        if (labels.at<int>(y, x) != 0) continue;
+        for (const auto& [i, j] : {std::pair(0, -1), {-1, 0}, {1, 0}, {0, 1}}) {
+          if (wider.at<int>(y, x) == 0) wider.at<int>(y, x) = labels.at<int>(y + j, x + i);
+        }
+      }
+    }
+    labels = wider;
+  }
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      const int label = labels.at<int>(y, x);
+      if (label == 0) continue;
+      BodyReading& body = bodies[static_cast<std::size_t>(label - 1)];
+      const double area = layer.side * layer.side, share = static_cast<double>(layer.share.at<float>(y, x));
+      const Spot m = layer.middle(x, y);
+      body.expected_mm2 += area * share;
+      body.detected_mm2 += area * std::clamp(static_cast<double>(dark.at<float>(y, x)) / ink, 0.0, 1.0);
+      body.x_mm += m.x;
+      body.y_mm += m.y;
+      ++cells[static_cast<std::size_t>(label - 1)];
+    }
+  }
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    bodies[b].x_mm /= std::max(cells[b], 1.0);
+    bodies[b].y_mm /= std::max(cells[b], 1.0);
+  }
+  return bodies;
+}
+
+/// The best similarity of the mirrored layer to the photograph.
+double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer) {
+  double best = -1;
+  for (const int axis : {0, 1}) {
+    cv::Mat mirrored;
+    cv::flip(cells, mirrored, axis);
+    double likeness = 0;
+    first_view(photo, mirrored, layer, likeness);
+    best = std::max(best, likeness);
+  }
+  return best;
+}
+
+cv::Mat disc_of(double across_cells) {
+  const int side = 2 * static_cast<int>(std::ceil(across_cells / 2)) + 1;
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side});
+}
+
+/// The image of the layer in cells from its upper left corner.
+struct ColourField {
+  double side = 0;  // mm
+  cv::Mat light;    // CV_32F; -1 where the photograph does not reach
+  cv::Mat wanted;   // CV_8U: something of the cell, or near it, was to be printed
+};
+
+ColourField field_of(const Photo& photo, const ExpectedLayer& layer, const View& view) {
+  const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6;
+  const double wide = layer.image.columns * px, deep = layer.image.rows() * py;
+  ColourField field;
+  field.side = std::max(layer.photo_um * 1e-3, std::max(wide, deep) / kMaxCells);
+  const int columns = static_cast<int>(wide / field.side) + 1, rows = static_cast<int>(deep / field.side) + 1;
+  field.wanted = cv::Mat::zeros(rows, columns, CV_8U);
+  for (std::uint32_t r = 0; r < layer.image.rows(); ++r) {
+    const auto row = layer.image.row(r);
+    const int top = static_cast<int>(r * py / field.side), bottom = static_cast<int>((r + 1) * py / field.side);
+    for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+      const int left = static_cast<int>(row[i] * px / field.side), right = static_cast<int>(row[i + 1] * px / field.side);
+      for (int y = top; y <= std::min(bottom, rows - 1); ++y)
+        std::fill(field.wanted.ptr(y) + left, field.wanted.ptr(y) + std::min(right + 1, columns), std::uint8_t{1});
+    }
+  }
+  cv::dilate(field.wanted, field.wanted, disc_of(2 * kAwayMm / field.side));
+  field.light = cv::Mat(rows, columns, CV_32F);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const Spot p = view.at((x + 0.5) * field.side, (y + 0.5) * field.side);
+      const bool inside = p.x >= 0 && p.y >= 0 && p.x < photo.light.cols - 1 && p.y < photo.light.rows - 1;
+      field.light.at<float>(y, x) = inside ? static_cast<float>(darkness_at(photo.light, p.x, p.y)) : -1.0f;
+    }
+  }
+  return field;
+}
+
+/// Connected dark areas of a square millimetre and more, half a millimetre wide and more, of half of full ink and more, half a
+/// millimetre away from what was to be printed. Searched wherever the photograph shows the image of the layer; an area that
+/// reaches the image's edge is taken for the edge of the bed.
+/// view  of the photograph
+/// ink   darkness of full ink, of the light of the blank sheet
+/// cost  O(cells of the image, 4 million at most)
+std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, const View& view, double ink) {
+  const ColourField field = field_of(photo, layer, view);
+  const cv::Mat dark = darkness_of(field.light, field.wanted == 0, 8, 0.3 * ink);
+  cv::Mat soft, found, labels, stats, middles;
+  cv::GaussianBlur(dark, soft, {}, 1);
+  cv::bitwise_and(soft > kMinShare * ink, field.wanted == 0, found);
+  cv::morphologyEx(found, found, cv::MORPH_OPEN, disc_of(kAwayMm / field.side));
+  const int count = cv::connectedComponentsWithStats(found, labels, stats, middles, 8);
+  std::vector<ExtraInk> extra;
+  for (int i = 1; i < count; ++i) {
+    const int left = stats.at<int>(i, cv::CC_STAT_LEFT), top = stats.at<int>(i, cv::CC_STAT_TOP);
+    const bool at_edge = left == 0 || top == 0 || left + stats.at<int>(i, cv::CC_STAT_WIDTH) == dark.cols ||
+                         top + stats.at<int>(i, cv::CC_STAT_HEIGHT) == dark.rows;
+    const double mm2 = field.side * field.side * stats.at<int>(i, cv::CC_STAT_AREA);
+    if (at_edge || mm2 < kMinMm2) continue;
+    extra.push_back({(middles.at<double>(i, 0) + 0.5) * field.side, (middles.at<double>(i, 1) + 0.5) * field.side, mm2});
+  }
+  return extra;
+}
+
+}  // namespace
+
+Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
+  constexpr double kMinLikeness = 0.25, kClearly = 0.05;
+  const LayerCells cells = cells_of(layer);
+  if (cells.share.empty())
+    return Error{Fault::kInput,
+                 "cannot be compared: the layer is empty, or too large for pixels of the size that --pixel says"};
+  const double wide = std::max(8.0, 0.08 * std::max(cells.share.cols, cells.share.rows));
+  const cv::Mat detected = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
+  Comparison comparison;
+  comparison.view = first_view(detected, wanted, cells, comparison.likeness);
+  if (const double mirrored = mirrored_likeness(detected, wanted, cells);
+      mirrored >= kMinLikeness && mirrored > comparison.likeness + kClearly)
+    return Error{Fault::kInput,
+                 "is mirrored: the layer lies in it as in a mirror; turn the picture over, or photograph the layer "
+                 "from above"};
+  if (comparison.likeness < kMinLikeness)
+    return Error{Fault::kInput,
+                 "does not show the layer: it has to lie upright, turned by at most 6 degrees, with pixels of about "
+                 "the size that --pixel says"};
+  for (const double blur : {4.0, 2.0, 1.0}) {
+    cv::Mat soft, soft_cells;
+    cv::GaussianBlur(detected, soft, {}, blur);
+    cv::GaussianBlur(wanted, soft_cells, {}, blur);
+    refine(soft, soft_cells, cells, comparison.view);
+  }
+  cv::Mat blank, full;
+  cv::dilate(cells.share > 0.01, blank, disc_of(8));
+  blank = blank == 0;
+  cv::erode(cells.share > 0.99, full, disc_of(4));
+  const cv::Mat dark = darkness_of(in_cells(photo.light, cells, comparison.view), blank, 1, 1);
+  std::vector<float> inked;
+  for (int y = 0; y < dark.rows; ++y) {
+    for (int x = 0; x < dark.cols; ++x) {
+      if (full.at<std::uint8_t>(y, x) != 0) inked.push_back(dark.at<float>(y, x));
+    }
+  }
+  if (inked.empty())
+    return Error{
+        Fault::kInput,
+        "cannot be compared: no place of the layer, several pixels of the photograph wide, is printed in full, to tell "
+        "the darkness of ink by; where drops are strewn, take the layer of a job without --saturation"};
+  const double ink = upper_median_of(inked);
+  if (ink < 0.05)
+    return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};
+  comparison.bands = missing_bands(dark, full, cells, layer.scan_along_x, ink);
+  comparison.bodies = bodies_of(dark, cells, ink);
+  comparison.extra = extra_ink(photo, layer, comparison.view, ink);
+  return comparison;
+}
+
+}  // namespace lamina::calibration

@@ -1,0 +1,331 @@
+#include "stages/checks/inspect.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lamina::checks {
+namespace {
+
+/// An estimate of the bytes to inspect an uninspected layer: enough with as many bodies below as in it.
+std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
+  Follower solid(true);
+  solid.find(image);
+  std::uint64_t bodies = solid.need(image);
+  solid = Follower(true);
+  Runs between;
+  complement(image, all, between);
+  Follower powder(false);
+  powder.find(between);
+  bodies += powder.need(between);
+  // Image, powder, and scratch of thin places.
+  return image.change.size_bytes() * 8 + image.row_offset.size_bytes() * 7 + bodies + bodies / 2;
+}
+
+}  // namespace
+
+void Found::note_location(const Location& position) {
+  locations.push_back(position);
+  if (locations.size() >= 4 * kMax) sort_locations();
+}
+
+void Found::sort_locations() {
+  std::ranges::stable_sort(locations, [](const Location& a, const Location& b) {
+    return a.amount != b.amount ? a.amount > b.amount : a.spot.layer < b.spot.layer;
+  });
+  locations.resize(std::min(locations.size(), kMax));
+}
+
+/// What set pixels are followed for.
+struct Inspection::Solids {
+  Inspection& all;
+  std::uint64_t islands = 0;  // of this layer
+
+  void grow(Body&) {}
+  void begin(Body& body) {
+    // A part begins in the layer that holds its bottom, or in the one above: then its first pixels lie above a layer's middle.
+    const std::uint32_t placed_part = all.owner_of(body, all.below_, body.top);
+    body.owner = placed_part != Body::kNone ? placed_part : all.first_of_several(body);
+    body.open = body.owner != Body::kNone;  // it has the bottom of a part
+    if (body.open) return;
+    body.owner = all.owner_of(body, INT64_MIN, body.top);
+    ++islands;
+    all.note_body(all.findings_.islands, body, static_cast<double>(body.pixels) * all.pixel_mm2_, body.first_layer);
+  }
+  void join(const Body& stays, const Body& ends, const Body& piece) {
+    if (stays.owner == Body::kNone || ends.owner == Body::kNone || stays.owner == ends.owner) return;
+    all.note_touching(stays.owner, ends.owner, piece.box, all.layer_);
+  }
+  void end(const Body& body) {
+    if (body.open) return;
+    all.note_body(all.findings_.loose, body, static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_, body.last_layer);
+  }
+};
+
+/// What the powder between set pixels is followed for.
+struct Inspection::Powder {
+  Inspection& all;
+
+  void begin(Body&) {}
+  void grow(Body& body) {
+    const PixelBox& box = body.box;
+    body.open = all.findings_.layers == 0 || box.left == all.all_.left || box.right == all.all_.right ||
+                box.top == all.all_.top || box.bottom == all.all_.bottom;
+  }
+  void join(const Body&, const Body&, const Body&) {}
+  void end(const Body& body) {
+    const double volume = static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_;
+    if (body.open || volume < all.min_mm_ * all.min_mm_ * all.min_mm_) return;
+    all.note_body(all.findings_.hollows, body, volume, body.last_layer);
+  }
+};
+
+Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
+                       std::uint64_t max_bytes)
+    : grid_(grid),
+      placed_parts_(std::move(placed_parts)),
+      stencils_(grid, min_nm),
+      min_mm_(static_cast<double>(min_nm) / kNmPerMm),
+      pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)),
+      max_bytes_(max_bytes) {
+  std::ranges::stable_sort(placed_parts_, {}, [](const checks::Solid& placed_part) { return placed_part.box.lo.z; });
+  for (const checks::Solid& placed_part : placed_parts_) {
+    window_.push_back(window_of(placed_part.box));
+    all_.add(window_.back());
+  }
+  if (placed_parts_.empty()) all_ = {0, 0, 0, 0};
+}
+
+/// The pixels that the box may set, one more on each side, within the image.
+PixelBox Inspection::window_of(const Box& box) const {
+  const auto clamp = [](const PixelAxis& axis, std::int64_t i) {
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, axis.count));
+  };
+  const std::uint32_t front = clamp(grid_.y, grid_.y.first_at_or_beyond(box.lo.y) - 1);
+  const std::uint32_t back = clamp(grid_.y, grid_.y.first_at_or_beyond(std::int64_t{box.hi.y} + 1) + 1);
+  return {clamp(grid_.x, grid_.x.first_at_or_beyond(box.lo.x) - 1),
+          clamp(grid_.x, grid_.x.first_at_or_beyond(std::int64_t{box.hi.x} + 1) + 1), grid_.rows() - back,
+          grid_.rows() - front};
+}
+
+Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const {
+  const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2, row = (std::int64_t{box.top} + box.bottom - 1) / 2;
+  return {static_cast<double>(grid_.x.centre(column)) / kNmPerMm,
+          static_cast<double>(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)) / kNmPerMm, layer,
+          static_cast<double>(z) / kNmPerMm};
+}
+
+Location Inspection::position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
+  const auto mm_of = [](std::uint32_t pixels, const PixelAxis& axis) { return pixels / axis.pixels_per_nm() / kNmPerMm; };
+  const std::uint32_t rows = grid_.rows();
+  return {
+      amount,
+      at,
+      {mm_of(box.left, grid_.x), mm_of(rows - box.bottom, grid_.y), mm_of(box.right, grid_.x), mm_of(rows - box.top, grid_.y)},
+      last_layer};
+}
+
+void Inspection::note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer) {
+  const Spot at = spot(body.box, body.first_layer, body.bottom);
+  ++found.count;
+  found.amount += amount;
+  found.note_location(position(body.box, at, amount, last_layer));
+  if (amount <= found.largest) return;
+  found.largest = amount;
+  found.spot = at;
+}
+
+/// A thin wall is thin in many layers: the places that lie upon each other are one.
+void Inspection::note_thin(const Layer& layer, const ThinRegions& thin) {
+  Found& found = findings_.thin;
+  std::vector<Wall> walls;
+  for (const ThinRegion& position : thin.largest) {
+    const auto below = std::ranges::find_if(walls_, [&](const Wall& wall) { return wall.last.meets(position.box); });
+    Wall wall{position.box, position.box, position.pixels, layer, layer};
+    if (below != walls_.end()) {
+      wall.all.add(below->all);
+      wall.max_pixels = std::max(wall.max_pixels, below->max_pixels);
+      wall.first = below->first;
+      walls_.erase(below);
+    }
+    walls.push_back(wall);
+  }
+  for (const Wall& wall : walls_) end_wall(wall);
+  walls_ = std::move(walls);
+  if (thin.count == 0) return;
+  found.count += thin.count;
+  found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
+  ++found.layers;
+  const ThinRegion& largest = thin.largest.front();
+  const double mm2 = static_cast<double>(largest.pixels) * pixel_mm2_;
+  if (mm2 <= found.largest) return;
+  found.largest = mm2;
+  found.spot = spot(largest.box, layer.index, layer.bottom);
+}
+
+void Inspection::end_wall(const Wall& wall) {
+  const Spot at = spot(wall.all, wall.first.index, wall.first.bottom);
+  findings_.thin.note_location(position(wall.all, at, static_cast<double>(wall.max_pixels) * pixel_mm2_, wall.latest.index));
+}
+
+/// Whether all of a body lies where a copy's box is.
+bool Inspection::is_in(std::uint32_t placed_part, const Body& body) const {
+  const PixelBox &window = window_[placed_part], &box = body.box;
+  return window.left <= box.left && box.right <= window.right && window.top <= box.top && box.bottom <= window.bottom &&
+         placed_parts_[placed_part].box.lo.z < body.top && body.bottom <= placed_parts_[placed_part].box.hi.z;
+}
+
+/// The copy with the narrowest box around a body, of those whose bottoms lie in [from, to); kNone without one.
+std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int64_t to) const {
+  const auto bottom = [](const checks::Solid& placed_part) { return std::int64_t{placed_part.box.lo.z}; };
+  const auto first = std::ranges::lower_bound(placed_parts_, from, {}, bottom),
+             last = std::ranges::lower_bound(placed_parts_, to, {}, bottom);
+  std::uint32_t owner = Body::kNone;
+  std::int64_t narrowest = 0;
+  for (auto placed_part = first; placed_part < last; ++placed_part) {
+    const auto number = static_cast<std::uint32_t>(placed_part - placed_parts_.begin());
+    if (!is_in(number, body)) continue;
+    const std::int64_t area = placed_part->box.width() / 1000 * (placed_part->box.depth() / 1000);
+    if (owner != Body::kNone && area >= narrowest) continue;
+    owner = number;
+    narrowest = area;
+  }
+  return owner;
+}
+
+/// The first of the copies that begin together as one piece, wider than the box of any; kNone if the body is no such piece.
+std::uint32_t Inspection::first_of_several(const Body& body) {
+  std::uint32_t first = Body::kNone;
+  const auto begins = [&](std::uint32_t s) { return placed_parts_[s].box.lo.z >= below_ && window_[s].meets(body.box); };
+  for (std::uint32_t s = 0; s < placed_parts_.size() && placed_parts_[s].box.lo.z < body.top; ++s) {
+    if (!begins(s)) continue;
+    if (first == Body::kNone) {
+      first = s;
+      continue;
+    }
+    // Its neighbour among the copies before it.
+    std::uint32_t neighbour = first;
+    for (std::uint32_t before = first; before < s; ++before) {
+      if (begins(before) && window_[before].meets(window_[s])) neighbour = before;
+    }
+    note_touching(neighbour, s, body.box, layer_);
+  }
+  return first;
+}
+
+/// within  where they are one piece: the place is where their own boxes meet in it
+void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const PixelBox& within, const Layer& layer) {
+  PixelBox box = within;
+  for (const PixelBox& window : {window_[a], window_[b]}) {
+    if (window.meets(box)) box = box.common(window);
+  }
+  const std::uint32_t part = std::min(placed_parts_[a].part, placed_parts_[b].part),
+                      other = std::max(placed_parts_[a].part, placed_parts_[b].part);
+  auto& noted = findings_.touching;
+  const bool known = std::ranges::any_of(noted, [&](const auto& pair) { return pair.part == part && pair.other == other; });
+  if (!known && noted.size() < Findings::kMax) noted.push_back({part, other, spot(box, layer.index, layer.bottom)});
+}
+
+/// Bodies that have left the box of the copy that they began with: they have grown into another one.
+void Inspection::note_outgrown(const Layer& layer) {
+  for (Body& body : solid_.live()) {
+    if (body.owner == Body::kNone) continue;
+    if (is_in(body.owner, body) && layer.bottom < placed_parts_[body.owner].box.hi.z) continue;
+    for (std::uint32_t other = 0; other < placed_parts_.size(); ++other) {
+      const Box& box = placed_parts_[other].box;
+      if (other == body.owner || !window_[other].meets(body.box) || box.lo.z >= layer.bottom + layer.thickness ||
+          box.hi.z <= layer.bottom) {
+        continue;
+      }
+      note_touching(body.owner, other, body.box, layer);
+      break;
+    }
+    body.owner = Body::kNone;
+  }
+}
+
+void Inspection::note_edges(const Layer& layer, const RunsView& image) {
+  if (findings_.bed_edge || image.rows() == 0) return;
+  const auto note = [&](std::uint32_t column, std::uint32_t row) {
+    if (!findings_.bed_edge) findings_.bed_edge = spot({column, column + 1, row, row + 1}, layer.index, layer.bottom);
+  };
+  for (std::uint32_t r = 0; r < image.rows() && !findings_.bed_edge; ++r) {
+    const auto row = image.row(r);
+    if (row.empty()) continue;
+    if (r == 0 || r + 1 == image.rows() || row.front() == 0) note(row.front(), r);
+    if (row.back() == image.columns) note(row.back() - 1, r);
+  }
+}
+
+std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
+  // The image, what lies around it and what is left of it; rows of these, and of four that hold little.
+  return stopped_ ? 0 : 3 * image.change.size_bytes() + 7 * image.row_offset.size_bytes();
+}
+
+void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
+  // The image, the numbers of its runs, and the layer below; the same of the powder, whose rows have one run less or more.
+  constexpr std::uint64_t kOfRun = 8 + 8 + 12;
+  const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), minimum = kOfRun * (2 * runs - std::min(runs, rows));
+  if (stopped_ || minimum > max_bytes_) {
+    inspection = {};
+    inspection.min_bytes = stopped_ ? minimum : expected_bytes(image, all_);
+    return;
+  }
+  inspection.min_bytes = 0;
+  inspection.image.columns = image.columns;
+  inspection.image.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
+  inspection.image.change.assign(image.change.begin(), image.change.end());
+  inspection.thin = thin_regions(image, stencils_, inspection.scratch);
+}
+
+void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
+  findings_.stop = {layer.index, mm(layer.bottom), bytes};
+  leave();
+}
+
+void Inspection::leave() {
+  stopped_ = true;
+  solid_ = Follower(true);
+  powder_ = Follower(false);
+  between_ = {};
+}
+
+void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
+  if (stopped_) return;
+  if (inspection.min_bytes > 0) return stop(layer, inspection.min_bytes);
+  const RunsView image = inspection.image;
+  solid_.find(image);
+  complement(image, all_, between_);
+  powder_.find(between_);
+  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + inspection.thin.bytes +
+                              solid_.need(image) + between_.view().change.size_bytes() + powder_.need(between_);
+  if (bytes > max_bytes_) return stop(layer, bytes);
+  layer_ = layer;
+  // The first layer that holds anything is the bottom of what it holds.
+  if (!holds_) below_ = INT64_MIN;
+  holds_ = holds_ || !image.change.empty();
+  Solids solids{*this};
+  solid_.add(layer, image, solids);
+  if (solids.islands > 0) ++findings_.islands.layers;
+  note_outgrown(layer);
+  Powder powder{*this};
+  powder_.add(layer, between_, powder);
+  note_edges(layer, image);
+  note_thin(layer, inspection.thin);
+  ++findings_.layers;
+  below_ = layer.bottom;
+}
+
+const Findings& Inspection::finish() {
+  Solids solids{*this};
+  solid_.finish(solids);
+  // What reaches the last layer is open at the top.
+  struct Open {
+    void end(const Body&) {}
+  } open;
+  powder_.finish(open);
+  note_thin({}, {});
+  for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.thin}) found->sort_locations();
+  return findings_;
+}
+
+}  // namespace lamina::checks

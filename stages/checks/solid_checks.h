@@ -1,0 +1,101 @@
+// stages/checks/solid_checks.h: what layers hold against what the meshes hold.
+//
+// codes   part-lost     a solid of which no layer has anything
+//         volume        more or less planned than the meshes hold
+//         bleed         the bleed takes away much of a part
+//         layers-empty  empty layers amid a solid
+//         tolerance     contours may move far
+//         above-bed     a part that stands on nothing
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stages/checks/tally.h"
+#include "stages/data/layer.h"
+#include "stages/data/mesh.h"
+#include "stages/data/status.h"
+
+namespace lamina::checks {
+
+/// How the job sees its solids.
+struct Sampling {
+  std::array<double, 2> pixel_mm{};  // 0 without pixels
+  double thickest_mm = 0;            // of all layers
+  std::array<double, 2> bleed_um{};  // along x and y; 0 where parts or edges have several
+  double tolerance_um = 0;           // of contours
+  double offset_mm = 0;              // of contours
+  /// What was tallied are images of a finished job: without their bleed, and with the drops that they got.
+  bool finished = false;
+  bool bleeds = false;                // of a finished job
+  bool drops_none = false;            // of a finished job: some part gets no drop, which is reported already
+  bool one_sided = false;             // steps lie inside or outside of the parts, on purpose
+  std::span<const std::string> part;  // names of files
+  /// The volume of the union of a group's solids, mm3, also where shells overlap or are inside out; 0: the volumes of the
+  /// meshes count. Requested only of groups with an uncertain volume by those; where it fails, no volume is reported.
+  std::function<Result<double>(std::uint32_t group)> union_mm3 = {};
+};
+
+/// One warning for each part and kind at most; the worst of its copies is named.
+/// errors  kInterrupted and kMemory of sampling.union_mm3
+Status check_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings);
+
+/// filled  by layer: whether it has anything; of the whole job
+void check_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,
+                  const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
+
+/// Contours may move by a fiftieth of a part's narrower side, at least 0.05 and at most 0.25 mm.
+void check_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
+
+/// Parts that are neither on the bed nor on the box of another solid; for printers that extrude beads.
+void check_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
+
+/// errors  kInput: why nothing at all is planned, and what to do; none if the solids do not explain it
+Status check_anything(const Tally& tally, const Sampling& sampling);
+
+// --- planes that meet a facet; layers at them are not rightly empty.
+
+/// For each of some rising planes, whether a facet crosses it. cost  O(T log P) for each instance of another mesh or height
+std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                         std::span<const Nm> planes);
+
+// --- what the solids of a group hold together, computed once for groups that are copies of each other.
+
+/// Not thread-safe.
+class GroupUnion {
+ public:
+  /// What instances hold together, mm3; 0 if that is not known.
+  using Volume = std::function<Result<double>(std::span<const Mesh>, std::span<const Instance>)>;
+  /// Reads the meshes again.
+  using Again = std::function<Result<std::vector<Mesh>>()>;
+
+  /// meshes  of the job; only their fingerprints are read if `again` is given. Must outlive this object
+  /// solids  one for each instance; both must outlive this object
+  /// again   where the triangles of the meshes are gone: called once, for the first volume
+  GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
+             Again again = {});
+
+  /// errors  of `again` and `volume`; kInput: a mesh of the group has changed since
+  /// cost    `volume` once for all groups that hold the same meshes in the same places relative to each other
+  Result<double> mm3(std::uint32_t group);
+
+ private:
+  using Key = std::vector<std::array<std::int64_t, 4>>;  // mesh, and x, y, z from the first
+  static Key key_of(std::span<const Instance> members);
+  Result<double> compute(std::span<const Instance> members);
+
+  std::span<const Mesh> meshes_;
+  Volume volume_;
+  Again again_;
+  std::vector<std::vector<Instance>> members_;  // by group
+  std::optional<Result<std::vector<Mesh>>> reread_;
+  std::map<Key, Result<double>> known_;
+};
+
+}  // namespace lamina::checks

@@ -1,0 +1,237 @@
+#include "stages/checks/thin.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "stages/geometry/combine.h"
+
+namespace lamina::checks {
+
+// A stencil grows by a column where its width in nm passes a whole number of them, and so by a row. Where it does both, two of
+// three times or so it grows along a diagonal: a regular octagon has 2 - sqrt(2) of its width there, about 41 of 70.
+Stencils::Stencils(const PixelGrid& grid, std::int64_t min_nm) {
+  const auto ends = [](std::uint32_t pixels, const PixelAxis& one, const PixelAxis& other) {
+    return static_cast<__int128>(pixels) * one.span * other.dots;
+  };
+  // Less one: so many whole pixels in nm, rounded, are no pixel more.
+  const __int128 minimum = static_cast<__int128>(min_nm - 1) * grid.x.dots * grid.y.dots;
+  Sum sum;
+  sums_.push_back(sum);
+  for (std::uint32_t both = 0;;) {
+    const __int128 column = ends(sum.columns(), grid.x, grid.y), row = ends(sum.rows(), grid.y, grid.x);
+    const __int128 next = std::min(column, row);
+    if (next >= minimum || sum.columns() > grid.columns() || sum.rows() > grid.rows()) return;
+    if (column != row) {
+      ++(column < row ? sum.right : sum.down);
+    } else if (const std::uint32_t diagonal = (41 * both++ + 17) / 70; diagonal == sum.falling + sum.rising) {
+      ++sum.right;
+      ++sum.down;
+    } else {
+      ++(diagonal % 2 == 1 ? sum.falling : sum.rising);
+    }
+    sums_.push_back(sum);
+  }
+}
+
+std::uint64_t Stencils::two_squares(std::uint32_t number) const {
+  return std::uint64_t{2} * sums_[number].columns() * sums_[number].rows();
+}
+
+Stencil Stencils::at(std::uint32_t number) const {
+  const Sum& sum = sums_[number];
+  // The point of a row that is farthest to the left lies on a diagonal step for each row beyond those that go straight down.
+  const auto first = [&](std::uint32_t row) {
+    if (row < sum.rising) return sum.rising - row;
+    return row > sum.rising + sum.down ? row - sum.rising - sum.down : 0;
+  };
+  Stencil stencil;
+  stencil.columns = sum.columns();
+  for (std::uint32_t row = 0; row < sum.rows(); ++row) {
+    stencil.rows.push_back({first(row), stencil.columns - 1 - first(sum.rows() - 1 - row)});
+  }
+  return stencil;
+}
+
+namespace {
+
+/// Where the image has rows and columns that are set.
+PixelBox box_of(const RunsView& image) {
+  PixelBox box;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const auto row = image.row(r);
+    if (!row.empty()) box.add({row.front(), row.back(), r, r + 1});
+  }
+  return box;
+}
+
+/// Where the top left corner of a stencil may lie within a box; empty if it does not fit.
+PixelBox corners_in(const PixelBox& box, const Stencil& stencil) {
+  const auto rows = static_cast<std::uint32_t>(stencil.rows.size());
+  if (box.right - box.left < stencil.columns || box.bottom - box.top < rows) return {0, 0, 0, 0};
+  return {box.left, box.right - stencil.columns + 1, box.top, box.bottom - rows + 1};
+}
+
+enum class To { kPixels, kCorners };
+
+/// Of corners, all pixels of their stencils; of pixels, the corners of all stencils that hold one. Within the window.
+void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, Buffer<std::uint64_t>& spans,
+            Runs& result) {
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+  const std::int64_t left = window.left, right = window.right;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::size_t row_begin = result.change.size();
+    const std::size_t rows = r >= window.top && r < window.bottom ? stencil.rows.size() : 0;
+    spans.clear();
+    for (std::size_t j = 0; j < rows; ++j) {
+      const std::int64_t from =
+          to == To::kPixels ? std::int64_t{r} - static_cast<std::int64_t>(j) : static_cast<std::int64_t>(r + j);
+      if (from < 0 || from >= image.rows()) continue;
+      const std::int64_t first = stencil.rows[j].first, last = stencil.rows[j].last;
+      const auto row = image.row(static_cast<std::uint32_t>(from));
+      for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+        const std::int64_t begin = std::max(left, row[i] + (to == To::kPixels ? first : -last));
+        const std::int64_t end = std::min(right, row[i + 1] + (to == To::kPixels ? last : -first));
+        if (begin < end) spans.push_back(static_cast<std::uint64_t>(begin) << 32 | static_cast<std::uint64_t>(end));
+      }
+    }
+    std::sort(spans.begin(), spans.end());
+    for (const std::uint64_t span : spans) {
+      const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
+      if (result.change.size() > row_begin && begin <= result.change.back()) {
+        result.change.back() = std::max(result.change.back(), end);
+      } else {
+        result.change.push_back(begin);
+        result.change.push_back(end);
+      }
+    }
+    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+}
+
+/// Pixels of `of`, all of which are set in the image, that the stencil covers nowhere.
+void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, const Stencil& stencil, ThinScratch& scratch) {
+  const PixelBox corners = corners_in(box, stencil);
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  if (&of == &image) {
+    complement(image, box, outside);
+    spread(outside, stencil, To::kCorners, corners, spans, grown);
+    complement(grown, corners, fits);
+  } else {
+    spread(of, stencil, To::kCorners, corners, spans, anchors);
+    spread(anchors, stencil, To::kPixels, box, spans, grown);
+    combine(grown, image, SetOperation::kDifference, outside);
+    spread(outside, stencil, To::kCorners, corners, spans, grown);
+    combine(anchors, grown, SetOperation::kDifference, fits);
+  }
+  spread(fits, stencil, To::kPixels, box, spans, grown);
+  combine(of, grown, SetOperation::kDifference, left);
+}
+
+/// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
+std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t minimum, std::uint64_t maximum, Runs& result) {
+  std::uint64_t largest = 0;
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
+      const std::uint64_t pixels = pieces.pixels[pieces.of_run[i]];
+      if (pixels <= minimum || pixels > maximum) continue;
+      largest = std::max(largest, pixels);
+      result.change.push_back(image.change[2 * i]);
+      result.change.push_back(image.change[2 * i + 1]);
+    }
+    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+  return largest;
+}
+
+/// Puts the largest in front, and no more than so many.
+void keep_largest(std::vector<ThinRegion>& locations, std::size_t maximum) {
+  const auto order = [](const ThinRegion& position) {
+    return std::tuple(~position.pixels, position.box.top, position.box.left);
+  };
+  std::ranges::stable_sort(locations, {}, order);
+  locations.resize(std::min(locations.size(), maximum));
+}
+
+/// Takes pieces of more pixels than `least` into the places.
+void take(const Pieces& pieces, std::uint64_t minimum, ThinRegions& locations) {
+  for (std::size_t p = 0; p < pieces.count(); ++p) {
+    const std::uint64_t pixels = pieces.pixels[p];
+    if (pixels <= minimum) continue;
+    ++locations.count;
+    locations.pixels += pixels;
+    locations.largest.push_back({pixels, pieces.box[p]});
+    if (locations.largest.size() >= 4 * ThinRegions::kMax) keep_largest(locations.largest, ThinRegions::kMax);
+  }
+}
+
+}  // namespace
+
+void complement(const RunsView& image, const PixelBox& window, Runs& result) {
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+  result.change.reserve(image.change.size() + 2 * (window.bottom - window.top));
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    if (r >= window.top && r < window.bottom) {
+      std::uint32_t at = window.left;
+      const auto row = image.row(r);
+      for (std::size_t i = 0; i + 1 < row.size() && at < window.right; i += 2) {
+        if (at < row[i]) {
+          result.change.push_back(at);
+          result.change.push_back(std::min(row[i], window.right));
+        }
+        at = std::max(at, row[i + 1]);
+      }
+      if (at < window.right) {
+        result.change.push_back(at);
+        result.change.push_back(window.right);
+      }
+    }
+    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+}
+
+std::uint64_t ThinScratch::bytes() const {
+  std::uint64_t total = bytes_held(spans) + pieces.bytes();
+  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending})
+    total += bytes_held(image->row_offset) + bytes_held(image->change);
+  return total;
+}
+
+// From wide to narrow. What a stencil covers is thin for no narrower one, so that each inspects what those before it left, and
+// of that the pieces that are large enough for it: few corners are.
+ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
+  ThinRegions locations;
+  if (stencils.count() < 2 || image.change.empty()) return locations;
+  const PixelBox box = box_of(image);
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  const std::uint64_t corner = stencils.two_squares(1);
+  std::uint32_t number = stencils.count() - 1;
+  uncovered(image, box, image, stencils.at(number), scratch);
+  pieces.find(left, true);
+  locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinRegion);
+  for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) locations.bytes += held->view().change.size_bytes();
+  take(pieces, stencils.two_squares(number), locations);
+  std::uint64_t maximum = pick(left, pieces, corner, stencils.two_squares(number), pending);
+  while (--number > 0) {
+    const std::uint64_t minimum = stencils.two_squares(number);
+    if (maximum <= minimum) continue;
+    pieces.find(pending, true);
+    pick(pending, pieces, minimum, UINT64_MAX, chosen);
+    maximum = pick(pending, pieces, corner, minimum, waiting);
+    uncovered(image, box, chosen, stencils.at(number), scratch);
+    pieces.find(left, true);
+    take(pieces, minimum, locations);
+    maximum = std::max(maximum, pick(left, pieces, corner, minimum, chosen));
+    combine(waiting, chosen, SetOperation::kUnion, pending);
+  }
+  keep_largest(locations.largest, ThinRegions::kMax);
+  return locations;
+}
+
+}  // namespace lamina::checks

@@ -1,0 +1,154 @@
+#include "stages/formats/bmp/bmp.h"
+
+#include <fmt/format.h>
+
+#include <unistd.h>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string_view>
+
+#include "stages/formats/images/image_formats.h"
+#include "stages/geometry/bits.h"
+
+namespace lamina::formats::bmp {
+namespace {
+
+constexpr std::uint32_t kHeadBytes = 62, kInfoBytes = 40;
+
+void put(Bytes& file, std::size_t at, std::uint32_t value, std::size_t bytes = 4) {
+  for (std::size_t i = 0; i < bytes; ++i) file[at + i] = static_cast<std::byte>(value >> (8 * i));
+}
+
+std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>(std::lround(dpi / 0.0254)); }
+
+class BmpEncoder : public ImageEncoder {
+ public:
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    if (runs.columns == 0 || runs.rows() == 0 || runs.columns > kMaxPixelsASide || runs.rows() > kMaxPixelsASide) {
+      return Error{Fault::kOutput, fmt::format("bmp holds no {} x {} pixels", runs.columns, runs.rows())};
+    }
+    const std::size_t used = row_bytes(runs.columns), stride = (used + 3) / 4 * 4;
+    const std::uint64_t size = kHeadBytes + std::uint64_t{stride} * runs.rows();
+    if (size > UINT32_MAX) {
+      return Error{Fault::kOutput, fmt::format("bmp holds less than 4 GiB, {} x {} pixels take {} bytes; choose tiff-g4",
+                                               runs.columns, runs.rows(), size)};
+    }
+    file.resize(size);
+    std::fill_n(file.data(), kHeadBytes, std::byte{0});
+    std::memcpy(file.data(), "BM", 2);
+    put(file, 2, static_cast<std::uint32_t>(size));
+    put(file, 10, kHeadBytes);
+    put(file, 14, kInfoBytes);
+    put(file, 18, runs.columns);
+    put(file, 22, runs.rows());
+    put(file, 26, 1, 2);
+    put(file, 28, 1, 2);
+    put(file, 34, static_cast<std::uint32_t>(size - kHeadBytes));
+    put(file, 38, per_metre(dpi_x));
+    put(file, 42, per_metre(dpi_y));
+    put(file, 46, 2);
+    put(file, 50, 2);
+    put(file, 54, 0x00FFFFFF);
+    const std::span<std::byte> rows = std::span(file).subspan(kHeadBytes);
+    for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+      const std::span<std::byte> row = rows.subspan(stride * (runs.rows() - 1 - r), stride);
+      expand_row(runs.row(r), row.first(used));
+      std::fill(row.begin() + static_cast<std::ptrdiff_t>(used), row.end(), std::byte{0});
+    }
+    return {};
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<BmpEncoder>(); }
+
+}  // namespace lamina::formats::bmp
+
+namespace lamina::formats {
+
+// 1-bit and 8-bit Windows bitmaps, uncompressed. Format: stages/formats/bmp/README.md.
+
+namespace {
+
+bool read_whole(int file, std::span<std::byte> to, std::uint64_t offset) {
+  while (!to.empty()) {
+    const ssize_t got = ::pread(file, to.data(), to.size(), static_cast<off_t>(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    to = to.subspan(static_cast<std::size_t>(got));
+    offset += static_cast<std::uint64_t>(got);
+  }
+  return true;
+}
+
+std::uint32_t number(std::span<const std::byte> bytes, std::size_t at, std::size_t size = 4) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < size; ++i) value |= std::to_integer<std::uint32_t>(bytes[at + i]) << (8 * i);
+  return value;
+}
+
+}  // namespace
+
+Result<Image> read_bmp(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+  const auto failure = [&](std::string_view why) {
+    return Error{Fault::kVerification, fmt::format("{}: not a whole BMP: {}; plan the layer again", path, why)};
+  };
+  std::array<std::byte, 54> head{};
+  if (bytes < head.size() || !read_whole(file, head, 0)) return failure("truncated");
+  const std::uint64_t begin = number(head, 10), info = number(head, 14);
+  const auto width = static_cast<std::int32_t>(number(head, 18)), height = static_cast<std::int32_t>(number(head, 22));
+  const std::uint32_t bits = number(head, 28, 2), compression = number(head, 30);
+  const bool grey = bits == 8 && threshold > 0;
+  if (info < 40 || info > 1024) return failure("its header is not one");
+  if (bits != 1 && !grey) return failure(threshold > 0 ? "neither of 1 bit nor of 8 bits" : "not a 1-bit image");
+  if (compression != 0) return failure("it is compressed");
+  const std::int64_t tall = std::abs(std::int64_t{height});
+  if (width <= 0 || tall == 0 || width > std::int64_t{kMaxPixelsASide} || tall > std::int64_t{kMaxPixelsASide})
+    return failure(fmt::format("{} x {} pixels", width, tall));
+  const auto columns = static_cast<std::uint32_t>(width), rows = static_cast<std::uint32_t>(tall);
+  const std::uint32_t named = number(head, 46), colours = named == 0 ? 1u << bits : named;
+  if (colours > 1u << bits || (bits == 1 && colours < 2)) return failure(fmt::format("{} colours", colours));
+  std::array<std::byte, 1024> palette{};
+  if (14 + info + 4 * colours > begin || !read_whole(file, std::span(palette).first(4 * std::size_t{colours}), 14 + info))
+    return failure("its colours are not whole");
+  std::array<std::uint8_t, 256> light{};
+  for (std::size_t c = 0; c < colours; ++c) {
+    const std::uint32_t blue = number(palette, 4 * c, 1), green = number(palette, 4 * c + 1, 1),
+                        red = number(palette, 4 * c + 2, 1);
+    light[c] = static_cast<std::uint8_t>((299 * red + 587 * green + 114 * blue + 500) / 1000);
+  }
+  const std::uint64_t stride = (std::uint64_t{columns} * bits + 31) / 32 * 4;
+  if (begin > bytes || bytes - begin < stride * rows)
+    return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, begin + stride * rows));
+
+  if (sink != nullptr && grey) sink->levels.start(columns);
+  RunsBuilder builder(columns);
+  const auto at_once = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(256 * 1024 / stride, 1, rows));
+  Buffer<std::byte> buffer(stride * at_once);
+  const bool from_top = height < 0;
+  for (std::uint32_t first = 0; first < rows; first += at_once) {
+    const std::uint32_t count = std::min(at_once, rows - first);
+    const std::span<std::byte> strip = std::span(buffer).first(stride * count);
+    if (!read_whole(file, strip, begin + stride * (from_top ? first : rows - first - count))) return failure("cannot read");
+    for (std::uint32_t r = 0; r < count; ++r) {
+      const std::span<std::byte> row = strip.subspan(stride * (from_top ? r : count - 1 - r), stride);
+      if (grey) {
+        for (std::uint32_t i = 0; i < columns; ++i) row[i] = std::byte{light[std::to_integer<std::uint8_t>(row[i])]};
+        if (sink != nullptr) {
+          if (!sink->add_row(row, columns, 8, false)) return failure("too many runs");
+          continue;
+        }
+        bits_of_grey(row, columns, 1, false, threshold);
+      }
+      if (!builder.add_row(row.first(row_bytes(columns)), !grey && light[1] >= light[0])) return failure("too many runs");
+    }
+  }
+  return Image{builder.finish(), number(head, 38) * 0.0254, number(head, 42) * 0.0254};
+}
+
+}  // namespace lamina::formats

@@ -1,0 +1,114 @@
+// stages/formats/extrusion_format.h: what writers of toolpaths are given, and how they are called.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "stages/data/buffer.h"
+#include "stages/data/extruder.h"
+#include "stages/data/layer.h"
+#include "stages/data/status.h"
+#include "stages/data/toolpaths.h"
+
+namespace lamina::formats {
+
+/// Sums over what was written; those of layers add up to those of the file.
+struct MoveTotals {
+  std::uint64_t moves = 0, travels = 0, retractions = 0;
+  double bead_mm = 0, travel_mm = 0;
+  double volume_mm3 = 0;   // of all that is laid: filament_mm x the filament's area x the machine's declared error
+  double filament_mm = 0;  // sum of E; what is drawn back comes again and does not count
+  double seconds = 0;      // estimated: changes of speed take the profile's acceleration, corners its corner speed
+  std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
+  // The share of moves, beads, volume and filament that lies beside the parts: skirts and prime lines.
+  std::uint64_t auxiliary_moves = 0;
+  double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
+  std::uint64_t part_moves() const { return moves - auxiliary_moves; }
+
+  void add(const MoveTotals& other) {
+    moves += other.moves;
+    travels += other.travels;
+    retractions += other.retractions;
+    bead_mm += other.bead_mm;
+    travel_mm += other.travel_mm;
+    volume_mm3 += other.volume_mm3;
+    filament_mm += other.filament_mm;
+    seconds += other.seconds;
+    lo_x = std::min(lo_x, other.lo_x);
+    lo_y = std::min(lo_y, other.lo_y);
+    hi_x = std::max(hi_x, other.hi_x);
+    hi_y = std::max(hi_y, other.hi_y);
+    auxiliary_moves += other.auxiliary_moves;
+    auxiliary_mm += other.auxiliary_mm;
+    auxiliary_mm3 += other.auxiliary_mm3;
+    auxiliary_filament_mm += other.auxiliary_filament_mm;
+  }
+  /// Adds a bead. feed  mm of filament a mm3
+  void deposit(const BeadMove& move, double length_mm, double feed) {
+    const double volume = length_mm * move.area_mm2;
+    ++moves;
+    bead_mm += length_mm;
+    volume_mm3 += volume;
+    filament_mm += volume * feed;
+    if (move.kind == PathKind::kSkirt) {
+      ++auxiliary_moves;
+      auxiliary_mm += length_mm;
+      auxiliary_mm3 += volume;
+      auxiliary_filament_mm += volume * feed;
+    }
+    for (const Point2 p : {move.from, move.to}) {
+      lo_x = std::min<std::int64_t>(lo_x, p.x);
+      lo_y = std::min<std::int64_t>(lo_y, p.y);
+      hi_x = std::max<std::int64_t>(hi_x, p.x);
+      hi_y = std::max<std::int64_t>(hi_y, p.y);
+    }
+  }
+};
+
+struct ExtrusionHead {
+  std::string program;  // "lamina 0.1.0"
+  std::string source;   // names of the parts, one line
+  std::uint32_t layers = 0;
+  bool segmented = false;
+};
+
+/// The layers of the file, from 0, with which settings of first layers end: parts with layers of their own have several.
+struct Switches {
+  std::uint32_t temperatures = 1;    // the later ones
+  std::optional<std::uint32_t> fan;  // absent: the machine's from_layer
+};
+
+/// Takes the moves of one layer, one after the other.
+class LayerMoves {
+ public:
+  virtual ~LayerMoves() = default;
+  /// Writes a move; returns its length in mm.
+  virtual double deposit(const BeadMove& move) = 0;
+  /// Ends the layer. returns its sums
+  virtual const MoveTotals& finish() = 0;
+};
+
+/// A format. head, the layers in order and tail are the file; a layer's text depends on that layer alone, so layers can
+/// be written by many threads at once.
+class ExtrusionFormat {
+ public:
+  virtual ~ExtrusionFormat() = default;
+  /// Whether the machine can lay layers of that thickness. errors  kUsage
+  virtual Status check(const Layer& layer) const = 0;
+  virtual void head(const ExtrusionHead& head, Buffer<char>& out) const = 0;
+  virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const = 0;
+  virtual void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const = 0;
+};
+
+/// `machine` has to outlive them.
+std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine, const Switches& switches = {});
+std::unique_ptr<ExtrusionFormat> make_sml_format(const Extruder& machine);
+/// The one that the machine reads.
+inline std::unique_ptr<ExtrusionFormat> make_extrusion_format(const Extruder& machine, const Switches& switches = {}) {
+  return machine.format == "sml" ? make_sml_format(machine) : make_gcode_format(machine, switches);
+}
+
+}  // namespace lamina::formats

@@ -1,0 +1,236 @@
+#include "stages/formats/gcode/read_gcode.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "stages/formats/gcode/commands.h"
+#include "stages/formats/gcode/layers.h"
+#include "stages/support/io/file_reader.h"
+
+namespace lamina::formats {
+namespace {
+
+constexpr double kUsualNozzle = 0.4;  // mm
+
+constexpr ReadRules kRules{.fault = Fault::kUsage, .missing = "cannot be read; name a directory of a job or a G-code file"};
+
+GcodeBead bead_of(const RawBead& raw, double width_mm, std::uint32_t type) {
+  const auto nm = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
+  return {{nm(raw.from[0]), nm(raw.from[1])}, {nm(raw.to[0]), nm(raw.to[1])}, std::max<Nm>(nm(width_mm), 1), type};
+}
+
+/// Why a file is none of text, if its first bytes tell.
+std::string_view binary_kind(const FileReader& reader) {
+  std::array<char, 4> magic{};
+  if (!reader.read_at(0, magic)) return {};
+  const std::string_view text(magic.data(), magic.size());
+  if (text == "GCDE") {  // prusa3d/libbgcode, doc/specifications.md
+    return "is binary G-code; make text of it with `bgcode FILE` (package bgcode, prusa3d/libbgcode), or switch \"binary G-code\" "
+           "off in the slicer's printer settings";
+  }
+  if (text == std::string_view("PK\3\4", 4)) {
+    return "is a zip archive, as .gcode.3mf of BambuStudio and Orca; draw the G-code in it: unzip FILE Metadata/plate_1.gcode";
+  }
+  return {};
+}
+
+std::string odd_arcs(const OddArcs& arcs, std::string_view what) {
+  const std::string others = arcs.count > 1 ? fmt::format(" and {} more", arcs.count - 1) : "";
+  return fmt::format("line {}{}: {}", arcs.line, others, what);
+}
+
+}  // namespace
+
+/// Reads a file from its start to its end, once.
+class GcodeSurvey {
+ public:
+  GcodeSurvey(FileReader& reader, const GcodeOptions& options)
+      : options_(options), walk_(reader, file_.types_), cutter_(options.layer_height_mm) {
+    file_.path_ = reader.path();
+  }
+  Result<GcodeFile> run();
+
+ private:
+  Status read_all();
+  Status check_limits() const;
+  void add_to_box(const RawBead& raw);
+  void take_filament();
+  void note_widths();
+  void note_climbs();
+  void note_arcs();
+  double mean_width() const;
+
+  const GcodeOptions options_;
+  GcodeFile file_;
+  GcodeCommands walk_;
+  LayerCutter cutter_;
+  std::array<double, 2> fed_{};  // by all beads: mm of filament, mm3
+};
+
+void GcodeSurvey::add_to_box(const RawBead& raw) {
+  const GcodeFile::FilePosition& position = walk_.position();
+  const bool slope = raw.from[2] != raw.to[2];  // the pitch of a climb is not known yet
+  const double below = slope ? raw.to[2] : cutter_.layers().back().position.below;
+  const double height = height_of(raw, position.height, 0, below);
+  const double unit = volume_of_unit(raw.volumetric, file_.filament_mm_);
+  const GcodeBead bead = bead_of(raw, position.width > 0 ? position.width : width_of(raw, height, unit), position.type);
+  const Nm half = bead.width / 2, top = static_cast<Nm>(nm_of(raw.to[2]));
+  for (const Point2 end : {bead.from, bead.to}) {
+    file_.box_.add(Point3{end.x - half, end.y - half, top});
+    file_.box_.add(Point3{end.x + half, end.y + half, top});
+  }
+}
+
+Status GcodeSurvey::check_limits() const {
+  const std::vector<LayerCutter::CutLayer>& layers = cutter_.layers();
+  if (layers.size() > options_.max_layers) {
+    return Error{Fault::kUsage, fmt::format("{}: line {}: more than {} layers; --layer-height MM cuts thicker ones",
+                                            file_.path_, walk_.position().line, options_.max_layers)};
+  }
+  if (!layers.empty() && layers.back().position.beads > options_.max_beads) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: line {}: a layer of more than {} beads; --layer-height MM makes thinner layers", file_.path_,
+                             walk_.position().line, options_.max_beads)};
+  }
+  return {};
+}
+
+Status GcodeSurvey::read_all() {
+  std::optional<RawBead> raw;
+  while (walk_.next(raw)) {
+    if (walk_.layer_tag) {
+      if (!cutter_.tagged()) file_.box_ = Box(), fed_ = {};  // what start code lays belongs to no layer
+      cutter_.tag(walk_.before());
+    } else {
+      cutter_.add(*raw, walk_.before(), walk_.position());
+      file_.states_widths_ |= walk_.position().width > 0;
+      add_to_box(*raw);
+      fed_[raw->volumetric ? 1 : 0] += raw->fed;
+    }
+    if (Status status = check_limits(); !status) return status;
+  }
+  if (walk_.fault) return Error{Fault::kUsage, *walk_.fault};
+  if (file_.box_.empty()) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: no move in it lays filament; name a G-code file of an extrusion printer", file_.path_)};
+  }
+  return {};
+}
+
+void GcodeSurvey::take_filament() {
+  const SlicerFacts& facts = walk_.facts;
+  file_.states_filament_ = facts.filament_mm > 0;
+  if (facts.filament_mm > 0) file_.filament_mm_ = facts.filament_mm;
+  if (options_.filament_mm > 0) file_.filament_mm_ = options_.filament_mm;
+  file_.volumetric_ = facts.volumetric;
+  file_.machine_ = facts.machine;
+  file_.density_g_cm3_ = facts.density_g_cm3;
+  file_.fed_mm3_ = fed_[0] * volume_of_unit(facts.volumetric, file_.filament_mm_) + fed_[1];
+}
+
+/// Over the length of all beads whose widths no tag tells; 0 if there is none.
+double GcodeSurvey::mean_width() const {
+  double area = 0, length = 0;
+  for (const LayerCutter::CutLayer& layer : cutter_.layers()) {
+    const auto& [start, below, height, beads] = layer.position;
+    const double own = layer.top > below ? layer.top - below : kUsualHeight;
+    const double h = layer.tag_height > 0 ? layer.tag_height : height > 0 ? height : own;
+    const double unit = volume_of_unit(layer.volumetric || file_.volumetric_, file_.filament_mm_);
+    area += layer.untagged_fed * unit / h + layer.untagged_length * h * kRoundSides;
+    length += layer.untagged_length;
+  }
+  return length > 0 ? area / length : 0;
+}
+
+void GcodeSurvey::note_widths() {
+  const double width = mean_width(), reported = walk_.facts.nozzle_mm, nozzle = reported > 0 ? reported : kUsualNozzle;
+  if (width == 0 || width >= nozzle / 2) return;
+  const bool given = options_.filament_mm > 0;
+  file_.notes_.push_back(
+      fmt::format("beads are {:.2f} mm wide on average by filament of {:g} mm{}, less than half of a nozzle of {:g} mm; {}",
+                  width, file_.filament_mm_, given || file_.states_filament_ ? "" : ", of which the file says nothing", nozzle,
+                  given ? "check --filament" : "if the filament is another, name it by --filament MM, as 2.85"));
+}
+
+void GcodeSurvey::note_climbs() {
+  if (cutter_.tagged() || options_.layer_height_mm > 0) return;
+  if (cutter_.turns() > 0) {
+    file_.notes_.emplace_back("beads climb in a spiral: layers are its turns; --layer-height MM cuts it by height");
+  }
+  if (cutter_.turnless() > 0) {
+    file_.notes_.emplace_back("beads climb without a turn: layers are 5 mm high; --layer-height MM makes them thinner");
+  }
+}
+
+void GcodeSurvey::note_arcs() {
+  if (walk_.left_out.count > 0) {
+    file_.notes_.push_back(odd_arcs(walk_.left_out,
+                                    "an arc without a centre (I, J, R) or a way, left out as Marlin does; Klipper "
+                                    "and RepRapFirmware stop there"));
+  }
+  if (walk_.short_radius.count > 0) {
+    file_.notes_.push_back(odd_arcs(walk_.short_radius,
+                                    "an arc whose R does not reach its end, drawn as half a circle, as Marlin "
+                                    "does; RepRapFirmware stops there"));
+  }
+  if (walk_.off_circle.count > 0) {
+    file_.notes_.push_back(
+        odd_arcs(walk_.off_circle, "an arc that ends off its circle, led to its end by a line, as Marlin does"));
+  }
+}
+
+Result<GcodeFile> GcodeSurvey::run() {
+  if (Status status = read_all(); !status) return status.error();
+  cutter_.finish();
+  take_filament();
+  for (const LayerCutter::CutLayer& layer : cutter_.layers()) file_.layers_.push_back(layer.position);
+  note_widths();
+  note_climbs();
+  note_arcs();
+  return std::move(file_);
+}
+
+Result<GcodeFile> GcodeFile::open(const std::string& path, const GcodeOptions& options) {
+  auto reader = FileReader::open(path, kRules);
+  return reader ? read(*reader, options) : Result<GcodeFile>(reader.error());
+}
+
+Result<GcodeFile> GcodeFile::read(FileReader& reader, const GcodeOptions& options) {
+  if (const std::string_view kind = binary_kind(reader); !kind.empty()) {
+    return Error{Fault::kUsage, fmt::format("{}: {}", reader.path(), kind)};
+  }
+  return GcodeSurvey(reader, options).run();
+}
+
+Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const {
+  if (index >= count()) return Error{Fault::kUsage, fmt::format("--layer {}: the file has layers 0 to {}", index, count() - 1)};
+  std::vector<std::string> types = types_;
+  const Error changed{Fault::kUsage, fmt::format("{}: has changed while it was drawn; draw it again", path_)};
+  auto reader = FileReader::open(path_, kRules);
+  if (!reader) return changed;
+  const LayerPosition& position = layers_[index];
+  GcodeCommands walk(*reader, types);
+  walk.go_to(position.start);
+  GcodeLayer layer;
+  layer.beads.reserve(position.beads);
+  std::optional<RawBead> raw;
+  while (layer.beads.size() < position.beads && walk.next(raw)) {
+    if (walk.layer_tag) continue;
+    if (layer.beads.empty()) layer.z = nm_of(raw->to[2]);
+    const FilePosition& now = walk.position();
+    const double unit = volume_of_unit(raw->volumetric || volumetric_, filament_mm_);
+    const double width = width_of(*raw, height_of(*raw, now.height, position.height, position.below), unit);
+    layer.beads.push_back(bead_of(*raw, now.width > 0 ? now.width : width, now.type));
+    if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined, raw->primed * unit});
+  }
+  if (walk.fault || types.size() != types_.size() || layer.beads.size() != position.beads) return changed;
+  // A layer in which nothing is laid is where the nozzle is at its end.
+  if (layer.beads.empty()) layer.z = nm_of(index + 1 < count() ? layers_[index + 1].start.at[2] : position.below);
+  return layer;
+}
+
+}  // namespace lamina::formats

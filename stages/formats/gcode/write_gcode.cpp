@@ -1,0 +1,296 @@
+#include "stages/formats/gcode/write_gcode.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "stages/data/units.h"
+#include "stages/support/text/decimal.h"
+
+namespace lamina::formats::gcode {
+namespace {
+
+constexpr std::size_t kMaxLine = 160;  // bytes; five numbers with their letters need less
+
+std::int64_t micrometres(std::int64_t nm) { return floor_div<std::int64_t>(nm + 500, 1000); }
+
+char* put(char* out, std::string_view text) {
+  std::memcpy(out, text.data(), text.size());
+  return out + text.size();
+}
+
+std::string_view type_name(PathKind kind) {
+  switch (kind) {
+    case PathKind::kOuter: return "External perimeter";
+    case PathKind::kInner: return "Perimeter";
+    case PathKind::kSkirt: return "Skirt/Brim";
+    default: return "Internal infill";
+  }
+}
+
+int type_of(PathKind kind) {
+  return kind == PathKind::kOuter ? 0 : kind == PathKind::kInner ? 1 : kind == PathKind::kSkirt ? 3 : 2;
+}
+
+}  // namespace
+
+LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out,
+                         const Switches& switches)
+    : machine_(machine), out_(out), height_(layer.thickness) {
+  feed_per_volume_ = 1 / machine.material.mm3_of_e();
+  corner_x_ = nm_of(machine.bed.corner_mm[0]);
+  corner_y_ = nm_of(machine.bed.corner_mm[1]);
+  retracted_ = machine.retraction.length_mm > 0;
+  const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
+  append(out_, ";LAYER_CHANGE\n;Z:");
+  append_mm(out_, top);
+  append(out_, "\n;HEIGHT:");
+  append_mm(out_, layer.thickness);
+  append(out_, "\n");
+  if (!machine.code.relative_extrusion) append(out_, "G92 E0\n");
+  append_written(out_, kMaxLine, [&](char* text) {
+    text = put_fixed<3>(micrometres(top), put(text, "G1 Z"));
+    text = put_fixed<0>(nearest(machine_.speed.lift_mm_s * 60), put(text, " F"));
+    *text++ = '\n';
+    return text;
+  });
+  if (layer.index == switches.temperatures) {
+    const auto& m = machine.material;
+    if (m.nozzle_degc != m.first_nozzle_degc) append(out_, fmt::format("M104 S{:.0f}\n", m.nozzle_degc));
+    if (m.bed_degc != m.first_bed_degc) append(out_, fmt::format("M140 S{:.0f}\n", m.bed_degc));
+  }
+  if (layer.index == switches.fan.value_or(machine.fan.from_layer) && machine.fan.percent > 0) {
+    append(out_, fmt::format("M106 S{:.0f}\n", machine.fan.percent * 2.55));
+  }
+  if (!machine.code.layer.empty()) {
+    append(out_, fill_code(machine.code.layer, machine, layers, layer.index, mm(top)));
+  }
+  totals_.seconds += mm(layer.thickness) / machine.speed.lift_mm_s;
+}
+
+void LayerWriter::extrude_to(double filament_mm, char*& text) {
+  fed_ += filament_mm;
+  const std::int64_t now = nearest(fed_ * 1e5);
+  text = put_fixed<5>(machine_.code.relative_extrusion ? now - written_ : now, put(text, " E"));
+  written_ = now;
+}
+
+void LayerWriter::tags(const BeadMove& move) {
+  if (type_of(move.kind) != kind_) {
+    kind_ = type_of(move.kind);
+    append(out_, ";TYPE:");
+    append(out_, type_name(move.kind));
+    append(out_, "\n");
+  }
+  if (move.width != width_) {
+    width_ = move.width;
+    append_written(out_, kMaxLine, [&](char* text) {
+      text = put_fixed<3>(micrometres(move.width), put(text, ";WIDTH:"));
+      text = put_fixed<3>(micrometres(height_), put(text, "\n; tool H"));
+      text = put_fixed<3>(micrometres(move.width), put(text, " W"));
+      *text++ = '\n';
+      return text;
+    });
+  }
+}
+
+/// A move with a trapezoid of speed: from the speed at its corner, which is bounded by what the machine changes at once,
+/// to its own and, as the next corner is not known yet, on at that speed.
+void LayerWriter::time(double length_mm, double speed_mm_s, double unit_x, double unit_y) {
+  const double turn = std::hypot(unit_x - last_x_, unit_y - last_y_);  // 0 straight on, 2 back
+  const double top = std::min(speed_mm_s, last_speed_);
+  double entry = top;
+  if (turn > 1e-6) entry = std::min(top, machine_.speed.corner_mm_s / turn);
+  entry = std::max(entry, std::min(speed_mm_s, machine_.speed.corner_mm_s / 2));
+  const double a = machine_.speed.acceleration_mm_s2;
+  // The move before had to slow down to the entry speed, and this one speeds up from it.
+  totals_.seconds += last_speed_ > entry ? (last_speed_ - entry) * (last_speed_ - entry) / (2 * a * last_speed_) : 0;
+  const double reach = std::min(speed_mm_s, std::sqrt(entry * entry + 2 * a * length_mm));
+  const double ramp = (reach * reach - entry * entry) / (2 * a);
+  totals_.seconds += (reach - entry) / a + (length_mm - ramp) / reach;
+  last_speed_ = reach;
+  last_x_ = unit_x;
+  last_y_ = unit_y;
+}
+
+void LayerWriter::travel(Point2 to) {
+  const double dx = mm(std::int64_t{to.x} - at_.x), dy = mm(std::int64_t{to.y} - at_.y);
+  const double length = placed_ ? std::hypot(dx, dy) : 0;
+  const auto& retraction = machine_.retraction;
+  const bool draws_back = !retracted_ && retraction.length_mm > 0 && placed_ && length >= retraction.min_travel_mm;
+  append_written(out_, kMaxLine * 2, [&](char* text) {
+    if (draws_back) {
+      retracted_ = true;
+      ++totals_.retractions;
+      const std::int64_t back = nearest(retraction.length_mm * 1e5);
+      text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
+      feed_rate_ = nearest(retraction.speed_mm_s * 60);
+      text = put_fixed<0>(feed_rate_, put(text, " F"));
+      *text++ = '\n';
+      totals_.seconds += retraction.length_mm / retraction.speed_mm_s;
+      last_speed_ = 0;
+    }
+    text = put_fixed<3>(micrometres(to.x + corner_x_), put(text, "G0 X"));
+    text = put_fixed<3>(micrometres(to.y + corner_y_), put(text, " Y"));
+    const std::int64_t rate = nearest(machine_.speed.travel_mm_s * 60);
+    if (rate != feed_rate_) text = put_fixed<0>(feed_rate_ = rate, put(text, " F"));
+    *text++ = '\n';
+    return text;
+  });
+  if (length > 0) {
+    time(length, machine_.speed.travel_mm_s, dx / length, dy / length);
+    totals_.travel_mm += length;
+  }
+  ++totals_.travels;
+  at_ = to;
+  placed_ = true;
+}
+
+double LayerWriter::deposit(const BeadMove& move) {
+  if (!placed_ || move.from != at_) travel(move.from);
+  if (retracted_) {
+    append_written(out_, kMaxLine, [&](char* text) {
+      const std::int64_t forth = nearest(machine_.retraction.length_mm * 1e5);
+      // Absolute counting starts a layer at 0 with the filament drawn back.
+      if (machine_.code.relative_extrusion) {
+        text = put_fixed<5>(forth, put(text, "G1 E"));
+      } else {
+        if (kind_ < 0) {
+          fed_ = static_cast<double>(forth) * 1e-5;
+          written_ = forth;
+        }
+        text = put_fixed<5>(written_, put(text, "G1 E"));
+      }
+      feed_rate_ = nearest(machine_.retraction.speed_mm_s * 60);
+      text = put_fixed<0>(feed_rate_, put(text, " F"));
+      *text++ = '\n';
+      return text;
+    });
+    totals_.seconds += machine_.retraction.length_mm / machine_.retraction.speed_mm_s;
+    last_speed_ = 0;
+    retracted_ = false;
+  }
+  tags(move);
+  const double dx = mm(std::int64_t{move.to.x} - move.from.x), dy = mm(std::int64_t{move.to.y} - move.from.y);
+  const double length = std::sqrt(dx * dx + dy * dy);
+  const double volume = length * move.area_mm2;
+  append_written(out_, kMaxLine, [&](char* text) {
+    text = put_fixed<3>(micrometres(move.to.x + corner_x_), put(text, "G1 X"));
+    text = put_fixed<3>(micrometres(move.to.y + corner_y_), put(text, " Y"));
+    extrude_to(volume * feed_per_volume_, text);
+    const std::int64_t rate = std::max<std::int64_t>(1, nearest(move.speed_mm_s * 60));
+    if (rate != feed_rate_) text = put_fixed<0>(feed_rate_ = rate, put(text, " F"));
+    *text++ = '\n';
+    return text;
+  });
+  totals_.deposit(move, length, feed_per_volume_);
+  if (length > 0) time(length, move.speed_mm_s, dx / length, dy / length);
+  at_ = move.to;
+  return length;
+}
+
+const MoveTotals& LayerWriter::finish() {
+  if (!retracted_ && machine_.retraction.length_mm > 0) {
+    append_written(out_, kMaxLine, [&](char* text) {
+      const std::int64_t back = nearest(machine_.retraction.length_mm * 1e5);
+      text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
+      text = put_fixed<0>(nearest(machine_.retraction.speed_mm_s * 60), put(text, " F"));
+      *text++ = '\n';
+      return text;
+    });
+    ++totals_.retractions;
+    totals_.seconds += machine_.retraction.length_mm / machine_.retraction.speed_mm_s;
+    retracted_ = true;
+  }
+  return totals_;
+}
+
+std::string fill_code(const std::string& code, const Extruder& machine, std::uint32_t layers, std::uint32_t layer,
+                      double z_mm) {
+  const auto& m = machine.material;
+  const std::pair<std::string_view, double> values[] = {{"{nozzle_degc}", m.nozzle_degc},
+                                                        {"{bed_degc}", m.bed_degc},
+                                                        {"{first_nozzle_degc}", m.first_nozzle_degc},
+                                                        {"{first_bed_degc}", m.first_bed_degc},
+                                                        {"{layers}", layers},
+                                                        {"{layer}", layer},
+                                                        {"{z}", z_mm}};
+  std::string text = code;
+  for (const auto& [name, value] : values) {
+    for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos;) {
+      text.replace(at, name.size(), fmt::format("{}", value));
+    }
+  }
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  return text;
+}
+
+void append_head(const Extruder& machine, const ExtrusionHead& facts, Buffer<char>& out) {
+  // PrusaSlicer's viewer reads ;WIDTH: in its own files only; of others it knows Simplify3D's tag.
+  append(out, fmt::format("; generated by {}\n; \"tool\" lines tell widths as in G-Code generated by Simplify3D(R)\n"
+                          "; machine: {}\n; parts: {}\n; layers: {}\n;FLAVOR:{}\n",
+                          facts.program, machine.name, facts.source, facts.layers, machine.code.flavor));
+  append(out, fill_code(machine.code.start, machine, facts.layers, 0, 0));
+  append(out, "G21 ; millimetres\nG90 ; absolute positions\n");
+  append(out, machine.code.relative_extrusion ? "M83 ; relative extrusion\n" : "M82 ; absolute extrusion\n");
+  append(out, "G92 E0\n");
+  if (facts.segmented && !machine.code.plain_pressure.empty()) {
+    append(out, fill_code(machine.code.plain_pressure, machine, facts.layers, 0, 0));
+  }
+  if (machine.retraction.length_mm > 0) {
+    const double length = machine.retraction.length_mm;
+    append(out, fmt::format("G1 E{} F{:.0f} ; every layer begins with the filament drawn back\n", -length,
+                            machine.retraction.speed_mm_s * 60));
+  }
+}
+
+std::string time_text(double seconds) {
+  const std::int64_t whole = nearest(seconds);
+  std::string text;
+  if (whole >= 86'400) text += fmt::format("{}d ", whole / 86'400);
+  if (whole >= 3600) text += fmt::format("{}h ", whole / 3600 % 24);
+  if (whole >= 60) text += fmt::format("{}m ", whole / 60 % 60);
+  return text + fmt::format("{}s", whole % 60);
+}
+
+void append_tail(const Extruder& machine, const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) {
+  append(out, fill_code(machine.code.end, machine, layers, layers == 0 ? 0 : layers - 1, 0));
+  const double cm3 = totals.filament_mm * machine.material.mm3_of_e() / 1000;
+  append(out, fmt::format("; filament used [mm] = {:.2f}\n; filament used [cm3] = {:.2f}\n; filament used [g] = {:.2f}\n"
+                          "; estimated printing time (normal mode) = {}\n",
+                          totals.filament_mm, cm3, cm3 * machine.material.density_g_cm3, time_text(totals.seconds)));
+}
+
+namespace {
+
+class GcodeFormat final : public ExtrusionFormat {
+ public:
+  GcodeFormat(const Extruder& machine, const Switches& switches) : machine_(machine), switches_(switches) {}
+  Status check(const Layer& layer) const override {
+    if (mm(layer.thickness) <= machine_.material.nozzle_mm) return {};
+    return Error{Fault::kUsage, fmt::format("layer {}: {} mm is thicker than the nozzle of {} mm is wide; take thinner layers",
+                                            layer.index, mm(layer.thickness), machine_.material.nozzle_mm)};
+  }
+  void head(const ExtrusionHead& head, Buffer<char>& out) const override { append_head(machine_, head, out); }
+  std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const override {
+    return std::make_unique<LayerWriter>(machine_, layer, layers, out, switches_);
+  }
+  void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const override {
+    append_tail(machine_, totals, layers, out);
+  }
+
+ private:
+  const Extruder& machine_;
+  Switches switches_;
+};
+
+}  // namespace
+}  // namespace lamina::formats::gcode
+
+namespace lamina::formats {
+std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine, const Switches& switches) {
+  return std::make_unique<gcode::GcodeFormat>(machine, switches);
+}
+}  // namespace lamina::formats

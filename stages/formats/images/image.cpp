@@ -1,0 +1,218 @@
+#include "stages/formats/images/image.h"
+
+#include <fmt/format.h>
+
+#include <unistd.h>
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <new>
+
+#include "stages/data/units.h"
+#include "stages/formats/images/image_formats.h"
+#include "stages/formats/images/numbered.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
+
+namespace lamina::formats {
+namespace {
+
+/// By the first bytes, whatever the name says.
+Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
+                            LevelSink* sink) {
+  unsigned char magic[8] = {};
+  if (::pread(file, magic, sizeof magic, 0) < 0) {
+    return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
+  }
+  const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
+  if (begins("II", 2) || begins("MM", 2)) return read_tiff(file, bytes, path, threshold, page, sink);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file, bytes, path, threshold, sink);
+  if (sink != nullptr && !sink->nearest)
+    return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
+  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return read_pbm(file, bytes, path, threshold, sink);
+  if (begins("BM", 2)) return read_bmp(file, bytes, path, threshold, sink);
+  return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
+}
+
+Result<Image> read_image(const std::string& path, int threshold, std::uint64_t page = 0, LevelSink* sink = nullptr) {
+  const auto file = FileReader::open(path, {});
+  if (!file) return file.error();
+  try {
+    return read_by_magic(file->descriptor(), file->size(), path, threshold, page, sink);
+  } catch (const std::bad_alloc&) {
+    return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
+  }
+}
+
+}  // namespace
+
+Result<Image> image(const std::string& path, std::uint8_t full) {
+  if (full == 0) return read_image(path, 0);
+  Levels unused;
+  return levels(path, full, unused);
+}
+
+Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels) {
+  LevelSink sink{full, levels};
+  auto image = read_image(path, 0, 0, &sink);
+  if (image) threshold_levels(levels, 1, image->runs);
+  return image;
+}
+
+Result<Levels> image_levels(const std::string& path, std::uint8_t full) {
+  Levels found;
+  const auto image = full == 0 ? read_image(path, 0) : levels(path, full, found);
+  if (!image) return image.error();
+  if (full == 0) levels_of(image->runs, 1, found);
+  return found;
+}
+
+namespace {
+
+/// Of images of others: what is wrong is with the input.
+Error of_others(std::string message) {
+  constexpr std::string_view kAgain = "; plan the layer again";
+  if (message.ends_with(kAgain)) message.resize(message.size() - kAgain.size());
+  return Error{Fault::kInput, message + "; take grey or 1-bit PNG, TIFF, BMP or PBM"};
+}
+
+}  // namespace
+
+Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels) {
+  LevelSink sink{request.full, levels, true, request.invert};
+  levels.row_offset.clear();
+  auto image = read_image(path, 128, request.page, &sink);
+  if (!image) return of_others(image.error().message);
+  if (levels.row_offset.empty()) {  // of 1 bit
+    levels_of(request.invert ? inverse(image->runs) : std::move(image->runs), request.full, levels);
+  }
+  image->runs = {};
+  return image;
+}
+
+Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page) {
+  auto image = read_image(path, threshold, page);
+  return image ? std::move(image) : of_others(image.error().message);
+}
+
+Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
+  const auto file = FileReader::open(path, {.fault = Fault::kInput});
+  if (!file) return file.error();
+  char magic[2] = {};
+  if (!file->read_at(0, magic)) return Error{Fault::kInput, path + ": is empty; take a whole image"};
+  const bool is_tiff = (magic[0] == 'I' || magic[0] == 'M') && magic[1] == magic[0];
+  if (!is_tiff) return std::vector<std::uint64_t>{0};
+  auto pages = tiff_pages(file->descriptor(), path);
+  if (pages && pages->size() == 1) pages->front() = 0;
+  return pages;
+}
+
+namespace {
+
+/// "layer 3 of 6, z 0.1 to 0.15 mm", behind a title and before what else there is: "" if the description does not say so, or
+/// says this layer.
+std::string other_layer(const std::string& description, const Layer& layer) {
+  const std::size_t begin = description.rfind("layer ");
+  unsigned number = 0, of = 0;
+  double bottom = 0, top = 0;
+  int end = 0;
+  if (begin == std::string::npos) return {};
+  const std::string text = description.substr(begin);
+  if (std::sscanf(text.c_str(), "layer %u of %u, z %lf to %lf mm%n", &number, &of, &bottom, &top, &end) != 4 || end == 0)
+    return {};
+  const std::int64_t lies = layer.bottom, ends = lies + layer.thickness;
+  if (number == std::uint64_t{layer.index} + 1 && nm_of(bottom) == lies && nm_of(top) == ends) return {};
+  return fmt::format("tells {}, the manifest says layer {} from {} to {} mm", text.substr(0, static_cast<std::size_t>(end)),
+                     std::uint64_t{layer.index} + 1, number_text(mm(lies)), number_text(mm(ends)));
+}
+
+}  // namespace
+
+std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set, const Layer& layer) {
+  const std::uint32_t columns = image.runs.columns, rows = image.runs.view().rows();
+  if (columns != grid.columns() || rows != grid.rows()) {
+    return fmt::format("{} x {} pixels, the manifest says {} x {}", columns, rows, grid.columns(), grid.rows());
+  }
+  const auto dpi_differs = [](double dpi, double recorded) {
+    // PNG stores whole pixels a metre, so that 600 dpi reads as 599.999.
+    return dpi != 0 && std::abs(dpi - recorded) > 0.02;
+  };
+  if (dpi_differs(image.dpi_x, grid.x.dpi()) || dpi_differs(image.dpi_y, grid.y.dpi())) {
+    return fmt::format("{} x {} dpi, the manifest says {} x {}", image.dpi_x, image.dpi_y, grid.x.dpi(), grid.y.dpi());
+  }
+  const std::uint64_t is_set = set_pixels(image.runs);
+  return is_set == set ? other_layer(image.description, layer)
+                       : fmt::format("{} set pixels, the manifest says {}", is_set, set);
+}
+
+// Rows of grey values become bits or levels.
+
+void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t step, bool second, int threshold) {
+  const std::size_t offset = second ? 1 : 0;
+  for (std::uint32_t first = 0; first < columns; first += 8) {
+    unsigned bits = 0;
+    for (std::uint32_t i = 0; i < 8 && first + i < columns; ++i) {
+      const int value = std::to_integer<int>(row[(std::size_t{first} + i) * step + offset]);
+      bits |= static_cast<unsigned>(value < threshold) << (7 - i);
+    }
+    row[first / 8] = static_cast<std::byte>(bits);  // before all values that are still to be read
+  }
+}
+
+void bits_of_nibbles(std::span<std::byte> row, std::uint32_t columns, int threshold) {
+  for (std::uint32_t first = 0; first < columns; first += 8) {
+    unsigned bits = 0;
+    for (std::uint32_t i = 0; i < 8 && first + i < columns; ++i) {
+      const auto pair = std::to_integer<unsigned>(row[(first + i) / 2]);
+      const auto value = static_cast<int>(i % 2 == 0 ? pair >> 4 : pair & 15u);
+      bits |= static_cast<unsigned>(17 * value < threshold) << (7 - i);
+    }
+    row[first / 8] = static_cast<std::byte>(bits);
+  }
+}
+
+namespace {
+
+/// The first byte of [from, to) that is another one; `to` if none is.
+std::size_t first_other(std::span<const std::byte> row, std::size_t from, std::size_t to, std::byte byte) {
+  std::uint64_t pattern = 0, word = 0;
+  std::memset(&pattern, std::to_integer<int>(byte), sizeof pattern);
+  for (; from + sizeof word <= to; from += sizeof word) {
+    std::memcpy(&word, row.data() + from, sizeof word);
+    if (word != pattern) break;
+  }
+  while (from < to && row[from] == byte) ++from;
+  return from;
+}
+
+}  // namespace
+
+bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low) {
+  const unsigned darkest = (1u << bits) - 1;
+  const auto value_at = [&](std::uint32_t column) -> unsigned {
+    if (bits == 16) {
+      return std::to_integer<unsigned>(row[2 * std::size_t{column}]) |
+             std::to_integer<unsigned>(row[2 * std::size_t{column} + 1]) << 8;
+    }
+    const auto byte = std::to_integer<unsigned>(row[bits == 8 ? column : column / 2]);
+    return bits == 8 ? byte : column % 2 == 0 ? byte >> 4 : byte & 15u;
+  };
+  for (std::uint32_t begin = 0; begin < columns;) {
+    const unsigned value = value_at(begin), dark = bright_is_low != invert ? value : darkest - value;
+    std::uint32_t end = begin + 1;
+    if (bits == 8) end = static_cast<std::uint32_t>(first_other(row, end, columns, row[begin]));
+    if (bits == 4)  // whole bytes of it from the next one on
+      end =
+          std::max(end, static_cast<std::uint32_t>(2 * first_other(row, (begin + 1) / 2, columns / 2, std::byte(17 * value))));
+    while (end < columns && value_at(end) == value) ++end;
+    if ((!nearest && dark * full % darkest != 0) || levels.level.size() >= UINT32_MAX / 2) return false;
+    levels.append(begin, end, static_cast<std::uint8_t>((2 * dark * full + darkest) / (2 * darkest)));
+    begin = end;
+  }
+  levels.end_row();
+  return true;
+}
+
+}  // namespace lamina::formats

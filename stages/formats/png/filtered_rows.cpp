@@ -1,0 +1,249 @@
+#include "stages/formats/png/filtered_rows.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "stages/geometry/bits.h"
+
+namespace lamina::formats::png {
+namespace {
+
+constexpr unsigned kUp = 2;
+
+/// Of one row, while it is written.
+struct PngRow {
+  const Codes& codes;
+  std::uint64_t begin;  // of its bytes of bits in the stream
+  std::uint32_t bytes;  // of bits
+  std::span<const std::uint32_t> changes, above;
+};
+
+/// What moves on while a row is written. It is handed on by value, so that it can stay in registers.
+struct State {
+  BitWriter out;
+  std::uint64_t written;                  // bytes of the stream; zeros may wait behind them
+  std::uint64_t values = 0, moments = 0;  // as Adler32 has them, from the filter's byte on
+  std::size_t next = 0, next_above = 0;   // changes
+};
+
+/// A zero, then matches, as long as it takes.
+[[gnu::noinline]] BitWriter put_long_zeros(BitWriter out, const Codes& codes, std::uint64_t zeros) {
+  const BitString match = codes.match[kLongestMatch];
+  const std::uint32_t maximum = BitWriter::kMaxBits / match.length();
+  BitString matches;
+  for (std::uint32_t i = 0; i < maximum; ++i) matches = join(matches, match);
+  out.put(codes.byte[0]);
+  for (--zeros; zeros >= maximum * kLongestMatch; zeros -= maximum * kLongestMatch) out.put(matches);
+  const auto whole = static_cast<std::uint32_t>(zeros) / kLongestMatch, bits = whole * match.length();
+  out.put(matches.bits() & ((std::uint64_t{1} << bits) - 1), bits);
+  out.put(codes.more_zeros[zeros - whole * kLongestMatch]);
+  return out;
+}
+
+/// Bytes of one value, which is not 0.
+[[gnu::noinline]] BitWriter put_repeated(BitWriter out, const Codes& codes, std::uint32_t value, std::uint32_t count) {
+  out.put(codes.byte[value]);
+  for (--count; count >= kLongestMatch; count -= kLongestMatch) out.put(codes.match[kLongestMatch]);
+  if (count >= kShortestMatch) {
+    out.put(codes.match[count]);
+    count = 0;
+  }
+  for (; count > 0; --count) out.put(codes.byte[value]);
+  return out;
+}
+
+/// All zeros up to a place, then a word of one byte or two.
+[[gnu::always_inline]] inline void put_at(State& state, const Codes& codes, std::uint64_t position, BitString word,
+                                          std::uint32_t bytes) {
+  const std::uint64_t zeros = position - state.written;
+  if (zeros < kShortZeros) [[likely]] {
+    state.out.put(join(codes.zeros[zeros], word));
+  } else {
+    state.out = put_long_zeros(state.out, codes, zeros);
+    state.out.put(word);
+  }
+  state.written = position + bytes;
+}
+
+/// Bytes `at` ... of one value, where one row is set and the other is not.
+[[gnu::always_inline]] inline void put_apart(State& state, const PngRow& row, std::uint32_t at, std::uint32_t count,
+                                             std::uint32_t value) {
+  put_at(state, row.codes, row.begin + at, {}, count);
+  state.out = put_repeated(state.out, row.codes, value, count);
+  state.values += std::uint64_t{value} * count;
+  state.moments += value * (std::uint64_t{count} * (at + 1) + std::uint64_t{count} * (count - 1) / 2);
+}
+
+std::uint32_t column_of(std::span<const std::uint32_t> changes, std::size_t next) {
+  return next < changes.size() ? changes[next] : UINT32_MAX;
+}
+
+/// The sum of what the changes within byte `at` do to it; `next` is behind them afterwards.
+inline std::uint32_t take_byte(std::span<const std::uint32_t> changes, std::size_t& next, std::uint32_t at) {
+  std::uint32_t value = 0;
+  for (; next < changes.size() && changes[next] / 8 == at; ++next) {
+    const std::uint32_t ones = 0xFFu >> (changes[next] & 7);
+    value += next % 2 == 0 ? ones : 0 - ones;
+  }
+  return value;
+}
+
+/// Any changes, byte by byte of those that hold one, until both rows have one colour again.
+[[gnu::noinline]] State put_bytes(State state, const PngRow& row) {
+  std::uint32_t between = 0;  // value of bytes without a change
+  std::uint32_t next = 0;     // byte behind the last one of a change
+  do {
+    const std::uint32_t column = std::min(column_of(row.changes, state.next), column_of(row.above, state.next_above));
+    const std::uint32_t at = std::min(column / 8, row.bytes);
+    if (between != 0 && at > next) put_apart(state, row, next, at - next, between);
+    std::uint32_t value = between + take_byte(row.changes, state.next, at);
+    value = (value - take_byte(row.above, state.next_above, at)) & 0xFF;
+    between = static_cast<std::uint32_t>(state.next_above % 2 - state.next % 2) & 0xFF;
+    if (at == row.bytes) break;  // changes behind the last pixel
+    if (value != 0) {
+      put_at(state, row.codes, row.begin + at, row.codes.byte[value], 1);
+      state.values += value;
+      state.moments += std::uint64_t{value} * (at + 1);
+    }
+    next = at + 1;
+  } while (between != 0);
+  return state;
+}
+
+/// An edge that moves: its first byte that differs, and its edge_index() in the lowest 8 bits.
+using MovedEdge = std::uint32_t;
+
+constexpr MovedEdge moved_edge(std::uint32_t at, std::size_t index) { return at << 8 | static_cast<std::uint32_t>(index); }
+
+[[gnu::always_inline]] inline void put_moved(State& state, const PngRow& row, MovedEdge moved) {
+  const EdgeWord& word = row.codes.edge[moved & 0xFF];
+  const std::uint32_t at = moved >> 8;
+  const std::uint64_t zeros = row.begin + at - state.written;
+  if (zeros < kShortZeros) [[likely]] {
+    const BitString before = row.codes.zeros[zeros];
+    state.out.put(before.bits() | std::uint64_t{word.bits} << before.length(), before.length() + word.length);
+  } else {
+    state.out = put_long_zeros(state.out, row.codes, zeros);
+    state.out.put(word.bits, word.length);
+  }
+  state.written += zeros + word.edge.bytes;
+  const std::uint32_t values = std::uint32_t{word.edge.first} + word.edge.second;
+  state.values += values;
+  state.moments += std::uint64_t{values} * (at + 1) + word.edge.second;
+}
+
+/// The next change of both rows, which have one colour before it and different columns, where it is an edge that moves a
+/// little and no other change is near. returns  false if the change is another one
+[[gnu::always_inline]] inline bool put_edge(State& state, const PngRow& row) {
+  const std::uint32_t* const change = row.changes.data() + state.next;
+  const std::uint32_t* const above = row.above.data() + state.next_above;
+  const std::uint32_t shift = *change - *above + kMaxShift;
+  if (shift > 2 * kMaxShift) return false;
+  const std::uint32_t last = (std::max(*change, *above) - 1) | 7;  // of the last byte that differs
+  if (state.next + 1 != row.changes.size() && change[1] <= last) return false;
+  if (state.next_above + 1 != row.above.size() && above[1] <= last) return false;
+  const std::uint32_t at = std::min(*change, *above) / 8;
+  put_moved(state, row, moved_edge(at, edge_index(state.next % 2 == 0, *above, shift)));
+  ++state.next, ++state.next_above;
+  return true;
+}
+
+using FourInts [[gnu::vector_size(16)]] = std::int32_t;
+
+FourInts four(const std::uint32_t* at) {
+  FourInts value;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+FourInts less_of(FourInts a, FourInts b) { return (a & (a < b)) | (b & (a >= b)); }
+FourInts more_of(FourInts a, FourInts b) { return (a & (a > b)) | (b & (a <= b)); }
+
+constexpr std::size_t kChangesAtOnce = 32;
+constexpr std::size_t kFewChanges = 16;  // less than that are taken one by one
+constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
+
+/// Finds the edges that move among the next `count` changes of both rows, which have one colour before them. Edges that
+/// move and edges that stand are mixed at random, so there is no branch between them: four are looked at at once, and what
+/// is found is kept by how far the place for it moves on.
+/// count    a multiple of 4, less than there are left in both rows
+/// moved    room for as many
+/// returns  how many move; kNotEdges if one moves too far or the change behind it is near
+[[gnu::always_inline]] inline std::size_t find_moved(const State& state, const PngRow& row, std::size_t count,
+                                                     MovedEdge* moved) {
+  const std::uint32_t* const change = row.changes.data() + state.next;
+  const std::uint32_t* const above = row.above.data() + state.next_above;
+  const std::int32_t even = state.next % 2 == 0 ? 1 << 7 : 0, odd = even ^ 1 << 7;
+  const FourInts begins = {even, odd, even, odd};
+  FourInts stops = {0, 0, 0, 0};
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < count; i += 4) {
+    const FourInts a = four(change + i), b = four(above + i);
+    const FourInts shift = a - b + kMaxShift, moves = a != b;
+    const FourInts behind = (more_of(a, b) + 7) >> 3, next = less_of(four(change + i + 1), four(above + i + 1)) >> 3;
+    stops |= (shift < 0) | (shift > 2 * kMaxShift) | (moves & (next < behind));
+    const FourInts edges = (less_of(a, b) >> 3) << 8 | begins | (b & 7) << 4 | (shift & 15);
+    for (int lane = 0; lane < 4; ++lane) {
+      moved[found] = static_cast<MovedEdge>(edges[lane]);
+      found += static_cast<std::uint32_t>(-moves[lane]);
+    }
+  }
+  std::uint64_t halves[2];
+  std::memcpy(halves, &stops, sizeof halves);
+  return (halves[0] | halves[1]) == 0 ? found : kNotEdges;
+}
+
+/// The next changes of both rows, up to kChangesAtOnce, if all are edges that stand or move a little; or else none.
+[[gnu::noinline]] State put_at_once(State state, const PngRow& row, std::size_t count) {
+  MovedEdge moved[kChangesAtOnce + 1];
+  const std::size_t found = find_moved(state, row, count, moved);
+  if (found == kNotEdges) return state;
+  for (std::size_t i = 0; i < found; ++i) put_moved(state, row, moved[i]);
+  state.next += count, state.next_above += count;
+  return state;
+}
+
+/// Changes of both rows one by one, up to number `end` of this row or the end of one of both.
+[[gnu::always_inline]] inline void put_one_by_one(State& state, const PngRow& row, std::size_t end) {
+  while (state.next < end && state.next_above < row.above.size()) {
+    if (row.changes[state.next] == row.above[state.next_above]) {
+      ++state.next, ++state.next_above;
+    } else if (!put_edge(state, row)) {
+      state = put_bytes(state, row);
+    }
+  }
+}
+
+}  // namespace
+
+FilteredRows::FilteredRows(const Codes& codes, std::uint32_t columns, std::uint32_t rows)
+    : codes_(codes), row_bytes_(1 + row_bytes(columns)), rows_(rows), check_(row_bytes_, rows) {}
+
+void FilteredRows::put_zeros(BitWriter& out, std::uint64_t zeros) {
+  out = put_long_zeros(out, codes_, zeros);
+  written_ += zeros;
+}
+
+void FilteredRows::put(BitWriter& out, std::uint32_t r, std::span<const std::uint32_t> changes,
+                       std::span<const std::uint32_t> above) {
+  const std::uint64_t start = r * row_bytes_;
+  const PngRow row{codes_, start + 1, static_cast<std::uint32_t>(row_bytes_ - 1), changes, above};
+  State state{out, written_};
+  if (!above.empty()) {
+    put_at(state, codes_, start, codes_.byte[kUp], 1);
+    state.values = kUp;
+  }
+  for (;;) {
+    const std::size_t left = std::min(changes.size() - state.next, above.size() - state.next_above);
+    if (left < kFewChanges) break;
+    const std::size_t next = state.next, count = std::min(left - 1, kChangesAtOnce) & ~std::size_t{3};
+    state = put_at_once(state, row, count);
+    if (state.next == next) put_one_by_one(state, row, next + count);
+  }
+  put_one_by_one(state, row, changes.size());
+  while (state.next < changes.size() || state.next_above < above.size()) state = put_bytes(state, row);
+  check_.add(state.values, state.moments, rows_ - r);
+  written_ = state.written;
+  out = state.out;
+}
+
+}  // namespace lamina::formats::png

@@ -1,0 +1,377 @@
+#include "stages/formats/png/png_format.h"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <unistd.h>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csetjmp>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <optional>
+#include <string_view>
+
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/image_formats.h"
+#include "stages/formats/png/chunk.h"
+#include "stages/formats/png/deflate.h"
+#include "stages/formats/png/image_data.h"
+#include "stages/geometry/bits.h"
+
+namespace lamina::formats::png {
+namespace {
+
+constexpr std::size_t kHeadBytes = 128;  // of what stands before the image data, and of IEND, at most
+
+std::byte* put_byte(std::byte* at, unsigned byte) {
+  *at = static_cast<std::byte>(byte);
+  return at + 1;
+}
+
+std::byte* put_text(std::byte* at, std::string_view bytes) {
+  std::memcpy(at, bytes.data(), bytes.size());
+  return at + bytes.size();
+}
+
+/// Pixels a metre, as pHYs has them, rounded to the nearest.
+std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
+
+/// Signature, IHDR, PLTE, pHYs. returns  where the image data begin
+std::byte* put_first_chunks(std::byte* at, const RunsView& runs, double dpi_x, double dpi_y) {
+  using namespace std::string_view_literals;
+  std::byte* chunk = put_text(at, "\x89PNG\r\n\x1A\n");
+  at = put_number(chunk + kChunkHead, runs.columns);
+  at = put_number(at, runs.rows());
+  chunk = close_chunk(chunk, put_text(at, "\x01\x03\0\0\0"sv), "IHDR");  // 1 bit, palette, deflate, filters, not interlaced
+  at = put_text(chunk + kChunkHead, "\xFF\xFF\xFF\0\0\0"sv);
+  chunk = close_chunk(chunk, at, "PLTE");
+  at = put_number(chunk + kChunkHead, per_metre(dpi_x));
+  at = put_number(at, per_metre(dpi_y));
+  return close_chunk(chunk, put_byte(at, 1), "pHYs");
+}
+
+class PngEncoder : public ImageEncoder {
+ public:
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    const auto failure = [&](std::string_view why) {
+      return Error{Fault::kOutput,
+                   fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", runs.columns, runs.rows(), why)};
+    };
+    if (runs.columns == 0 || runs.rows() == 0) return failure("it has no pixels");
+    if (runs.columns > kMaxPixelsASide || runs.rows() > kMaxPixelsASide) {
+      return failure(fmt::format("a side has at most {} pixels", kMaxPixelsASide));
+    }
+    file.resize(std::max(file.capacity(), kHeadBytes));
+    const std::byte* data = put_first_chunks(file.data(), runs, dpi_x, dpi_y);
+    const std::size_t end = put_image_data(runs, file, static_cast<std::size_t>(data - file.data()));
+    file.resize(end + kChunkHead + kChunkTail);
+    close_chunk(file.data() + end, file.data() + end + kChunkHead, "IEND");
+    return {};
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<PngEncoder>(); }
+
+// PNG of 8-bit grey, in which 0, black, is a full voxel (PNG specification, second edition, 11.2.2).
+//
+// Rows have no filter and one block of deflate's fixed code: equal bytes are a literal and matches of distance 1 (RFC 1951,
+// 3.2.5, 3.2.6), so that the bytes depend on no library.
+
+namespace {
+
+constexpr std::uint32_t kMaxEqual = 258, kEndOfBlock = 256, kLengthOf258 = 285;
+
+constexpr std::array<std::uint8_t, 288> fixed_lengths() {
+  std::array<std::uint8_t, 288> lengths{};
+  for (std::size_t s = 0; s < lengths.size(); ++s) lengths[s] = s < 144 ? 8 : s < 256 ? 9 : s < 280 ? 7 : 8;
+  return lengths;
+}
+constexpr auto kFixed = words_of(fixed_lengths());
+
+/// A match of `length` 3 .. 257 bytes of distance 1, whose own word is five zeros.
+constexpr BitString match_word(std::uint32_t length) {
+  std::uint32_t symbol = 257, base = 3, extra = 0;
+  for (;; ++symbol) {
+    extra = symbol < 265 ? 0 : (symbol - 261) / 4;
+    if (length < base + (1u << extra)) break;
+    base += 1u << extra;
+  }
+  return join(join(kFixed[symbol], BitString(length - base, extra)), BitString(0, 5));
+}
+constexpr std::array<BitString, kMaxEqual + 1> match_words() {
+  std::array<BitString, kMaxEqual + 1> words{};
+  for (std::uint32_t length = 3; length < kMaxEqual; ++length) words[length] = match_word(length);
+  words[kMaxEqual] = join(kFixed[kLengthOf258], BitString(0, 5));
+  return words;
+}
+constexpr auto kMatch = match_words();
+
+/// Adler's check (RFC 1950, section 9) of runs of equal bytes.
+class Check {
+ public:
+  void add(std::uint32_t byte, std::uint64_t count) {
+    // b grows by a + byte, a + 2 byte, ...
+    const std::uint64_t n = count % kPrime,
+                        sum = count % 2 == 0 ? count / 2 % kPrime * ((count + 1) % kPrime) : (count + 1) / 2 % kPrime * n;
+    b_ = (b_ + n * a_ + sum % kPrime * byte) % kPrime;
+    a_ = (a_ + n * byte) % kPrime;
+  }
+  std::uint32_t value() const { return static_cast<std::uint32_t>(b_ << 16 | a_); }
+
+ private:
+  static constexpr std::uint64_t kPrime = 65'521;
+  std::uint64_t a_ = 1, b_ = 0;
+};
+
+class GreyEncoder : public LevelEncoder {
+ public:
+  Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) override {
+    const auto failure = [&](std::string_view why) {
+      return Error{Fault::kOutput,
+                   fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", image.columns, image.rows(), why)};
+    };
+    if (image.columns == 0 || image.rows() == 0) return failure("it has no pixels");
+    if (image.columns > kMaxPixelsASide || image.rows() > kMaxPixelsASide) {
+      return failure(fmt::format("a side has at most {} pixels", kMaxPixelsASide));
+    }
+    if (full == 0 || 255 % full != 0) return failure(fmt::format("{} levels are no whole steps of 8 bits", full + 1));
+    file.resize(std::max<std::size_t>(file.capacity(), 4096));
+    const std::size_t data = put_head(image, dpi_x, dpi_y, file);
+    chunk_ = data;
+    BitWriter out(file.data() + chunk_ + kChunkHead);
+    out.put(0x0178, 16);  // zlib's header: deflate, a window of 32 KiB, the fastest level
+    out.put(0b011, 3);    // the last block, of the fixed code
+    check_ = Check();
+    for (std::uint32_t r = 0; r < image.rows(); ++r) {
+      put(0, 1, out, file);  // no filter
+      std::uint32_t at = 0;
+      for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
+        put(255, image.change[2 * i] - at, out, file);
+        at = image.change[2 * i + 1];
+        put(255u - image.level[i] * (255u / full), at - image.change[2 * i], out, file);
+      }
+      put(255, image.columns - at, out, file);
+    }
+    ensure_capacity(out, file);
+    out.put(kFixed[kEndOfBlock]);
+    std::byte* end = close_chunk(file.data() + chunk_, put_number(out.finish(), check_.value()), "IDAT");
+    const std::size_t last = static_cast<std::size_t>(end - file.data());
+    file.resize(last + kChunkHead + kChunkTail);
+    close_chunk(file.data() + last, file.data() + last + kChunkHead, "IEND");
+    return {};
+  }
+
+ private:
+  static constexpr std::size_t kSlack = 128, kChunkContent = std::size_t{1} << 16;
+
+  static std::size_t put_head(const LevelsView& image, double dpi_x, double dpi_y, Bytes& file) {
+    using namespace std::string_view_literals;
+    const auto text = [](std::byte* at, std::string_view bytes) {
+      std::memcpy(at, bytes.data(), bytes.size());
+      return at + bytes.size();
+    };
+    std::byte* chunk = text(file.data(), "\x89PNG\r\n\x1A\n"sv);
+    std::byte* at = put_number(put_number(chunk + kChunkHead, image.columns), image.rows());
+    chunk = close_chunk(chunk, text(at, "\x08\0\0\0\0"sv), "IHDR");  // 8 bits, grey, deflate, filters, not interlaced
+    at = put_number(put_number(chunk + kChunkHead, per_metre(dpi_x)), per_metre(dpi_y));
+    *at++ = std::byte{1};
+    return static_cast<std::size_t>(close_chunk(chunk, at, "pHYs") - file.data());
+  }
+  /// Pixels a metre, as pHYs has them, rounded to the nearest.
+  static std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
+
+  /// Closes a chunk that is long enough, and makes room for some words.
+  void ensure_capacity(BitWriter& out, Bytes& file) {
+    std::size_t used = static_cast<std::size_t>(out.next() - file.data());
+    if (used - chunk_ < kChunkContent && used + kSlack <= file.size()) return;
+    if (file.size() < used + 2 * kSlack) file.resize(2 * file.size() + 2 * kSlack);
+    if (used - chunk_ >= kChunkContent) {
+      chunk_ = static_cast<std::size_t>(close_chunk(file.data() + chunk_, file.data() + used, "IDAT") - file.data());
+      used = chunk_ + kChunkHead;
+    }
+    out.move_to(file.data() + used);
+  }
+
+  void put(std::uint32_t byte, std::uint64_t count, BitWriter& out, Bytes& file) {
+    if (count == 0) return;
+    check_.add(byte, count);
+    ensure_capacity(out, file);
+    out.put(kFixed[byte]);
+    for (--count; count > 0;) {
+      ensure_capacity(out, file);
+      const auto length = static_cast<std::uint32_t>(std::min<std::uint64_t>(count, kMaxEqual));
+      if (length < 3) {
+        for (std::uint32_t i = 0; i < length; ++i) out.put(kFixed[byte]);
+      } else {
+        out.put(kMatch[length]);
+      }
+      count -= length;
+    }
+  }
+
+  std::size_t chunk_ = 0;  // where it begins
+  Check check_;
+};
+
+}  // namespace
+
+std::unique_ptr<LevelEncoder> make_8_bit_encoder() { return std::make_unique<GreyEncoder>(); }
+
+}  // namespace lamina::formats::png
+
+namespace lamina::formats {
+namespace {
+
+// Deflate makes at most 1032 bytes of one (zlib's technical notes); a header that promises more lies.
+constexpr std::uint64_t kMaxExpansion = 1032;
+
+/// What libpng's callbacks see and what has to outlive a jump out of libpng.
+struct ReadState {
+  int file = -1;
+  std::uint64_t bytes = 0;
+  char message[128] = {};
+  std::byte buffer[16 * 1024];
+  std::size_t begin = 0, end = 0;  // unread part of buffer
+  Buffer<std::byte> row;
+  std::optional<RunsBuilder> builder;
+  LevelSink* sink = nullptr;
+  unsigned level_bits = 0;  // of a value for the sink; 0: the image is of 1 bit
+  double dpi_x = 0, dpi_y = 0;
+};
+
+void keep_error(png_structp png, png_const_charp text) {
+  auto* source = static_cast<ReadState*>(png_get_error_ptr(png));
+  std::strncpy(source->message, text, sizeof source->message - 1);
+  png_longjmp(png, 1);
+}
+
+void ignore_warning(png_structp, png_const_charp) {}
+
+void read_bytes(png_structp png, png_bytep to, png_size_t count) {
+  ReadState& source = *static_cast<ReadState*>(png_get_io_ptr(png));
+  while (count != 0) {
+    if (source.begin == source.end) {
+      ssize_t got;
+      do {
+        got = ::read(source.file, source.buffer, sizeof source.buffer);
+      } while (got < 0 && errno == EINTR);
+      if (got <= 0) png_error(png, got == 0 ? "truncated" : "cannot read");
+      source.begin = 0;
+      source.end = static_cast<std::size_t>(got);
+    }
+    const std::size_t part = std::min<std::size_t>(count, source.end - source.begin);
+    std::memcpy(to, source.buffer + source.begin, part);
+    source.begin += part;
+    to += part;
+    count -= part;
+  }
+}
+
+/// True if a set bit is a dark pixel.
+bool set_is_dark(png_structp png, png_infop info, int colour_type) {
+  if (colour_type == PNG_COLOR_TYPE_GRAY) return false;
+  png_colorp palette = nullptr;
+  int entries = 0;
+  png_get_PLTE(png, info, &palette, &entries);
+  if (entries < 2) png_error(png, "a palette of fewer than two colours");
+  const auto light = [](const png_color& c) { return int{c.red} + c.green + c.blue; };
+  return light(palette[1]) < light(palette[0]);
+}
+
+bool add_row(ReadState& source, std::size_t bytes, bool invert) {
+  try {
+    if (source.level_bits > 0) return source.sink->add_row(source.row, source.sink->levels.columns, source.level_bits, false);
+    return source.builder->add_row(std::span(source.row).first(bytes), invert);
+  } catch (...) {
+    return false;
+  }
+}
+
+bool prepare(ReadState& source, std::uint32_t columns, std::size_t stride) {
+  try {
+    source.row.resize(stride);
+    source.builder.emplace(columns);
+    if (source.level_bits > 0) source.sink->levels.start(columns);
+    return true;
+  } catch (...) {
+    return false;
+  }
+}
+
+/// No object of this frame needs its destructor run when libpng jumps out.
+bool read_rows(png_structp png, png_infop info, ReadState& source, int threshold) {
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_user_limits(png, kMaxPixelsASide, kMaxPixelsASide);
+  png_set_chunk_malloc_max(png, 1 << 20);
+  png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
+  // Comments and colours are passed over: libpng allocates whatever length they claim.
+  constexpr png_byte kResolution[] = "pHYs";
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, kResolution, 1);
+  png_read_info(png, info);
+  const std::uint32_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
+  const int colour_type = png_get_color_type(png, info);
+  const int coded = png_get_bit_depth(png, info);
+  const bool exact = source.sink != nullptr && !source.sink->nearest;
+  const bool grey = (exact ? coded == 8 : threshold > 0 && coded > 1) && colour_type == PNG_COLOR_TYPE_GRAY;
+  const bool levels = source.sink != nullptr && grey;
+  if (exact && !grey) png_error(png, "not 8 bits of grey");
+  if (grey && coded < 8) png_set_expand_gray_1_2_4_to_8(png);
+  if (levels && coded == 16) png_set_swap(png);  // low byte first
+  const int depth = grey && coded < 8 ? 8 : coded;
+  source.level_bits = levels ? static_cast<unsigned>(depth) : 0;
+  if (depth != 1 && !grey) png_error(png, threshold > 0 ? "neither 1-bit nor grey" : "not a 1-bit image");
+  if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced images are not supported");
+  const std::size_t step = static_cast<std::size_t>(depth) / 8, stride = grey ? columns * step : row_bytes(columns);
+  const std::size_t coded_stride = (std::size_t{columns} * static_cast<std::size_t>(coded) + 7) / 8;
+  if ((coded_stride + 1) * std::uint64_t{rows} / kMaxExpansion > source.bytes) {
+    png_error(png, "more pixels than a file of this size can hold");
+  }
+  const bool invert = !grey && !set_is_dark(png, info, colour_type);
+  png_uint_32 per_unit_x = 0, per_unit_y = 0;
+  int unit = 0;
+  if (png_get_pHYs(png, info, &per_unit_x, &per_unit_y, &unit) != 0 && unit == PNG_RESOLUTION_METER) {
+    source.dpi_x = per_unit_x * 0.0254;
+    source.dpi_y = per_unit_y * 0.0254;
+  }
+  if (!prepare(source, columns, stride)) png_error(png, "out of memory");
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    png_read_row(png, reinterpret_cast<png_bytep>(source.row.data()), nullptr);
+    if (grey && !levels) bits_of_grey(source.row, columns, step, false, threshold);
+    if (!add_row(source, row_bytes(columns), invert))
+      png_error(png, levels ? "a value is no level" : "too many runs for the memory");
+  }
+  png_read_end(png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+  const auto source = std::make_unique<ReadState>();
+  source->file = file;
+  source->bytes = bytes;
+  source->sink = sink;
+  png_structp reader = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), keep_error, ignore_warning);
+  png_infop info = reader != nullptr ? png_create_info_struct(reader) : nullptr;
+  bool whole = false;
+  if (info != nullptr) {
+    png_set_read_fn(reader, source.get(), read_bytes);
+    whole = read_rows(reader, info, *source, threshold);
+  }
+  png_destroy_read_struct(&reader, &info, nullptr);
+  if (!whole) {
+    return Error{Fault::kVerification, fmt::format("{}: not a whole {}PNG: {}; plan the layer again", path,
+                                                   threshold > 0 || sink != nullptr ? "" : "1-bit ",
+                                                   source->message[0] != 0 ? source->message : "out of memory")};
+  }
+  return Image{source->builder->finish(), source->dpi_x, source->dpi_y};
+}
+
+}  // namespace lamina::formats

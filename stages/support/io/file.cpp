@@ -1,0 +1,255 @@
+#include "stages/support/io/file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <utility>
+
+#include "stages/support/io/file_target.h"
+#include "stages/support/io/sync.h"
+#include "stages/support/io/temporary.h"
+
+namespace lamina {
+
+constexpr std::size_t kGathered = 64 << 10, kLarge = 16 << 10;  // bytes that wait for one system call; pieces that do not
+constexpr std::uint64_t kGiven = 2 << 20;                       // bytes with which the disk begins while the file grows
+
+struct File::State {
+  std::string path;    // as named, for errors
+  std::string target;  // the file that it leads to
+  std::string grows;   // the name until then; "" for a stream
+  int watched = -1;    // removed at a signal
+  FileOptions options;
+  bool streams = false;
+  int file = -1;
+  std::uint64_t size = 0;
+  std::uint64_t waiting = 0;  // bytes that the disk has not been given
+  Buffer<std::byte> gathered;
+  std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> hash{nullptr, XXH3_freeState};
+
+  State(const std::string& name, const FileOptions& chosen) : path(name), options(chosen) {
+    if (!options.hash) return;
+    hash.reset(XXH3_createState());
+    XXH3_128bits_reset(hash.get());
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() {
+    if (file < 0) return;
+    if (options.keep_part || streams) {
+      write_all(file, gathered);  // an error is found by whoever goes on
+    } else {
+      remove();
+    }
+    ::close(file);
+  }
+
+  void grow(std::string name) {
+    grows = std::move(name);
+    if (!options.keep_part) watched = watch(grows.c_str());
+  }
+  /// Under the lock: another run may not find the name of a file that is being removed.
+  void remove() {
+    forget(std::exchange(watched, -1));
+    remove_or_note(grows);
+  }
+
+  Status put(std::span<const std::byte> bytes) {
+    const int reason = write_all(file, bytes);
+    if (reason != 0) return write_failure(path, reason);
+    give(bytes.size());
+    return {};
+  }
+
+  /// Lets the disk begin with what is written, so that the sync at the end waits for less. It tells the errors, too.
+  void give(std::size_t bytes) {
+    waiting += bytes;
+    if (waiting < kGiven || streams || options.durable == Durable::kNo) return;
+    waiting = 0;
+    ::sync_file_range(file, 0, 0, SYNC_FILE_RANGE_WRITE);
+  }
+
+  /// Takes the bytes that the file has already into the hash.
+  int hash_what_is_there() {
+    Buffer<std::byte> piece(256 << 10);
+    for (std::uint64_t at = 0; at < size;) {
+      const auto maximum = static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), size - at));
+      const ssize_t got = ::pread(file, piece.data(), maximum, static_cast<off_t>(at));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) return got < 0 ? errno : EIO;
+      XXH3_128bits_update(hash.get(), piece.data(), static_cast<std::size_t>(got));
+      at += static_cast<std::uint64_t>(got);
+    }
+    return 0;
+  }
+
+  int rename_to_target() const {
+    if (options.replace) return std::rename(grows.c_str(), target.c_str()) == 0 ? 0 : errno;
+    // Not every file system can do that in one step.
+    if (::renameat2(AT_FDCWD, grows.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS) return errno;
+    if (::faccessat(AT_FDCWD, target.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
+    return std::rename(grows.c_str(), target.c_str()) == 0 ? 0 : errno;
+  }
+
+  /// Network file systems report a full disk when a descriptor is closed: that of a locked file is closed twice, once
+  /// before the file has its name, once, with its lock, behind. After EINTR a descriptor is closed all the same (Linux).
+  int close_and_rename() {
+    int reason = options.durable == Durable::kNo ? 0 : sync_file(file);
+    const bool held = options.lock;
+    const int first = held ? ::fcntl(file, F_DUPFD_CLOEXEC, 3) : std::exchange(file, -1);
+    if (first < 0) return errno;
+    if (::close(first) != 0 && errno != EINTR && reason == 0) reason = errno;
+    if (reason == 0) reason = rename_to_target();
+    if (reason == 0) {
+      forget(std::exchange(watched, -1));
+    } else if (!options.keep_part) {
+      remove();
+    }
+    if (held) ::close(std::exchange(file, -1));
+    return reason == 0 && options.durable == Durable::kAll ? sync_folder_of(target) : reason;
+  }
+};
+
+File::File(std::unique_ptr<State> state) : state_(std::move(state)) {}
+File::File(File&&) noexcept = default;
+File& File::operator=(File&&) noexcept = default;
+File::~File() = default;
+
+Result<File> File::open(const std::string& path, const FileOptions& options) {
+  auto state = std::make_unique<State>(path, options);
+  const auto target = find_target(path, options.follow);
+  if (!target) return target.error();
+  state->target = target->file;
+  state->streams = target->file.empty();
+  if (state->streams) {
+    const auto stream = open_stream(path, *target, options.stream);
+    if (!stream) return stream.error();
+    state->file = *stream;
+  } else if (options.keep_part) {
+    const auto part = create_part(path, part_of(target->file));
+    if (!part) return part.error();
+    state->file = *part;
+    state->options.lock = true;
+    state->grow(part_of(target->file));
+  } else {
+    auto made = create_temporary(path, target->file, options.lock);
+    if (!made) return made.error();
+    state->file = made->file;
+    state->grow(std::move(made->name));
+  }
+  return File(std::move(state));
+}
+
+Result<File> File::reopen(const std::string& path, std::uint64_t size, const FileOptions& options) {
+  auto state = std::make_unique<State>(path, options);
+  const auto target = find_target(path, options.follow);
+  if (!target) return target.error();
+  if (target->file.empty()) return open_stream(path, *target, false).error();
+  state->target = target->file;
+  state->grows = part_of(target->file);
+  const auto part = take_part(path, state->grows, size);
+  if (!part) return part.error();
+  // A file that cannot be continued stays as it is.
+  const bool keep = std::exchange(state->options.keep_part, true);
+  state->file = *part;
+  state->size = size;
+  int reason = options.hash ? state->hash_what_is_there() : 0;
+  if (reason == 0 && ::ftruncate(state->file, static_cast<off_t>(size)) != 0) reason = errno;
+  if (reason == 0 && ::lseek(state->file, 0, SEEK_END) < 0) reason = errno;
+  if (reason != 0) return write_failure(path, reason);
+  state->options.keep_part = keep;
+  state->options.lock = true;
+  state->grow(state->grows);
+  return File(std::move(state));
+}
+
+Status File::append(std::span<const std::byte> bytes) {
+  State& state = *state_;
+  if (state.hash) XXH3_128bits_update(state.hash.get(), bytes.data(), bytes.size());
+  state.size += bytes.size();
+  const bool large = bytes.size() >= kLarge;
+  if (large || state.gathered.size() + bytes.size() > kGathered) {
+    if (Status status = flush(); !status) return status;
+    if (large) return state.put(bytes);
+  }
+  state.gathered.insert(state.gathered.end(), bytes.begin(), bytes.end());
+  return {};
+}
+
+Status File::flush() {
+  const Status status = state_->put(state_->gathered);
+  state_->gathered.clear();
+  return status;
+}
+
+Status File::sync() {
+  const int reason = state_->streams ? 0 : sync_file(state_->file);
+  return reason == 0 ? Status() : Status(write_failure(state_->path, reason));
+}
+
+Status File::become_part(bool synced) {
+  State& state = *state_;
+  if (Status status = flush(); !status) return status;
+  if (synced && state.options.durable != Durable::kNo) {
+    if (Status status = sync(); !status) return status;
+  }
+  // Nobody else knows its name yet; file systems without locks have one writer at a time.
+  if (!state.options.lock) ::flock(state.file, LOCK_EX | LOCK_NB);
+  const std::string part = part_of(state.target);
+  if (std::rename(state.grows.c_str(), part.c_str()) != 0) return write_failure(state.path, errno);
+  forget(std::exchange(state.watched, -1));
+  state.grows = part;
+  state.options.keep_part = state.options.lock = true;
+  return {};
+}
+
+Result<FileDigest> File::finish() {
+  State& state = *state_;
+  if (Status status = flush(); !status) return status.error();
+  int reason = 0;
+  if (!state.streams) {
+    reason = state.close_and_rename();
+  } else if (::close(std::exchange(state.file, -1)) != 0 && errno != EINTR) {
+    reason = errno;
+  }
+  if (reason != 0) return write_failure(state.path, reason);
+  return digest();
+}
+
+void File::discard() {
+  state_->options.keep_part = false;
+  state_.reset();  // of a finished file nothing is left
+}
+
+std::uint64_t File::size() const { return state_->size; }
+
+FileDigest File::digest() const {
+  FileDigest digest;
+  digest.bytes = state_->size;
+  if (!state_->hash) return digest;
+  const XXH128_hash_t hash = XXH3_128bits_digest(state_->hash.get());
+  digest.hash = {hash.high64, hash.low64};
+  return digest;
+}
+
+bool File::streams() const { return state_->streams; }
+
+Status write_file(const std::string& path, std::span<const std::byte> bytes, const FileOptions& options) {
+  auto file = File::open(path, options);
+  if (!file) return file.error();
+  if (Status status = file->append(bytes); !status) return status;
+  const auto digest = file->finish();
+  return digest ? Status() : Status(digest.error());
+}
+
+Status write_file(const std::string& path, std::string_view text, const FileOptions& options) {
+  return write_file(path, std::as_bytes(std::span(text)), options);
+}
+
+}  // namespace lamina

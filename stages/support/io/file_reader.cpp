@@ -1,0 +1,219 @@
+#include "stages/support/io/file_reader.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kPiece = 64 << 10, kLongestPiece = 16 << 20;  // bytes read at once
+
+/// A size for a person: whole MiB and KiB where it is.
+std::string size_text(std::uint64_t bytes) {
+  if (bytes % (1 << 20) == 0) return fmt::format("{} MiB", bytes >> 20);
+  return bytes % (1 << 10) == 0 ? fmt::format("{} KiB", bytes >> 10) : fmt::format("{} bytes", bytes);
+}
+
+std::string too_long(std::uint64_t maximum) {
+  return fmt::format("holds more than {}, the most for such a file", size_text(maximum));
+}
+
+/// Empty, or why a file of this kind is not read.
+std::string fault_of_kind(const struct stat& status, bool stream, const ReadRules& rules) {
+  if (S_ISDIR(status.st_mode)) return std::string(rules.directory);
+  if (S_ISREG(status.st_mode)) {
+    return static_cast<std::uint64_t>(status.st_size) > rules.max_bytes ? too_long(rules.max_bytes) : std::string();
+  }
+  if (stream) return {};
+  return std::string(rules.device) + (rules.streams ? "; give what it holds to standard input and name it -" : "");
+}
+
+}  // namespace
+
+struct FileReader::State {
+  std::string path;
+  ReadRules rules;
+  int file = -1;
+  bool own = true;      // the descriptor is closed in the end
+  bool stream = false;  // may wait for bytes
+  std::uint64_t size = 0;
+  std::string buffer;
+  std::size_t begin = 0, end = 0;  // unread part of buffer
+  std::uint64_t line = 0, offset = 0, taken = 0;
+  bool at_end = false, ended_by_break = true;
+  Status status;
+
+  ~State() {
+    if (file >= 0 && own) ::close(file);
+  }
+  Error error(const std::string& what) const { return {rules.fault, fmt::format("{}: {}", path, what)}; }
+  bool stop(const std::string& what) {
+    status = Error{rules.fault, fmt::format("{}:{}: {}", path, line + 1, what)};
+    return false;
+  }
+
+  /// Reads up to `most` bytes behind `end`; false at the end of the file and after an error.
+  bool fill(std::size_t maximum) {
+    if (at_end || !status) return false;
+    if (begin > 0) {
+      std::memmove(buffer.data(), buffer.data() + begin, end - begin);
+      end -= std::exchange(begin, 0);
+    }
+    if (buffer.size() < end + maximum) buffer.resize(std::max(end + maximum, buffer.size() + buffer.size() / 2));
+    pollfd waiting{file, POLLIN, 0};
+    if (stream && ::poll(&waiting, 1, -1) < 0 && errno == EINTR) {  // unlike read(), it is never taken up again
+      status = Error{Fault::kInterrupted, fmt::format("{}: interrupted", path)};
+      return false;
+    }
+    ssize_t got = 0;
+    do {
+      got = ::read(file, buffer.data() + end, maximum);
+    } while (got < 0 && errno == EINTR);
+    if (got < 0) {
+      status = error(fmt::format("cannot be read: {}", std::strerror(errno)));
+      return false;
+    }
+    at_end = got == 0;
+    end += static_cast<std::size_t>(got);
+    taken += static_cast<std::uint64_t>(got);
+    if (taken > rules.max_bytes) {
+      status = error(too_long(rules.max_bytes));
+      return false;
+    }
+    return !at_end;
+  }
+};
+
+FileReader::FileReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+FileReader::FileReader(FileReader&&) noexcept = default;
+FileReader& FileReader::operator=(FileReader&&) noexcept = default;
+FileReader::~FileReader() = default;
+
+bool names_stream(std::string_view path) {
+  return path == "-" || path == "/dev/stdin" || path.starts_with("/dev/fd/") || path.starts_with("/proc/self/fd/");
+}
+
+Result<FileReader> FileReader::open(const std::string& path, const ReadRules& rules) {
+  auto state = std::make_unique<State>();
+  state->path = path;
+  state->rules = rules;
+  const bool stream = rules.streams && names_stream(path);
+  if (stream && path == "-") {
+    state->file = STDIN_FILENO;
+    state->own = false;
+  } else {
+    // Without O_NONBLOCK, opening a pipe that nobody writes to would wait for ever.
+    state->file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
+  }
+  struct stat status {};
+  if (state->file < 0 || ::fstat(state->file, &status) != 0) {
+    const bool absent = errno == ENOENT || errno == ENOTDIR;
+    return state->error(absent ? std::string(rules.missing) : fmt::format("cannot be opened: {}", std::strerror(errno)));
+  }
+  if (const std::string fault = fault_of_kind(status, stream, rules); !fault.empty()) return state->error(fault);
+  if (stream && state->own) ::fcntl(state->file, F_SETFL, ::fcntl(state->file, F_GETFL) & ~O_NONBLOCK);
+  state->stream = !S_ISREG(status.st_mode);
+  if (!state->stream) state->size = static_cast<std::uint64_t>(status.st_size);
+  return FileReader(std::move(state));
+}
+
+const std::string& FileReader::path() const { return state_->path; }
+std::uint64_t FileReader::size() const { return state_->size; }
+int FileReader::descriptor() const { return state_->file; }
+const Status& FileReader::status() const { return state_->status; }
+std::uint64_t FileReader::line_number() const { return state_->line; }
+std::uint64_t FileReader::offset() const { return state_->offset; }
+bool FileReader::ended_by_break() const { return state_->ended_by_break; }
+
+Result<std::string> FileReader::text() {
+  State& state = *state_;
+  std::uint64_t left = state.size;
+  do {
+    left = state.size - std::min(state.size, state.taken);
+  } while (state.fill(static_cast<std::size_t>(std::clamp<std::uint64_t>(left, 1024, kLongestPiece))));
+  if (!state.status) return state.status.error();
+  std::string all = std::move(state.buffer);
+  all.resize(state.end);
+  all.erase(0, std::exchange(state.begin, state.end = 0));
+  return all;
+}
+
+bool FileReader::next(std::string_view& line) {
+  State& state = *state_;
+  if (!state.status) return false;
+  std::size_t searched = 0;  // bytes of the unread part that hold no end of a line
+  const auto has_nul = [&](std::size_t from, std::size_t to) {
+    return std::memchr(state.buffer.data() + from, '\0', to - from) != nullptr;
+  };
+  while (true) {
+    const char* from = state.buffer.data() + state.begin;
+    const std::size_t held = state.end - state.begin;
+    const auto* found =
+        held > searched ? static_cast<const char*>(std::memchr(from + searched, '\n', held - searched)) : nullptr;
+    const std::size_t length = found != nullptr ? static_cast<std::size_t>(found - from) : held;
+    if (!state.rules.any_bytes && has_nul(state.begin + searched, state.begin + length))
+      return state.stop(std::string(state.rules.no_text));
+    if (length > state.rules.longest_line) {
+      return state.stop(fmt::format("a line of more than {}; {}", size_text(state.rules.longest_line), state.rules.no_text));
+    }
+    searched = length;
+    if (found == nullptr && state.fill(kPiece)) continue;
+    if (!state.status || (found == nullptr && held == 0)) return false;
+    line = {state.buffer.data() + state.begin, length};
+    state.ended_by_break = found != nullptr;
+    const std::size_t step = length + (state.ended_by_break ? 1 : 0);
+    state.begin += step;
+    state.offset += step;
+    ++state.line;
+    return true;
+  }
+}
+
+void FileReader::bound_lines(std::size_t longest) { state_->rules.longest_line = longest; }
+
+void FileReader::go_to(std::uint64_t offset, std::uint64_t lines) {
+  State& state = *state_;
+  state.offset = state.taken = offset;
+  state.line = lines;
+  state.status = {};
+  if (state.file < 0) {
+    state.begin = static_cast<std::size_t>(std::min<std::uint64_t>(offset, state.end));
+    state.taken = state.end;
+    return;
+  }
+  state.begin = state.end = 0;
+  state.at_end = ::lseek(state.file, static_cast<off_t>(offset), SEEK_SET) < 0;
+}
+
+bool FileReader::read_at(std::uint64_t offset, std::span<char> to) const {
+  const State& state = *state_;
+  if (state.file < 0) {
+    if (offset > state.size || to.size() > state.size - offset) return false;
+    std::copy_n(state.buffer.data() + offset, to.size(), to.data());
+    return true;
+  }
+  while (!to.empty()) {
+    const ssize_t got = ::pread(state.file, to.data(), to.size(), static_cast<off_t>(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    to = to.subspan(static_cast<std::size_t>(got));
+    offset += static_cast<std::uint64_t>(got);
+  }
+  return true;
+}
+
+Result<std::string> read_file(const std::string& path, const ReadRules& rules) {
+  auto file = FileReader::open(path, rules);
+  if (!file) return file.error();
+  return file->text();
+}
+
+}  // namespace lamina

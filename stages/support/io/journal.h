@@ -1,0 +1,42 @@
+// stages/support/io/journal.h: a text file that grows by whole lines and survives a kill at any moment.
+//
+// Each line is a single write. A line torn by a kill or a full disk stays torn: the next line starts after a line break,
+// and readers must skip incomplete lines. An open journal locks the file; the lock ends with the process.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "stages/data/status.h"
+
+namespace lamina {
+
+class Journal {
+ public:
+  /// Opens a file without changing it, or creates it empty.
+  /// held    error text after the path if another process holds the file: "another batch is running here"
+  /// errors  kOutput: another process holds it, it is no file, or the system's reason
+  static Result<Journal> open(const std::string& path, std::string_view held);
+  Journal(Journal&& other) noexcept;
+  Journal& operator=(Journal&&) = delete;
+  ~Journal();
+
+  bool empty() const;
+  /// Empties the file. errors  kOutput
+  Status clear();
+  /// Every line so far, in order, without its end; the last one may be torn. cost  reads the file once
+  /// errors  kOutput: cannot be read, or a line of more than 64 MiB
+  Status read(const std::function<void(const std::string&)>& line);
+  /// Adds a line, which ends with a line's end. errors  kOutput: one line with the path and the system's reason
+  Status append(std::string line);
+
+ private:
+  Journal(std::string path, int file) : path_(std::move(path)), file_(file) {}
+
+  std::string path_;
+  int file_;
+  bool torn_ = false;  // the file does not end with a line break
+};
+
+}  // namespace lamina

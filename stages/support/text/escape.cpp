@@ -1,0 +1,69 @@
+#include "stages/support/text/escape.h"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace lamina {
+namespace {
+
+/// The text with a backslash before each of some characters.
+std::string with_backslashes(std::string_view text, std::string_view special) {
+  std::string out;
+  for (const char c : text) {
+    if (special.find(c) != std::string_view::npos) out += '\\';
+    out += c;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string roff(std::string_view text) {
+  std::string out;
+  bool line_begins = true;
+  for (const char c : text) {
+    if (line_begins && (c == '.' || c == '\'')) out += "\\&";
+    if (c == '\\') {
+      out += "\\e";
+    } else if (c == '-') {
+      out += "\\-";
+    } else {
+      out += c;
+    }
+    line_begins = c == '\n';
+  }
+  return out;
+}
+
+std::string markdown_cell(std::string_view text) {
+  std::string out = with_backslashes(text, "|<*_");
+  for (char& c : out) {
+    if (c == '\n') c = ' ';
+  }
+  return out;
+}
+
+std::string markdown_code(std::string_view text) { return "`" + with_backslashes(text, "|") + "`"; }
+
+std::string zsh_argument(std::string_view text) {
+  std::string out;
+  for (const char c : with_backslashes(text, "[]:\\")) c == '\'' ? out.append("'\\''") : out.append(1, c);
+  return out;
+}
+
+std::string fish_word(std::string_view text) { return "'" + with_backslashes(text, "\\'") + "'"; }
+
+std::string base64(std::span<const std::byte> bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t have = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < have ? static_cast<std::uint32_t>(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= have ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+}  // namespace lamina

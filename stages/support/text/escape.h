@@ -1,0 +1,34 @@
+// stages/support/text/escape.h: escapes text for manual pages, Markdown and shells.
+//
+// Each function accepts any text and returns its escaped form; none fails.
+// cost  one pass
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace lamina {
+
+/// For a man page: backslashes, dashes, and dots and quotes at the start of a line.
+std::string roff(std::string_view text);
+
+/// For a cell of a Markdown table, on one line.
+std::string markdown_cell(std::string_view text);
+
+/// For code in a cell of a Markdown table, in backticks.
+std::string markdown_code(std::string_view text);
+
+/// For [...] in a single-quoted argument of zsh's _arguments.
+std::string zsh_argument(std::string_view text);
+
+/// A word of fish, in single quotes.
+std::string fish_word(std::string_view text);
+
+// --- bytes as text.
+
+/// Base 64 as in RFC 4648, padded, without line ends.
+std::string base64(std::span<const std::byte> bytes);
+
+}  // namespace lamina

@@ -1,0 +1,42 @@
+// stages/support/text/number_text.h: strict parsing of numbers in options and job files.
+//
+// The whole text must be one finite number: "12mm", "1e999", "nan" and "inf" are errors.
+// Every reader returns an empty string, or an error with the valid form, to follow the option's name.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lamina {
+
+/// A number in [low, high]. `unit` is for the message only, as in " mm".
+std::string read_number(std::string_view text, double low, double high, std::string_view unit, double& value);
+
+/// A whole number in [low, high]; 600 and 600.0 are both whole.
+std::string read_whole(std::string_view text, std::int64_t low, std::int64_t high, std::int64_t& value);
+
+/// true or false.
+std::string read_switch(std::string_view text, bool& value);
+
+/// Bytes: 1073741824, 256M, 1G, 1.5GiB; K, M and G are powers of 1024.
+std::string read_bytes(std::string_view text, std::uint64_t& bytes);
+
+/// Layers first:last, from 0, without last; either side may be missing. An open end is UINT32_MAX.
+std::string read_layer_range(std::string_view text, std::array<std::uint32_t, 2>& range);
+
+/// Shard i/n with i from 1 to n; `shard` holds i from 0.
+std::string read_shard(std::string_view text, std::array<std::uint32_t, 2>& shard);
+
+/// The parts of a text between any of `separators`; one empty part for an empty text.
+std::vector<std::string_view> split(std::string_view text, std::string_view separators);
+
+/// The text without the spaces around it.
+std::string_view trimmed(std::string_view text);
+
+/// The shortest text that reads back as the same number; never -0.
+std::string number_text(double value);
+
+}  // namespace lamina

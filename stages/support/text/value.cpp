@@ -1,0 +1,60 @@
+#include "stages/support/text/value.h"
+
+#include "stages/support/text/names.h"
+
+namespace lamina {
+namespace {
+
+template <class Whole>
+std::string read_whole_value(std::string_view text, const Limits& limits, Whole& value) {
+  std::int64_t whole = 0;
+  auto wrong = read_whole(text, static_cast<std::int64_t>(limits.low), static_cast<std::int64_t>(limits.high), whole);
+  if (wrong.empty()) value = static_cast<Whole>(whole);
+  return wrong;
+}
+
+}  // namespace
+
+std::string read_value(std::string_view text, const Limits& limits, double& value) {
+  return read_number(text, limits.low, limits.high, limits.unit, value);
+}
+std::string read_value(std::string_view text, const Limits& limits, std::int64_t& value) {
+  return read_whole_value(text, limits, value);
+}
+std::string read_value(std::string_view text, const Limits& limits, std::uint32_t& value) {
+  return read_whole_value(text, limits, value);
+}
+std::string read_value(std::string_view text, const Limits& limits, std::int32_t& value) {
+  return read_whole_value(text, limits, value);
+}
+std::string read_value(std::string_view text, const Limits&, bool& value) { return read_switch(text, value); }
+
+std::string check_value(double value, const Limits& limits) {
+  return value >= limits.low && value <= limits.high  // nan is not
+             ? std::string()
+             : fmt::format("{} is out of range; give a number from {} to {}{}", number_text(value), limits.low, limits.high,
+                           limits.unit);
+}
+std::string check_value(std::int64_t value, const Limits& limits) {
+  const auto low = static_cast<std::int64_t>(limits.low), high = static_cast<std::int64_t>(limits.high);
+  return value >= low && value <= high ? std::string()
+                                       : fmt::format("{} is out of range; give a whole number from {} to {}", value, low, high);
+}
+
+std::string check_length(std::size_t length, const Limits& limits) {
+  if (length < limits.minimum) return fmt::format("holds {} values; give at least {}", length, limits.minimum);
+  if (length > limits.maximum) return fmt::format("holds {} values; give at most {}", length, limits.maximum);
+  return {};
+}
+
+std::string not_one_of(std::string_view text, std::span<const std::string_view> words) {
+  return fmt::format("'{}' is none of {}{}", text, fmt::join(words, ", "), suggest(text, words));
+}
+
+std::string check_path(std::string_view text) {
+  if (text.empty()) return "is empty; name a file or directory";
+  if (text.find('\0') != std::string_view::npos) return "holds a zero byte; name a file or directory";
+  return {};
+}
+
+}  // namespace lamina

@@ -1,0 +1,129 @@
+#include "stages/view/picture/contact_sheet.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <mutex>
+#include <utility>
+
+#include "stages/geometry/combine.h"
+#include "stages/geometry/coverage.h"
+#include "stages/view/picture/canvas.h"
+#include "stages/view/picture/layout.h"
+
+namespace lamina::view::picture {
+namespace {
+
+constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59}, kQuiet{120, 116, 108},
+    kWarning{217, 72, 15};
+
+/// The levels of a layer, its images added up.
+Result<Levels> levels_of_layer(const SheetRequest& request, const SheetLayer& layer, const ReadImage& read) {
+  Levels all;
+  for (const std::string& path : layer.paths) {
+    Result<Levels> image = read(path);
+    if (!image) return image;
+    if (image->columns != request.grid.columns() || image->view().rows() != request.grid.rows()) {
+      return Error{Fault::kVerification,
+                   fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again", path, image->columns,
+                               image->view().rows(), request.grid.columns(), request.grid.rows())};
+    }
+    if (&path == &layer.paths.front()) {
+      all = std::move(*image);
+      continue;
+    }
+    Levels before;
+    std::swap(before, all);
+    add_levels(before, *image, all);
+  }
+  if (const int found = highest(all); found > request.maximum) {
+    return Error{Fault::kVerification, fmt::format("{}: has pixels of {} drops, the job at most {}; plan the layer again",
+                                                   layer.paths.front(), found, request.maximum)};
+  }
+  return all;
+}
+
+/// Calls use(index, levels) for each layer, from several threads. The error is that of the first layer with one.
+template <class Use>
+Status for_each_image(const SheetRequest& request, const ReadImage& read, const Use& use) {
+  std::mutex mutex;
+  std::size_t first_wrong = request.layers.size();
+  Error error;
+  tbb::parallel_for(std::size_t{0}, request.layers.size(), [&](std::size_t index) {
+    const Result<Levels> levels = levels_of_layer(request, request.layers[index], read);
+    if (levels) return use(index, levels->view());
+    const std::lock_guard lock(mutex);
+    if (index < first_wrong) {
+      first_wrong = index;
+      error = levels.error();
+    }
+  });
+  if (first_wrong < request.layers.size()) return error;
+  return {};
+}
+
+Result<PixelWindow> shown_window(const SheetRequest& request, const ReadImage& read) {
+  const PixelWindow bed{0, request.grid.columns(), 0, request.grid.rows()};
+  if (request.whole_bed) return bed;
+  std::mutex mutex;
+  PixelWindow all;
+  const Status status = for_each_image(request, read, [&](std::size_t, const LevelsView& levels) {
+    const PixelWindow window = window_of(levels);
+    const std::lock_guard lock(mutex);
+    all = joined(all, window);
+  });
+  if (!status) return status.error();
+  return with_margin(all, request.grid);
+}
+
+std::string shown_size(const PixelWindow& window, const PixelGrid& grid) {
+  const auto size = [](double pixels, double dpi) { return pixels * 25.4 / dpi; };
+  return fmt::format("{:.1f} x {:.1f} mm", size(window.width(), grid.x.dpi()), size(window.height(), grid.y.dpi()));
+}
+
+/// The longest beginning of `line` that fits, with dots if it is cut.
+std::string fitted(const std::string& line, int size, int width) {
+  if (text_width(line, size) <= width) return line;
+  std::size_t length = line.size();
+  while (length > 0 && text_width(line.substr(0, length) + "...", size) > width) --length;
+  return line.substr(0, length) + "...";
+}
+
+void draw_frame(Canvas& canvas, const SheetRequest& request, const SheetLayout& layout, int cell) {
+  const int left = layout.cell_left(cell), top = layout.cell_top(cell);
+  canvas.fill_box(left - 1, top - 1, layout.cell_width + 2, layout.cell_height + 2, kFrame);
+  canvas.fill_box(left, top, layout.cell_width, layout.cell_height, kPaper);
+  const SheetLayer& layer = request.layers[static_cast<std::size_t>(cell)];
+  const int baseline = top + layout.cell_height + layout.caption_size * 5 / 4, size = layout.caption_size;
+  const int remark_width = text_width(layer.remark, size), name_width = text_width(layer.name, size);
+  canvas.text(left, baseline, size, fitted(layer.name, size, layout.cell_width), layer.warns ? kWarning : kInk);
+  if (name_width + size / 2 + remark_width <= layout.cell_width) {
+    canvas.text(left + layout.cell_width - remark_width, baseline, size, layer.remark, kQuiet);
+  }
+}
+
+}  // namespace
+
+Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read) {
+  const Result<PixelWindow> window = shown_window(request, read);
+  if (!window) return window.error();
+  const int cells = static_cast<int>(request.layers.size());
+  const SheetLayout layout = layout_chart(cells, *window, request.grid, static_cast<int>(request.width));
+  Canvas canvas(layout.width, layout.height, kGround);
+  const std::string title = request.title + "   |   " + shown_size(*window, request.grid) + " shown";
+  canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size,
+              fitted(title, layout.title_size, layout.width - 2 * layout.margin), kInk);
+  for (int cell = 0; cell < cells; ++cell) draw_frame(canvas, request, layout, cell);
+
+  const Status status = for_each_image(request, read, [&](std::size_t index, const LevelsView& levels) {
+    Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
+    box_coverage(levels, request.maximum, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
+    const int cell = static_cast<int>(index);
+    const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;
+    canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, request.layers[index].warns ? kWarning : kInk);
+  });
+  if (!status) return status.error();
+  return canvas.png();
+}
+
+}  // namespace lamina::view::picture

@@ -1,0 +1,40 @@
+// stages/view/picture/contact_sheet.h: layers side by side, for people.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+#include "stages/data/levels.h"
+#include "stages/data/status.h"
+
+namespace lamina::view::picture {
+
+struct SheetLayer {
+  std::vector<std::string> paths;  // of the images, whose levels are added up: one a drop of a pixel, or one of all
+  std::string name, remark;        // below the cell, on the left and on the right
+  bool warns = false;              // drawn in orange, its name too
+};
+
+struct SheetRequest {
+  std::string title;               // above all
+  std::vector<SheetLayer> layers;  // one or more, in the order of the sheet
+  PixelGrid grid;                  // of the bed; all images are of its size
+  std::uint8_t maximum = 1;        // level of a pixel that is drawn as set; those below are paler by their share of it
+  bool whole_bed = false;          // else the part of it that holds what is set in any of the layers, and a margin
+  std::uint32_t width = 2400;      // pixels of the sheet; a single layer is never made larger than its pixels
+};
+
+/// A PNG of the layers. All cells show the same part of the bed at the same scale; each of its pixels is as dark as
+/// the share of its area that is set, or the mean of levels / most over it. The bytes depend on the images, the request and the
+/// versions of OpenImageIO and of the font alone.
+/// read    the image of a file, 1 where one of 1 bit is set; called from any thread
+/// errors  those of `read`; kVerification if an image is not of the bed's size, or a pixel has a level above the most
+/// cost    two readings of each image, on all processors; memory is the picture and the runs of the images being read
+using ReadImage = std::function<Result<Levels>(const std::string& path)>;
+Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read);
+
+}  // namespace lamina::view::picture

@@ -1,0 +1,123 @@
+// What a person types, and what the program says of itself.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/terminal/arguments.h"
+#include "pipeline/cli/terminal/pages.h"
+#include "pipeline/cli/terminal/slicer_aliases.h"
+#include "stages/support/text/names.h"
+
+namespace lamina::pipeline {
+namespace {
+
+TEST(Help, IsAsWideAsTheTerminalAndNamesEveryOption) {
+  for (CommandSpec spec : pipeline::all_specs()) {
+    spec.closing.clear();  // examples stay as they are
+    spec.more = nullptr;
+    for (const int columns : {40, 60, 100}) {
+      std::istringstream lines(help_text(spec, columns));
+      for (std::string line; std::getline(lines, line);) {
+        const bool one_word = line.find(' ', line.find_first_not_of(' ')) == std::string::npos;
+        const bool a_term = line.starts_with("  -") || line.starts_with("Usage");
+        EXPECT_TRUE(line.size() <= static_cast<std::size_t>(columns) || one_word || a_term ||
+                    line.find("(default ") != line.npos)
+            << spec.name << ", " << columns << ": " << line;
+      }
+    }
+    const std::string text = help_text(spec, 100);
+    for (const OptionSpec& option : spec.options) {
+      EXPECT_NE(text.find(option.flag.substr(option.flag.rfind(',') + 1)), std::string::npos) << spec.name << option.flag;
+    }
+    EXPECT_EQ(text.find("\n\n\n"), std::string::npos) << spec.name;
+    EXPECT_EQ(text.find('\1'), std::string::npos) << spec.name;
+  }
+}
+
+TEST(Help, HasEachHeadingOnce) {
+  for (CommandSpec spec : pipeline::all_specs()) {
+    spec.summary.clear();
+    spec.closing.clear();
+    spec.more = nullptr;
+    std::multiset<std::string> headings;
+    std::istringstream lines(help_text(spec, 100) + man_page(spec) + markdown_page(spec));
+    for (std::string line; std::getline(lines, line);) {
+      const bool of_help = !line.starts_with(' ') && line.ends_with(':');
+      if (of_help || line.starts_with(".SS ") || line.starts_with("## ")) headings.insert(line);
+    }
+    for (const std::string& heading : headings) EXPECT_EQ(headings.count(heading), 1u) << spec.name << ": " << heading;
+    EXPECT_TRUE(headings.contains("Options:")) << spec.name;
+    if (spec.name == "jet") {
+      EXPECT_TRUE(headings.contains("Machine and binder:"));
+    }
+    if (spec.name == "extrude") {
+      EXPECT_TRUE(headings.contains("Machine:"));
+      EXPECT_FALSE(headings.contains("Machine and binder:"));
+    }
+  }
+}
+
+TEST(Manual, EveryPageSaysWhereFilesLieAndWhatTheEnvironmentDoes) {
+  const auto specs = pipeline::all_specs();
+  EXPECT_NE(man_page(specs).find("SOURCE_DATE_EPOCH"), std::string::npos);
+  for (const CommandSpec& spec : specs) {
+    const std::string page = man_page(spec);
+    for (const char* heading : {".SH FILES\n", ".SH ENVIRONMENT\n", ".SH EXIT STATUS\n"}) {
+      EXPECT_NE(page.find(heading), std::string::npos) << spec.name << heading;
+    }
+  }
+}
+
+TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
+  const auto requested = [](const char* command, const char* flag) {
+    return slicer_alias(flag, pipeline::spec_of(*pipeline::find_command(command)));
+  };
+  const struct {
+    const char *command, *flag, *ours;
+  } rows[] = {
+      {"jet", "--layer-height", "'--layer'"},
+      {"extrude", "--layer_height", "'--layer'"},
+      {"extrude", "--fill-density", "--line-distance"},
+      {"extrude", "--infill-pattern", "'--pattern'"},
+      {"jet", "--resolution", "'--dpi'"},
+      {"slice", "--resolution", "'--tolerance'"},
+      {"extrude", "--perimeters", "'--walls'"},
+      {"extrude", "--wall_line_count", "'--walls'"},
+      {"extrude", "--temperature", "'--nozzle-temperature'"},
+      {"jet", "--duplicate", "'--copies'"},
+      {"extrude", "--rotate-x", "'--rotate'"},
+      {"extrude", "--support", "lamina makes no supports"},
+      {"jet", "--support_material", "lamina makes no supports"},
+      {"extrude", "--brim", "lamina lays no brim"},
+      {"extrude", "--raft-layers", "lamina lays no raft"},
+  };
+  for (const auto& row : rows) EXPECT_NE(requested(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;
+  EXPECT_EQ(requested("info", "--layer-height"), "") << "info has no layers";
+  EXPECT_EQ(requested("jet", "--dip"), "");
+  const auto refused = read_arguments(pipeline::spec_of(*pipeline::find_command("jet")), {"part.stl", "--layer-height=0.2"});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "--layer-height: no such option; did you mean '--layer'?");
+}
+
+TEST(Suggestions, TheShorterOfTwoNamesThatHoldTheWordIsNearer) {
+  const std::vector<std::string_view> names = {"nuferbj-31", "nuferbj-360dpi", "nuferbj"};
+  EXPECT_EQ(suggest("nuferb", names), "; did you mean 'nuferbj'?");
+  EXPECT_EQ(suggest("360dpi", names), "; did you mean 'nuferbj-360dpi'?");
+}
+
+TEST(Suggestions, AThirdOfTheLettersMayBeWrong) {
+  const std::vector<std::string_view> names = {"--skirt", "--walls", "--nozzle-temperature", "--at", "-o"};
+  EXPECT_EQ(suggest("--support", names), "");
+  EXPECT_EQ(suggest("--raft", names), "");
+  EXPECT_EQ(suggest("--wall", names), "; did you mean '--walls'?");
+  EXPECT_EQ(suggest("--skrit", names), "; did you mean '--skirt'?");
+  EXPECT_EQ(suggest("--wlals", names), "; did you mean '--walls'?");
+  EXPECT_EQ(suggest("--nozle-temprature", names), "; did you mean '--nozzle-temperature'?");
+  EXPECT_EQ(suggest("--zzz", names), "");
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
