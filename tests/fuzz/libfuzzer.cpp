@@ -1,4 +1,4 @@
-// A program for libFuzzer with one of its targets: fuzz_meshes --target=obj FOLDER.
+// A program for libFuzzer with all targets, of which a call runs one: fuzz_readers --target=obj FOLDER.
 //
 //   --list        every target, a line each: name, most bytes, dictionary or -, endings of seeds, sources
 //   --seeds=DIR   writes the seeds that the target makes itself
