@@ -77,7 +77,7 @@ class Squares {
   Buffer<std::uint32_t> begin_, held_;
 };
 
-/// The piece beside one that it touches, and the area of the cusps between them: below 0 there is no room for both.
+/// A neighbour that a piece touches, and the area of the cusps between them; below 0: both do not fit.
 struct Contact {
   std::uint32_t piece = kNone;
   double distance_mm = 0, clearance_mm2 = 0;
@@ -121,7 +121,7 @@ class ContactFinder {
       if (distance >= widths || distance <= kOwnLine * widths || forward > here.half_mm + other.half_mm) return;
       Contact& best = found[leftward > 0 ? 0 : 1];
       double& best_offset = offset[leftward > 0 ? 0 : 1];
-      // Pieces of one line differ in rounding alone: the one that lies straight beside is the neighbour.
+      // Pieces of one line differ in rounding alone: the one straight across is the neighbour.
       const bool same_line = best.piece != kNone && std::abs(distance - best.distance_mm) < 0.1 * widths;
       const bool nearer = same_line ? forward < best_offset || (forward == best_offset && j < best.piece)
                                     : best.piece == kNone || distance < best.distance_mm;

@@ -1,8 +1,8 @@
-// stages/bead/contacts.h: where the pieces of a layer's beads touch those beside them, and what shape they have there.
+// stages/bead/contacts.h: contacts between neighbouring pieces of a layer's beads, and the shape of the sides.
 //
-// Two beads that reach each other share the room between their lines, as in neighbours.h: what would lie twice fills the cusps
-// above and below the place where they touch; a cusp that is partly filled is round. What finds no room there goes to the other
-// sides of both beads. One constant: a free side takes a twentieth of its bead at a time.
+// Two beads that reach each other share the space between their lines, as in neighbours.h: the volume of their overlap fills
+// the cusps above and below the contact; a partly filled cusp is round. Volume that does not fit there goes to the other sides
+// of both beads. One constant: a free side takes a twentieth of its bead at a time.
 #pragma once
 
 #include <span>
@@ -18,7 +18,7 @@ struct PieceSide {
   double corner_mm = -1;  // where it touches: the radius of the cusps above and below; below 0: it touches nothing
 };
 
-/// Both, as seen along the piece.
+/// Both sides, viewed along the piece.
 struct PieceSides {
   PieceSide left, right;
 };
@@ -31,8 +31,8 @@ struct PieceClearance {
 
 /// height_mm  of the layer
 /// sides      one for each piece
-/// rooms      one for each piece; none: not told
-/// returns    mm3 that found no room and are left out
+/// clearances  one for each piece; null: not reported
+/// returns    mm3 that did not fit and are left out
 /// cost       O(pieces x pieces within the widest bead's width of one), parallel; 100 bytes a piece. Same for any threads
 double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
                      Buffer<PieceClearance>* clearances = nullptr);
@@ -40,12 +40,12 @@ double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, B
 /// How far a side reaches at a height over or below the middle of the layer, mm; below 0: not at all.
 double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm);
 
-// --- melt that finds no room beside its neighbours flows along its own line.
+// --- melt that does not fit between its neighbours flows along its own line.
 //
-// Between two beads that leave it none, melt is pushed along the line, half of it forwards and half back, to the nearest places
-// where cusps are open or a side is free. Volume is kept. Assumed: it flows as easily as that, however far it is. A free side
-// takes a twentieth of its bead in each of eight rounds (contacts.h): what lies about is levelled so far, and no measurement
-// decided how far.
+// If two neighbours leave no space, melt is pushed along the line, half of it forwards and half back, to the nearest positions
+// where cusps are open or a side is free. Volume is kept. Assumed: it flows equally easily at any distance. A free side takes a
+// twentieth of its bead in each of eight rounds (contacts.h), which limits how far the surplus is levelled; no measurement
+// determined that limit.
 
 /// pieces   of a layer in the order of printing; those that follow each other without a gap are a line. Areas and widths change
 ///          where melt leaves or comes

@@ -1,10 +1,10 @@
-// stages/bead/deposition.h: the beads of a layer as they come to lie, predicted from what a toolpath file commands.
+// stages/bead/deposition.h: predicts the deposited beads of a layer from the commands of a toolpath file.
 //
-// A line is what is laid without a stop: it is fed along its whole way (line.h) and may spread along it (spread.h). At a bend
-// the head slows down to the speed at which the change of its velocity is that which the machine makes at once (the classic
-// jerk of Marlin's planner). Assumed: what the melt held when a line ended it holds when the next one begins, and what was fed
-// in between in addition: retractions are made for that, and nothing is known of how well they do. The first line of all begins
-// with the flow of the speed with which it begins, and so does one behind a feed that no flow of a line explains (a purge).
+// A line is a chain of moves deposited without a stop: it is fed along its whole length (line.h) and may spread along it
+// (spread.h). At a bend the head slows down to the speed at which its velocity changes by what the machine changes at once (the
+// classic jerk of Marlin's planner). Assumed: the melt has the state of the end of the previous line when a line begins, plus
+// what was fed in between: retractions are made for that; how well they work is unknown. The first line begins with the flow of
+// its own initial speed, and so does a line after a feed that no flow of a line explains (a purge).
 #pragma once
 
 #include <span>
@@ -22,15 +22,15 @@ struct DepositionRules {
   double feed_ratio = 1;   // what is fed / what is commanded
   double height_mm = 0.2;  // of the layer, > 0
   double piece_mm = 0.02;  // length of pieces, > 0
-  double usual_mm_s = 40;  // of beads whose speed the file does not tell
-  Box within;              // pieces that do not reach into it are left out; empty: all are laid
+  double usual_mm_s = 40;  // of beads whose speed the file does not state
+  Box within;              // pieces that do not reach into it are left out; empty: all are kept
   bool spread = false;     // along the line too: lines end round then, and reach beyond their ends
 };
 
 /// A piece of a bead that is straight and has one cross-section.
 struct DepositedPiece {
   Point2 from, to;            // nm on the bed
-  double area_mm2, width_mm;  // alone: of the bead that nothing is beside
+  double area_mm2, width_mm;  // of the bead without neighbours
 };
 
 /// beads, feeds  of one layer, in the order of printing, as many of each

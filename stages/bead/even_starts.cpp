@@ -13,7 +13,7 @@ constexpr double kMin = 1e-3;      // mm3 that the melt holds too little or too 
 constexpr double kWay = 0.2;       // mm, of the first piece
 constexpr double kMinFeed = 0.05;  // times that of the line: a move without a feed is a travel
 constexpr double kMaxFeed = 3;
-constexpr double kTolerance = 1;     // mm of width: nobody looks at widths here
+constexpr double kTolerance = 1;     // mm of width: widths are not used here
 constexpr double kMinLength = 1e-3;  // mm, of a piece
 
 double length_of(const BeadMove& move) { return std::hypot(mm(move.to.x - move.from.x), mm(move.to.y - move.from.y)); }
@@ -57,7 +57,7 @@ EvenStarts::MovePieces EvenStarts::made_even(const BeadMove& move) {
   const double way = way_of(ratio, reach), kept = std::exp(-way / reach);
   const double share = (1 - ratio * kept) / (1 - kept);
   pieces.move[0].area_mm2 *= share;
-  if (length < way - kMinLength) {  // goes on with the line's next move
+  if (length < way - kMinLength) {  // continues with the line's next move
     left_ = own_ * (share + (ratio - share) * std::exp(-length / reach));
     return pieces;
   }

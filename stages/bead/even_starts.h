@@ -1,10 +1,9 @@
-// stages/bead/even_starts.h: lines that begin with the flow they keep, whatever the line before left behind.
+// stages/bead/even_starts.h: lines begin with the flow they keep, regardless of the previous line.
 //
-// The melt lags (stages/bead/lag.h): behind a line that was laid faster a line begins too thick, behind a slower one too thin,
-// until the melt has forgotten, some tenths of a millimetre on. The first 0.2 mm of a line, or as much as keeps the feed
-// between a twentieth and thrice its own, are fed as much more or less as makes the flow at their end that of the line. Nothing
-// is fed standing or drawn back for it. Within a line nothing is changed: segmented lines live from the lag.
-//
+// The melt lags (stages/bead/lag.h): after a faster line a line begins too thick, after a slower one too thin, until the
+// transient has decayed after some tenths of a millimetre. The first 0.2 mm of a line, or as much as keeps the feed between a
+// twentieth and three times its own, are fed more or less such that the flow at their end is that of the line. Nothing is fed
+// or retracted for it while the head stands still. Within a line nothing is changed: segmented lines depend on the lag.
 // Assumed: travels and retractions keep what the melt holds; lines begin and end with their own speeds. Braking at ends is the
 // same for all lines, and what it leaves behind is left alone.
 #pragma once
@@ -17,7 +16,7 @@
 
 namespace lamina::bead {
 
-/// Takes the moves of a layer in the order in which they are laid. The first line of a layer is left as it is.
+/// Takes the moves of a layer in the order in which they are deposited. The first line of a layer is left as it is.
 /// cost  some ten exponentials a move
 class EvenStarts {
  public:
@@ -25,11 +24,11 @@ class EvenStarts {
   /// height   of the layer, mm
   EvenStarts(const Extruder& machine, double height_mm);
 
-  /// What is laid without this object is not known: the next line is left as it is.
+  /// Moves deposited without this object are unknown: the next line is left as it is.
   void forget() { known_ = false; }
 
-  /// Gives lay(const BeadMove&) the move, or two pieces of it.
-  /// returns  what both have laid; nothing if `lay` stops
+  /// Calls deposit(const BeadMove&) with the move, or with two pieces of it.
+  /// returns  the sum of both; nothing if `deposit` stops
   template <class Deposit>
   std::optional<DepositedMove> deposit(const BeadMove& move, Deposit&& deposit) {
     const MovePieces pieces = take(move);
@@ -57,7 +56,7 @@ class EvenStarts {
   double speed_ = 0;           // of the last move
   double left_ = 0, own_ = 0;  // mm3/s: the flow that runs, and that of the line, until it is even
   bool even_ = true;
-  bool known_ = false;  // whether a line was laid
+  bool known_ = false;  // whether a line was deposited
 };
 
 }  // namespace lamina::bead

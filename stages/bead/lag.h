@@ -26,7 +26,7 @@ struct Phase {
     if (tau_s <= 0) return followed;
     return followed + excess() * std::exp(-t / tau_s);
   }
-  /// mm3 that were laid by then: the integral of the flow, not what was fed less what is held.
+  /// mm3 that were deposited by then: the integral of the flow, not what was fed less what is held.
   double deposited_after(double t) const {
     const double followed = area_mm2 * t * (speed_mm_s + acceleration_mm_s2 * (t / 2 - tau_s));
     if (tau_s <= 0) return followed;

@@ -17,9 +17,9 @@ namespace lamina::bead {
 
 // --- the speed of the head along a line, decided as far ahead as it has to be and no further.
 //
-// A planner joins two stretches at the slower of their two speeds: what changes, changes within the faster one. Where a stretch
-// is too short for that the speed at its beginning is lower. A speed at a joint is final as soon as it is the same whether
-// the head stops behind the last stretch that is known or goes on, so that what waits is as long as a braking distance.
+// A planner joins two segments at the slower of their two speeds: a change takes place within the faster one. Where a segment
+// is too short for that, the speed at its beginning is lower. A junction speed is final as soon as it is the same whether the
+// head stops after the last known segment or continues, so that the queue is as long as a braking distance.
 
 /// A stretch and the speeds at its two ends.
 struct Planned {
@@ -37,7 +37,7 @@ class SpeedPlan {
   /// A new line; nothing may wait. speed  that the line before joins with; faster than the first stretch: it is left at once
   void begin(double speed_mm_s) { speed_ = speed_mm_s; }
   void add(const LineSegment& segment) { waiting_.push_back(segment); }
-  /// The line ends with this speed. Whoever says so takes all that waits.
+  /// The line ends with this speed. The caller then takes all queued segments.
   bool take_last(double speed_mm_s, Planned& out);
   /// The next stretch whose speeds are final. cost  O(stretches that wait)
   bool take(Planned& out);
@@ -65,7 +65,7 @@ struct BeadPiece {
   double begin_mm, end_mm;
   double begin_area_mm2, end_area_mm2;
   double begin_width_mm, end_width_mm;
-  double volume_mm3;  // that is laid
+  double volume_mm3;  // deposited
   bool pressed;       // between nozzle and layer
 };
 

@@ -1,6 +1,6 @@
-// stages/bead/machine.h: what a machine differs in when it lays beads, and what it is told to lay.
+// stages/bead/machine.h: the bead parameters of a machine, and the commands that deposit beads.
 //
-// A bead is predicted from three numbers of a machine and from the volume it is fed; no table of widths is looked up.
+// A bead is predicted from three numbers of a machine and from the volume it is fed; no table of widths is used.
 #pragma once
 
 #include <limits>
@@ -12,7 +12,7 @@ namespace lamina::bead {
 /// A calibration for the model. Nothing else of a machine enters it.
 struct BeadMachine {
   double area_mm2 = 0;  // cross-section of 100 %: bead_area x flow of the profile
-  /// The melt follows the feed with this lag, s; 0 lays at once what is fed. Anet A8: time_constant() in stabilisation.h.
+  /// The melt follows the feed with this lag, s; 0: deposits at once what is fed. Anet A8: time_constant() in stabilisation.h.
   double tau_s = 0;
   /// Of the head along a line. Infinite: speeds change at once.
   double acceleration_mm_s2 = std::numeric_limits<double>::infinity();

@@ -10,7 +10,7 @@
 namespace lamina::bead {
 namespace {
 
-constexpr double kResolution = 0.01;  // mm, to which widths are told apart
+constexpr double kResolution = 0.01;  // mm, resolution of widths
 constexpr double kForgotten = 10;     // lags, after which a line is as if nothing had been
 
 /// The widths about a thin stretch between two thick ones that are long enough to forget.

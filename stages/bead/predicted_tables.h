@@ -1,7 +1,7 @@
-// stages/bead/predicted_tables.h: the tables of a calibration as the model has them, for machines on which nobody measured any.
+// stages/bead/predicted_tables.h: calibration tables predicted by the model, for machines without measured ones.
 //
-// Test pieces are those of Di Nisio 2022: a thin stretch between long thick ones, by speed (Table 11) and by extrusion
-// (Table 12), and stretches of 1.5 mm in turn (Tables 13 to 15). Against what was measured there: tests/bead/test_tables.cpp.
+// Test pieces are those of Di Nisio 2022: a thin segment between long thick ones, by speed (Table 11) and by extrusion (Table
+// 12), and alternating segments of 1.5 mm (Tables 13 to 15). Comparison with its measurements: tests/bead/test_tables.cpp.
 #pragma once
 
 #include "stages/bead/line.h"
@@ -11,7 +11,7 @@
 namespace lamina::bead {
 
 /// machine     area_mm2 > 0 and tau_s > 0
-/// width_mm    of what 100 % lays, as it is asked for; widths of the tables are those of the model
+/// width_mm    requested width of 100 % extrusion; widths of the tables are those of the model
 /// height_mm   of the layer
 /// speed_mm_s  that 100 % means
 /// cost        some milliseconds
@@ -34,7 +34,7 @@ struct IntervalWidths {
 
 /// Of a period.
 struct PatternSums {
-  double fed_mm3;  // and laid
+  double fed_mm3;  // and deposited
   double seconds;
   double flow_mm3_s;  // with which a thick stretch begins
   double peak_mm_s;   // that the head reaches in a thin stretch

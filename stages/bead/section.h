@@ -1,14 +1,14 @@
-// stages/bead/section.h: how wide a bead of a cross-section is.
+// stages/bead/section.h: the width of a bead of given cross-section.
 //
 // Three forms, none with a constant of its own:
 // - A bead that fills its layer is a stadium: a rectangle with half circles at both sides (the `Flow` of PrusaSlicer and
 // Slic3r).
 // - A bead that filled its layer and is starved by the lag, though it is fed enough, stays between nozzle and layer below: it
-//   keeps its height and is an ellipse. Such are the thin stretches of Di Nisio 2022, Table 11.
-// - A thread that is fed too little to fill its layer lets go and lies as it left the nozzle, round, until the layer is
-//   filled again. Such are those of Table 12.
-// The rule that tells the last two apart was found by looking at Tables 11 and 12, in both of which a bead has half of its area
-// and is 0.21 mm wide in one, 0.27 mm in the other. Tables 13 to 16 had no say in it.
+//   keeps its height and is an ellipse. Examples are the thin segments of Di Nisio 2022, Table 11.
+// - A thread that is fed too little to fill its layer detaches and stays round, as it left the nozzle, until the layer is
+//   filled again. Examples are those of Table 12.
+// The rule that separates the last two was derived from Tables 11 and 12, in both of which a bead has half of its area
+// and is 0.21 mm wide in one, 0.27 mm in the other. Tables 13 to 16 were not used for it.
 #pragma once
 
 #include <algorithm>

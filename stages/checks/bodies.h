@@ -1,9 +1,9 @@
-// stages/checks/bodies.h: what hangs together from layer to layer, followed upwards on runs.
+// stages/checks/bodies.h: bodies connected from layer to layer, followed upwards on runs.
 //
-// Pieces are what touches within a layer; bodies are pieces that lie upon each other in neighbouring layers. Of the layers
-// below only the last one is kept, with the number of its body for each run.
+// Pieces are connected within a layer; bodies are pieces that overlap in neighbouring layers. Of the layers below only the last
+// one is kept, with the number of its body for each run.
 //
-// Source: sets that are united, R. E. Tarjan, "Efficiency of a Good But Not Linear Set Union Algorithm", Journal of the ACM
+// Source: disjoint-set union, R. E. Tarjan, "Efficiency of a Good But Not Linear Set Union Algorithm", Journal of the ACM
 // 22(2), 1975; labels of runs row by row, A. Rosenfeld and J. L. Pfaltz, "Sequential Operations in Digital Picture Processing",
 // Journal of the ACM 13(4), 1966.
 #pragma once
@@ -46,7 +46,7 @@ struct Body {
   std::uint32_t first_layer = UINT32_MAX, last_layer = 0;  // numbers
   std::int64_t bottom = 0, top = 0;                        // nm above the bed
   PixelBox box;
-  std::uint32_t owner = kNone;  // whatever a follower's rules put there
+  std::uint32_t owner = kNone;  // any value of a follower's rules
   bool open = false;            // the same
 };
 
@@ -118,8 +118,8 @@ class Follower {
   std::uint64_t need(const RunsView& image) const;
 
   /// Rules: begin(Body&) a piece with nothing below; grow(Body&) any piece, before it joins what is below; join(const Body&
-  /// stays, const Body& ends, const Body& piece) two bodies of lower layers that a piece unites; fields `owner` and `open` of
-  /// what is united are those of the first that has one, and of either. end(const Body&) a body that no layer goes on with.
+  /// stays, const Body& ends, const Body& piece) two bodies of lower layers that a piece merges; fields `owner` and `open` of
+  /// the merged body are those of the first that has one, and of either. end(const Body&) a body that does not continue.
   template <class Rules>
   void add(const Layer& layer, const RunsView& image, Rules& rules);
 
@@ -182,7 +182,7 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   for (std::uint32_t p = 0; p < pieces_.count(); ++p) {
     if (hangs_[p] == 0) rules.begin(bodies_[old + p]);
   }
-  // Bodies that a piece of this layer belongs to go on, in the order of the pieces.
+  // Bodies that a piece of this layer belongs to continue, in the order of the pieces.
   number_.assign(bodies_.size(), Body::kNone);
   next_.clear();
   next_.reserve(pieces_.count());

@@ -6,7 +6,7 @@
 namespace lamina::checks {
 namespace {
 
-/// About what looking at a layer takes that is not looked at: it is enough, with as many bodies below as in it.
+/// An estimate of the bytes to inspect an uninspected layer: enough with as many bodies below as in it.
 std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
   Follower solid(true);
   solid.find(image);
@@ -192,7 +192,7 @@ std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int
   return owner;
 }
 
-/// The first of the copies that begin together as one piece, wider than the box of any; kNone if it is none of them.
+/// The first of the copies that begin together as one piece, wider than the box of any; kNone if the body is no such piece.
 std::uint32_t Inspection::first_of_several(const Body& body) {
   std::uint32_t first = Body::kNone;
   const auto begins = [&](std::uint32_t s) { return placed_parts_[s].box.lo.z >= below_ && window_[s].meets(body.box); };
@@ -202,7 +202,7 @@ std::uint32_t Inspection::first_of_several(const Body& body) {
       first = s;
       continue;
     }
-    // The one beside it, of those before it.
+    // Its neighbour among the copies before it.
     std::uint32_t neighbour = first;
     for (std::uint32_t before = first; before < s; ++before) {
       if (begins(before) && window_[before].meets(window_[s])) neighbour = before;

@@ -1,6 +1,5 @@
-// stages/checks/inspect.h: looks at the layers of a powder job for what a person would want to know before printing: pieces
-// that hang on nothing, bodies that belong to no part, closed hollows full of powder, thin places, parts that grow together,
-// parts at the edge of the bed.
+// stages/checks/inspect.h: inspects the layers of a powder job for faults to know before printing: unsupported pieces, bodies
+// that belong to no part, closed hollows full of powder, thin regions, parts that grow together, parts at the edge of the bed.
 //
 // codes   islands      pieces of layers with nothing below that are not the bottom of a part
 //         loose        bodies without the bottom of a part: they fall off
@@ -61,7 +60,7 @@ struct Found {
 };
 
 struct Findings {
-  std::uint32_t layers = 0;  // that were looked at
+  std::uint32_t layers = 0;  // inspected
   Found islands, loose, hollows, thin;
   struct Touching {
     std::uint32_t part = 0, other = 0;  // of the job; equal for copies of one
@@ -70,33 +69,33 @@ struct Findings {
   std::vector<Touching> touching;  // each pair of parts once, the first kMax
   std::optional<Spot> bed_edge;    // of the first layer that reaches it
   struct Stop {
-    std::uint32_t layer = 0;  // from which on none was looked at
+    std::uint32_t layer = 0;  // the first that was not inspected
     double z_mm = 0;          // its bottom
-    std::uint64_t bytes = 0;  // that looking at it takes, at least
+    std::uint64_t bytes = 0;  // minimum to inspect it
   };
   std::optional<Stop> stop;  // for want of memory
   static constexpr std::size_t kMax = 20;
 };
 
-/// What of a layer is looked at before its turn; kept from layer to layer.
+/// The inspection of a layer on its own, before its turn; kept from layer to layer.
 struct LayerInspection {
   Runs image;
   ThinScratch scratch;
   ThinRegions thin;
-  std::uint64_t min_bytes = 0;  // of looking at it, if that is more than there may be: then the rest is empty
+  std::uint64_t min_bytes = 0;  // to inspect it, if above the limit: then the rest is empty
   std::uint64_t bytes() const { return bytes_held(image.row_offset) + bytes_held(image.change) + scratch.bytes(); }
 };
 
 /// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
-/// memory  two layers' runs with their numbers and bodies. Where these and the look at a layer are more than they may be, the
-///         inspection stops, and lets go of what it holds; where it does depends on the images alone
+/// memory  two layers' runs with their numbers and bodies. Where these and the inspection of a layer exceed the limit, the
+///         inspection stops and frees its memory; where it stops depends on the images alone
 /// cost    O(runs) a layer for all but thin places
 class Inspection {
  public:
   /// grid        of the images; must outlive this object
-  /// stands      the boxes of all copies; a piece at the bottom of one is not an island
+  /// placed_parts  the boxes of all copies; a piece at the bottom of one is not an island
   /// min_nm    what is narrower is thin; 0: nothing is
-  /// max_bytes  that it may take, with the look at one layer
+  /// max_bytes  limit of memory, with the inspection of one layer
   Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
              std::uint64_t max_bytes = UINT64_MAX);
 
@@ -107,14 +106,14 @@ class Inspection {
   void prepare(const RunsView& image, LayerInspection& inspection) const;
 
   // --- in layer order
-  /// Looks at no more layers, and lets go of what it holds.
+  /// Inspects no more layers, and frees its memory.
   void leave();
   void add(const Layer& layer, const LayerInspection& inspection);
   /// After the last layer.
   const Findings& finish();
   const Findings& findings() const { return findings_; }
 
-  /// Without looks.
+  /// Without LayerInspection.
   std::uint64_t bytes() const {
     return solid_.bytes() + powder_.bytes() + bytes_held(between_.change) + bytes_held(between_.row_offset);
   }
@@ -122,7 +121,7 @@ class Inspection {
  private:
   struct Solids;
   struct Powder;
-  /// A thin place that goes on from layer to layer.
+  /// A thin region that continues from layer to layer.
   struct Wall {
     PixelBox all, last;  // of all its layers; of the last one
     std::uint64_t max_pixels = 0;
@@ -154,7 +153,7 @@ class Inspection {
   std::int64_t below_ = 0;  // bottom of the layer before
   bool holds_ = false;      // any layer so far
   Layer layer_{};
-  std::vector<Wall> walls_;  // of the last layer, that the next one may go on with
+  std::vector<Wall> walls_;  // of the last layer, that the next one may continue
   Follower solid_{true}, powder_{false};
   Runs between_;  // the powder of a layer
   Findings findings_;

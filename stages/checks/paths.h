@@ -1,7 +1,7 @@
-// stages/checks/paths.h: warnings of contours and toolpaths that are told by layers.
+// stages/checks/paths.h: warnings of contours and toolpaths, reported by layers.
 //
 // codes   chains-open  cuts of layers stay open
-//         undivided    segmented lines are too short for the pores asked for
+//         undivided    segmented lines are too short for the requested pores
 //         no-bead      none fits
 #pragma once
 
@@ -32,7 +32,7 @@ struct PathWarnings {
 
   /// A layer's open chains of cuts, its segmented lines and its thin stretches.
   void add(const Layer& layer, std::uint64_t open_chains, std::uint64_t lines, std::uint64_t thin);
-  /// fills  whether walls or lines are asked for. moves  of the parts, of all layers. layers  of the job
+  /// fills  whether walls or lines are requested. moves  of the parts, of all layers. layers  of the job
   void report(bool fills, std::uint64_t moves, std::uint32_t layers, std::vector<Warning>& warnings) const;
 };
 

@@ -96,7 +96,7 @@ Status check_volumes(const Tally& tally, const Sampling& sampling, std::vector<W
   std::vector<Group> groups(tally.groups().begin(), tally.groups().end());
   for (std::uint32_t g = 0; g < groups.size(); ++g) {
     Group& group = groups[g];
-    // What has vanished as a whole is told as such.
+    // Solids that have vanished as a whole are reported as such.
     if (!group.closed || !tally.measured(g) || tally.planned_mm3(g) == 0) continue;
     const Result<double> badness = badness_as_union(g, group, tally.planned_mm3(g), sampling);
     if (!badness) return badness.error();

@@ -34,11 +34,11 @@ struct Sampling {
   /// What was tallied are images of a finished job: without their bleed, and with the drops that they got.
   bool finished = false;
   bool bleeds = false;                // of a finished job
-  bool drops_none = false;            // of a finished job: some part gets no drop, which is told already
+  bool drops_none = false;            // of a finished job: some part gets no drop, which is reported already
   bool one_sided = false;             // steps lie inside or outside of the parts, on purpose
   std::span<const std::string> part;  // names of files
-  /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0: the volumes of the meshes
-  /// count. Asked only of groups that are doubted by those; where it fails, no volume is doubted.
+  /// The volume of the union of a group's solids, mm3, also where shells overlap or are inside out; 0: the volumes of the
+  /// meshes count. Requested only of groups with an uncertain volume by those; where it fails, no volume is reported.
   std::function<Result<double>(std::uint32_t group)> union_mm3 = {};
 };
 
@@ -53,7 +53,7 @@ void check_layers(std::span<const Solid> solids, std::span<const std::uint8_t> f
 /// Contours may move by a fiftieth of a part's narrower side, at least 0.05 and at most 0.25 mm.
 void check_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
 
-/// Parts that neither stand on the bed nor on the box of another solid; for printers that lay beads.
+/// Parts that are neither on the bed nor on the box of another solid; for printers that extrude beads.
 void check_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings);
 
 /// errors  kInput: why nothing at all is planned, and what to do; none if the solids do not explain it
@@ -75,9 +75,9 @@ class GroupUnion {
   /// Reads the meshes again.
   using Again = std::function<Result<std::vector<Mesh>>()>;
 
-  /// meshes  of the job; only their fingerprints are looked at if `again` is given. Must outlive this object
+  /// meshes  of the job; only their fingerprints are read if `again` is given. Must outlive this object
   /// solids  one for each instance; both must outlive this object
-  /// again   where the triangles of the meshes are gone: asked once, when the first volume is
+  /// again   where the triangles of the meshes are gone: called once, for the first volume
   GroupUnion(std::span<const Mesh> meshes, std::span<const Instance> instances, std::span<const Solid> solids, Volume volume,
              Again again = {});
 

@@ -19,16 +19,16 @@ namespace lamina::checks {
 struct Solid {
   Box box;                  // nm, on the bed
   std::uint32_t part = 0;   // of the job
-  std::uint32_t group = 0;  // solids whose boxes touch have one group: layers cannot tell them apart
+  std::uint32_t group = 0;  // solids whose boxes touch have one group: layers cannot distinguish them
   double mesh_mm3 = 0;      // of its triangles; hollows count negative, overlaps as often as they overlap
   bool closed = true;       // only then mesh_mm3 is a volume
 };
 
-/// Solids that layers cannot tell apart.
+/// Solids that layers cannot distinguish.
 struct Group {
   Box box;
   std::uint32_t part = 0;           // of the first solid
-  double min_mm3 = 0, max_mm3 = 0;  // between these lies the union of its solids, as far as their meshes tell
+  double min_mm3 = 0, max_mm3 = 0;  // bounds of the union of its solids, by their meshes
   bool closed = true;               // all of them
 };
 
@@ -38,7 +38,7 @@ struct Group {
 /// Thread-safe; sums are whole numbers, so that they do not depend on the order of the layers.
 class Tally {
  public:
-  /// Of images, solids whose boxes overlap seen from above must share a group.
+  /// Of images, solids whose boxes overlap in plan view must share a group.
   explicit Tally(std::vector<Solid> solids);
 
   // --- images
@@ -57,7 +57,7 @@ class Tally {
   bool detected(std::uint32_t solid) const {
     return grid_ ? detected_[solid].load(std::memory_order_relaxed) != 0 : planned_mm3(solids_[solid].group) > 0;
   }
-  /// Whether a pixel's centre lies in the solid's box, seen from above; of images.
+  /// Whether a pixel's centre is in the solid's box, in plan view; of images.
   bool has_pixels(std::uint32_t solid) const {
     const ImageWindow& window = solid_window_[solid];
     return window.first_column < window.last_column && window.first_row < window.last_row;

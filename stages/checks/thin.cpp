@@ -203,8 +203,8 @@ std::uint64_t ThinScratch::bytes() const {
   return total;
 }
 
-// From wide to narrow. What a stencil covers is thin for none that is narrower, so that each looks at what those before it
-// left, and of that at pieces that are large enough for it: of corners few are.
+// From wide to narrow. What a stencil covers is thin for no narrower one, so that each inspects what those before it left, and
+// of that the pieces that are large enough for it: few corners are.
 ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
   ThinRegions locations;
   if (stencils.count() < 2 || image.change.empty()) return locations;

@@ -13,8 +13,8 @@ namespace lamina::checks {
 
 // --- eight-sided discs of pixels, one for each width up to a least one.
 //
-// Each is the one before it, laid side by side with itself one pixel to the right, down, both, or right and up. So each is made
-// of copies of all narrower ones, and what a wide one covers they cover too: whatever is thin for a width is so for wider ones.
+// Each is the union of the previous one and its copy one pixel to the right, down, both, or right and up. So each consists of
+// copies of all narrower ones, and what a wide one covers they cover too: a region thin for a width is so for wider ones.
 //
 // Source: sizes of what is opened, G. Matheron, Random Sets and Integral Geometry, Wiley 1975, chapter 1.5; polygons as sums of
 // segments, P. Soille, Morphological Image Analysis, 2nd ed., Springer 2003, chapter 3.

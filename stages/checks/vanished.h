@@ -33,7 +33,7 @@ struct VanishScratch {
 /// since tips of domes and ridges are of no more. before, after  of the same size. cost  O(runs)
 VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch);
 
-/// Counts them over a job. The last layers of a slope vanish rightly: fewer than kLayers on end are not told.
+/// Counts them over a job. The last layers of a slope vanish rightly: fewer than kLayers in sequence are not reported.
 class VanishCount {
  public:
   static constexpr std::uint32_t kLayers = 3;
@@ -54,7 +54,7 @@ class VanishCount {
 
   std::uint32_t next_ = 0;  // layer
   LayerSpan now_;
-  std::uint32_t layers_ = 0;  // told
+  std::uint32_t layers_ = 0;  // reported
   LayerSpan worst_;
 };
 

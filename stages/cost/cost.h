@@ -1,7 +1,7 @@
 // stages/cost/cost.h: what a powder job uses up and costs, and what each of its parts has of that.
 //
 //      binder   (drops + spat drops x layers) x volume of a drop
-//      fed      sum over layers: dose x thickness x area of the vats, that of the bed unless told, as the powder cycle feeds
+//      fed      sum over layers: dose x thickness x area of the vats, that of the bed by default, as the powder cycle feeds
 //      it; volumes of powder are those of
 //               the bed, gaps between grains included
 //      bound    sum over layers: set pixels x area of a pixel x thickness

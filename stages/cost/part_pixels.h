@@ -17,14 +17,14 @@ namespace lamina::cost {
 struct Body {
   Box box;                  // nm
   std::uint32_t part = 0;   // of the job
-  std::uint32_t group = 0;  // bodies whose boxes touch seen from above; boxes around groups do not overlap
+  std::uint32_t group = 0;  // bodies whose boxes touch in plan view; boxes around groups do not overlap
 };
 
 /// The box of all voxels that hold some of a box, for images of shares of voxels: pixels are set whose centres lie outside of
 /// the part. Boxes of bodies with no voxel in common do not touch.
 Box box_of_voxels(const Box& box, const PixelGrid& grid);
 
-/// Windows of bodies in the images of a bed. Exact where boxes seen from above lie apart. In a group of several parts the
+/// Windows of bodies in the images of a bed. Exact where boxes are separated in plan view. In a group of several parts the
 /// group's pixels of a layer are shared by what is set in the windows of those bodies that reach the layer: exact again where
 /// these windows have no set pixel in common.
 class PartPixels {

@@ -28,7 +28,7 @@ struct CoveredMesh {
 struct Copy {
   std::uint32_t mesh;
   Point3 offset;
-  bool crowded;             // its box meets too many others to look at each
+  bool crowded;             // its box meets too many others to inspect each
   std::vector<Box> others;  // boxes of other copies that its own meets, nm, on the bed
 };
 
@@ -75,7 +75,7 @@ bool is_near_others(const Copy& copy, const Triangle& facet) {
   return std::ranges::any_of(copy.others, [&](const Box& other) { return boxes_meet(box, other); });
 }
 
-/// Facets lie in the order of the mesh, and each is looked at once.
+/// Facets are in the order of the mesh, and each is read once.
 void fetch(const SlabFacet& facet) {
   const auto* bytes = reinterpret_cast<const char*>(&facet);
   for (std::size_t at = 0; at < sizeof facet; at += 64) __builtin_prefetch(bytes + at);

@@ -44,7 +44,7 @@ struct CoverageScratch {
 
 // ---
 
-/// What a layer told besides its levels.
+/// The report of a layer in addition to its levels.
 struct CoverageReport {
   double volume_mm3 = 0;             // sum of share x voxel, before shares become levels
   std::uint32_t facets = 0;          // that reach into the layer
@@ -64,10 +64,10 @@ struct LayerBound {
   std::uint64_t scratch_bytes = 0;  // its levels left out
 };
 
-/// Immutable once built; layers may be asked for from any number of threads.
+/// Immutable once built; any number of threads may request layers.
 class Coverage {
  public:
-  /// meshes     triangles are moved into Mesh::blocks, unless they are there: whoever indexes the meshes next shares these
+  /// meshes     triangles are moved into Mesh::blocks, unless they are there: later users of the meshes share these
   /// instances  where copies stand; every corner within the grid's bed and below kNmReach
   /// levels     2 .. 256 of them; 2, 4 and 16 are what drops come in
   /// isa        the widest instructions to use; levels are the same with any

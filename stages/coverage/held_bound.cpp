@@ -32,7 +32,7 @@ struct HeldBound::Facet {
   Triangle t;           // corners by height
   bool suspect;         // meets others: samples may say anything
   bool flat;            // shares that pass levels are fewer than its voxels
-  double area, levels;  // seen from above, voxels; along x, levels x nm
+  double area, levels;  // in plan view, voxels; along x, levels x nm
   double low, middle, high;
   double rise() const { return high - low; }
   /// Voxels that a way along x and one along y pass.

@@ -13,14 +13,14 @@ namespace lamina::coverage {
 
 /// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMaxSlabs; 112 bytes a slab.
 ///
-/// Seen from above, what lies of a facet in a layer is convex: of area A, width w and depth d in voxels it touches at most
-/// A + 2 w + 2 d + 4 voxels, in d + 2 rows. Twice its width is how far its border runs along x: along the facet's edges, of
+/// In plan view, the piece of a facet in a layer is convex: of area A, width w and depth d in voxels it touches at most A + 2 w
+/// + 2 d + 4 voxels, in d + 2 rows. Twice its width is how far its border runs along x: along the facet's edges, of
 /// which each slab has its share, and along the cuts with the layer's two planes, which grow evenly up to the middle corner and
 /// shrink again, as areas for each nm of height do.
 ///
-/// Of a steep facet, and of one that meets others, each voxel may be a run of levels. Along a row of a flat one shares only
-/// rise or only fall, by its area seen along x over that of the row: of levels 0 .. n they pass n times that many, and what
-/// other facets add begins or ends with them.
+/// Of a steep facet, and of one that meets others, each voxel may be a run of levels. Along a row of a flat one coverage only
+/// rises or only falls, by its area projected along x over that of the row: of levels 0 .. n it passes n times that many, and
+/// the contributions of other facets begin or end with them.
 class HeldBound {
  public:
   struct HeldCount {

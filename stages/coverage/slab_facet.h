@@ -47,7 +47,7 @@ void cut(const Piece<Number>& from, const Number& limit, Piece<Number>& to) {
   }
 }
 
-/// Seen along x; positive where +x goes into the solid.
+/// Projected along x; positive where +x goes into the solid.
 template <class Number>
 Number area_along_x(const Corner<Number>& a, const Corner<Number>& b, const Corner<Number>& c) {
   return ((b.z - a.z) * (c.y - a.y) - (b.y - a.y) * (c.z - a.z)) / 2;
@@ -58,7 +58,7 @@ Number area_along_x(const Corner<Number>& a, const Corner<Number>& b, const Corn
 template <class Number>
 struct Tent {
   Number x0, x1, x2;  // corners, in order
-  Number area;        // seen along x; positive where +x goes into the solid
+  Number area;        // projected along x; positive where +x goes into the solid
 
   Tent() = default;
   Tent(const Corner<Number>& a, const Corner<Number>& b, const Corner<Number>& c) : x0(a.x), x1(b.x), x2(c.x) {
@@ -102,7 +102,7 @@ struct SlabFacet {
   Triangle facet;                     // nm, on the bed
   Point3 low;                         // lowest corner of its box
   Nm size;                            // longest side of its box
-  bool edgewise;                      // seen from along x it has no area
+  bool edgewise;                      // projected along x it has no area
   bool enters;                        // +x goes into the solid
   bool suspect;                       // it meets others (meet/meetings.h)
   std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included

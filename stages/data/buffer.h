@@ -1,4 +1,4 @@
-// stages/data/buffer.h: a growable flat array that does not touch memory it is not told to write.
+// stages/data/buffer.h: a growable flat array that touches only memory that it is to write.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// stages/data/chart.h: the elements of a calibration chart of a powder printer and their positions. The chart is laid out by
+// stages/data/chart.h: the elements of a calibration chart of a powder printer and their positions. The chart is arranged by
 // stages/calibration/chart and read back from a photograph by stages/calibration/scan.
 #pragma once
 
@@ -21,7 +21,7 @@ struct ChartDash {
   bool operator==(const ChartDash&) const = default;
 };
 
-/// A full bar whose width tells how far drops spread. along: its width lies along the scan
+/// A full bar whose width measures how far drops spread. along: its width is along the scan
 struct ChartBar {
   bool along = false;
   ChartBox box;
@@ -53,11 +53,11 @@ struct Chart {
   double between_mm = 0, gap_mm = 0;  // of dashes: across the scan from centre to centre, along it from end to end
   double mark_mm = 0;                 // radius of the marks
   double layer_mm = 0;                // thickness that it is printed with; 0: not stated
-  std::vector<ChartBox> marks;        // around the four discs, the first one a ring; clockwise as the image is seen
+  std::vector<ChartBox> marks;        // around the four discs, the first one a ring; clockwise in the image
   std::vector<ChartDash> dashes;
   std::vector<ChartBar> bars;
   std::vector<ChartWedge> wedges;
-  std::vector<ChartBox> stitches;      // full blocks over the joints before swath 1, 2 ...; their height tells gaps
+  std::vector<ChartBox> stitches;      // full blocks over the stitch lines before swath 1, 2 ...; gaps by their height
   std::vector<ChartVernier> verniers;  // none where the bed has no room
   bool operator==(const Chart&) const = default;
 };

@@ -30,23 +30,23 @@ struct Extruder {
     double nozzle_mm = 0.4;
     double filament_mm = 1.75;
     double density_g_cm3 = 1.24;
-    // 100 % lays bead_area x flow: the shape of the bead, all of it in the volume. Absent: a stadium.
+    // 100 % extrudes bead_area x flow: the shape of the bead, all of it in the volume. Absent: a stadium.
     std::optional<BeadShape> bead_area;
     double flow = 1;        // found by measuring walls
-    double feed_ratio = 1;  // the machine's error: filament that is fed / filament that E asks for
+    double feed_ratio = 1;  // the machine's error: filament that is fed / filament commanded by E
     double lag_s = 0;       // with which the melt follows its feed (stages/bead/lag.h); 0: at once, or unknown
     double nozzle_degc = 200, bed_degc = 60;
-    double first_nozzle_degc = 200, first_bed_degc = 60;  // while the first layer is laid
+    double first_nozzle_degc = 200, first_bed_degc = 60;  // while the first layer is extruded
 
     BeadShape shape() const { return bead_area.value_or(BeadShape::kStadium); }
-    /// What a millimetre of E lays, mm3.
+    /// Volume extruded per millimetre of E, mm3.
     double mm3_of_e() const { return feed_ratio * std::numbers::pi / 4 * filament_mm * filament_mm; }
   } material;
 
   struct Speed {
     double print_mm_s = 40;  // raster and closed curves that fill: the reference of segmented lines
     double wall_mm_s = 30, inner_wall_mm_s = 40;
-    double first_layer_mm_s = 15;  // nothing of the first layer is laid faster, but thin stretches by their share
+    double first_layer_mm_s = 15;  // speed limit of the first layer; thin segments exceed it by their share
     double travel_mm_s = 120, lift_mm_s = 10;
     double acceleration_mm_s2 = 1000;  // for the estimate of time
     double corner_mm_s = 8;            // change of speed that the machine makes at once
@@ -70,7 +70,7 @@ struct Extruder {
   } fan;
 
   struct Code {
-    std::string flavor = "Marlin";  // told to viewers: Marlin, RepRap (RepRapFirmware), Repetier or Klipper
+    std::string flavor = "Marlin";  // reported to viewers: Marlin, RepRap (RepRapFirmware), Repetier or Klipper
     bool relative_extrusion = true;
     // In start, end and layer: {nozzle_degc} {bed_degc} {first_nozzle_degc} {first_bed_degc} {layer} {z} {layers}
     std::string start, end, layer;

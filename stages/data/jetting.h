@@ -6,7 +6,7 @@ namespace lamina {
 /// What a sweep of the head passes over: pixels [left, right) x [top, bottom) of the image.
 struct SwathBand {
   double left, right, top, bottom;
-  bool present;  // the one that is looked at
+  bool present;  // the one under inspection
 };
 
 /// A nozzle at a step.

@@ -12,7 +12,7 @@ namespace lamina {
 /// Why a layer has its thickness.
 enum class LayerReason : std::uint8_t {
   kUniform,  // the thickest that there is, or the only one
-  kSlope,    // a facet is at least as flat as the angle that asks for thinner layers
+  kSlope,    // a facet is at least as flat as the angle that requests thinner layers
   kPeak,     // a horizontal face lies in or on top of the thicker layer
   kCusp,     // a thicker layer would leave too high a step on a slope
   kFlat      // so that a layer ends on a horizontal face, or at the top or bottom of a part

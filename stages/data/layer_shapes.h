@@ -19,7 +19,7 @@ struct LayerShapes {
   std::uint32_t index = 0;  // of the layer
   std::int64_t z = 0;       // nm: where the part is cut, or the nozzle
   Box box;                  // nm on the bed: of all layers; pictures show a margin around it
-  Contours contours;        // clean: of the solid, drawn first; none if the job does not tell
+  Contours contours;        // clean: of the solid, drawn first; none if the job does not state any
   struct Beads {
     Ink ink;
     std::string name;  // for the legend

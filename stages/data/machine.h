@@ -11,7 +11,7 @@ namespace lamina {
 
 enum class BedShape : std::uint8_t { kRectangle, kRound };
 enum class ScanAxis : std::uint8_t { kX, kY };
-/// A side of the bed as seen from above: x grows to the right, y to the back.
+/// A side of the bed in plan view: x grows to the right, y to the back.
 enum class Side : std::uint8_t { kLeft, kRight, kFront, kBack };
 /// What becomes of the pixels of a nozzle that does not fire.
 enum class BlockedRule : std::uint8_t {
@@ -86,7 +86,7 @@ struct Machine {
 
   struct Powder {
     std::uint32_t vats = 1;
-    std::vector<std::string> materials;  // what each vat holds; empty: whatever a job names, in that order
+    std::vector<std::string> materials;  // content of each vat; empty: those that a job names, in that order
     VatRule vat_rule = VatRule::kRefuse;
     std::string build_axis = "Z";
     std::vector<std::string> feed_axes{"A", "B"};
@@ -97,7 +97,7 @@ struct Machine {
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
     double base_mm() const { return base_layers * base_layer_mm; }
     double spread_s = 0;  // a layer's powder cycle that the program does not spell; 0: by the movements above
-    double pause_s = 0;   // a layer, beside all movements: drying, wiping
+    double pause_s = 0;   // a layer, in addition to all movements: drying, wiping
     std::array<double, 2> vat_depth_mm{0, 0};  // that each vat can feed when it is full; 0: not stated
     double vat_area_mm2 = 0;                   // of each; 0: that of the bed
     VatRefill refill = VatRefill::kRefuse;
@@ -105,7 +105,7 @@ struct Machine {
     double base_layer_mm = 0.1;                            // thickness of each
     double dry_s = 0;                                      // pause of the program behind the last sweep of each layer
     std::vector<std::string> dry_on_lines, dry_off_lines;  // the machine's own around it: a lamp
-    double roller_rpm = 0;              // of a roller that turns against its way while it spreads; 0: not told
+    double roller_rpm = 0;              // of a roller that turns against its way while it spreads; 0: not stated
     double packing = 0.6;               // share of the powder bed that is solid
     double evaporates_percent = 0;      // of the jetted binder, before the next layer is spread
     double min_saturation_percent = 0;  // of the voids, that binds; 0: not stated

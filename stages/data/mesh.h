@@ -18,15 +18,15 @@ struct Point3 {
   friend auto operator<=>(const Point3&, const Point3&) = default;
 };
 
-/// Corners in counter-clockwise order seen from outside. 36 bytes; corners are stored, not indexed, because only
-/// diagnosis asks for topology and everything else streams triangles.
+/// Corners in counter-clockwise order viewed from outside. 36 bytes; corners are stored, not indexed, because only diagnosis
+/// needs topology and all else streams triangles.
 struct Triangle {
   Point3 a, b, c;
   friend bool operator==(const Triangle&, const Triangle&) = default;
 };
 static_assert(sizeof(Triangle) == 36);
 
-/// Closed axis-parallel box. The empty box has lo > hi and grows to whatever is put into it.
+/// Closed axis-parallel box. The empty box has lo > hi and grows to contain all that is added.
 struct Box {
   Point3 lo{INT32_MAX, INT32_MAX, INT32_MAX};
   Point3 hi{INT32_MIN, INT32_MIN, INT32_MIN};
@@ -64,12 +64,12 @@ struct Mesh {
   Box bounds;
   std::uint64_t fingerprint = 0;  // of the triangles in any order (load/diagnose.h)
   /// Volume of the triangles, caps included. Shells that overlap count as often as they overlap, hollows count
-  /// negative, so a part whose shells unite has less; never negative for a closed mesh, because a mesh that is inside
+  /// negative, so the union of a part's shells has less; never negative for a closed mesh, because a mesh that is inside
   /// out as a whole is turned over. An estimate where the mesh is not closed.
   double volume_mm3 = 0;
   /// Area of the triangles that repair added over the area of all, 0 to 1: how much of the surface is a guess.
   double capped_share = 0;
-  /// Where whoever reads the file asked for blocks (load::LoadOptions::blocks), the triangles may be here in place of the list,
+  /// Where the reader of the file requested blocks (load::LoadOptions::blocks), the triangles may be here in place of the list,
   /// which is empty then. Copies share them.
   std::shared_ptr<MeshBlocks> blocks;
 };

@@ -103,7 +103,7 @@ struct ProgramCount {
   std::uint64_t moved = 0, lost = 0;      // pixels of blocked nozzles: fired by a neighbour instead, or not at all
 };
 
-/// What the machine has to know of a layer beside its vectors.
+/// The data of a layer for the machine in addition to its vectors.
 struct LayerCycle {
   std::uint32_t layer = 0, layers = 0;
   std::int64_t bottom_nm = 0, thickness_nm = 0;

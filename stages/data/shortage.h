@@ -1,4 +1,4 @@
-// stages/data/shortage.h: whether memory or threads ran out, within libraries that do not tell too.
+// stages/data/shortage.h: detects a shortage of memory or threads, also within libraries that do not report it.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 namespace lamina {
 
 /// How often `new` was refused memory in this process since the first call, which begins to count: a handler that counts and
-/// goes on to the one before it (std::set_new_handler). Callable from any thread.
+/// then calls the previous one (std::set_new_handler). Callable from any thread.
 std::uint64_t refused_allocations();
 
 /// Whether an exception says that the system gives no more memory, or no more threads.

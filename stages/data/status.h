@@ -74,7 +74,7 @@ class [[nodiscard]] Result<void> {
 
 using Status = Result<void>;
 
-/// A doubt about a result that was made nevertheless.
+/// A problem with a result that was made nevertheless.
 struct Warning {
   std::string code;  // short and stable, for scripts: "volume"
   std::string text;  // one line for a person

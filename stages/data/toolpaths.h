@@ -1,5 +1,5 @@
-// stages/data/toolpaths.h: where a bead is laid in one layer, in the order in which it is laid, and its straight pieces on
-// their way to a file: these are never stored, only passed on.
+// stages/data/toolpaths.h: beads of one layer in the order of deposition, and their straight pieces on their way to a file:
+// these are never stored, only passed on.
 #pragma once
 
 #include <algorithm>
@@ -26,13 +26,13 @@ enum class PathKind : std::uint8_t {
 /// Line number of walls and links.
 inline constexpr std::int32_t kNoLine = INT32_MIN;
 
-/// Borrowed toolpaths of one layer. A path is laid without a stop; from the end of one to the start of the next the
-/// nozzle travels.
+/// Borrowed toolpaths of one layer. A path is deposited without a stop; from the end of one to the start of the next the nozzle
+/// travels.
 ///
 /// offset  paths + 1 entries, first 0, last point.size(); path p owns point[offset[p] .. offset[p + 1]), two or more
 /// point   nm on the bed. A closed path ends with its first point repeated.
-/// kind, width, line   one entry a point: they belong to the stretch from that point to the next one of its path. The
-///         last point of a path starts no stretch and repeats the entries before it.
+/// kind, width, line   one entry a point: they belong to the segment from that point to the next one of its path. The last
+///         point of a path starts no segment and repeats the entries before it.
 /// width   nm of bead, > 0
 /// line    number of the raster line in its layer, counted across over the part, the same in every layer with one angle
 ///         (negative before the first line); the pieces into which holes cut a line share it. Even lines run along the
@@ -93,10 +93,10 @@ inline double length_mm(const ToolpathsView& paths) {
 enum class Thickness : std::uint8_t {
   kReference,  // as wide as walls and continuous lines
   kThick,      // wide enough to touch the neighbouring lines
-  kThin        // leaves pores beside it
+  kThin        // leaves pores next to it
 };
 
-/// A straight piece of a layer's toolpaths, in the order in which they are laid.
+/// A straight piece of a layer's toolpaths, in the order in which they are deposited.
 struct PathInterval {
   Point2 from, to;  // nm; never equal
   PathKind kind;
@@ -107,23 +107,23 @@ struct PathInterval {
   std::uint32_t run = 0;  // index of the stored point where its line, curve or wall begins
 };
 
-/// What a machine is told of a stretch.
+/// The command for a segment.
 struct BeadMove {
   Point2 from, to;  // nm
   PathKind kind;
   bool jump;
   Nm width;         // nm, that the bead is expected to have: a tag for viewers
-  double area_mm2;  // cross-section of what is laid: volume / length
+  double area_mm2;  // cross-section of the bead: volume / length
   double speed_mm_s;
   bool begins = false;  // a wall, line, curve or link begins
 };
 
-/// What a move has laid.
+/// The bead that a move has deposited.
 struct DepositedMove {
   double length_mm, volume_mm3;
 };
 
-/// Segmented lines as they were laid. A piece is a line, or what holes leave of it, that is divided.
+/// Segmented lines as deposited. A piece is a line, or what holes leave of it, that is divided.
 struct SegmentCounts {
   std::uint64_t pieces = 0;
   std::uint64_t intervals = 0;  // points of the lists of Fukuda 2020: the start of a piece and its marks
@@ -139,11 +139,11 @@ struct SegmentCounts {
   }
 };
 
-/// The pores beside thin stretches as they were laid. A side of a thin stretch is a pore where a line lies beside all of it,
-/// where the thick stretches at both of its ends reach that line, and where something stays open between.
+/// The pores next to thin segments as deposited. A side of a thin segment is a pore where a line runs alongside all of it,
+/// where the thick segments at both of its ends reach that line, and where a gap stays open between.
 struct PoreCounts {
   std::uint64_t closed = 0;            // pores
-  std::uint64_t open = 0;              // sides whose thick stretches do not reach the line beside them: a channel
+  std::uint64_t open = 0;              // sides whose thick segments do not reach the next line: a channel
   std::uint64_t filled = 0;            // sides without room: round ends meet, or the thin stretch touches its neighbour
   std::uint64_t edges = 0;             // sides along walls, and at ends of lines without a thick stretch
   double length_mm = 0, width_mm = 0;  // sums over `closed`
@@ -168,7 +168,7 @@ struct PoreCounts {
 struct ShortIntervals {
   std::uint64_t count = 0;
   double shortest_mm = 0;                       // of them; 0 without any
-  double reached_mm_s = 0, commanded_mm_s = 0;  // of the one that becomes fastest: its speed, and the one it is told
+  double reached_mm_s = 0, commanded_mm_s = 0;  // of the one that becomes fastest: its speed, and the commanded one
 
   void add(const ShortIntervals& other) {
     if (other.count == 0) return;
@@ -183,7 +183,7 @@ struct ShortIntervals {
 /// Void share of what was planned: of the volume within the contours.
 struct PlannedPorosity {
   double solid_mm3 = 0;     // area within the contours x thickness, over all layers
-  double extruded_mm3 = 0;  // of the parts' beads: what the machine lays, its declared error included
+  double extruded_mm3 = 0;  // of the parts' beads: as extruded, the machine's declared error included
   double measured_mm3 = 0;  // stadia of the widths that were measured
   double by_extrusion() const { return 1 - extruded_mm3 / solid_mm3; }
   double by_widths() const { return 1 - measured_mm3 / solid_mm3; }
@@ -195,7 +195,7 @@ struct PlannedPorosity {
   }
 };
 
-/// All that is counted while the moves of a layer are laid.
+/// All that is counted while the moves of a layer are deposited.
 struct DepositedSums {
   SegmentCounts segments;
   PlannedPorosity porosity;
@@ -210,7 +210,7 @@ struct DepositedSums {
   }
 };
 
-/// A straight move of a toolpath file that lays a bead.
+/// A straight move of a toolpath file that deposits a bead.
 struct DepositedBead {
   Point2 from, to;     // nm on the bed
   Nm width;            // nm
@@ -220,7 +220,7 @@ struct DepositedBead {
 /// What was commanded for one.
 struct BeadFeed {
   double volume_mm3;      // fed along it
-  double speed_mm_s;      // of the head; 0: untold
+  double speed_mm_s;      // of the head; 0: not stated
   bool joined;            // it begins where the bead before ended, and nothing was moved in between
   double primed_mm3 = 0;  // fed since the bead before, retractions and what took them back together
 };

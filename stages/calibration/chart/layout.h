@@ -1,9 +1,9 @@
 // stages/calibration/chart/layout.h: a calibration chart for the head of a powder printer.
 //
-//   o | nozzle by nozzle, thrice | verniers of joints | bars of known widths, wedges | o
+//   o | nozzle by nozzle, thrice | verniers of stitches | bars of known widths, wedges | o
 //
-// Along the scan lie three combs. Of a comb each nozzle of each swath prints one dash alone; dashes that lie beside each other
-// are of nozzles so far apart that blurred ones do not touch.
+// Three combs are printed along the scan. In a comb each nozzle of each swath prints one dash alone; neighbouring dashes are of
+// nozzles so far apart that blurred ones do not touch.
 #pragma once
 
 #include "stages/data/chart.h"
@@ -17,7 +17,7 @@ namespace lamina::calibration {
 /// blocked. drops  for a counted number of them: other nozzles fire those of blocked ones
 Machine chart_machine(Machine machine, bool drops = false);
 
-/// Lays the chart out for chart_machine() and its grid. Swaths are those of the print program: chart and nozzles belong
+/// Arranges the chart for chart_machine() and its grid. Swaths are those of the print program: chart and nozzles belong
 /// together. returns  its boxes, all of them on the bed errors   kUsage: the bed is too small for a chart of this head
 Result<Chart> layout_chart(const Machine& machine, const HeadGrid& grid);
 

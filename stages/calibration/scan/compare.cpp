@@ -16,7 +16,7 @@ namespace {
 constexpr double kMaxTurnDeg = 6;
 constexpr double kMinMissingMm = 0.2;
 constexpr double kAwayMm = 0.5, kMinMm2 = 1, kMinShare = 0.5;  // of extra ink; the last of full ink
-constexpr double kMaxCells = 2000;                             // along an axis of the image, where it is looked for
+constexpr double kMaxCells = 2000;                             // along an axis of the image that is searched
 
 /// The layer in cells as large as pixels of the photograph: the share of each that is set.
 struct LayerCells {
@@ -304,7 +304,7 @@ std::vector<BodyReading> bodies_of(const cv::Mat& dark, const LayerCells& layer,
   return bodies;
 }
 
-/// How alike the layer is when it is seen in a mirror, at its best.
+/// The best similarity of the mirrored layer to the photograph.
 double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer) {
   double best = -1;
   for (const int axis : {0, 1}) {
@@ -357,9 +357,9 @@ Field field_of(const Photo& photo, const ExpectedLayer& layer, const View& view)
   return field;
 }
 
-/// Connected dark places of a square millimetre and more, half a millimetre wide and more, of half of full ink and more, half a
-/// millimetre away from what was to be printed. Looked for wherever the photograph shows the image of the layer; what reaches
-/// the image's edge is taken for the edge of the bed.
+/// Connected dark areas of a square millimetre and more, half a millimetre wide and more, of half of full ink and more, half a
+/// millimetre away from what was to be printed. Searched wherever the photograph shows the image of the layer; an area that
+/// reaches the image's edge is taken for the edge of the bed.
 /// view  of the photograph
 /// ink   darkness of full ink, of the light of the blank sheet
 /// cost  O(cells of the image, 4 million at most)

@@ -1,4 +1,4 @@
-// stages/calibration/scan/compare.h: a photograph of a printed layer beside the layer.
+// stages/calibration/scan/compare.h: compares a photograph of a printed layer with the layer.
 #pragma once
 
 #include <vector>

@@ -154,7 +154,7 @@ double middle_of_ends(const std::vector<double>& profile, double step, double gr
   return middle;
 }
 
-/// What looks at one dash after the other.
+/// Inspects one dash after the other.
 class Inspect {
  public:
   Inspect(const Photo& photo, const Chart& chart, const View& view, const std::optional<DashShapes>& shapes)
@@ -180,7 +180,7 @@ class Inspect {
     return detected;
   }
 
-  /// The shapes of all that were seen.
+  /// The common shapes of all detected dashes.
   std::optional<DashShapes> shapes() {
     gathered_->across.settle();
     gathered_->along.settle();
@@ -263,7 +263,7 @@ class Inspect {
   std::vector<double> edge_, weights_;
 };
 
-/// Tells what is there, by what usual dashes have.
+/// Decides which dashes are there, by comparison with usual dashes.
 void check_dashes(const Photo& photo, const Chart& chart, std::vector<DashReading>& detected) {
   constexpr double kThere = 0.5, kMax = 2.5, kMarred = 3;  // shares of a usual dash
   // A usual dash: three quarters of all have less. Where most are missing, half of what full ink of its width has.
@@ -303,8 +303,8 @@ std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, cons
   };
   for (const ChartDash& dash : chart.dashes) {
     const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath], offset = fit.offset[dash.nozzle];
-    // Strewn over a sample: of windows that all lie about where their dashes were seen before, the common shape knows some
-    // places alone, and keeps each dash there. By chance, as a nozzle's dashes come at even distances.
+    // Distributed over a sample: if all windows are near where their dashes were detected before, the common shape is known at
+    // few positions only, and keeps each dash there. This happens by chance, as a nozzle's dashes have even distances.
     const double dx = strewn(), dy = strewn();
     detected.push_back(inspection.see(dash, {m.x + shift.x + std::clamp(offset.x, -maximum, maximum) + dx,
                                              m.y + shift.y + std::clamp(offset.y, -maximum, maximum) + dy}));

@@ -1,4 +1,4 @@
-// stages/calibration/scan/dashes.h: what is seen of each dash of a chart.
+// stages/calibration/scan/dashes.h: what is detected of each dash of a chart.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,7 @@
 
 namespace lamina::calibration {
 
-// --- profiles that look alike, and where one of them lies: by their common shape, not by a level
-// or a centre.
+// --- similar profiles, and the position of one of them: by their common shape, not by a level or a centre.
 
 /// Values at places that are evenly spaced about zero.
 struct Profile {
@@ -50,10 +49,10 @@ ShapeFit fit_shape(const Profile& profile, const Shape& shape, double middle, do
 /// Lengths in mm of the sheet, in the directions of x and y of its image.
 struct DashReading {
   double mass = 0;      // darkness across the dash, summed: mm of full black
-  double ground = 0;    // darkness beside it
+  double ground = 0;    // darkness next to it
   Spot position;        // of its middle; meaningful if it is there
   bool there = false;   // it was printed
-  bool hidden = false;  // too dark for a dash, or out of the picture: nothing can be told
+  bool hidden = false;  // too dark for a dash, or out of the picture: not readable
   double misfit = 0;    // from the common shape, as a share of its height
   bool marred = false;  // by dust: it is there, but its place is not to be trusted
 };
@@ -63,8 +62,8 @@ struct DashShapes {
   Shape across, along;
 };
 
-/// Looks at each dash where the fit puts it.
-/// shapes   by which dashes are placed if there are any, else by centres and ends; replaced by those that were seen
+/// Inspects each dash at its position by the fit.
+/// shapes   locate the dashes if given, else centres and ends do; replaced by the detected shapes
 /// returns  one for each dash of the chart
 /// cost     some thousand samples a dash
 std::vector<DashReading> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,

@@ -1,5 +1,5 @@
-// stages/calibration/scan/inks.h: what bars and wedges of a chart tell: how far edges stand out, and how dark shares of the
-// pixels are.
+// stages/calibration/scan/inks.h: what bars and wedges of a chart show: ink spread at edges, and darkness by the coverage of
+// pixels.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@ struct InkReading {
   double gain_along_um = 0, gain_across_um = 0;   // how far an edge stands out of its pixels
   std::uint32_t bars_along = 0, bars_across = 0;  // that the gains are from
   std::uint32_t bars_detected = 0;                // along the scan, that lie in the photograph
-  double full = 0;                                // darkness of full ink, as the widest bars show; 0: not seen
-  std::vector<std::pair<double, double>> wedges;  // per cent of pixels, per cent of full ink that is seen
+  double full = 0;                                // darkness of full ink, as the widest bars show; 0: not detected
+  std::vector<std::pair<double, double>> wedges;  // per cent of pixels, per cent of full ink that was detected
 };
 
 InkReading read_inks(const Photo& photo, const Chart& chart, const SheetFit& fit, const HeadReading& head);

@@ -10,7 +10,7 @@
 namespace lamina::calibration {
 namespace {
 
-constexpr double kFaintDash = 0.15;  // of full ink: the contrast of a dash that is blurred and looked at beside its middle
+constexpr double kFaintDash = 0.15;  // of full ink: the contrast of a blurred dash that is read off its middle
 constexpr double kRingShare = 1 - kRingHole * kRingHole;
 
 /// A view, and how many of the dashes' places it finds darker than those between them: 1 if all are, about 0 if any place is as
@@ -119,7 +119,7 @@ struct Guess {
   double misfit = 0;
 };
 
-/// seen  of the marks but the missing one, in their order
+/// detected  the marks but the missing one, in their order
 void add_guess(const Chart& chart, std::size_t missing, const std::array<const Patch*, 3>& detected,
                std::vector<Guess>& guesses) {
   constexpr double kMaxAspect = 1.35, kMaxSize = 1.8;
@@ -219,7 +219,7 @@ Result<View> find_marks(const Photo& photo, const Chart& chart) {
     }
     if (best.contrast > kClear) return best.view;
   }
-  // Four marks tell which way the sheet lies; three discs alone may not.
+  // Four marks determine the sheet's orientation; three discs alone may not.
   if (best.contrast > kMinOfFour) return best.view;
   std::vector<Guess> guesses = guesses_of(chart, all);
   if (guesses.size() > kMaxGuesses) guesses.resize(kMaxGuesses);

@@ -34,7 +34,7 @@ Offset offset_of(const Chart& chart, const Axes& um, const Axes& error_um, const
   return {measured(um[0], error_um[0], freedom[0], along_nm), measured(um[1], error_um[1], freedom[1], across_nm)};
 }
 
-/// What was seen of the dashes of a nozzle. um  how far each lies from where its swath has it, along and across
+/// The detected dashes of a nozzle. um  distance of each from its position in the swath, along and across
 struct NozzleTally {
   std::uint32_t there = 0, absent = 0, deposited = 0;
   std::array<std::vector<double>, 2> um;
@@ -110,7 +110,7 @@ std::vector<Axes> line_errors(const std::vector<std::optional<Axes>>& nozzles, c
   return line_error;
 }
 
-/// Shifts of swaths against the first one, along the head's line, by a fit. told  which nozzles make the line
+/// Shifts of swaths against the first one, along the head's line, by a fit. reported  which nozzles make the line
 std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::vector<bool>& reported, std::uint32_t first) {
   std::vector<std::optional<Axes>> nozzles(chart.nozzles);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {

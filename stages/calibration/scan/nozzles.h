@@ -1,4 +1,4 @@
-// stages/calibration/scan/nozzles.h: what the dashes of a chart tell of nozzles and swaths, and how far it can be wrong.
+// stages/calibration/scan/nozzles.h: offsets of nozzles and swaths from the dashes of a chart, with their errors.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace lamina::calibration {
 
-/// A length with its standard error. within_um  99 in 100 of them lie nearer to the truth (stages/calibration/within.h)
-/// told  four standard errors are at most a tenth of a pixel of the layer
+/// A length with its standard error. within_um  99 in 100 of them are nearer to the true value (stages/calibration/within.h)
+/// reported  four standard errors are at most a tenth of a pixel of the layer
 struct Measure {
   double um = 0, error_um = 0, within_um = 0;
   bool reported = false;
@@ -24,9 +24,9 @@ struct Offset {
 };
 
 struct HeadReading {
-  std::vector<std::uint32_t> blocked, weak;   // nozzles: never seen, seen by times
+  std::vector<std::uint32_t> blocked, weak;   // nozzles: never detected, detected sometimes
   std::vector<std::uint32_t> unreadable;      // nozzles whose dashes are all hidden
-  std::vector<std::optional<Offset>> nozzle;  // against the head's line, of those that were seen
+  std::vector<std::optional<Offset>> nozzle;  // against the head's line, of detected nozzles
   std::vector<std::optional<Offset>> swath;   // against the first one, along the head's line; absent: not printed
 };
 
@@ -39,7 +39,7 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashRea
 
 /// Decides each nozzle by all of its dashes in the swaths that were printed, and measures nozzles and swaths.
 ///
-/// The head's line is the straight line through its nozzles' offsets (line_of), which cannot be told from the scale of the
+/// The head's line is the straight line through its nozzles' offsets (line_of), which is not separable from the scale of the
 /// photograph. Errors of swaths follow from leaving out a ninth of all dashes at a time (jackknife). Those of nozzles are of
 /// two parts: the scatter of dashes, and the line's own error, which the middle nozzle brings to all: found by moving nozzles
 /// by their errors. fit      of these dashes printed  as printed_swaths() has it, one at least

@@ -19,9 +19,9 @@ struct Photo {
   double ink = 0;    // darkness of full ink: what three pixels in a thousand exceed
 };
 
-/// Reads PNG, JPEG, TIFF and whatever else OpenImageIO reads; values count as sRGB, colours by their luminance,
-/// what is transparent as white. Turned as the file says that the camera was held.
-/// least   pixels of the shorter side
+/// Reads PNG, JPEG, TIFF and any other format of OpenImageIO; values count as sRGB, colours by their luminance, transparent
+/// pixels as white. Rotated by the camera orientation that the file states.
+/// minimum  pixels of the shorter side
 /// errors  kInput: no such image, smaller, or more than 2^27 pixels
 /// cost    reads the image; 13 bytes a pixel
 Result<Photo> read_photo(const std::string& path, int minimum);

@@ -13,13 +13,13 @@ namespace {
 
 constexpr std::size_t kFewest = 30, kEnoughForLens = 200;  // dashes
 constexpr double kFaintBar = 0.3;                          // of full ink
-constexpr double kClosest = 4.5;                           // pixels from a dash to the one beside it
+constexpr double kClosest = 4.5;                           // pixels from a dash to the one next to it
 
 std::uint32_t first_of(const std::vector<bool>& printed) {
   return static_cast<std::uint32_t>(std::ranges::find(printed, true) - printed.begin());
 }
 
-/// Fits the view, the swaths and the nozzles to the dashes, and looks again, thrice. False if too few are seen.
+/// Fits the view, the swaths and the nozzles to the dashes, and detects them again, three times. False if too few are detected.
 bool settle(const Photo& photo, const Chart& chart, ChartReading& reading) {
   std::optional<DashShapes> shapes;
   reading.dashes = see_dashes(photo, chart, reading.fit, shapes);

@@ -1,4 +1,4 @@
-// stages/calibration/scan/reading.h: what a photograph of a chart tells of the head that printed it.
+// stages/calibration/scan/reading.h: reads a photograph of a chart, and reports on the head that printed it.
 #pragma once
 
 #include <optional>
@@ -29,7 +29,7 @@ struct ChartReading {
 /// cost    some seconds for a thousand nozzles
 Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart);
 
-/// The photograph with a sign on every dash: green seen, red not seen, orange hidden; the marks in blue.
+/// The photograph with a sign on every dash: green detected, red not detected, orange hidden; the marks in blue.
 cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& reading);
 
 }  // namespace lamina::calibration

@@ -17,7 +17,7 @@ struct Tick {
   std::size_t vernier = 0;
   bool after = false;
   Profile profile;    // along the scan, in mm of the image
-  double middle = 0;  // where it is seen in it
+  double middle = 0;  // where it is detected in it
   double height = 0;
   double shift_mm = 0;  // of its swath, that the profile is about
 };
@@ -84,7 +84,7 @@ std::vector<Tick> see_ticks(const Photo& photo, const Chart& chart, const SheetF
   return ticks;
 }
 
-/// The nozzle of each line of the image, as the dash on it tells.
+/// The nozzle of each line of the image, by the dash on it.
 struct LineOffset {
   bool known = false, there = false;
   double along_um = 0, across_um = 0;

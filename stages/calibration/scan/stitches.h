@@ -1,5 +1,5 @@
-// stages/calibration/scan/stitches.h: what verniers and blocks over the joints of swaths tell, beside what all dashes tell of
-// the swaths.
+// stages/calibration/scan/stitches.h: what verniers and blocks over the stitch lines of swaths measure, in addition to the
+// swath offsets from all dashes.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ namespace lamina::calibration {
 /// offsets are.
 struct JointReading {
   std::uint32_t swath = 0;
-  std::optional<double> along_um;  // by its vernier; absent: no vernier, or too little of it is seen
+  std::optional<double> along_um;  // by its vernier; absent: no vernier, or too little of it is detected
   std::optional<double>
       across_um;       // by the height of its block; absent: its outermost nozzles are blocked, or no gain is known
   bool agrees = true;  // with the swaths' offsets, within a quarter of a pixel along the scan and one across it

@@ -179,7 +179,7 @@ LAMINA_LANES std::int64_t sweep_span(const RowTask& row, const ColumnSpan& span,
 }
 
 LAMINA_LANES void sweep_body(const RowTask& row_of, Changes& result) {
-  const RowTask row = row_of;  // none of it is looked up again after what is written
+  const RowTask row = row_of;  // a copy: no member is read again after a write
   Changes changes = result;
   ColumnSpan span;
   std::uint32_t level = 0, at = 0;

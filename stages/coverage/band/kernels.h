@@ -1,4 +1,4 @@
-// stages/coverage/band/kernels.h: trapezoids are laid into the cells of eight rows, and cells of a row become changes of level.
+// stages/coverage/band/kernels.h: adds trapezoids to cells of eight rows, and converts cells of a row into changes of level.
 //
 // Eight rows of a trapezoid are cut out at once, then eight columns of a row at a time get what it adds. All instruction sets
 // do the same with the same numbers in the same order.
@@ -35,7 +35,7 @@ struct ColumnSpan {
   std::int64_t winding = 0;  // before it
 };
 
-/// Some of eight columns that doubles do not decide, or whose samples have to be looked at: a bit each.
+/// Some of eight columns that doubles do not decide, or whose samples have to be read: a bit each.
 struct OpenLanes {
   const ColumnSpan& span;
   std::uint32_t column;               // the first of the eight
@@ -46,7 +46,7 @@ struct OpenLanes {
 /// Decides them.
 class LaneResolver {
  public:
-  /// levels  eight, a byte each, the first lowest; returned with those that were asked for
+  /// levels  eight, a byte each, the first lowest; returned with the requested ones
   virtual std::uint64_t decide(const OpenLanes& open_lanes, std::uint64_t levels) = 0;
   /// Where the level of the last column that decide() decided, which holds no facet with area along x, ends.
   virtual std::uint32_t even_until() const = 0;

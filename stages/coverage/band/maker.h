@@ -15,9 +15,9 @@ struct CoverageReport;
 
 /// One band of rows after the other, from the back of the bed; keeps its buffers.
 ///
-/// A facet adds to a column the volume that lies behind it there, and to all columns behind its area along x: their volume is
-/// area x width. Where a column holds no facet the winding number is whole, so errors do not outlive a stretch of columns with
-/// facets, and rationals look no further back.
+/// A facet adds to a column the volume behind it there, and to all columns behind its area along x: their volume is area x
+/// width. Where a column contains no facet the winding number is whole, so errors do not outlive an interval of columns with
+/// facets, and rationals read no further back.
 class BandMaker {
  public:
   /// slab  outlives the layer. isa  one that this processor has, not kAuto
@@ -26,7 +26,7 @@ class BandMaker {
   void enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows);
   bool is_empty() const { return active_.empty(); }
   /// Appends the rows of geometry rows [first, first + rows), the last one first, to `out`; adds to `report`. Its volume_mm3 is
-  /// in nm^3, and gets what the rule and samples change of the volume that facets tell.
+  /// in nm^3, and gets the change of the facets' volume by the rule and samples.
   void make(const BandSlab& slab, std::uint32_t first, std::uint32_t rows, Levels& out, CoverageReport& report);
 
   std::uint64_t bytes() const {

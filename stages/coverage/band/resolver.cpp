@@ -80,7 +80,7 @@ void RowResolver::take(const ColumnSpan& span) {
     columns += of_row.last - of_row.first + 1;
   }
   const auto facets = static_cast<double>(taken_.size());
-  // Each facet is laid as up to three trapezoids in a row.
+  // Each facet is added as up to three trapezoids in a row.
   spoilt_ =
       spoilt_share(*slab_, depth, scale, 3 * (columns + 2 * facets), std::abs(static_cast<double>(span.winding)) + facets);
   even_begin_ = even_end_ = 0;

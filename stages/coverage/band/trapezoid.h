@@ -1,4 +1,4 @@
-// stages/coverage/band/trapezoid.h: what of a facet lies between two of its corners, seen from along x.
+// stages/coverage/band/trapezoid.h: the piece of a facet between two of its corners, projected along x.
 //
 // Two edges of the facet's piece within the layer bound it, and a plane of one y at each end. So each row of voxels cuts a
 // trapezoid out of it again, by two chords.

@@ -58,7 +58,7 @@ struct PairKernels {
   /// Which of the boxes touch the box. A bit a lane.
   std::uint32_t (*touching)(const BoxLanes& boxes, const Box& box);
   /// All pairs of a facet of `a` with one of `b`, which lies in `around_b`, whose boxes touch; within a group (`a` is `b`) each
-  /// once. Both groups fit into a box of kWidestPair. Facets that share an edge are not doubtful if their normals are less than
+  /// once. Both groups fit into a box of kWidestPair. Facets that share an edge are no suspects if their normals are less than
   /// a right angle apart; others are not if one of their planes parts them, with the corner that both have on it.
   void (*pairs)(const FacetGroup& a, const FacetGroup& b, const Box& around_b, FoundPairs& found);
 };

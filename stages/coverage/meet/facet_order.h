@@ -13,7 +13,7 @@
 
 namespace lamina::coverage {
 
-/// Facets with area along a curve through their middles, sixteen a group, whatever the order of the file; and a tree of sixteen
+/// Facets with area along a curve through their middles, sixteen a group, regardless of the file's order; and a tree of sixteen
 /// boxes a node over the groups. 4 bytes a facet and 2 of boxes, 20 more while it is made.
 ///
 /// Source: G. Morton's order (1966); each bit of it halves the cell's longest side

@@ -131,7 +131,7 @@ void test_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a, c
   }
 }
 
-/// Each pair of groups that touch is looked at once: by the first of them, or by the other if that has too many others.
+/// Each pair of groups that touch is tested once: by the first of them, or by the other if that has too many others.
 void test_neighbours(const MeshBlocks& mesh, const FacetOrder& order, const PairKernels& kernels, Findings& findings) {
   std::vector<std::uint8_t> crowded(order.groups());
   tbb::parallel_for(std::uint32_t{0}, order.groups(), [&](std::uint32_t g) {
@@ -180,7 +180,7 @@ Hit hit(const Plane& plane, std::int64_t y, std::int64_t z) {
     turns += turn > 0 ? 1 : turn < 0 ? -1 : 0;
   }
   if (plane.nx == 0 || std::abs(turns) != 3) {
-    result.divisor = turns == 0 || std::abs(turns) == 1 ? 1 : 0;  // 0: on an edge, nobody can tell
+    result.divisor = turns == 0 || std::abs(turns) == 1 ? 1 : 0;  // 0: on an edge, undetermined
     return result;
   }
   const Point3& a = plane.facet.a;

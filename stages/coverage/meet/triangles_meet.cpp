@@ -29,7 +29,7 @@ struct Flat {
   std::int64_t u, v;
 };
 
-/// Seen along the axis on which the plane has the largest area.
+/// Projects along the axis on which the plane has the largest area.
 Flat detected(const Plane& plane, const Point3& p) {
   const auto x = std::abs(plane.nx), y = std::abs(plane.ny), z = std::abs(plane.nz);
   if (x >= y && x >= z) return {p.y, p.z};

@@ -17,7 +17,7 @@ struct Plane {
   bool flat() const { return nx == 0 && ny == 0 && nz == 0; }  // no area
 };
 
-/// True if they do; also where they come so near that doubles cannot tell. Both have area.
+/// True if they do; also where they come too near for doubles to decide. Both have area.
 /// shared  corners that both have
 /// Source: separating axes of convex bodies (S. Gottschalk, 1996); coplanar and touching ones are decided in integers
 bool triangles_meet(const Plane& f, const Plane& g, int& shared);
