@@ -89,20 +89,20 @@ struct LayerInspection {
 /// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
 /// memory  two layers' runs with their numbers and bodies. Where these and the inspection of a layer exceed the limit, the
 ///         inspection stops and frees its memory; where it stops depends on the images alone
-/// cost    O(runs) a layer for all but thin places
+/// cost    O(runs) a layer for all but thin regions
 class Inspection {
  public:
-  /// grid        of the images; must outlive this object
+  /// grid          of the images; must outlive this object
   /// placed_parts  the boxes of all copies; a piece at the bottom of one is not an island
-  /// min_nm    what is narrower is thin; 0: nothing is
-  /// max_bytes  limit of memory, with the inspection of one layer
+  /// min_nm        the width below which a region is thin; 0: none is
+  /// max_bytes     limit of memory, with the inspection of one layer
   Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
              std::uint64_t max_bytes = UINT64_MAX);
 
   // --- from any thread
   /// About what prepare() adds to what a layer holds.
   std::uint64_t bytes_needed(const RunsView& image) const;
-  /// Keeps the image, and finds its thin places.
+  /// Keeps the image, and finds its thin regions.
   void prepare(const RunsView& image, LayerInspection& inspection) const;
 
   // --- in layer order
@@ -145,7 +145,7 @@ class Inspection {
   const PixelGrid& grid_;
   std::vector<checks::Solid> placed_parts_;  // by bottom
   std::vector<PixelBox> window_;
-  PixelBox all_;  // of all stands, a pixel wider
+  PixelBox all_;  // of all placed parts, a pixel wider
   Stencils stencils_;
   double min_mm_, pixel_mm2_;
   std::uint64_t max_bytes_;

@@ -59,7 +59,7 @@ class FarField {
   }
 
  private:
-  /// Row by row, so that the first of equals is looked for in one.
+  /// Row by row, so that the search for the first of equals is within one row.
   template <class Value>
   LAMINA_BODY std::uint32_t first_of_largest(Value value) const {
     std::uint32_t best = 0, maximum = 0;
@@ -106,7 +106,7 @@ class NearField {
  private:
   static constexpr std::uint32_t kSet = ~0u;
 
-  /// Looks for the least energy of a block again.
+  /// Searches for the minimum energy of a block again.
   void inspection(std::uint32_t left, std::uint32_t top) {
     const std::uint32_t block = top / kBlock * kBlocks + left / kBlock;
     min_[block] = kSet;

@@ -130,7 +130,7 @@ void Budget::inspect_field(const Layer& layer, std::uint32_t zone, bool core) {
     if (survey != nullptr) range = survey->in(layer);
   }
   no_number_ |= made_ && !range.each;
-  if (!range.any) return;  // where it meets a part it is told
+  if (!range.any) return;  // where it meets a part it is reported
   const DropScale scale(binder_, grid_, layer.thickness);
   const auto of = [&](double requested) {
     LayerDose dose;

@@ -1,4 +1,4 @@
-// stages/dose/budget.h: what binder a job asks for and gets, before it is made and after.
+// stages/dose/budget.h: requested and reached binder of a job, before it is made and after.
 #pragma once
 
 #include <cstdint>
@@ -35,32 +35,32 @@ struct DoseFault {
 struct Jetting {
   bool dithered = true;          // else drops of a pixel are rounded to whole ones
   bool shell = false;            // else all is core
-  double core = 1;               // share of the core's pixels that get their drop; a job with a wish has 1
-  std::uint32_t full_drops = 1;  // of a full pixel without a wish
+  double core = 1;               // share of the core's pixels that get their drop; a job with a target has 1
+  std::uint32_t full_drops = 1;  // of a full pixel without a target
 };
 
-/// Looks at the layers of a job before any is made.
+/// Checks the doses of a job's layers before any is made.
 class Budget {
  public:
-  /// wishes         none: one drop a pixel
-  /// max_drops     that may be jetted on a pixel
-  /// min_percent  of the voids, that binds; 0: nobody knows
-  /// stretches      where doses are needed: those of nothing are not judged
+  /// targets      none: one drop a pixel
+  /// max_drops    that may be jetted on a pixel
+  /// min_percent  of the voids, that binds; 0: unknown
+  /// covered      where doses are needed: elsewhere they are not checked
   Budget(const Binder& binder, const PixelGrid& grid, std::optional<DoseTargets> targets, std::uint32_t max_drops,
          double min_percent, const Jetting& jetting = {true, true, 1}, CoveredSpans covered = {});
 
-  /// Before foresee(), of wishes that are formulas: where parts lie, and how many layers there are.
+  /// Before foresee(), of targets that are formulas: positions of the parts, and number of layers.
   void survey(std::vector<ZoneBox> boxes, std::uint32_t layers);
 
   /// Layers in their order. cost  that of dose_of(), once for equal layers; of formulas that of FieldSurvey
-  /// made  false: by another run of the same job, which tells what is to be told of it
+  /// made  false: by another run of the same job, which reports its warnings
   void foresee(const Layer& layer, bool made = true);
 
   /// The most drops of any pixel in the layers so far.
   std::uint32_t max_drops() const { return max_drops_; }
 
-  /// Warns of wishes that cannot be met, and of those that come to no drop.
-  /// errors  kUsage: layers get less than binds, whoever makes them, and that is not allowed; a formula is none
+  /// Warns of targets that cannot be met, and of those too low for one drop.
+  /// errors  kUsage: layers of any run get less than binds, and that is not allowed; a formula is invalid
   Status check(bool allow_unbound, std::vector<Warning>& warnings) const;
 
   const Binder& binder() const { return binder_; }
@@ -69,7 +69,7 @@ class Budget {
   bool has_target() const { return targets_.has_value(); }
   /// Whether somewhere in the boxes of parts a formula is no number of per cent, or gives less than binds.
   bool is_uncertain(bool allow_unbound) const { return no_number_ || (!allow_unbound && !thin_.where.empty()); }
-  /// Least and most per cent that the layers get that are made.
+  /// Minimum and maximum per cent that the made layers get.
   std::pair<double, double> gets() const { return gets_; }
 
  private:
@@ -87,13 +87,13 @@ class Budget {
   Jetting jetting_;
   CoveredSpans spans_;
   std::pair<double, double> gets_{0, 0};
-  bool any_ = false, made_ = true;                          // made: the layer that is looked at
-  std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by place of the wish and thickness
+  bool any_ = false, made_ = true;                          // made: the layer under inspection
+  std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by target index and thickness
   DoseFault peaks_;                                         // as cut_, of formulas in boxes of parts
-  DoseFault cut_, unbound_, thin_;                          // thin: by places of a formula, of which none need be in a part
+  DoseFault cut_, unbound_, thin_;                          // thin: by positions of a formula, in parts or not
   DoseFault unbound_anywhere_;                              // in layers of other runs, too
-  std::map<std::pair<std::size_t, bool>, DoseFault> none_;  // wishes above 0 that come to no drop; by place, of the core
-  std::map<std::uint32_t, bool> jetted_;                    // whether parts with a wish of their own get any; by zone
+  std::map<std::pair<std::size_t, bool>, DoseFault> none_;  // targets above 0 without a drop; by index, of the core
+  std::map<std::uint32_t, bool> jetted_;                    // whether parts with their own target get any; by zone
   std::vector<ZoneBox> boxes_;
   std::uint32_t layers_ = 1;
   std::map<std::pair<std::string, std::uint32_t>, FieldSurvey> surveys_;  // by formula and zone
@@ -109,10 +109,10 @@ class BinderCount {
            std::uint64_t requested_drops, std::uint64_t lost, std::uint32_t max_drops = 0);
 
   std::uint64_t drops() const { return drops_; }
-  /// Of any pixel; a dithered wish plans for one more than a small part may get.
+  /// Of any pixel; a dithered target plans for one more than a small part may get.
   std::uint32_t max_drops() const { return max_drops_; }
   double binder_ml(const Budget& budget) const;
-  /// Per cent of the voids of all dosed pixels, by the wish and by the drops.
+  /// Per cent of the voids of all dosed pixels, by the target and by the drops.
   double requested_percent(const Budget& budget) const;
   double reached_percent(const Budget& budget) const;
 

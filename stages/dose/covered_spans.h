@@ -18,7 +18,7 @@ struct ZoneBox {
   std::array<std::int64_t, 3> origin{};  // corner of the part, from which a formula of its own counts
 };
 
-/// A bound by boxes: what is told not to be there is not there; what is told to be there may be absent.
+/// A bound by boxes: zones reported as absent are absent; zones reported as present may be absent.
 class CoveredSpans {
  public:
   /// Every zone at all heights, with a core.

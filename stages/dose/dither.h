@@ -32,8 +32,8 @@ struct DitherScratch {
 /// blue-noise tile (blue_noise.h) as it lies in this layer. Thresholds have 24 bits: the rank of the pixel, and below it an
 /// offset that goes through 1024 places from layer to layer, so that fractions finer than a tile can show come out right
 /// over the layers.
-/// image   levels: zones of different doses, or shares of a voxel that a part fills
-/// drops   a pixel of each level, [0] for level 0 is not looked at; each at most kMaxDrops
+/// image   levels: zones of different doses, or fill fractions of voxels
+/// drops   a pixel of each level, [0] for level 0 is not read; each at most kMaxDrops
 /// layer   its number: the same for the same job
 /// cost    O(runs + changes of the result), and once a level and layer O(tile)
 void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,

@@ -1,4 +1,4 @@
-// stages/dose/dose_target.h: the saturation that is asked for at each height, and the drops that every layer gets for it.
+// stages/dose/dose_target.h: the requested saturation at each height, and the drops that every layer gets for it.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ struct DoseTarget {
   bool operator==(const DoseTarget&) const = default;
 };
 
-/// Another wish between two heights above the bed, in mm; the last one that holds a layer's plane counts.
+/// Another target between two heights above the bed, in mm; the last one that contains a layer's plane counts.
 struct DoseTargetRange {
   double from_mm = 0, to_mm = 0;
   DoseTarget target;
@@ -40,7 +40,7 @@ struct DoseTargets {
     if (position > ranges.size()) return *own[position - ranges.size() - 1];
     return position == 0 ? all : ranges[position - 1].target;
   }
-  /// Whether a layer's wish is one of a part, whose formulas count from the part's corner.
+  /// Whether a layer's target is one of a part, whose formulas count from the part's corner.
   bool is_own(std::uint32_t zone) const { return zone > 0 && own[zone - 1].has_value(); }
   /// Whether any is a formula.
   bool has_formula() const;
@@ -54,7 +54,7 @@ struct LayerDose {
   Drops24 requested_shell = 0, requested_inside = 0;  // however many
   double requested = 0, requested_core = 0;           // per cent
   double gets = 0, gets_core = 0;                     // per cent, by these drops
-  bool cut = false;                                   // more drops were asked for than may be jetted
+  bool cut = false;                                   // more drops were requested than may be jetted
   std::uint32_t maximum() const {                     // drops of any pixel
     return static_cast<std::uint32_t>(((shell > core ? shell : core) + kOneDrop - 1) >> kDropBits);
   }
@@ -63,7 +63,7 @@ struct LayerDose {
 /// Drops rounded to whole ones, half of one to one, and what they give: as a job without dithering jets them.
 void round_drops(LayerDose& dose, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm);
 
-/// Of a layer without a wish: a drop a pixel, or so many.
+/// Of a layer without a target: a drop a pixel, or so many.
 inline LayerDose one_drop(std::uint32_t drops = 1) {
   LayerDose dose;
   dose.shell = dose.core = dose.requested_shell = dose.requested_inside = Drops24{drops} << kDropBits;

@@ -1,7 +1,7 @@
-// stages/dose/field.h: a saturation that differs from place to place: formulas of x, y and z.
+// stages/dose/field.h: a saturation that depends on the position: formulas of x, y and z.
 //
 // A formula is taken for blocks of 4 x 4 pixels, counted from the left front corner of the bed, at the middle of the block
-// and of the layer: all of a block's pixels ask for the same. x, y and z are mm from the corner of the bed; those of a part's
+// and of the layer: all of a block's pixels request the same. x, y and z are mm from the corner of the bed; those of a part's
 // own formula from the least corner of its box as it stands, each copy from its own.
 #pragma once
 
@@ -61,7 +61,7 @@ class Field {
   /// errors  kUsage: the formula is none
   Status start(const std::string& formula, std::string_view key, const Sheet& sheet, std::span<const ZoneBox> copies);
 
-  /// Drops that a full pixel of a block asks for, however many may be jetted; a block is evaluated once a band of rows.
+  /// Drops that a full pixel of a block requests, without the limit; a block is evaluated once a band of rows.
   /// 0 where it has none: fault() then says why
   Drops24 drops_of(std::uint32_t block_column, std::uint32_t block_row) {
     if (block_row != band_) begin_band(block_row);
@@ -116,7 +116,7 @@ class FieldSurvey {
   std::vector<ZoneBox> boxes_;
   bool own_ = false;
   std::uint32_t layers_ = 1;
-  std::optional<FieldRange> always_;  // of a formula that does not look at z
+  std::optional<FieldRange> always_;  // of a formula that does not depend on z
 };
 
 }  // namespace lamina::dose

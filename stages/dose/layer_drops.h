@@ -28,7 +28,7 @@ struct DepositedPart {
 
 /// Scratch for the drops of a layer, and what they are; buffers keep their capacity.
 struct DropWork {
-  Levels shares;  // how full voxels are, if the job asks for that
+  Levels shares;  // fill fractions of voxels, if the job requests them
   Levels zones;
   Levels levels;  // drops of each pixel, where any of the job gets several
   DitherScratch dither;
@@ -36,7 +36,7 @@ struct DropWork {
   std::vector<Runs> planes;  // then: the pixels with at least one drop, two, ...: as many as the job has
   std::vector<DepositedPart> deposited;
   ShareOut shared;                    // of the parts' shares
-  std::vector<Levels> of_material;    // drops of each material, where they are told apart
+  std::vector<Levels> of_material;    // drops of each material, where they are separated
   std::vector<Runs> material_planes;  // of them: the planes of the first material, of the next, ...
   Levels up_to;                       // drops of the materials so far; scratch
   std::vector<Field> fields;          // two a zone: of its shell, of its core
@@ -52,8 +52,8 @@ struct DropRules {
   std::uint32_t max_drops = 0;  // of any pixel of the job
 };
 
-/// What the parts in work.laid, of which each lies over those before, make of the voxels together: shares.h. Laid more parts
-/// upon, the same again gives what all of them at once would.
+/// Distributes the voxels among the parts in work.deposited, of which each overrides those before: shares.h. After more parts
+/// are added, another call gives what one call with all of them would.
 void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work);
 
 /// What the images of a layer have at most, before it gets its drops.
@@ -63,8 +63,8 @@ struct DropSizes {
   std::uint64_t runs = 0;       // of the shares of voxels of all parts, if there are any
   std::uint64_t pixels = 0;     // that get drops which are not whole
   bool zones = false;           // of several doses, or moved edges or axes
-  std::uint32_t parts = 0;      // in DropWork::laid
-  std::uint32_t materials = 1;  // whose drops are told apart
+  std::uint32_t parts = 0;      // in DropWork::deposited
+  std::uint32_t materials = 1;  // whose drops are separated
 };
 
 /// What it has at most with them; buffers double as they grow.
@@ -90,9 +90,9 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
 ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer,
                         std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work);
 
-/// The same of parts in work.laid that share voxels, or whose doses are formulas. The image is that of all of them.
-/// asks       of each zone, shell and core; work.zones becomes the levels of all parts together
-/// materials  whose drops are told apart in work.of_material: of a voxel's drops the first are those of the first material, so
+/// The same of parts in work.deposited that share voxels, or whose doses are formulas. The image is that of all of them.
+/// requests   of each zone, shell and core; work.zones becomes the levels of all parts together
+/// materials  whose drops are separated in work.of_material: of a voxel's drops the first are those of the first material, so
 ///            that each gets them in proportion to its share over many voxels
 /// errors     of pour()
 Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
@@ -100,7 +100,7 @@ Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
                                     Runs& second, DropWork& work);
 
 /// The planes of each material's drops, work.material_planes, after any of the functions above.
-/// shared  drops_of_deposited() has told the drops apart; else all drops of a pixel are of the material that it is of
+/// shared  drops_of_deposited() has separated the drops; else all drops of a pixel are of the material that it is of
 /// image   of each material, its pixels; becomes that of those which get any drop of it
 /// cost    O((runs + rows) x materials x max_drops)
 void drops_of_materials(std::uint32_t max_drops, bool shared, std::span<Runs> image, DropWork& work);

@@ -14,7 +14,7 @@
 
 namespace lamina::dose {
 
-/// What a full pixel asks for, however many drops may be jetted: a number of them, or a formula's.
+/// The request of a full pixel, without the limit of drops: a number of them, or a formula's.
 struct DropRequest {
   Drops24 drops = 0;
   Field* field = nullptr;

@@ -9,7 +9,7 @@ namespace lamina::dose {
 
 /// Whether a pixel of a core is jetted: the fractional part of a c + b r + g l is below the share, where a, b and g are
 /// (sqrt 5 - 1) / 2, (sqrt 13 - 3) / 2 and sqrt 2 - 1 as whole 32-bit fractions. Their continued fractions are all ones,
-/// threes and twos, so that along columns, along rows and from layer to layer the set pixels of every line are the asked
+/// threes and twos, so that along columns, along rows and from layer to layer the set pixels of every line are the target
 /// share, evenly spread, and no streak forms in any of the three directions.
 /// source  Niederreiter, "Random Number Generation and Quasi-Monte Carlo Methods" (1992), section 3.1
 constexpr bool core_pixel(std::uint32_t column, std::uint32_t row, std::uint32_t layer, std::uint32_t threshold) {

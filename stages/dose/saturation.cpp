@@ -41,7 +41,7 @@ Wide voxel_of(const PixelGrid& grid, std::int64_t thickness_nm) {
   const Wide pixels = static_cast<Wide>(grid.x.dots) * static_cast<Wide>(grid.y.dots);
   return area * static_cast<Wide>(thickness_nm) / pixels * 1000;
 }
-/// What one drop leaves, in the same unit times 10^12, as wishes and voids are in millionths.
+/// What one drop leaves, in the same unit times 10^12, as targets and voids are in millionths.
 Wide one_of(const Binder& binder) {
   return static_cast<Wide>(stays_of(binder)) * static_cast<Wide>(drop_of(binder)) *
          (static_cast<Wide>(kMillion) * kMillion * 1000);

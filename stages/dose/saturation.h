@@ -23,7 +23,7 @@ inline constexpr std::uint32_t kMaxDrops = 64;
 ///   saturation = drops x drop x (1 - evaporates) / voids
 /// source  H. Miyanaji, S. Zhang, L. Yang, "A new physics-based model for equilibrium saturation determination in binder
 ///         jetting additive manufacturing process" (2018), for saturation as binder over voids; the share that evaporates
-///         before the next layer is measured by whoever states it
+///         before the next layer is measured by the user
 struct Binder {
   double drop_pl = 0;
   double evaporates = 0;  // share of the jetted binder, 0 .. below 1

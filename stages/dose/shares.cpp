@@ -43,7 +43,7 @@ void append_masked(const LevelsView& image, std::uint32_t row, std::span<const s
   }
 }
 
-/// How many changes two rows have in common at their beginning; eight are looked at at once.
+/// How many changes two rows have in common at their beginning; eight are compared at once.
 std::size_t same_changes(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
   const std::size_t maximum = std::min(a.size(), b.size());
   std::size_t same = 0;

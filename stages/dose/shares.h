@@ -40,7 +40,7 @@ struct ZoneSums {
 };
 ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose);
 
-/// Parts of a layer, in the order in which they are laid, whose voxels have one sum.
+/// Parts of a layer, in the order in which they are added, whose voxels have one sum.
 struct ShareOut {
   std::vector<Levels> part;  // scratch
   std::vector<Runs> owner;   // of each part, the voxels half full or more of which it has most; of equals the last

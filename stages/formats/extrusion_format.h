@@ -19,11 +19,11 @@ namespace lamina::formats {
 struct MoveTotals {
   std::uint64_t moves = 0, travels = 0, retractions = 0;
   double bead_mm = 0, travel_mm = 0;
-  double volume_mm3 = 0;   // of all that is laid: filament_mm x the filament's area x the machine's declared error
+  double volume_mm3 = 0;   // of all beads: filament_mm x the filament's area x the machine's declared error
   double filament_mm = 0;  // sum of E; what is drawn back comes again and does not count
   double seconds = 0;      // estimated: changes of speed take the profile's acceleration, corners its corner speed
   std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
-  // The share of moves, beads, volume and filament that lies beside the parts: skirts and prime lines.
+  // The share of moves, beads, volume and filament that is not of the parts: skirts and prime lines.
   std::uint64_t auxiliary_moves = 0;
   double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
   std::uint64_t part_moves() const { return moves - auxiliary_moves; }
@@ -96,7 +96,7 @@ class LayerMoves {
 class ExtrusionFormat {
  public:
   virtual ~ExtrusionFormat() = default;
-  /// Whether the machine can lay layers of that thickness. errors  kUsage
+  /// Whether the machine can extrude layers of that thickness. errors  kUsage
   virtual Status check(const Layer& layer) const = 0;
   virtual void head(const ExtrusionHead& head, Buffer<char>& out) const = 0;
   virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const = 0;

@@ -23,7 +23,7 @@ constexpr Count kFileOverhead = 4096;  // header, directory, checks
 constexpr Count max_g4(Count, Count rows, Count changes) { return kFileOverhead + rows + 4 * changes; }
 /// Every pixel a bit, rows in whole bytes.
 constexpr Count max_bits(Count columns, Count rows, Count) { return kFileOverhead + (columns + 7) / 8 * rows; }
-/// The same, with the place of each strip of 256 KiB (or of a longer row), and one strip of bits beside the file.
+/// The same, with the offset of each strip of 256 KiB (or of a longer row), and one strip of bits in addition to the file.
 constexpr Count max_strips(Count columns, Count rows, Count changes) {
   const Count bits = max_bits(columns, rows, changes);
   return bits + bits / 16384 + 256 * 1024 + columns / 8;
@@ -64,7 +64,7 @@ const ImageFormat* find_image_format(std::string_view id) {
 
 namespace {
 
-constexpr std::uint64_t kCapacity = 512 * 1024;  // header, directory, checks, a strip beside the file
+constexpr std::uint64_t kCapacity = 512 * 1024;  // header, directory, checks, a strip in addition to the file
 
 /// A packet of two bytes for each 128 equal ones, up to four more around a change.
 constexpr std::uint64_t max_grey_packbits(std::uint64_t columns, std::uint64_t rows, std::uint64_t changes) {

@@ -20,7 +20,7 @@ namespace lamina::formats {
 
 using Bytes = Buffer<std::byte>;
 
-/// What a file may say of its layer beside the pixels. No name of a file, so that equal layers are equal files.
+/// What a file may state of its layer in addition to the pixels. No name of a file, so that equal layers are equal files.
 struct LayerTags {
   std::string title;         // of the job, if its owner gave it one
   std::string material;      // empty if the job has one

@@ -33,7 +33,7 @@ struct SliceLayer {
   Layer layer;
   ContoursView contours;
   std::span<const std::uint32_t> body;
-  ToolpathsView paths;                       // filling; none if it was not asked for
+  ToolpathsView paths;                       // filling; none if it was not requested
   std::span<const std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1]); empty if none
 };
 

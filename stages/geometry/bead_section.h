@@ -1,4 +1,4 @@
-// stages/geometry/bead_section.h: the cross-section of a bead that is laid on a layer, in mm.
+// stages/geometry/bead_section.h: the cross-section of a bead that is deposited on a layer, in mm.
 #pragma once
 
 #include <algorithm>

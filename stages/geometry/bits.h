@@ -30,7 +30,7 @@ class RunsBuilder {
   /// Set bits are pixels, or clear bits if `invert`. Bits after the last column are ignored.
   /// row    row_bytes(columns) bytes
   /// false  if the image has 2^32 changes or more, which runs cannot hold
-  /// cost   one look at each 64 bits, and a few operations a change
+  /// cost   one read of each 64 bits, and a few operations a change
   bool add_row(std::span<const std::byte> row, bool invert);
 
   Runs finish();

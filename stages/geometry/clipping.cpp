@@ -66,7 +66,7 @@ Error refusal(const char* why) {
 Error refusal(const std::exception& why) { return is_shortage(why) ? out_of_memory() : refusal(why.what()); }
 
 /// What `act` leaves in `out`. Clipper swallows its own std::bad_alloc, and ClipperOffset then answers with less or nothing: so
-/// whatever came of an act during which memory ran out, in any thread, is not taken.
+/// the result of an act during which memory ran out, in any thread, is discarded.
 template <class Act>
 Result<Contours> guarded(Act&& act) {
   const std::uint64_t before = refused_allocations();

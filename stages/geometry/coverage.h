@@ -26,8 +26,8 @@ PixelWindow window_of(const LevelsView& levels);
 PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
 
 /// How much of each of columns x rows equal parts of the window is set: 0 none ... 255 all, to the nearest.
-/// The share is that of the area (a box filter), found from the runs in integers: no pixel of the full size is looked
-/// at. Parts may be smaller than pixels.
+/// The share is that of the area (a box filter), found from the runs in integers: no pixel of the full size is
+/// read. Parts may be smaller than pixels.
 /// window   not empty, within the image
 /// columns  1 .. 65535; result  columns x rows values, the top row first
 /// cost     a few operations a run and result row that it touches, and one a result value

@@ -23,7 +23,7 @@ Isa of_processor() {
 #endif
 }
 
-/// The variable as it was first seen.
+/// The variable's value at the first call.
 const char* cap() {
   static const char* const value = std::getenv("LAMINA_ISA");
   return value;

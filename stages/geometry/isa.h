@@ -12,7 +12,7 @@ namespace lamina {
 std::string_view isa_name(Isa isa);
 
 /// The widest set that the processor and its operating system have; of x86-64's baseline, or of another processor, kPlain.
-/// The environment variable LAMINA_ISA, a name as above, caps it. Looked up once.
+/// The environment variable LAMINA_ISA, a name as above, caps it. Read once.
 ///
 /// kAvx2 means AVX2, BMI 1 and 2 and POPCNT; kAvx512 these and AVX-512 F, BW, DQ and VL.
 Isa widest_isa();
@@ -23,7 +23,7 @@ Isa capped_isa(Isa isa, const char* cap);
 /// `wanted`, or the widest where that is kAuto or more than the processor has.
 Isa limited_isa(Isa wanted);
 
-/// The set to use where `wanted` is wished for; kAuto is the widest.
+/// The set to use where `wanted` is requested; kAuto is the widest.
 /// errors  kUsage if the processor does not have it, or LAMINA_ISA does not allow it
 Result<Isa> usable_isa(Isa wanted);
 

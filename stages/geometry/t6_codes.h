@@ -36,7 +36,7 @@ inline constexpr std::array<Code, 7> kVertical = {code_of("0000010"), code_of("0
                                                   code_of("011"),     code_of("000011"), code_of("0000011")};
 
 /// Four vertical modes after each other, by (a1 - b1 + 3) of the first + 8 of the second + 64 + 512. Entries with a
-/// 7 in them are never asked for.
+/// 7 in them are never used.
 inline constexpr std::array<Code, 4096> kFourVertical = [] {
   std::array<Code, 4096> table{};
   for (std::uint32_t index = 0; index < table.size(); ++index) {

@@ -1,5 +1,5 @@
 // stages/geometry/targets.h: functions for instruction sets that not every processor has. The rest of the program runs on any;
-// who calls them asks isa.h.
+// callers select them with isa.h.
 #pragma once
 
 #if defined(__x86_64__)

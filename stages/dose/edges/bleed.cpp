@@ -79,7 +79,7 @@ void Bleeds::remove(const Layer& layer, Runs& image, std::span<Runs> zone, Bleed
     move_edges(image, bleed, work, work.moved);
     return std::swap(image, work.moved);
   }
-  // First all that stays within the layer: what is beside another part is no edge. Then what grows out of it.
+  // First all that stays within the layer: a border with another part is no edge. Then what grows out of it.
   Runs whole;
   copy(image, whole);
   const auto deposit = [&](Runs& own) {

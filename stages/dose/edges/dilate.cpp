@@ -18,7 +18,7 @@ void append(std::uint32_t begin, std::uint32_t end, Buffer<std::uint32_t>& runs)
   runs.push_back(end);
 }
 
-/// The runs of `united` with those of `row`, each longer by `width` at both ends.
+/// The runs of `merged` with those of `row`, each longer by `width` at both ends.
 void merge(Row merged, Row row, std::uint32_t width, std::uint32_t columns, Buffer<std::uint32_t>& result) {
   result.clear();
   std::size_t u = 0;

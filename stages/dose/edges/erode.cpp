@@ -59,7 +59,7 @@ void erode(const RunsView& image, const Reach& reach, Runs& result) {
     if (r < far || r + far >= rows) continue;
     const Row own = image.row(static_cast<std::uint32_t>(r));
     kept.assign(own.begin(), own.end());
-    // The farthest rows first: where they are empty, nothing else has to be looked at.
+    // The farthest rows first: where they are empty, nothing else has to be read.
     for (std::int64_t j = far; j >= 0 && !kept.empty(); --j) {
       const std::uint32_t width = reach.half_width[static_cast<std::size_t>(j)];
       keep_inside(kept, image.row(static_cast<std::uint32_t>(r + j)), width, next);

@@ -1,4 +1,4 @@
-// stages/formats/bmp/bmp.h: 1-bit Windows bitmaps. Format and sources: README.md beside this file.
+// stages/formats/bmp/bmp.h: 1-bit Windows bitmaps. Format and sources: README.md in this folder.
 #pragma once
 
 #include <memory>

@@ -20,7 +20,7 @@ std::string label_of(std::string_view name) {
   return out;
 }
 
-/// What of a path is a hatch (a straight line of a raster on its own) is told apart from polylines.
+/// Hatches (single straight lines of a raster) are separated from polylines.
 bool is_hatch(const ToolpathsView& paths, std::uint32_t interval) { return paths.kind[interval] == PathKind::kRaster; }
 
 // Text; commands of 32 bits with floats; commands of 16 bits with whole units.

@@ -43,7 +43,7 @@ class BitWriter {
 
   /// First byte that is not final yet.
   std::byte* next() const { return next_; }
-  /// Goes on in other memory, into which the caller has copied all before next() and, if any bit waits, its byte.
+  /// Continues in other memory, into which the caller has copied all before next() and, if any bit waits, its byte.
   void move_to(std::byte* next) { next_ = next; }
   /// Fills the last byte up with zeros; the end of what was written.
   std::byte* finish() const { return next_ + (pending_ != 0 ? 1 : 0); }

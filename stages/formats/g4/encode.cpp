@@ -118,7 +118,7 @@ inline std::uint32_t put_in_step(BitWriter& writer, const std::uint32_t* a, cons
   return done;
 }
 
-/// Changes that go the way of all rows between two looks at whether eight keep step: the least, and after looks in vain.
+/// Changes that take the general path between two tests whether eight keep step: minimum, and after failed tests.
 constexpr std::uint32_t kMinBetween = 4, kMaxBetween = 64;
 constexpr std::array<Code, 8> kVerticalOrPass = {kVertical[0], kVertical[1], kVertical[2], kVertical[3],
                                                  kVertical[4], kVertical[5], kVertical[6], kPass};

@@ -22,7 +22,7 @@ class Encoder {
   /// Bytes before `start` are kept; the file grows as needed and may be left larger than its content.
   /// needs    1 <= columns <= 2^31 - 1 and well-formed runs (data/runs.h)
   /// returns  one past the last byte of content
-  /// cost     one look at each change: below a nanosecond where rows follow each other's edges, a few where they do
+  /// cost     one read of each change: below a nanosecond where rows follow each other's edges, a few where they do
   ///          not; a row like the one above costs a comparison, a stretch of empty rows the logarithm of its length
   std::size_t encode(const RunsView& runs, Buffer<std::byte>& file, std::size_t start);
 

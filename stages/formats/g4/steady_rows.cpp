@@ -44,7 +44,7 @@ std::uint32_t put_steady_rows(BitWriter& writer, const SteadyRows& rows, const S
     if (at != 0) put_words(out, steps);
     if (at < count) at = put_horizontals(out, task, steps, at, count);
     task.left -= at;
-    // Neither does a change that keeps no step go on, nor a far one before such.
+    // A change that keeps no step stops, and so does a far one before such.
     const bool stops = at < count && (steps.keeps >> at & 1) == 0;
     const bool before_stop = at + 1 < count && (steps.keeps >> at & steps.far >> at & 1) != 0;
     if (stops || before_stop || task.left == 0) break;

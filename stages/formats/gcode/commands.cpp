@@ -147,7 +147,7 @@ void SlicerFacts::read_setting(std::string_view comment) {
     density_set_ = density_g_cm3 > 0;
   }
   if (name == "filamentusedcm") used_cm3_ = leading_number(line.value);
-  if (name == "filamentusedg" && used_cm3_ >= 0.2)  // told to 0.01
+  if (name == "filamentusedg" && used_cm3_ >= 0.2)  // stated to 0.01
     state_density(leading_number(line.value) / used_cm3_);
   if (name == "usevolumetrice" && leading_number(line.value) == 1) volumetric = true;
 }
@@ -380,7 +380,7 @@ bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
   return code != 0 && code != 1 && code != 2 && code != 3 && code != 92;
 }
 
-/// Whether the line lays a bead.
+/// Whether the line deposits a bead.
 bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
   std::string_view left = text_.substr(0, text_.find_first_of(";(*"));
   if (left.starts_with('N')) left.remove_prefix(std::min(left.find_first_of("GMT"), left.size()));  // a line's number

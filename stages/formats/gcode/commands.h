@@ -20,18 +20,18 @@ namespace lamina::formats {
 ///     ;Filament Diameter #1: 1.75          ideaMaker
 ///     ;CURA_PROFILE_STRING:eNrt...         Cura up to 15.04: settings, deflated, base64
 ///     ;SETTING_3 {"...                     Cura since then: what of its profile was changed
-///     ;Filament used: 1.3m 9.1g            Cura up to 15.04: what a metre weighs tells 1.75 mm from 2.85 mm
+///     ;Filament used: 1.3m 9.1g            Cura up to 15.04: its weight per metre decides 1.75 mm or 2.85 mm
 ///     ;FLAVOR:Griffin                      CuraEngine: printers for 2.85 mm
 ///     ;FLAVOR:UltiGCode                    CuraEngine: E counts mm3; so does "; use_volumetric_e = 1" of PrusaSlicer
 ///     ; machine: Anet A8                   lamina
 ///     ; filament_density = 1.24,1.24       PrusaSlicer, Orca; with a colon BambuStudio
 ///     ; filament used [cm3] = 1.23         lamina, PrusaSlicer: density by what [g] of it weigh
 struct SlicerFacts {
-  double filament_mm = 0;    // diameter; 0 if untold
-  double nozzle_mm = 0;      // 0 if untold
-  double density_g_cm3 = 0;  // 0 if untold
+  double filament_mm = 0;    // diameter; 0 if not stated
+  double nozzle_mm = 0;      // 0 if not stated
+  double density_g_cm3 = 0;  // 0 if not stated
   bool volumetric = false;
-  std::string machine;  // a name, at most 100 characters; empty if untold
+  std::string machine;  // a name, at most 100 characters; empty if not stated
 
   /// Takes a line that begins with a semicolon.
   void read(std::string_view comment);
@@ -53,7 +53,7 @@ struct SlicerFacts {
 /// cost  64 KiB at most are inflated
 double cura_profile_number(std::string_view base64, std::string_view setting);
 
-/// The words of a G2 or G3, in mm. I and J lead from the start to the centre, whatever G90 and G91 say; R excludes them.
+/// The words of a G2 or G3, in mm. I and J lead from the start to the centre, regardless of G90 and G91; R excludes them.
 struct ArcWords {
   bool clockwise = false;  // G2
   double i = 0, j = 0;
@@ -80,7 +80,7 @@ class Arc {
   /// J; R with an end at the start; or, without a word of Marlin, an end in the direction of the start, counter-clockwise.
   /// Also of radii beyond all numbers of a firmware.
   bool plan(ArcPoint from, ArcPoint to, const ArcWords& words);
-  /// At least 1. The chords within a bed of some metres are a few thousand, whatever the radius.
+  /// At least 1. The chords within a bed of some metres are a few thousand, for any radius.
   std::uint64_t chords() const { return chords_; }
   /// The end of a chord, 1 .. chords(); that of the last one is the arc's.
   ArcPoint end_of(std::uint64_t chord) const;
@@ -89,13 +89,13 @@ class Arc {
 
  private:
   ArcPoint from_, to_, spoke_;  // spoke: from the centre to the start
-  double travel_ = 0;               // radians, counter-clockwise
+  double travel_ = 0;           // radians, counter-clockwise
   double miss_ = 0;
   bool short_radius_ = false;
   std::uint64_t chords_ = 1;
 };
 
-/// A straight move, or a chord of an arc, that lays filament; mm.
+/// A straight move, or a chord of an arc, that extrudes filament; mm.
 struct RawBead {
   double from[3], to[3];
   double fed;             // mm of filament, or mm3

@@ -20,7 +20,7 @@ double heading_of(const RawBead& bead) { return std::atan2(bead.to[1] - bead.fro
 }  // namespace
 
 void LayerCutter::tag(const GcodeFile::FilePosition& before) {
-  if (!tagged_) layers_.clear();  // what start code lays belongs to no layer
+  if (!tagged_) layers_.clear();  // beads of start code belong to no layer
   tagged_ = true;
   if (step_ > 0) return;
   begin(before, false);
@@ -31,7 +31,7 @@ void LayerCutter::begin(const GcodeFile::FilePosition& before, bool climb_goes_o
   layers_.emplace_back();
   layers_.back().position.start = before;
   layers_.back().position.below = below;
-  layers_.back().low = layers_.back().top = below;  // of a layer in which nothing is laid
+  layers_.back().low = layers_.back().top = below;  // of a layer without a bead
   climbs_ = climbs_ && climb_goes_on;
   slope_length_ = flat_length_ = 0;
 }

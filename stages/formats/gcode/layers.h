@@ -42,7 +42,7 @@ class LayerCutter {
   std::size_t turnless() const { return turnless_; }  // layers that end after a climb without one
 
  private:
-  enum class Cut { kNone, kLayer, kClimb };  // kClimb: a layer within a climb that goes on
+  enum class Cut { kNone, kLayer, kClimb };  // kClimb: a layer within a climb that continues
   Cut cut_at(const RawBead& bead);
   void finish_steps();
   bool begins_step(const RawBead& bead);

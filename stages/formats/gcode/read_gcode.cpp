@@ -23,7 +23,7 @@ GcodeBead bead_of(const RawBead& raw, double width_mm, std::uint32_t type) {
   return {{nm(raw.from[0]), nm(raw.from[1])}, {nm(raw.to[0]), nm(raw.to[1])}, std::max<Nm>(nm(width_mm), 1), type};
 }
 
-/// Why a file is none of text, if its first bytes tell.
+/// Why a file is not text, if its first bytes show it.
 std::string_view binary_kind(const FileReader& reader) {
   std::array<char, 4> magic{};
   if (!reader.read_at(0, magic)) return {};
@@ -103,7 +103,7 @@ Status GcodeSurvey::read_all() {
   std::optional<RawBead> raw;
   while (walk_.next(raw)) {
     if (walk_.layer_tag) {
-      if (!cutter_.tagged()) file_.box_ = Box(), fed_ = {};  // what start code lays belongs to no layer
+      if (!cutter_.tagged()) file_.box_ = Box(), fed_ = {};  // beads of start code belong to no layer
       cutter_.tag(walk_.before());
     } else {
       cutter_.add(*raw, walk_.before(), walk_.position());
@@ -132,7 +132,7 @@ void GcodeSurvey::take_filament() {
   file_.fed_mm3_ = fed_[0] * volume_of_unit(facts.volumetric, file_.filament_mm_) + fed_[1];
 }
 
-/// Over the length of all beads whose widths no tag tells; 0 if there is none.
+/// Over the length of all beads whose widths no tag states; 0 if there is none.
 double GcodeSurvey::mean_width() const {
   double area = 0, length = 0;
   for (const LayerCutter::CutLayer& layer : cutter_.layers()) {
@@ -228,7 +228,7 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const 
     if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined, raw->primed * unit});
   }
   if (walk.fault || types.size() != types_.size() || layer.beads.size() != position.beads) return changed;
-  // A layer in which nothing is laid is where the nozzle is at its end.
+  // A layer without a bead is at the height of the nozzle at its end.
   if (layer.beads.empty()) layer.z = nm_of(index + 1 < count() ? layers_[index + 1].start.at[2] : position.below);
   return layer;
 }

@@ -1,4 +1,4 @@
-// stages/formats/gcode/read_gcode.h: the beads that a G-code file lays, layer by layer, as its printer would.
+// stages/formats/gcode/read_gcode.h: reads the beads of a G-code file layer by layer, as its printer would extrude them.
 #pragma once
 
 #include <cstdint>
@@ -18,17 +18,17 @@ class FileReader;
 
 namespace lamina::formats {
 
-/// One straight move that lays filament; its type is one of GcodeFile::types.
+/// One straight move that extrudes filament; its type is one of GcodeFile::types.
 using GcodeBead = DepositedBead;
 
 struct GcodeLayer {
   std::int64_t z = 0;  // nm, of the nozzle at the first bead; without beads about there
   Buffer<GcodeBead> beads;
-  Buffer<BeadFeed> feeds;  // one for each bead, if they are asked for
+  Buffer<BeadFeed> feeds;  // one for each bead, if requested
 };
 
 struct GcodeOptions {
-  double filament_mm = 0;                // diameter; 0: what the file tells, else 1.75
+  double filament_mm = 0;                // diameter; 0: the file's value, else 1.75
   double layer_height_mm = 0;            // begins layers at its multiples; 0: at tags, heights or turns
   std::uint32_t max_beads = 10'000'000;  // of a layer, 24 bytes each
   std::uint32_t max_layers = 400'000;    // a bed's height in steps of 5 um, some 400 bytes each
@@ -41,14 +41,14 @@ struct GcodeOptions {
 ///   each turn of their direction, or after 5 mm without one.
 /// Arcs (G2, G3) are chords within 5 um. Widths are those of ;WIDTH: tags; without them those of a rectangle with half circles
 /// at its sides whose volume is the filament that is fed, in a layer as high as ;HEIGHT:, the climb of a turn, or the distance
-/// to the beads below. The filament's diameter is the given one, or the one that comments tell
+/// to the beads below. The filament's diameter is the given one, or the one that comments state
 /// (stages/formats/gcode/commands.h), or 1.75 mm.
 ///
-/// memory  of the layers' places in the file; beads are read when they are asked for
+/// memory  of the layers' positions in the file; beads are read on request
 class GcodeFile {
  public:
-  /// Reads the file once. errors  kUsage: cannot be read, is no text of G-code, lays nothing, does what is not drawn (arcs
-  /// out of the bed's plane, splines), lays more than max_beads in a layer, or has more than max_layers; with the line
+  /// Reads the file once. errors  kUsage: cannot be read, is no text of G-code, has no bead, has unsupported moves (arcs
+  /// out of the bed's plane, splines), has more than max_beads in a layer, or has more than max_layers; with the line
   /// cost    O(bytes + chords)
   static Result<GcodeFile> open(const std::string& path, const GcodeOptions& options = {});
   /// The same of an open file.
@@ -59,11 +59,11 @@ class GcodeFile {
   const std::vector<std::string>& types() const { return types_; }
   bool states_widths() const { return states_widths_; }
   double filament_mm() const { return filament_mm_; }  // diameter
-  /// The printer's name, as lamina's files tell it; "" of others.
+  /// The printer's name, as lamina's files state it; "" of others.
   const std::string& machine() const { return machine_; }
-  /// What all beads take, mm3; without what start code lays, and priming on the spot.
+  /// Filament of all beads, mm3; without that of start code, and without priming on the spot.
   double fed_mm3() const { return fed_mm3_; }
-  double density_g_cm3() const { return density_g_cm3_; }  // of the filament, as comments tell it; 0: untold
+  double density_g_cm3() const { return density_g_cm3_; }  // of the filament, by comments; 0: not stated
   /// What a person should know of the drawing, one line each: thin beads, spirals, arcs on which firmwares differ.
   const std::vector<std::string>& notes() const { return notes_; }
   /// errors  kUsage: no such layer, the file has changed
@@ -77,17 +77,17 @@ class GcodeFile {
     std::uint64_t byte = 0, line = 0;
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
-    double speed = 0;                              // mm/s; 0 until a line tells it
+    double speed = 0;                              // mm/s; 0 until a line states it
     bool relative = false, relative_feed = false;  // G91, M83
     Firmware firmware = Firmware::kUnknown;        // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
     std::uint8_t plane = 17;                       // of arcs: G17, G18, G19
     double width = 0, height = 0;                  // mm: tags, 0 without
     std::uint32_t type = 0;
-    bool deposits = false;  // the last move laid a bead
+    bool deposits = false;  // the last move deposited a bead
     double primed = 0;      // fed since then: mm, or mm3
   };
-  /// Where a layer begins, and how high its beads are where no tag tells it.
+  /// Where a layer begins, and how high its beads are where no tag states it.
   struct LayerPosition {
     FilePosition start;
     double below = 0, height = 0;  // mm: the top of the layer before; of all beads, 0: what they lie above `below`

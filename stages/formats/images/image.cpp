@@ -19,7 +19,7 @@
 namespace lamina::formats {
 namespace {
 
-/// By the first bytes, whatever the name says.
+/// By the first bytes, regardless of the file name.
 Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
                             LevelSink* sink) {
   unsigned char magic[8] = {};

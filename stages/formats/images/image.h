@@ -38,7 +38,7 @@ Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t 
 
 /// Decodes levels of voxels as the formats of stages/formats/image_format.h have them (TIFF of 4 or 8 bits, PNG of 8), row
 /// by row. full    level of a full voxel: 1, 3 or 15 image   its runs are the pixels of any level above 0 levels  the levels
-/// errors  kVerification with the file's name: of image(); a value that is none of the levels
+/// errors  kVerification with the file's name: of image(); a value that is not one of the levels
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels);
 
 /// An image of a job as levels: those that it carries, or 1 where one of 1 bit is set. full  as in image()
@@ -64,7 +64,7 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path);
 /// What an image differs from its manifest in, its pixels or their size first: "12 x 10 pixels, the manifest says 12 x 11";
 /// or "".
 /// set    pixels that are to be set
-/// layer  that the image is of, and that its description tells where lamina wrote one (stages/formats/tiff/)
+/// layer  of the image, and stated by its description where lamina wrote one (stages/formats/tiff/)
 std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set, const Layer& layer);
 
 }  // namespace lamina::formats

@@ -1,5 +1,4 @@
-// stages/formats/images/image_formats.h: the readers of layer images, one a format; what the formats hold is told in
-// stages/formats/.
+// stages/formats/images/image_formats.h: the readers of layer images, one a format; stages/formats/ describes the formats.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +18,7 @@ struct LevelSink {
   bool nearest = false;  // values between two levels become the nearest, halves the higher one; else they are wrong
   bool invert = false;   // bright pixels are full
 
-  /// bits  a value, 4, 8 or 16 (low byte first). returns  false if a value is none of the levels, or there are too many runs
+  /// bits  a value, 4, 8 or 16 (low byte first). returns  false if a value is not a level, or there are too many runs
   bool add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low);
 };
 

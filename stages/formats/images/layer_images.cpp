@@ -77,7 +77,7 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
 
 Status LayerImages::inspect_others(std::uint64_t changes_of_first) {
   const auto add = [&](std::uint32_t layer, std::uint64_t changes) {
-    // What a file has beside its pixels says nothing of them.
+    // The bytes of a file other than its pixels do not count.
     changes_a_byte_ = std::max(changes_a_byte_, static_cast<double>(changes) / static_cast<double>(pages_[layer].bytes + 512));
   };
   add(0, changes_of_first);

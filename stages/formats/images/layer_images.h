@@ -17,7 +17,7 @@ struct Image;
 /// Whether a name is that of layer images: a folder, or a file that ends in .tif, .tiff, .png, .bmp, .pbm or .pgm.
 bool names_images(const std::string& path);
 
-/// What the files do not tell.
+/// Facts that the files do not state.
 struct LayerImagesRequest {
   int threshold = 128;            // 1 .. 255: grey below it is set
   bool invert = false;            // bright pixels are set
@@ -29,7 +29,7 @@ struct LayerImagesRequest {
 class LayerImages {
  public:
   /// A folder of numbered images of one page, or one file of one page or several. Reads all bytes once, for their hash, and
-  /// decodes the first image, and as many others as are asked for.
+  /// decodes the first image, and as many others as requested.
   /// errors  kInput: those of numbered_images() and dark_pixels()
   static Result<LayerImages> open(const std::string& path, const LayerImagesRequest& request);
 
@@ -43,14 +43,14 @@ class LayerImages {
   std::uint64_t first_number() const { return first_number_; }
   /// Of the file of a layer; empty for a layer that is missing.
   std::string_view file(std::uint32_t layer) const;
-  /// About how many changes a layer has, rather too many: by the size of its file, at twice what the most crowded one of those
-  /// that were looked at has of it.
+  /// An estimate of a layer's changes, rather too high: the size of its file times twice the changes a byte of the densest
+  /// inspected one.
   std::uint64_t expected_changes(std::uint32_t layer) const;
 
   /// Decodes one layer. errors  kInput with the file: cannot be read, is of another size or resolution than the first,
   /// or was changed since open()
   Result<Runs> read(std::uint32_t layer) const;
-  /// The same in levels up to `full`, 1 to 255, whatever the threshold says: nearest_levels().
+  /// The same in levels up to `full`, 1 to 255, regardless of the threshold: nearest_levels().
   Result<Levels> levels(std::uint32_t layer, std::uint8_t full) const;
 
  private:
@@ -59,7 +59,7 @@ class LayerImages {
     std::uint64_t position = 0;       // of pages_of()
     std::uint64_t bytes = 0;          // its share of the file
   };
-  /// What tells that a file is another one than when it was hashed.
+  /// Detects that a file has changed since it was hashed.
   struct Stamp {
     std::uint64_t bytes = 0;
     std::int64_t modified = 0;  // of the clock of files
@@ -78,7 +78,7 @@ class LayerImages {
   std::uint32_t columns_ = 0, rows_ = 0, missing_ = 0;
   double dpi_x_ = 0, dpi_y_ = 0;
   std::uint64_t fingerprint_ = 0, first_number_ = 0;
-  double changes_a_byte_ = 0;  // the most of those that were looked at
+  double changes_a_byte_ = 0;  // maximum of the inspected ones
 };
 
 }  // namespace lamina::formats

@@ -22,7 +22,7 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
   for (fs::directory_iterator entry(folder, wrong); !wrong && entry != fs::directory_iterator(); entry.increment(wrong)) {
     const fs::path& path = entry->path();
     const std::string ending = lower_case(path.extension().string()), stem = path.stem().string();
-    if (stem.starts_with('.')) continue;  // what other systems leave beside images: ._0001.tif
+    if (stem.starts_with('.')) continue;  // files of other systems next to images: ._0001.tif
     std::error_code ignored;
     if (entry->is_directory(ignored)) {
       nested = nested.empty() ? path.string() : std::min(nested, path.string());

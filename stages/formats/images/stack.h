@@ -13,7 +13,7 @@
 
 namespace lamina::formats {
 
-/// What a folder without a manifest does not tell.
+/// Facts that a folder without a manifest does not state.
 struct StackRequest {
   double pixel_um = 0, layer_um = 0;  // 0: not said; a layer is as thick as a pixel then
   int threshold = 128;                // 1 .. 255: grey from it on is bright

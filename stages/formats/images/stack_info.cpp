@@ -64,7 +64,7 @@ ImageInspection inspect_image(const ImageFile& position, int threshold) {
   return inspection;
 }
 
-/// What keeps an image from being a layer beside the first one.
+/// Why an image cannot be a layer of the same stack as the first one.
 std::string differs(const ImageInspection& inspection, const StackInfo& first) {
   if (inspection.columns != first.columns || inspection.rows != first.rows)
     return fmt::format("{} x {} pixels, the first image has {} x {}", inspection.columns, inspection.rows, first.columns,
@@ -91,7 +91,7 @@ void add_image(const ImageFile& position, const ImageInspection& inspection, Sta
   info.empty += inspection.set == 0;
   info.min_set = std::min(info.min_set, inspection.set);
   info.max_set = std::max(info.max_set, inspection.set);
-  // As long as all are of one kind it is told.
+  // The kind is reported as long as all are of one kind.
   if (inspection.kind.format != info.kind.format) info.kind.format = "several formats";
   if (inspection.kind.light != info.kind.light) info.kind.light = "0 is white in some";
   if (inspection.kind.coding != info.kind.coding) info.kind.coding = "several codings";

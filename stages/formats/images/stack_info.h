@@ -31,7 +31,7 @@ struct StackInfo {
   std::vector<std::array<std::uint64_t, 2>> missing;  // ranges of numbers, both ends included
   ImageKind kind;                                     // of the first image, as the next ones
   std::uint32_t columns = 0, rows = 0;
-  double dpi_x = 0, dpi_y = 0;                      // 0: not told
+  double dpi_x = 0, dpi_y = 0;                      // 0: not stated
   std::uint64_t set = 0, min_set = 0, max_set = 0;  // dark pixels, of all images and of one
   std::uint64_t empty = 0;                          // images without any
   std::uint64_t grey = 0;                           // pixels between white and black

@@ -18,10 +18,10 @@ struct Floor {
   double seconds() const { return read + write + touch; }
 };
 
-/// Fills in the seconds and the bytes read. What is written are temporary files of `beside` (temporary.h), two at a time, that
-/// are gone afterwards and at a signal; what a killed run leaves, the next one that writes `beside` removes.
+/// Fills in the seconds and the bytes read. It writes temporary files of `neighbour` (temporary.h), two at a time, that
+/// are gone afterwards and at a signal; what a killed run leaves, the next one that writes `neighbour` removes.
 /// Reading and writing count with the middle of three times, where once takes less than 0.1 s. At most 128 MiB of memory.
-/// errors  kInput; kOutput: `beside` is a stream, or the system's reason; kInterrupted: `cancel` was set
+/// errors  kInput; kOutput: `neighbour` is a stream, or the system's reason; kInterrupted: `cancel` was set
 Status measure_floor(const std::vector<std::string>& parts, const std::string& neighbour, const std::atomic<bool>& cancel,
                      Floor& floor);
 

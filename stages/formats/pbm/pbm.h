@@ -1,4 +1,4 @@
-// stages/formats/pbm/pbm.h: portable bitmaps, binary (P4). Format and sources: README.md beside this file.
+// stages/formats/pbm/pbm.h: portable bitmaps, binary (P4). Format and sources: README.md in this folder.
 #pragma once
 
 #include <memory>

@@ -101,7 +101,7 @@ class BitWriter {
 
   /// First byte that is not final yet.
   std::byte* next() const { return next_; }
-  /// Goes on in other memory, into which the caller has copied all before next(); bits that wait come along.
+  /// Continues in other memory, into which the caller has copied all before next(); bits that wait come along.
   void move_to(std::byte* next) { next_ = next; }
   /// Fills the last byte up with zeros; the end of what was written.
   std::byte* finish() {
@@ -122,7 +122,7 @@ class BitWriter {
 
 // --- the deflate words of rows that are filtered, in tables that are made when this is compiled.
 //
-// Source: RFC 1951, sections 3.2.5 (lengths and distances) and 3.2.7 (how a block tells its code). The only distance is 1:
+// Source: RFC 1951, sections 3.2.5 (lengths and distances) and 3.2.7 (how a block states its code). The only distance is 1:
 // a match repeats the byte before it. Its code has one word, a zero bit, which here belongs to the words of the lengths.
 
 inline constexpr std::uint32_t kSymbols = 286;  // 256 bytes, the end of the block, 29 classes of lengths
@@ -187,7 +187,7 @@ inline constexpr std::array<RunEdge, 256> kEdges = [] {
   return edges;
 }();
 
-/// How often symbols are met, beside each other. Bytes of rows that are filtered Up: 0 where nothing changes, 2 as the
+/// Relative frequencies of symbols. Bytes of rows that are filtered Up: 0 where nothing changes, 2 as the
 /// filter's own, one bit or less one bit where an edge moves by a pixel, several bits where it moves further.
 struct Weights {
   std::uint32_t zero, filter, one_pixel, few_pixels, other_bytes;
@@ -279,7 +279,7 @@ constexpr std::uint32_t longest(const std::array<BitString, kWords>& words) {
   return longest;
 }
 
-// --- how a deflate block tells its code (RFC 1951, section 3.2.7).
+// --- how a deflate block states its code (RFC 1951, section 3.2.7).
 
 /// Bits in the order in which they are written, 32 a word.
 struct BlockHead {
@@ -293,12 +293,12 @@ struct BlockHead {
   }
 };
 
-/// The last block of its stream. All symbols have words, and so has distance 1, a single bit. Lengths of words are told in
+/// The last block of its stream. All symbols have words, and so has distance 1, a single bit. Lengths of words are stated in
 /// a code of their own, whose symbol 16 repeats the one before 3 to 6 times.
 constexpr BlockHead block_head(const Codes& codes) {
   constexpr std::uint32_t kRepeat = 16, kLengths = kSymbols + 1, kLengthSymbols = 19;
   std::array<std::uint8_t, kLengths> reported{};
-  std::array<std::uint32_t, kLengths> times{};  // that follow a length told; 0 or 3 .. 6
+  std::array<std::uint32_t, kLengths> times{};  // that follow a stated length; 0 or 3 .. 6
   std::uint32_t count = 0;
   const auto length = [&](std::uint32_t s) { return s < kSymbols ? codes.length[s] : std::uint8_t{1}; };
   std::array<std::uint32_t, kLengthSymbols> weights{};
@@ -317,7 +317,7 @@ constexpr BlockHead block_head(const Codes& codes) {
 
   BlockHead head;
   head.put(BitString(1, 1));               // the last block
-  head.put(BitString(2, 2));               // which tells its code
+  head.put(BitString(2, 2));               // which states its code
   head.put(BitString(kSymbols - 257, 5));  // HLIT
   head.put(BitString(0, 5));               // HDIST: one distance
   constexpr std::array<std::uint8_t, kLengthSymbols> kOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,

@@ -163,8 +163,8 @@ constexpr std::size_t kFewChanges = 16;  // less than that are taken one by one
 constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
 
 /// Finds the edges that move among the next `count` changes of both rows, which have one colour before them. Edges that
-/// move and edges that stand are mixed at random, so there is no branch between them: four are looked at at once, and what
-/// is found is kept by how far the place for it moves on.
+/// move and edges that stay are mixed at random, so there is no branch between them: four are tested at once, and a hit
+/// is kept by advancing the write position.
 /// count    a multiple of 4, less than there are left in both rows
 /// moved    room for as many
 /// returns  how many move; kNotEdges if one moves too far or the change behind it is near

@@ -1,8 +1,8 @@
 // stages/formats/png/filtered_rows.h: rows of bits as what differs from the rows above them, deflated.
 //
 // A white row and a row below a white one have filter 0 (none), all others filter 2 (Up; PNG specification, section 9.2).
-// So bytes are 0 but where a row changes, and a stretch of white rows is zeros and nothing else. Zeros are never looked
-// at: they are the distance between two bytes that are not 0.
+// So bytes are 0 but where a row changes, and an interval of white rows consists of zeros only. Zeros are never read: they are
+// the distance between two bytes that are not 0.
 #pragma once
 
 #include <cstdint>

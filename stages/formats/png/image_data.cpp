@@ -15,7 +15,7 @@ namespace {
 // zlib's header (RFC 1950, 2.2): deflate, a window of 32 KiB, no dictionary, the fastest level.
 constexpr std::uint32_t kZlibHeader = 0x0178;
 
-// White rows are cut here, so that a chunk is bounded whatever the image: 1 bit or more for 258 of them.
+// White rows are cut here, so that a chunk is bounded for any image: 1 bit or more for 258 of them.
 constexpr std::uint64_t kMaxZeros = std::uint64_t{1} << 22;
 
 /// The memory into which chunks are written.

@@ -16,7 +16,7 @@ inline constexpr std::size_t kChunkBytes = 64 * 1024;
 /// as needed and may be left larger than its content.
 /// needs    1 <= columns and rows <= kMaxPixelsASide and well-formed runs (data/runs.h)
 /// returns  one past the last byte of the chunks
-/// cost     a look at each change and some 5 ns for each that is not as in the row above; some 10 ns for a row that is not
+/// cost     one read of each change and some 5 ns for each that is not as in the row above; some 10 ns for a row that is not
 ///          white; a stretch of white rows costs the logarithm of its length and a bit in a hundred bytes
 std::size_t put_image_data(const RunsView& runs, Bytes& file, std::size_t start);
 

@@ -310,7 +310,7 @@ bool read_rows(png_structp png, png_infop info, ReadState& source, int threshold
   png_set_user_limits(png, kMaxPixelsASide, kMaxPixelsASide);
   png_set_chunk_malloc_max(png, 1 << 20);
   png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
-  // Comments and colours are passed over: libpng allocates whatever length they claim.
+  // Comments and colours are skipped: libpng allocates any length that they claim.
   constexpr png_byte kResolution[] = "pHYs";
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, kResolution, 1);

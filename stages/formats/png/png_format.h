@@ -1,4 +1,4 @@
-// stages/formats/png/png_format.h: PNG of 1 bit, and of 8 bits of grey. Chunks and their sources: README.md beside this file.
+// stages/formats/png/png_format.h: PNG of 1 bit, and of 8 bits of grey. Chunks and their sources: README.md in this folder.
 #pragma once
 
 #include <memory>

@@ -9,7 +9,7 @@ namespace lamina::formats::rp3 {
 
 struct LayerSetting {
   double thickness_mm;
-  double angle_deg;  // the flattest slope that the layer looked at: 0 a wall, 90 a horizontal face
+  double angle_deg;  // the flattest slope considered for the layer: 0 a wall, 90 a horizontal face
 };
 
 struct Settings {

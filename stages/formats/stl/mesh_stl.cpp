@@ -79,7 +79,7 @@ std::string block(const std::array<double, 3>& size) {
   put(std::uint32_t{12});
   for (int axis = 0; axis < 3; ++axis) {
     for (int side = 0; side < 2; ++side) {
-      // The four corners of a side, anticlockwise seen from outside.
+      // The four corners of a side, anticlockwise viewed from outside.
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       std::array<std::array<float, 3>, 4> corner{};
       for (int i = 0; i < 4; ++i) {

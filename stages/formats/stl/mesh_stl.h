@@ -18,13 +18,13 @@ struct StlCounts {
   double rounding_mm = 0;  // the farthest that a coordinate moved
 };
 
-/// Writes all instances one after the other, in mm, facets counter-clockwise seen from outside, with their normals.
+/// Writes all instances one after the other, in mm, facets counter-clockwise viewed from outside, with their normals.
 ///
 /// STL holds floats: a coordinate of 256 mm moves by up to 8 nm. Equal corners stay equal, so a closed mesh stays closed;
 /// what the format cannot hold is which facets are one object, and the unit.
 ///
 /// file     open, at its beginning; the caller finishes it
-/// program  told in the header, such as "lamina 0.1.0"
+/// program  stated in the header, such as "lamina 0.1.0"
 /// errors   kOutput; kInput: more facets than the format's 32 bits count
 /// cost     one pass; 50 bytes a triangle go to the file
 Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<const Instance> instances,
@@ -32,7 +32,7 @@ Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<
 
 // --- a closed block as a binary STL file.
 
-/// The file of a block from the origin to `size`, mm: 12 triangles, anticlockwise seen from outside, normals left at 0.
+/// The file of a block from the origin to `size`, mm: 12 triangles, anticlockwise viewed from outside, normals left at 0.
 std::string block(const std::array<double, 3>& size);
 
 }  // namespace lamina::formats::stl

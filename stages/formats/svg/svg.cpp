@@ -127,7 +127,7 @@ class SvgEncoder : public SliceEncoder {
 std::unique_ptr<SliceEncoder> make_svg_encoder() { return std::make_unique<SvgEncoder>(); }
 
 // Slices as Slic3r 1.3 writes them with --export-svg, byte for byte but for the comment, since
-// the hosts of powder printers that read them look at lines; see README.md for each. source  slic3r/Slic3r, tag 1.3.0
+// the hosts of powder printers that read them parse lines; see README.md for each. source  slic3r/Slic3r, tag 1.3.0
 // (3ba8e0f), lib/Slic3r/Print.pm, export_svg
 
 namespace {

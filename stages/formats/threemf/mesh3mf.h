@@ -15,7 +15,7 @@ namespace lamina::formats {
 /// An object of the file.
 struct Mesh3mfObject {
   std::string name;                     // shown by other programs; "" for none
-  std::span<const Triangle> triangles;  // nm, corners counter-clockwise seen from outside; borrowed
+  std::span<const Triangle> triangles;  // nm, corners counter-clockwise viewed from outside; borrowed
 };
 
 struct Mesh3mfCounts {
@@ -25,11 +25,11 @@ struct Mesh3mfCounts {
 
 /// Writes each object once and a build item for each instance, which is moved by its offset. Numbers are mm with as many
 /// decimals as they need, at most 6, exact to the nanometre. Equal corners are one vertex, numbered in the order of their first
-/// triangle, so a closed mesh is closed to every reader. The same meshes give the same bytes, whatever the threads.
+/// triangle, so a closed mesh is closed to every reader. The same meshes give the same bytes with any threads.
 ///
 /// file       open, at its beginning (an open File of this folder's file.h); the caller finishes it
 /// instances  Instance::mesh is an index into `objects`; at least one
-/// program    told as the application, such as "lamina 0.1.0"
+/// program    stated as the application, such as "lamina 0.1.0"
 /// errors     kOutput; kInput: an object without any triangle of three different corners, which 3MF cannot hold (begins with
 ///            the object's name, not with a file's)
 /// cost       parallel; 60 bytes a vertex while an object is indexed, and the compressed file (about 10 bytes a triangle)

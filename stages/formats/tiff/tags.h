@@ -1,4 +1,4 @@
-// stages/formats/tiff/tags.h: what all TIFF files of layers have in common (README.md beside this file).
+// stages/formats/tiff/tags.h: what all TIFF files of layers have in common (README.md in this folder).
 #pragma once
 
 #include <cstddef>
@@ -78,8 +78,8 @@ class Ending {
     bool operator==(const TiffLayout&) const = default;
   };
 
-  /// Keeps the ending of a whole file, as libtiff wrote it, whose strip ends at `strip_end`. Keeps nothing of a file that is
-  /// laid out otherwise than in one strip from byte 8 on and all else behind it.
+  /// Keeps the ending of a whole file, as libtiff wrote it, whose strip ends at `strip_end`. Keeps nothing of a file with
+  /// another layout than one strip from byte 8 on and all else after it.
   void take(const TiffLayout& image, std::span<const std::byte> file, std::size_t strip_end);
   /// Ends another file, whose strip stands from byte 8 to `strip_end`. returns  false if no ending of such an image is kept
   bool put(const TiffLayout& image, std::size_t strip_end, Bytes& file) const;

@@ -261,7 +261,7 @@ std::string description_of(TIFF* tiff) {
   return std::string(text).substr(0, kLongestDescription);
 }
 
-/// What the directory of an image tells.
+/// The contents of an image's directory.
 struct TiffHead {
   std::uint32_t columns = 0, rows = 0;
   std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE;

@@ -1,5 +1,5 @@
 // stages/formats/tiff/tiff.h: TIFF of 1 bit, and of 4 and 8 bits of grey, through libtiff. Tags and their sources: README.md
-// beside this file.
+// in this folder.
 #pragma once
 
 #include <memory>

@@ -26,7 +26,7 @@ inline void expand_row(std::span<const std::uint32_t> changes, VoxelPhase side, 
   }
 }
 
-/// One file each, head and voxels; the README tells what stands in them.
+/// One file each, head and voxels; the README describes their contents.
 enum class ImageKind : std::uint8_t { kNrrd, kMeta, kVti };
 
 /// By the ending of a name: .nrrd, .mha, .vti, in any case.
@@ -39,7 +39,7 @@ inline constexpr std::string_view kMark = "written by lamina";
 /// lower corner of the box is the origin, so that the middle of the first voxel is half an edge away from it.
 ///
 /// file     open, at its beginning; the caller finishes it
-/// version  of this program, told in the head
+/// version  of this program, stated in the head
 /// errors   kOutput
 /// cost     one pass; memory of some rows, never of the box
 Status write_image(File& file, const VoxelView& box, VoxelPhase side, ImageKind kind, std::string_view version);

@@ -61,7 +61,7 @@ class Neighbours {
   std::array<Buffer<std::uint8_t>, 9> row_;
 };
 
-/// A face of a voxel: its normal, and the four steps to its edges, counter-clockwise seen from outside.
+/// A face of a voxel: its normal, and the four steps to its edges, counter-clockwise viewed from outside.
 struct Face {
   Step normal;
   std::array<Step, 4> edge;

@@ -36,7 +36,7 @@ inline constexpr ZipDate kFirstZipDate = (1u << 5 | 1u) << 16;  // 1 January 198
 /// source  https://reproducible-builds.org/specs/source-date-epoch/
 Result<ZipDate> zip_date(const char* text);
 
-/// Sizes and sums stand before the data of an entry, so that readers need not look for its end.
+/// Sizes and sums are before the data of an entry, so that readers need not search for its end.
 ///
 /// source  PKWARE, APPNOTE.TXT 6.3.10, sections 4.3 and 4.5.3
 class ZipWriter {

@@ -12,8 +12,8 @@
 namespace lamina {
 
 // Corners find the first corner that is the same vertex through a table in which the first corner of each hash stands: it is
-// written from the last corner to the first, so nothing asks what it held. Vertices whose slot another one has are few; they
-// are matched the same way among themselves, and those that are left then by probing.
+// written from the last corner to the first, so its previous content is never read. Vertices whose slot another one has are
+// few; they are matched the same way among themselves, and those that are left then by probing.
 
 bool VertexNumbers::number(const SortedBlock& block, const BlockKernels& kernels) {
   const std::uint32_t corners = block.clusters() * SortedBlock::kCorners, maximum = block.triangles * 3 / 2;

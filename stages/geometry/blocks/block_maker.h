@@ -46,7 +46,7 @@ class BlockMaker {
   /// isa  the widest instruction set to use; blocks are the same with any
   explicit BlockMaker(Isa isa = Isa::kAuto) : kernels_(block_kernels_for(limited_isa(isa))) {}
 
-  /// The triangles of a block of `mesh`, sorted; whoever calls hashes the corners: equal where vertices are, and of many values
+  /// The triangles of a block of `mesh`, sorted; the caller hashes the corners: equal where vertices are, and of many values
   /// where they are not.
   /// triangles  at least one, in the order of the file; those that repair added stay in it
   SortedBlock& sort(std::span<const Triangle> triangles, const MeshBlocks& mesh, std::uint32_t block);

@@ -22,8 +22,8 @@ struct alignas(16) Cluster {
 };
 static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
 
-/// What heights the 16 triangles of a cluster reach, in steps that their block tells, modulo 256: enough to pass over nearly
-/// all that a plane does not cut, without a look at any vertex.
+/// The heights that the 16 triangles of a cluster reach, in steps that their block defines, modulo 256: enough to skip nearly
+/// all triangles that a plane does not cut, without reading any vertex.
 struct FacetSteps {
   std::uint8_t low[kClusterSize];   // the step of the lowest corner
   std::uint8_t span[kClusterSize];  // steps from there to the one 1 nm below the highest corner, or 255: any plane may cut it

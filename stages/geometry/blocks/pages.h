@@ -39,7 +39,7 @@ class Pages {
   std::atomic<std::uint64_t> taken_{0};
 };
 
-/// Asks for large pages where memory is about to be written from end to end: faulting 4 KiB at a time takes as long as reading
+/// Requests large pages where memory is about to be written from end to end: faulting 4 KiB at a time takes as long as reading
 /// and snapping facets. Where the system has none to give, nothing changes.
 void prefer_large_pages(void* begin, void* end);
 template <class T>

@@ -23,7 +23,7 @@ struct alignas(64) SortedBlock {
 
   /// Takes at least one triangle; order[i] is the i-th of them.
   void take(std::span<const Triangle> list, std::span<const std::uint16_t> order);
-  /// Hashes by itself, where nobody else does.
+  /// Hashes by itself, where no caller does.
   void hash_corners();
 };
 

@@ -88,8 +88,8 @@ void append(std::span<const Point2> points, bool reversed, Contours& out) {
   out.close();
 }
 
-/// Unites the contours of one group about which the others wind `outside` times. Frames around the group stand for
-/// them; what becomes of the frames is left out again.
+/// The union of the contours of one group about which the others wind `outside` times. Frames around the group represent them;
+/// their remains are removed again.
 Status group_union(const Contours& contours, std::uint32_t group_number, const Buffer<std::uint32_t>& group,
                    std::int32_t outside, FillRule rule, Contours& out) {
   constexpr std::int64_t kAway = 1'000'000;
@@ -202,7 +202,7 @@ Bounds bounds_of(std::span<const Point2> points) {
   const Point2 a = points[(smallest + n - 1) % n], b = points[smallest], c = points[(smallest + 1) % n];
   const std::int64_t right = (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y);
   const std::int64_t left = (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
-  outline.outer = right == left ? doubled_area(points) > 0 : right > left;  // the tip of a spike does not tell
+  outline.outer = right == left ? doubled_area(points) > 0 : right > left;  // the tip of a spike does not decide
   return outline;
 }
 

@@ -13,7 +13,7 @@ namespace lamina {
 /// themselves go through a boolean operation, group by group: what lies around a group winds the same about all of it.
 ///
 /// group    of each contour, from find_contacts; empty if there is no contact at all
-/// returns  how many groups were united
+/// returns  number of merged groups
 /// errors   kInternal of the clipping library
 /// cost     O(P) and, for C contours, C log C and the points of the contours whose boxes lie around each
 Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::uint32_t>& group);
@@ -33,8 +33,8 @@ bool same_nesting(const Contours& contours, const Contours& others);
 ///           whose boxes lie around it
 void order_by_outer(Contours& contours);
 
-/// Whether they are in that order, as far as one place of each hole tells. Boolean operations of contours that share edges may
-/// leave spikes, or a hole behind an outer contour beside it.
+/// Whether they are in that order, checked with one point of each hole. Boolean operations of contours that share edges may
+/// leave spikes, or a hole after an outer contour next to it.
 /// cost  O(P), and for each hole the points of the outer contour before it
 bool is_ordered_by_outer(const ContoursView& contours);
 

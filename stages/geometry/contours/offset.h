@@ -5,7 +5,7 @@
 //
 // A curve is what the edges of a contour become when each moves along its normal. Curves without loops that keep clear of each
 // other and of themselves are the result; boolean operations are made only where edges vanish on the way, or the region
-// divides, unites or vanishes.
+// divides, merges or vanishes.
 #pragma once
 
 #include <cstdint>

@@ -55,7 +55,7 @@ class SegmentTolerance {
   std::int64_t max_;  // across is whole: it is at most tolerance x length if it is at most the root of that squared
 };
 
-/// So many looks at each point for every halving of the contour are enough for the furthest ones to be taken; contours of real
+/// So many checks of each point for every halving of the contour are enough to find the furthest ones; contours of real
 /// parts take a quarter of that.
 constexpr std::size_t kChecksPerPoint = 8;
 
@@ -102,7 +102,7 @@ class Ring {
         if (position.apart > maximum) maximum = position.apart, furthest = i;
       }
       if (!beyond) continue;
-      // The teeth of a comb are split off one by one: a stretch that has been looked at often is split near its middle.
+      // The teeth of a comb are split off one by one: a segment that was checked often is split near its middle.
       const std::size_t near_end = inspected > enough ? (last - first) / 8 : 0;
       if (furthest - first < near_end || last - furthest < near_end) furthest = first + (last - first) / 2;
       kept_[furthest < points_.size() ? furthest : furthest - points_.size()] = 1;
@@ -129,7 +129,7 @@ class Ring {
     next.resize(count);
     before.resize(count);
     for (std::uint32_t k = 0; k < count; ++k) next[k] = k + 1 < count ? k + 1 : 0, before[k] = k > 0 ? k - 1 : count - 1;
-    // A point that has to stay has to until one beside it goes: the walk steps back after each that does.
+    // A point that has to stay does so until a neighbour is removed: the walk steps back after each removal.
     std::uint32_t left = count, passed = 0;
     for (std::uint32_t k = 0; left > 3 && passed < left;) {
       const std::uint32_t b = before[k], n = next[k];
@@ -160,7 +160,7 @@ class Ring {
     for (std::size_t k = 0; k < count; ++k) {
       const Point2 a = points_[index[k]], b = points_[index[k + 1 < count ? k + 1 : 0]];
       const Point2 c = points_[index[k + 2 < count ? k + 2 : k + 2 - count]];
-      if (area_of(a, b, c) == 0) return false;  // a spike: neighbours in contact are not looked for
+      if (area_of(a, b, c) == 0) return false;  // a spike: neighbours in contact are not searched
       area += static_cast<__int128>(a.x) * b.y - static_cast<__int128>(b.x) * a.y;
     }
     const __int128 full = doubled_area(points_);
@@ -251,7 +251,7 @@ bool append_merged(std::span<const Point2> points, double shortest, double toler
   for (std::size_t i = 0; i < count; ++i) {
     const Point2 b = points[i], c = points[i + 1 < count ? i + 1 : 0];
     const EdgeVector own = from_to(b, c);
-    const bool first_stays = i + 1 < count;  // the seam's edge would need the point that has been laid first
+    const bool first_stays = i + 1 < count;  // the seam's edge would need the point that was written first
     if (left > 4 && first_stays && own.x * own.x + own.y * own.y < shortest * shortest) {
       const Point2 a = out.point.size() > begin ? out.point.back() : points.back();
       const Point2 d = points[i + 2 < count ? i + 2 : i + 2 - count];

@@ -1,6 +1,6 @@
 // Corners are matched eight at a time with AVX2.
 //
-// Whole numbers only: each lane looks up and compares what plain::match() does.
+// Whole numbers only: each lane reads and compares the same as plain::match().
 #include "stages/geometry/blocks/kernels/kernels.h"
 
 #if defined(LAMINA_WIDE_KERNELS)

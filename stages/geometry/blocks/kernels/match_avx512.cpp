@@ -1,6 +1,6 @@
 // Corners are matched and numbered 16 at a time with AVX-512.
 //
-// Whole numbers only: each lane looks up and compares what plain::match() does, and numbers are counted in the order of lanes.
+// Whole numbers only: each lane reads and compares the same as plain::match(), and numbers are counted in the order of lanes.
 #include "stages/geometry/blocks/kernels/kernels.h"
 
 #if defined(LAMINA_WIDE_KERNELS)
