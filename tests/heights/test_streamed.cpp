@@ -13,7 +13,7 @@ namespace {
 /// Slopes, steps and horizontal faces up to a height.
 Mesh random_hill(std::mt19937& random) {
   std::vector<std::pair<double, double>> profile{{0, 0}};
-  const std::uint32_t corners = 3 + random() % 12;
+  const std::uint32_t corners = 3 + static_cast<std::uint32_t>(random()) % 12;
   for (std::uint32_t i = 0; i < corners; ++i) {
     const auto [x, z] = profile.back();
     const double width = random() % 4 == 0 ? 0 : 0.01 * static_cast<double>(random() % 200);

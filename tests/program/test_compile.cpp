@@ -245,7 +245,7 @@ TEST(Compile, BothDirectionsToVectorsGiveTheSameBits) {
     const HeadGrid grid = grid_of(setup.machine);
     FireScratch scratch;
     std::vector<Buffer<std::uint32_t>> positions(grid.nozzles);
-    std::vector<Line> lines;
+    std::vector<ColumnChanges> lines;
     for (auto& line : positions) {
       const unsigned rarity = 1 + setup.random() % 40;
       for (std::uint32_t p = 0; p <= grid.positions; ++p) {
