@@ -161,7 +161,7 @@ TEST(DropSweeps, BothDirectionsToTheVectorsAgree) {
     const HeadGrid grid = grid_of_head(machine);
     testing::Random random(ticks);
     std::vector<std::vector<std::uint32_t>> changes(std::size_t{grid.nozzles} * grid.drop_bits);
-    std::vector<Line> lines;
+    std::vector<ColumnChanges> lines;
     for (auto& line : changes) {
       for (std::uint32_t c = random() % 5; c < grid.positions && random() % 40 != 0; c += 1 + random() % 4) line.push_back(c);
       if (line.size() % 2 == 1) line.push_back(grid.positions);
