@@ -4,6 +4,7 @@
 #include <map>
 #include <random>
 
+#include "stages/geometry/interval_table.h"
 #include "stages/raster/beams.h"
 #include "stages/raster/height_runs.h"
 #include "tests/raster/shapes.h"

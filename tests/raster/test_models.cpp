@@ -54,7 +54,7 @@ std::vector<Nm> planes_through(const std::vector<Triangle>& facets) {
   for (const auto& [area, z] : largest) planes.insert({z - 1, z, z + 1});
   planes.insert({facets[facets.size() / 2].a.z, facets[facets.size() / 3].b.z});
   for (Nm i = 1; planes.size() < 14; ++i) planes.insert(static_cast<Nm>(std::int64_t{top} * (2 * i - 1) / 17));
-  planes.erase(planes.begin(), planes.threshold_levels(0));
+  planes.erase(planes.begin(), planes.lower_bound(0));
   return {planes.begin(), planes.end()};
 }
 

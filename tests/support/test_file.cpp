@@ -35,25 +35,25 @@ std::string message_of(const Result<File>& file) { return file ? std::string() :
 bool ends_with(const std::string& text, const std::string& end) { return text.ends_with(end); }
 
 TEST(WriteFile, TheFileIsThereWholeAndNothingElse) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string text(3'000'000, 'x');
   ASSERT_TRUE(write_file(folder / "layer.tif", bytes_of(text)).ok());
-  EXPECT_EQ(testing::load(folder / "layer.tif"), text);
+  EXPECT_EQ(formats::testing::load(folder / "layer.tif"), text);
   ASSERT_TRUE(write_file(folder / "empty.tif", "").ok());
-  EXPECT_EQ(testing::load(folder / "empty.tif"), "");
+  EXPECT_EQ(formats::testing::load(folder / "empty.tif"), "");
   EXPECT_EQ(folder.files(), 2u);
 }
 
 TEST(WriteFile, AnOlderFileIsReplaced) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   ASSERT_TRUE(write_file(folder / "layer.tif", bytes_of("old and longer")).ok());
   ASSERT_TRUE(write_file(folder / "layer.tif", bytes_of("new")).ok());
-  EXPECT_EQ(testing::load(folder / "layer.tif"), "new");
+  EXPECT_EQ(formats::testing::load(folder / "layer.tif"), "new");
   EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(WriteFile, AMissingFolderIsNamedWithTheReason) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const Status status = write_file(folder / "no/layer.tif", bytes_of("x"));
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().fault, Fault::kOutput);
@@ -68,7 +68,7 @@ TEST(WriteFile, AFullDiskIsSaid) {
 }
 
 TEST(WriteFile, AWriteThatStopsInTheMiddleLeavesTheOlderFile) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "layer.tif";
   ASSERT_TRUE(write_file(path, "old").ok());
   EXPECT_EQ(in_a_process([&] {
@@ -79,19 +79,19 @@ TEST(WriteFile, AWriteThatStopsInTheMiddleLeavesTheOlderFile) {
               return !status.ok() && status.error().message.find("File too large") != std::string::npos ? 0 : 1;
             }),
             0);
-  EXPECT_EQ(testing::load(path), "old");
+  EXPECT_EQ(formats::testing::load(path), "old");
   EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(WriteFile, AFolderOfThatNameIsAnErrorAndLeavesNothing) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   std::filesystem::create_directory(folder / "layer.tif");
   EXPECT_FALSE(write_file(folder / "layer.tif", bytes_of("x")).ok());
   EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(File, AppearsWholeOrNotAtAll) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode";
   {
     auto file = File::open(path);
@@ -111,14 +111,14 @@ TEST(File, AppearsWholeOrNotAtAll) {
   }
   const auto digest = file->finish();
   ASSERT_TRUE(digest.ok());
-  EXPECT_EQ(testing::load(path), whole);
+  EXPECT_EQ(formats::testing::load(path), whole);
   EXPECT_EQ(digest->bytes, whole.size());
   EXPECT_EQ(digest->hash, hash_bytes(bytes_of(whole)));
   EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(File, TheSecondWriterOfAFileIsRefusedAsLongAsTheFirstIsThere) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode";
   std::filesystem::create_symlink("part.gcode", folder / "other.gcode");
   auto first = File::open(path);
@@ -133,13 +133,13 @@ TEST(File, TheSecondWriterOfAFileIsRefusedAsLongAsTheFirstIsThere) {
   EXPECT_FALSE(File::reopen(path, 0).ok());
   EXPECT_FALSE(check_not_being_written(path).ok());
   ASSERT_TRUE(first->finish().ok());
-  EXPECT_EQ(testing::load(path), "first");
+  EXPECT_EQ(formats::testing::load(path), "first");
   EXPECT_TRUE(check_not_being_written(path).ok());
   EXPECT_TRUE(write_file(path, "second").ok());
 }
 
 TEST(File, OfManyThatBeginAtOnceEachIsWholeOrRefused) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode";
   std::atomic<int> written{0}, refused{0}, wrong{0};
   std::vector<std::thread> writers;
@@ -160,13 +160,13 @@ TEST(File, OfManyThatBeginAtOnceEachIsWholeOrRefused) {
   EXPECT_EQ(wrong, 0);
   EXPECT_GT(written, 0);
   EXPECT_EQ(written + refused, 1600);
-  const std::string text = testing::load(path);
+  const std::string text = formats::testing::load(path);
   EXPECT_EQ(text, std::string(5'000, text.empty() ? '?' : text.front()));
   EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(File, WhatAKilledRunLeftIsReplaced) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode";
   for (const bool lock : {true, false}) {
     EXPECT_EQ(in_a_process([&] {
@@ -176,10 +176,10 @@ TEST(File, WhatAKilledRunLeftIsReplaced) {
               }),
               -1);
     EXPECT_EQ(folder.files(), 1u) << "what the killed run left";
-    testing::save(path + ".part", bytes_of("somebody else's"));
+    formats::testing::save(path + ".part", bytes_of("somebody else's"));
     ASSERT_TRUE(write_file(path, "whole").ok());
-    EXPECT_EQ(testing::load(path), "whole") << lock;
-    EXPECT_EQ(testing::load(path + ".part"), "somebody else's");
+    EXPECT_EQ(formats::testing::load(path), "whole") << lock;
+    EXPECT_EQ(formats::testing::load(path + ".part"), "somebody else's");
     EXPECT_EQ(folder.files(), 2u);
     std::filesystem::remove(path);
     std::filesystem::remove(path + ".part");
@@ -187,23 +187,23 @@ TEST(File, WhatAKilledRunLeftIsReplaced) {
 }
 
 TEST(File, OnlyTemporaryFilesOfTheSameNameAreRemoved) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode", longest = folder / std::string(250, 'n');
   const std::vector<std::string> others = {temporary_name(folder / "other.gcode"), path + ".lamina-short.part",
                                            path + ".lamina-ABCDEFGHIJKLM.part", temporary_name(path) + ".part"};
-  for (const std::string& other : others) testing::save(other, bytes_of("stays"));
+  for (const std::string& other : others) formats::testing::save(other, bytes_of("stays"));
   const std::string stale = temporary_name(path), of_longest = temporary_name(longest);
-  for (const std::string& name : {stale, of_longest}) testing::save(name, bytes_of("left"));
+  for (const std::string& name : {stale, of_longest}) formats::testing::save(name, bytes_of("left"));
   ASSERT_TRUE(write_file(path, "whole").ok());
   ASSERT_TRUE(write_file(longest, "whole").ok());
-  for (const std::string& other : others) EXPECT_EQ(testing::load(other), "stays") << other;
+  for (const std::string& other : others) EXPECT_EQ(formats::testing::load(other), "stays") << other;
   EXPECT_FALSE(std::filesystem::exists(stale) || std::filesystem::exists(of_longest));
   EXPECT_EQ(named_by_temporary("part.gcode.lamina-abcdefg234567.part"), "part.gcode");
   EXPECT_EQ(named_by_temporary("part.gcode.part"), "");
 }
 
 TEST(File, ASignalThatEndsTheProgramLeavesNothingButWhatCanBeContinued) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   for (const int signal : {SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU, SIGALRM, SIGUSR1}) {
     const pid_t child = ::fork();
     if (child == 0) {
@@ -226,30 +226,30 @@ TEST(File, ASignalThatEndsTheProgramLeavesNothingButWhatCanBeContinued) {
 }
 
 TEST(File, WhatCannotBeReplacedByAgreementIsAnErrorInTheEnd) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode";
   auto file = File::open(path, {.keep_part = true, .replace = false});
   ASSERT_TRUE(file.ok() && file->append("long work").ok());
-  testing::save(path, bytes_of("somebody was faster"));
+  formats::testing::save(path, bytes_of("somebody was faster"));
   const auto digest = file->finish();
   ASSERT_FALSE(digest.ok());
   EXPECT_EQ(digest.error().message, path + ": cannot write: File exists");
-  EXPECT_EQ(testing::load(path), "somebody was faster");
-  EXPECT_EQ(testing::load(path + ".part"), "long work");
+  EXPECT_EQ(formats::testing::load(path), "somebody was faster");
+  EXPECT_EQ(formats::testing::load(path + ".part"), "long work");
 }
 
 TEST(File, InAJobsDirectoryLinksAreReplacedAndNotFollowed) {
-  const testing::Folder folder;
-  testing::save(folder / "archive", bytes_of("precious"));
+  const formats::testing::Folder folder;
+  formats::testing::save(folder / "archive", bytes_of("precious"));
   std::filesystem::create_symlink("archive", folder / "layer.tif");
   ASSERT_TRUE(write_file(folder / "layer.tif", "new", {.lock = false, .follow = false}).ok());
-  EXPECT_EQ(testing::load(folder / "archive"), "precious");
-  EXPECT_EQ(testing::load(folder / "layer.tif"), "new");
+  EXPECT_EQ(formats::testing::load(folder / "archive"), "precious");
+  EXPECT_EQ(formats::testing::load(folder / "layer.tif"), "new");
   EXPECT_FALSE(std::filesystem::is_symlink(folder / "layer.tif"));
 }
 
 TEST(Claim, OfManyThatBeginAtOnceOneHoldsADirectory) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "manifest.json";
   for (int round = 0; round < 20; ++round) {
     std::atomic<int> held{0}, maximum{0}, taken{0};
@@ -274,7 +274,7 @@ TEST(Claim, OfManyThatBeginAtOnceOneHoldsADirectory) {
 }
 
 TEST(Claim, StaysWithTheFileThatReplacesIt) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "manifest.json";
   {
     auto claim = Claim::take(path, "out");
@@ -285,7 +285,7 @@ TEST(Claim, StaysWithTheFileThatReplacesIt) {
     claim->hand_over();
     ASSERT_TRUE(file->become_part().ok());
     { const auto dropped = std::move(*claim); }
-    EXPECT_EQ(testing::load(path + ".part"), "head\n");
+    EXPECT_EQ(formats::testing::load(path + ".part"), "head\n");
     const auto second = Claim::take(path, "out");
     ASSERT_FALSE(second.ok());
     EXPECT_EQ(second.error().message, "out: another run is writing here right now; wait for it or name another file");
@@ -299,16 +299,16 @@ TEST(Claim, StaysWithTheFileThatReplacesIt) {
 }
 
 TEST(File, AFileOfSeveralNamesKeepsItsBytesUnderTheOtherOne) {
-  const testing::Folder folder;
-  testing::save(folder / "precious", bytes_of("precious"));
+  const formats::testing::Folder folder;
+  formats::testing::save(folder / "precious", bytes_of("precious"));
   std::filesystem::create_hard_link(folder / "precious", folder / "part.gcode.part");
   ASSERT_TRUE(write_file(folder / "part.gcode", "whole", {.keep_part = true}).ok());
-  EXPECT_EQ(testing::load(folder / "precious"), "precious");
+  EXPECT_EQ(formats::testing::load(folder / "precious"), "precious");
 }
 
 TEST(File, NothingIsWrittenThroughALinkOfTheTemporaryFile) {
-  const testing::Folder folder;
-  testing::save(folder / "victim", bytes_of("precious"));
+  const formats::testing::Folder folder;
+  formats::testing::save(folder / "victim", bytes_of("precious"));
   std::filesystem::create_symlink("victim", folder / "part.gcode.part");
   const std::string refusal = (folder / "part.gcode.part") + ": is a link where lamina writes its temporary file; remove it";
   EXPECT_EQ(message_of(File::open(folder / "part.gcode", {.keep_part = true})), refusal);
@@ -319,7 +319,7 @@ TEST(File, NothingIsWrittenThroughALinkOfTheTemporaryFile) {
     EXPECT_TRUE(std::filesystem::is_symlink(folder / "part.gcode.part"));
     std::filesystem::remove(folder / "part.gcode");
   }
-  EXPECT_EQ(testing::load(folder / "victim"), "precious");
+  EXPECT_EQ(formats::testing::load(folder / "victim"), "precious");
   EXPECT_FALSE(std::filesystem::exists(folder / "part.gcode"));
   std::filesystem::create_directory(folder / "other.gcode.part");
   EXPECT_TRUE(ends_with(message_of(File::open(folder / "other.gcode", {.keep_part = true})),
@@ -327,24 +327,24 @@ TEST(File, NothingIsWrittenThroughALinkOfTheTemporaryFile) {
 }
 
 TEST(File, LinksAreFollowedToTheFileThatTheyLeadTo) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   std::filesystem::create_directory(folder / "deep");
-  testing::save(folder / "deep/there", bytes_of("old"));
+  formats::testing::save(folder / "deep/there", bytes_of("old"));
   std::filesystem::create_symlink("deep/there", folder / "second");
   std::filesystem::create_symlink("second", folder / "first");
   std::filesystem::create_symlink(folder / "deep/absent", folder / "dangling");
   ASSERT_TRUE(write_file(folder / "first", "new").ok());
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "first") && std::filesystem::is_symlink(folder / "second"));
-  EXPECT_EQ(testing::load(folder / "deep/there"), "new");
+  EXPECT_EQ(formats::testing::load(folder / "deep/there"), "new");
   ASSERT_TRUE(write_file(folder / "dangling", "made").ok());
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "dangling"));
-  EXPECT_EQ(testing::load(folder / "deep/absent"), "made");
+  EXPECT_EQ(formats::testing::load(folder / "deep/absent"), "made");
   std::filesystem::create_symlink("round", folder / "round");
   EXPECT_EQ(message_of(File::open(folder / "round")), (folder / "round") + ": cannot write: Too many levels of symbolic links");
 }
 
 TEST(File, DevicesAndPipesAreNeverReplacedAndTakeBytesOnlyAsAStream) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   std::filesystem::create_symlink("pipe", folder / "link");
   std::vector<std::string> names = {"pipe", "link"};
@@ -375,7 +375,7 @@ TEST(File, DevicesAndPipesAreNeverReplacedAndTakeBytesOnlyAsAStream) {
 }
 
 TEST(File, StandardOutputIsAStreamUnderAllItsNames) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   std::filesystem::create_symlink("/dev/stdout", folder / "link");
   std::fflush(stdout);  // what the runner of the tests has said is not for the file
   EXPECT_EQ(in_a_process([&] {
@@ -388,7 +388,7 @@ TEST(File, StandardOutputIsAStreamUnderAllItsNames) {
               return 0;
             }),
             0);
-  EXPECT_EQ(testing::load(folder / "out"), "-t11k");
+  EXPECT_EQ(formats::testing::load(folder / "out"), "-t11k");
   EXPECT_EQ(folder.files(), 2u);
   EXPECT_FALSE(std::filesystem::exists("-"));
 }
@@ -406,7 +406,7 @@ TEST(File, AReaderThatIsGoneIsAnError) {
 }
 
 TEST(File, WhatIsKeptIsContinuedFromAnyOfItsBytes) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   const std::string path = folder / "part.gcode";
   const std::string whole = "layer 0\nlayer 1\nlayer 2\n";
   EXPECT_EQ(in_a_process([&] {
@@ -416,7 +416,7 @@ TEST(File, WhatIsKeptIsContinuedFromAnyOfItsBytes) {
               return 2;
             }),
             -1);
-  EXPECT_EQ(testing::load(path + ".part"), whole.substr(0, 16)) << "what was flushed";
+  EXPECT_EQ(formats::testing::load(path + ".part"), whole.substr(0, 16)) << "what was flushed";
   {
     auto file = File::reopen(path, 8, {.hash = true, .keep_part = true});
     ASSERT_TRUE(file.ok()) << message_of(file);
@@ -425,17 +425,17 @@ TEST(File, WhatIsKeptIsContinuedFromAnyOfItsBytes) {
     EXPECT_FALSE(File::open(path).ok()) << "locked again";
     ASSERT_TRUE(file->append(whole.substr(8, 3)).ok());
   }
-  EXPECT_EQ(testing::load(path + ".part"), whole.substr(0, 11)) << "kept where it is let go";
+  EXPECT_EQ(formats::testing::load(path + ".part"), whole.substr(0, 11)) << "kept where it is let go";
   const auto longer = File::reopen(path, 12);
   EXPECT_EQ(message_of(longer),
             path + ".part: is shorter than the 12 bytes that its record names; start over with --overwrite");
-  EXPECT_EQ(testing::load(path + ".part"), whole.substr(0, 11));
+  EXPECT_EQ(formats::testing::load(path + ".part"), whole.substr(0, 11));
   auto file = File::reopen(path, 8, {.hash = true});
   ASSERT_TRUE(file.ok());
   ASSERT_TRUE(file->append(whole.substr(8)).ok());
   const auto digest = file->finish();
   ASSERT_TRUE(digest.ok());
-  EXPECT_EQ(testing::load(path), whole);
+  EXPECT_EQ(formats::testing::load(path), whole);
   EXPECT_EQ(digest->hash, hash_bytes(bytes_of(whole)));
   EXPECT_EQ(digest->bytes, whole.size());
   EXPECT_EQ(folder.files(), 1u);
@@ -443,7 +443,7 @@ TEST(File, WhatIsKeptIsContinuedFromAnyOfItsBytes) {
 }
 
 TEST(File, WhatIsDiscardedIsGone) {
-  const testing::Folder folder;
+  const formats::testing::Folder folder;
   auto file = File::open(folder / "part.gcode", {.keep_part = true});
   ASSERT_TRUE(file.ok() && file->append("x").ok());
   EXPECT_EQ(folder.files(), 1u);

@@ -143,7 +143,7 @@ TEST(Credits, ALayerKeepsItsScratchUntilRecordedIfTheRecorderReadsIt) {
 TEST(Credits, BytesOfTheRecorderAreThoseAfterItsLastLayer) {
   Lender lender(1000);
   for (std::uint32_t i = 0; i < 3; ++i) lender.begin(i), lender.is(Phase::kDone, i);
-  lender.out[0]->neighbour = 100, lender.out[1]->neighbour = 200, lender.out[2]->neighbour = 700;
+  lender.out[0]->extra = 100, lender.out[1]->extra = 200, lender.out[2]->extra = 700;
   for (const std::uint32_t late : {0u, 2u, 1u}) lender.is(Phase::kRecorded, late);
   lender.estimate = 301;
   lender.begin(3);

@@ -15,14 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
+struct PreviewOutcome {
   int code = -1;
   std::string output;  // stdout and stderr
 };
 
-Outcome preview(const std::string& arguments) {
+PreviewOutcome preview(const std::string& arguments) {
   const std::string program = (fs::path(LAMINA_PROGRAM).parent_path() / "lamina-preview").string();
-  Outcome outcome;
+  PreviewOutcome outcome;
   std::FILE* pipe = ::popen((program + " " + arguments + " 2>&1").c_str(), "r");
   char part[256];
   while (std::fgets(part, sizeof part, pipe) != nullptr) outcome.output += part;
@@ -37,7 +37,7 @@ class Preview : public ::testing::Test {
   void SetUp() override { make_job("tiff-g4"); }
 
   void make_job(const std::string& id) {
-    const ImageFormat* format = find_image_format(id);
+    const formats::ImageFormat* format = formats::find_image_format(id);
     ManifestHead head;
     head.version = "0";
     head.format = id;
@@ -53,10 +53,10 @@ class Preview : public ::testing::Test {
     auto writer = ManifestWriter::open(folder_ / "manifest.json", head, {});
     ASSERT_TRUE(writer.ok()) << writer.error().message;
     for (std::uint32_t k = 0; k < 20; ++k) {
-      std::vector<testing::Row> rows(75);
+      std::vector<formats::testing::Row> rows(75);
       for (std::uint32_t r = 20; r < 50; ++r) rows[r] = {100 + 2 * k, 200 - 2 * k};
-      const Runs runs = testing::image_of(300, rows);
-      const Bytes file = testing::encoded(*format, runs, 300, 150);
+      const Runs runs = formats::testing::image_of(300, rows);
+      const formats::Bytes file = formats::testing::encoded(*format, runs, 300, 150);
       if (!head.extension.empty()) {
         ASSERT_TRUE(write_file(folder_ / layer_file_name(k, head.extension), file).ok());
       }
@@ -74,7 +74,7 @@ class Preview : public ::testing::Test {
 
   /// Width and height from the PNG's header.
   std::pair<std::uint32_t, std::uint32_t> size() const {
-    const std::string file = testing::load(sheet());
+    const std::string file = formats::testing::load(sheet());
     if (file.size() < 24) return {0, 0};
     const auto number = [&](std::size_t at) {
       std::uint32_t value = 0;
@@ -84,22 +84,22 @@ class Preview : public ::testing::Test {
     return {number(16), number(20)};
   }
 
-  testing::Folder folder_;
+  formats::testing::Folder folder_;
 };
 
 TEST_F(Preview, MakesAContactSheetOfTheWantedWidthAndTheSameBytesEachTime) {
-  const Outcome first = preview(directory() + " -o " + sheet() + " --width 900");
+  const PreviewOutcome first = preview(directory() + " -o " + sheet() + " --width 900");
   ASSERT_EQ(first.code, 0) << first.output;
   EXPECT_NE(first.output.find("12 of 20 layers"), std::string::npos) << first.output;
   EXPECT_EQ(size().first, 900u);
-  const std::string bytes = testing::load(sheet());
+  const std::string bytes = formats::testing::load(sheet());
   EXPECT_EQ(preview(directory() + " -o " + sheet() + " --width 900 --quiet").output, "");
-  EXPECT_EQ(testing::load(sheet()), bytes);
+  EXPECT_EQ(formats::testing::load(sheet()), bytes);
 }
 
 TEST_F(Preview, ASingleLayerIsNeverWiderThanRequested) {
   for (const char* options : {"--layer 0 --width 300", "--layer 19 --whole-bed --width 2000", "--every 7", "--count 1"}) {
-    const Outcome outcome = preview(directory() + " -o " + sheet() + " " + options);
+    const PreviewOutcome outcome = preview(directory() + " -o " + sheet() + " " + options);
     ASSERT_EQ(outcome.code, 0) << outcome.output;
     EXPECT_GT(size().first, 0u) << options;
     EXPECT_LE(size().first, 2400u) << options;
@@ -116,7 +116,7 @@ TEST_F(Preview, AnInterruptedJobIsDrawnAsFarAsItIs) {
   std::string text;
   for (std::string line; std::getline(whole, line) && line.find("000013.tif") == std::string::npos;) text += line + "\n";
   std::ofstream(folder_ / "manifest.json.part") << text;
-  const Outcome part = preview(directory() + " -o " + sheet());
+  const PreviewOutcome part = preview(directory() + " -o " + sheet());
   EXPECT_EQ(part.code, 0);
   EXPECT_NE(part.output.find("12 of 13 layers that are there, of 20"), std::string::npos) << part.output;
 }
@@ -127,7 +127,7 @@ TEST_F(Preview, WrongUseIsExitCodeTwoAndOneLine) {
        {std::string(""), directory(), "-o " + sheet(), good + " --layer 20", good + " --layer x", good + " --count 0",
         good + " --count 9999", good + " --every 0", good + " --layer 1 --count 2", good + " --width 10", good + " --nonsense",
         directory() + " -o " + (folder_ / "sheet.jpg"), good + " more"}) {
-    const Outcome outcome = preview(arguments);
+    const PreviewOutcome outcome = preview(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments << "\n" << outcome.output;
     EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
     EXPECT_FALSE(fs::exists(sheet())) << arguments;
@@ -136,17 +136,17 @@ TEST_F(Preview, WrongUseIsExitCodeTwoAndOneLine) {
 
 TEST_F(Preview, ADirectoryThatIsNotWholeIsExitCodeFive) {
   fs::resize_file(folder_ / "layers/000003.tif", 100);
-  Outcome outcome = preview(directory() + " -o " + sheet() + " --layer 3");
+  PreviewOutcome outcome = preview(directory() + " -o " + sheet() + " --layer 3");
   EXPECT_EQ(outcome.code, 5);
   EXPECT_NE(outcome.output.find("000003.tif"), std::string::npos) << outcome.output;
   fs::remove(folder_ / "layers/000003.tif");
   EXPECT_EQ(preview(directory() + " -o " + sheet() + " --every 1").code, 5);
-  const Runs other = testing::image_of(301, std::vector<testing::Row>(75));
-  testing::save(folder_ / "layers/000003.tif", testing::encoded(*find_image_format("tiff-g4"), other));
+  const Runs other = formats::testing::image_of(301, std::vector<formats::testing::Row>(75));
+  formats::testing::save(folder_ / "layers/000003.tif", formats::testing::encoded(*formats::find_image_format("tiff-g4"), other));
   outcome = preview(directory() + " -o " + sheet() + " --layer 3");
   EXPECT_EQ(outcome.code, 5);
   EXPECT_NE(outcome.output.find("301"), std::string::npos) << outcome.output;
-  testing::save(folder_ / "manifest.json", std::as_bytes(std::span("{\"nothing\":", 11)));
+  formats::testing::save(folder_ / "manifest.json", std::as_bytes(std::span("{\"nothing\":", 11)));
   EXPECT_EQ(preview(directory() + " -o " + sheet()).code, 5);
   EXPECT_EQ(preview((folder_ / "layers") + " -o " + sheet()).code, 5);
   EXPECT_FALSE(fs::exists(sheet()));
@@ -155,7 +155,7 @@ TEST_F(Preview, ADirectoryThatIsNotWholeIsExitCodeFive) {
 TEST_F(Preview, AJobWithoutImagesSaysSo) {
   fs::remove_all(folder_ / "layers");
   make_job("null");
-  const Outcome outcome = preview(directory() + " -o " + sheet());
+  const PreviewOutcome outcome = preview(directory() + " -o " + sheet());
   EXPECT_EQ(outcome.code, 5);
   EXPECT_NE(outcome.output.find("null"), std::string::npos) << outcome.output;
 }
