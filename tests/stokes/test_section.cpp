@@ -39,7 +39,7 @@ Solved solved(const VoxelStack& solid, int axis) {
 }
 
 stokes::Section section_through(const VoxelStack& solid, const Solved& run, int axis, std::uint32_t ends) {
-  return stokes::section_of({positions_of(solid, 1), run.grid.cells.box, axis, axis}, run.grid.cells, run.field,
+  return stokes::section_of({stokes::cell_positions(solid, 1), run.grid.cells.box, axis, axis}, run.grid.cells, run.field,
                             run.flow.permeability[static_cast<std::size_t>(axis)], ends);
 }
 
@@ -50,7 +50,7 @@ double mean_of(const Plane& plane) {
 TEST(Section, CellsLieWhereTheirNeighboursSay) {
   const VoxelStack solid = narrowed_slit();
   const stokes::Grid grid = *stokes::make_grid(solid, 4);
-  const auto positions = positions_of(solid, 1);
+  const auto positions = stokes::cell_positions(solid, 1);
   ASSERT_EQ(positions.size(), grid.cells.size());
   for (std::uint32_t i = 0; i < grid.cells.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
