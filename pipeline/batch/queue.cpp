@@ -67,6 +67,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     stopped_ = true;
     changed_.notify_all();
     changed_.wait_for(lock, grace(), [&] { return workers_ == 0; });
+    const BatchRecord released = std::move(record_);  // the next run may open it at once
     if (!record_status_) return record_status_.error();
     return summary_;
   }

@@ -122,7 +122,7 @@ std::string DoseCheck::fault_of_dosed(const LayerRecord& record, std::uint64_t s
   const double maximum = max_pixels(record.layer);
   if (dosed >= minimum && dosed <= maximum + 0.5) return {};
   return fmt::format("the manifest says dosed_pixels {}, and {} is the {} that its {} can have", record.dosed_pixels,
-                     dosed < minimum ? std::ceil(minimum) : std::floor(maximum), dosed < minimum ? "min" : "max",
+                     dosed < minimum ? std::ceil(minimum) : std::floor(maximum), dosed < minimum ? "minimum" : "maximum",
                      dosed < minimum ? "images" : "parts");
 }
 

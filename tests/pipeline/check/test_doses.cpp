@@ -101,9 +101,9 @@ TEST_F(DosesOnRecord, WhereFewerFallTheyAreBounded) {
   expect_found(with(job, {{"requested_drops", requested + 2}}), "the manifest says requested_drops");
   expect_found(with(job, {{"dosed_pixels", dosed + 5}}), "the manifest says requested_drops");
   expect_found(with(job, {{"dosed_pixels", dosed / 4}, {"requested_drops", requested / 4}}),
-               "is the least that its images can have");
+               "is the minimum that its images can have");
   expect_found(with(job, {{"dosed_pixels", 2 * dosed}, {"requested_drops", 2 * requested}}),
-               "is the most that its parts can have");
+               "is the maximum that its parts can have");
 }
 
 TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirTargets) {

@@ -23,7 +23,7 @@ struct Completion : testing::Test {
   /// The candidates for the last word of a line.
   std::vector<std::string> candidates(const std::string& line) const {
     const std::string script = "cd '" + folder.path().string() + "'; HOME=$PWD; source ./lamina.bash; COMP_WORDS=(" + line +
-                               "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _lamina; printf '%s\\n' \"${COMPREPLY[@]}\" > told";
+                               "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _lamina; printf '%s\\n' \"${COMPREPLY[@]}\" > stated";
     write_text(folder / "request.bash", script);
     EXPECT_EQ(std::system(("bash '" + (folder / "request.bash") + "'").c_str()), 0) << line;
     std::istringstream reported(read_text(folder / "stated"));

@@ -110,7 +110,7 @@ TEST(PoreAnalysis, CuspsThatTouchNoPoreDistinguishBondedFromUnbondedPlans) {
       EXPECT_NE(again.err.find(fmt::format("connected {:.2f} % if", bonded)), std::string::npos) << again.err;
       EXPECT_EQ(test::run_lamina({"report", "part.gcode", "-o", "page.html"}, directory.path()).code, 0);
       const std::string page = test::read_text(directory / "page.html");
-      EXPECT_NE(page.find("\"laid\":\"fed "), std::string::npos);
+      EXPECT_NE(page.find("\"deposited\":\"fed "), std::string::npos);
       EXPECT_NE(page.find("\"deposited_svg\":\"PHN2Zy"), std::string::npos) << "<svg in base 64";
       const auto info = test::run_lamina({"info", "part.gcode", "--density", "1.1", "--json"}, directory.path());
       EXPECT_EQ(nlohmann::ordered_json::parse(info.out)["pores"].dump(), json["pores"].dump());
