@@ -1,4 +1,4 @@
-// bench/stokes.cpp: creeping flow past spheres, whose drag is published, and through a large cell of random ones, compared with what
+// bench/stokes.cpp: creeping flow past spheres with published drag and through a large cell of random ones, compared to what
 // copying memory allows.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // bench/write_g4.cpp: the G4 and PNG encoders and the G4 decoder alone, on rows of known kinds; what they write is first
-// decoded by libtiff and libpng. PNG's time is reported next to that of zlib at its fastest for the same rows of bits, that of the
+// decoded by libtiff and libpng. PNG's time is reported next to that of zlib at its fastest for the same bits, that of the
 // decoder next to libtiff's, which decodes into rows of bits that become runs.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>

@@ -94,7 +94,7 @@ class DosePlan {
   void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
 
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
-  /// laid       work.laid has the shares of voxels of several solids
+  /// deposited  work.deposited has the fill fractions of several solids
   /// materials  of the job, whose drops are distinguished if solids share voxels
   /// zone       the image of each zone, where there are several
   /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind

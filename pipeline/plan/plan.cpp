@@ -230,7 +230,7 @@ class Planner {
 
   Status index_sections() {
     if (images() && !beads_) return {};
-    Job cut = job();  // job() stays as requested: its file means the same in another command
+    Job cut = job();                           // job() stays as requested: its file means the same in another command
     if (images()) cut.slice = SliceRequest();  // of contours and toolpaths
     cut.slice.tolerance_um = tolerance_um_of(cut, plan_.product);
     auto sections = Sections::make(cut, *plan_.scene, std::move(schedule_), std::move(fillings_));

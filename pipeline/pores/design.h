@@ -45,7 +45,7 @@ Result<ExtruderProfile> designable_extruder(const std::string& machine);
 /// Searches by slots (segment/design/slots.h), runs the plan forward, corrects the slots by what that says, and searches again
 /// until every target is met, or the corrected slots show that none within the machine's limits meets them.
 /// returns  the best forward run, even if it misses the target
-/// tell     is told how far it is, 0 .. 1; false stops
+/// advance  receives the progress, 0 .. 1; false stops
 /// errors   kUsage: no such machine, or no calibration of segmented lines; of run_forward(); kInterrupted
 /// cost     of up to max_runs forward runs
 Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& advance);

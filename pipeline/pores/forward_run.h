@@ -38,7 +38,7 @@ struct ForwardRegion {
 /// of each region, of beads as the machine deposits them (bead_rules.h).
 /// job      of extrusion, without parts and output; all layers at one angle of 90 degrees
 /// machine  as --machine takes it
-/// tell     is told how far it is, 0 .. 1; false stops
+/// advance  receives the progress, 0 .. 1; false stops
 /// errors   of run() and analyse_pores(); kOutput: no temporary folder; kInternal: there is no layer at that height
 /// cost     a second for each region and place of the voxels, 150 bytes a voxel of void
 Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine, double height_mm,

@@ -26,7 +26,7 @@ struct StackWindow {
   WindowChoice choice;
   VoxelStack fine, coarse;  // coarse: twice as large, by majority
 };
-/// wish      voxel_um 0: those of the stack, else as near as whole factors allow; size_mm 0: 2 mm, or the part
+/// selection  voxel_um 0: those of the stack, else as near as whole factors allow; size_mm 0: 2 mm, or the part
 /// periodic  what is said to repeat
 /// errors    kUsage: larger than the part, or more than 2^31 voxels; those of cut_box()
 Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest& selection,

@@ -215,10 +215,10 @@ void add_to(const PoreAnalysis& analysis, Json& json) {
   for (std::size_t a = 0; a < 3; ++a) {
     const pores::Tortuosity& way = analysis.tortuosities[a];
     json["tortuosity"].push_back({{"along", std::string(1, "xyz"[a])},
-                            {"tortuosity", way.mean},
-                            {"min", way.minimum},
-                            {"max", way.maximum},
-                            {"throat_mm", analysis.throat_mm[a]}});
+                                  {"tortuosity", way.mean},
+                                  {"min", way.minimum},
+                                  {"max", way.maximum},
+                                  {"throat_mm", analysis.throat_mm[a]}});
   }
   const LayerSections& sections = analysis.sections;
   json["pores"] = {{"sections", sections.layers},

@@ -72,7 +72,7 @@ struct AnalysisPage {
 };
 AnalysisPage analysis_page(const std::string& path);
 
-/// Adds four lines and an object "deposited" to the summary of a job that wrote toolpaths; none for other files and those above
+/// Adds four lines and an object "deposited" to the summary of a toolpath job; none for other files and those above
 /// 16 MB, of which lamina info reports the same in more than a second.
 /// path  of the file
 void add_pores(const std::string& path, Summary& summary);

@@ -53,7 +53,7 @@ struct FlowRequest {
 };
 
 /// Along axes that do not repeat, walls close the sides of the window, and fluid stands before its ends.
-/// tell    is told how far it is, 0 .. 1; false stops
+/// advance  receives the progress, 0 .. 1; false stops
 /// errors  kUsage: it does not fit the memory, with the voxels that do; kInput: no void; kInterrupted
 /// cost    of stokes::solve() for each axis and window
 Result<PoreReport> analyse_pores(const PoreRasters& rasters, const FlowRequest& request,

@@ -37,7 +37,7 @@ std::string csv_text(std::span<const std::vector<std::string>> rows);
 std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
                                                           std::span<const QuotedPart> parts);
 
-/// Layers that do not state the part of their pixels, although there are several parts.
+/// Reports layers that do not state the part of their pixels, if there are several parts.
 /// An object: hours, litres and, with prices, the currency's units of the job; the same of each part under "parts", if there
 /// are prices or several.
 Json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const QuotedPart> parts);
@@ -55,7 +55,7 @@ class Account {
   std::size_t parts() const { return parts_.size(); }
 
   using Rows = std::vector<std::vector<std::string>>;
-  /// For people, and for programs (told.h); as a table.
+  /// For users, and for programs (machine_text.h); as a table.
   void report(std::vector<std::pair<std::string, std::string>>& lines, Json& use, Rows& rows) const;
   Rows rows() const { return quote_rows(tally_.quote(), machine_.cost, parts_); }
 

@@ -8,7 +8,7 @@
 
 namespace lamina::pipeline {
 
-/// Adds the warnings and places of the job's inspection.json to the findings; nothing if there is none of this job.
+/// Adds the warnings and places of the job's inspection.json to the findings; nothing without a file of this job.
 /// directory  of the manifest. mirrored  whether columns and rows of the images are, on which places are then shown
 void add_inspection(const std::string& directory, const ManifestHead& head, bool mirrored_x, bool mirrored_y,
                     ReportLayers& detected);

@@ -10,14 +10,14 @@
 namespace lamina::bead {
 
 struct BeadPore {
-  double width;        // mm, in the middle of the thin stretch; 0 or below: none
+  double width;        // mm, in the middle of the thin segment; 0 or below: none
   double widest;       // of all places
   double half_length;  // mm around that middle where it is at least half as wide as there
   double open_length;  // mm around that middle where beads do not bond: no nearer than bond_gap; the whole period at most
 };
 
 /// spacing     mm, centre to centre
-/// beside      mm, width of the line beside it
+/// adjacent_mm   mm, width of the line next to it
 /// bond_gap    mm: beads that are no further apart bond
 BeadPore adjacent_pore(const BeadMachine& machine, double height_mm, const Pattern& pattern, double spacing_mm,
                        double adjacent_mm, double bond_gap_mm, bool spread);

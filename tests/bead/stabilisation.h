@@ -1,8 +1,8 @@
 // tests/bead/stabilisation.h: the lag of a hot end from where a bead is as wide again as before the speed rose.
 //
-// A line deposited evenly continues at a higher speed; its width drops and comes back. The way until then is measured with a ruler,
+// A line deposited evenly continues at a higher speed; its width drops and comes back. The distance is measured by ruler,
 // and no width of the thin bead is needed: Di Nisio 2022, Table 11, column "stabilisation distance". "As wide again" is as near
-// to the width before as widths can be distinguished. That is the only thing the constant depends on besides the distances, and near
+// to the width before as widths can be distinguished. The constant depends only on that and the distances, and near
 // 100 % it decides (0.03 s at 125 %): hence the median.
 #pragma once
 
@@ -13,7 +13,7 @@
 namespace lamina::bead {
 
 struct StableAfter {
-  double speed_mm_s;   // of the thin stretch, above that of the line before
+  double speed_mm_s;   // of the thin segment, above that of the line before
   double distance_mm;  // from where it begins
 };
 

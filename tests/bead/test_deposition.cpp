@@ -106,7 +106,7 @@ TEST(DepositedBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
   }
 }
 
-/// The melt keeps its content from the end of the previous line: all that is fed is deposited, except what the last line leaves.
+/// The melt keeps its content from the end of the previous line: all fed is deposited, except what the last line leaves.
 TEST(DepositedBeads, ALineBeginsWithWhatTheLineBeforeLeftBehind) {
   CommandedWay one, both;
   one.add(0, 0, 15, 0, 30, kDepositedArea, false);

@@ -125,7 +125,7 @@ TEST(Tables, WidthsOfThinIntervalsByExtrusion) {  // Table 12
 }
 
 TEST(Tables, WidthsOfRepeatedIntervals) {  // Tables 13 to 15
-  // Di Nisio does not state where along a segment he measured. By Table 16: its pores are as wide as thin stretches of
+  // Di Nisio does not state where along a segment he measured. By Table 16: its pores are as wide as thin segments of
   // 0.22 (B100) and 0.20 mm (B75) leave, those of Tables 14 and 13 are 0.31 and 0.28 mm wide: means, not middles.
   for (const bool spread : {false, true}) {
     EXPECT_LE(errors_of_tables_13_to_15(anet(set_area(), kProfile), spread).mean, 0.0351);

@@ -1,4 +1,4 @@
-// Files that a job file names are relative to its folder: parts, profiles, presets and the output, regardless of the working folder.
+// Files in a job file are relative to its folder: parts, profiles, presets, output, regardless of the working folder.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -54,7 +54,7 @@ TEST(OpenImageIO, SeesBlackExactlyWhereRunsAreInEveryFormat) {
       double dpi[2] = {};
       ASSERT_EQ(pixels_by_openimageio(path, runs, dpi), expected);
       if (format->extension == ".pbm") continue;  // has no place for it but a comment
-      if (format->extension == ".bmp") {          // whose resolution OpenImageIO does not report: pixels a metre, bytes 38 to 45
+      if (format->extension == ".bmp") {          // resolution unreported by OpenImageIO: pixels a metre, bytes 38 to 45
         std::ifstream file(path, std::ios::binary);
         std::int32_t metre[2] = {};
         file.seekg(38).read(reinterpret_cast<char*>(metre), sizeof metre);

@@ -156,7 +156,7 @@ TEST(Order, SpeedsAreThoseOfTheProfile) {
   expect_in(Reordered(bench).replace(fmt::format(" F{:.0f}", scan), fmt::format(" F{:.0f}", scan / 2)).reported(), "scans at");
 }
 
-// State that the controller keeps from another print must be set before the first line, and at its rest alone it forgets a sweep.
+// State kept from another print must be set before the first line, and at its rest alone it forgets a sweep.
 TEST(Order, OfLinesForTheHp45IsHeld) {
   const TamperBench bench("hp45", [](Machine& m) {
     printed_parts::all_maintenance_of(m);

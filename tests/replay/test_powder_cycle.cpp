@@ -1,4 +1,4 @@
-// What a layer's program does with the powder, in addition to its drops: edited programs of the dialects that move axes by G-code.
+// Powder handling of a layer's program, in addition to drops: edited programs of the dialects that move axes by G-code.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

@@ -93,7 +93,7 @@ TEST(Gases, OneSampleByHand) {
 TEST(Gases, TheEquationIsWhatTheGradientAddsUpToAlongTheMedium) {
   // dp / dx = mu / k1 v + rho / k2 v^2 with v = v0 p0 / p and rho = rho0 p / p0, from the outlet backwards (Runge, Kutta).
   const double k1 = 60 * kDarcy, k2 = 6e-6, length = 0.0255, outlet = 95000, reported = 101325;
-  const Fluid air{1.81e-5, 1.204};  // at `told`
+  const Fluid air{1.81e-5, 1.204};  // at `reported`
   std::vector<FlowPoint> points;
   for (int i = 1; i <= 6; ++i) {
     const double v0 = 0.5 * i;

@@ -1,4 +1,4 @@
-// tests/stokes/test_fine_walls.cpp: creeping flow between walls that are given by a raster three times finer than the flow's voxels.
+// tests/stokes/test_fine_walls.cpp: creeping flow between walls given by a raster three times finer than the flow's voxels.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 

@@ -9,7 +9,7 @@
 namespace lamina::pipeline {
 
 /// "; did you mean '--layer'?" for an option of PrusaSlicer, Slic3r or CuraEngine whose counterpart the command has, with
-/// what differs; "; lamina lays no brim" for what lamina does not make; else "". Sources: PrusaSlicer
+/// what differs; "; lamina makes no supports" for what lamina does not make; else "". Sources: PrusaSlicer
 /// src/libslic3r/PrintConfig.cpp, Cura fdmprinter.def.json.
 std::string slicer_alias(std::string_view flag, const CommandSpec& spec);
 

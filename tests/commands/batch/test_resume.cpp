@@ -1,4 +1,4 @@
-// tests/commands/batch/test_resume.cpp: a batch that is killed, interrupted, out of disk, or concurrent with other work resumes where
+// tests/commands/batch/test_resume.cpp: a batch that is killed, interrupted, out of disk, or disturbed resumes where
 // it was, to the same bytes.
 #include <fcntl.h>
 #include <gtest/gtest.h>

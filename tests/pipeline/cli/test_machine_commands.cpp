@@ -112,7 +112,7 @@ TEST_F(MachineCommands, CheckReportsTheTimeThatTheProgramOfAFullLayerTakes) {
   }
 }
 
-// Twelve full layers, of which shots are due in three, wipes in two, one of them with a shot: the reported mean per layer is a twelfth.
+// Twelve full layers, of which shots are due in three, wipes in two, one of them with a shot: a twelfth is reported.
 TEST_F(MachineCommands, CheckAveragesMaintenanceThatIsDueEverySoManyLayers) {
   std::ofstream part(at("full.stl"));
   part << "solid full\n";
