@@ -16,7 +16,9 @@ target_compile_definitions(lamina_test_support PUBLIC LAMINA_TEST_DIR="${PROJECT
                            LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
 # Tests are compiled without optimisation, in two thirds of the time; what they call is optimised, and so is the slow reference of the bitmaps.
 target_compile_options(lamina_test_support PUBLIC -O0 -fno-sanitize=undefined)
-target_precompile_headers(lamina_test_support PRIVATE tests/precompiled.h)
+if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")  # as in lamina_targets.cmake
+  target_precompile_headers(lamina_test_support PRIVATE tests/precompiled.h)
+endif()
 
 # Loaded before the program, to see what it syncs and renames.
 add_library(lamina_call_log MODULE EXCLUDE_FROM_ALL tests/commands/call_log.cc)
@@ -56,7 +58,9 @@ foreach(folder run ${folders})
   add_executable(test_${folder} ${test_sources})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
                         PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
-  target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
+  if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+    target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
+  endif()
   if(LAMINA_UNITY_TESTS)
     list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp)  # options of its own
     lamina_unity(test_${folder} ${test_sources})
