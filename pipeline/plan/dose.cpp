@@ -112,7 +112,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
     limit_ = std::min(limit_, machine->head.max_drop_sweeps * sweep_drops);
   if (full_drops_ > limit_) {
     return Error{Fault::kUsage,
-                 fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.most_drop_sweeps of {} in "
+                 fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.max_drop_sweeps of {} in "
                              "each); choose fewer levels, or give --saturation",
                              rules_.full + 1, full_drops_, limit_, sweep_drops)};
   }

@@ -177,7 +177,7 @@ Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
   if (unbound_.where.empty() && !thin_.where.empty() && allow_unbound) {
     warnings.push_back(
         {"saturation", fmt::format("{} may get as little as {:.1f} % of their voids filled by their formula, and the "
-                                   "powder binds from {} % on (powder.least_saturation_percent)",
+                                   "powder binds from {} % on (powder.min_saturation_percent)",
                                    where(thin_.where), thin_.gets, number_text(min_percent_))});
   }
   const DoseFault& unbound = allow_unbound ? unbound_ : unbound_anywhere_;
@@ -185,7 +185,7 @@ Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
   const std::string requested = has_target() ? fmt::format(" where {} % is asked", number_text(unbound.requested)) : "";
   const std::string text = fmt::format(
       "{} get {}{:.1f} % of their voids filled{}, and the powder binds from {} % on "
-      "(powder.least_saturation_percent)",
+      "(powder.min_saturation_percent)",
       where(unbound.where), unbound.alike ? "" : "as little as ", unbound.gets, requested, number_text(min_percent_));
   if (!allow_unbound) {
     return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound",

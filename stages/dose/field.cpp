@@ -105,7 +105,7 @@ void Field::blame(double value, bool binds) {
                    fmt::format("{}; it has to be a number from 0 to {:g}: put it into max(0, ...)", where, kMaxPercent)};
   } else {
     fault_ = Error{Fault::kUsage,
-                   fmt::format("{}, and the powder binds from {} % on (powder.least_saturation_percent); give a higher "
+                   fmt::format("{}, and the powder binds from {} % on (powder.min_saturation_percent); give a higher "
                                "saturation, or --allow-unbound",
                                where, number_text(sheet_->min_percent))};
   }

@@ -23,7 +23,7 @@ std::uint64_t fraction_of(unsigned __int128 a, unsigned __int128 b, unsigned bit
   return 2 * a >= b ? quotient + 1 : quotient;
 }
 
-using Wide = unsigned __int128;
+using Uint128 = unsigned __int128;
 
 /// Both in millionths.
 std::int64_t voids_of(const Binder& binder) {
@@ -36,15 +36,15 @@ std::int64_t target_of(double percent) { return std::clamp<std::int64_t>(million
 std::int64_t drop_of(const Binder& binder) { return std::max<std::int64_t>(0, millionths(binder.drop_pl)); }  // 10^6 nm3
 
 /// In thousandths of a nm3, at most 10^9 x 10^9 x 10^9 x 10^3 before it is divided.
-Wide voxel_of(const PixelGrid& grid, std::int64_t thickness_nm) {
-  const Wide area = static_cast<Wide>(grid.x.span) * static_cast<Wide>(grid.y.span);
-  const Wide pixels = static_cast<Wide>(grid.x.dots) * static_cast<Wide>(grid.y.dots);
-  return area * static_cast<Wide>(thickness_nm) / pixels * 1000;
+Uint128 voxel_of(const PixelGrid& grid, std::int64_t thickness_nm) {
+  const Uint128 area = static_cast<Uint128>(grid.x.span) * static_cast<Uint128>(grid.y.span);
+  const Uint128 pixels = static_cast<Uint128>(grid.x.dots) * static_cast<Uint128>(grid.y.dots);
+  return area * static_cast<Uint128>(thickness_nm) / pixels * 1000;
 }
 /// What one drop leaves, in the same unit times 10^12, as targets and voids are in millionths.
-Wide one_of(const Binder& binder) {
-  return static_cast<Wide>(stays_of(binder)) * static_cast<Wide>(drop_of(binder)) *
-         (static_cast<Wide>(kMillion) * kMillion * 1000);
+Uint128 one_of(const Binder& binder) {
+  return static_cast<Uint128>(stays_of(binder)) * static_cast<Uint128>(drop_of(binder)) *
+         (static_cast<Uint128>(kMillion) * kMillion * 1000);
 }
 
 }  // namespace
@@ -54,19 +54,19 @@ Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, s
   const Drops24 limit = Drops24{maximum} << kDropBits;
   const std::int64_t target = target_of(percent), voids = voids_of(binder);
   if (target == 0 || voids == 0) return 0;
-  const Wide one = one_of(binder);
+  const Uint128 one = one_of(binder);
   if (one == 0) return limit;
-  const Wide requested = voxel_of(grid, thickness_nm) * static_cast<Wide>(target) * static_cast<Wide>(voids);
-  const Wide whole = requested / one;
+  const Uint128 requested = voxel_of(grid, thickness_nm) * static_cast<Uint128>(target) * static_cast<Uint128>(voids);
+  const Uint128 whole = requested / one;
   if (whole >= maximum) return limit;
   return std::min(limit, (static_cast<Drops24>(whole) << kDropBits) + fraction_of(requested % one, one, kDropBits));
 }
 
 DropScale::DropScale(const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
   constexpr unsigned kBits = 88;
-  constexpr Wide kMax = Wide{1} << (kBits - 2);  // more than any nozzle fires, for ten millionths
-  Wide requested = voxel_of(grid, thickness_nm) * static_cast<Wide>(voids_of(binder));
-  const Wide one = one_of(binder);
+  constexpr Uint128 kMax = Uint128{1} << (kBits - 2);  // more than any nozzle fires, for ten millionths
+  Uint128 requested = voxel_of(grid, thickness_nm) * static_cast<Uint128>(voids_of(binder));
+  const Uint128 one = one_of(binder);
   if (requested == 0) return;
   of_millionth_ = kMax;
   if (requested >= one / 4) return;
@@ -81,8 +81,8 @@ DropScale::DropScale(const Binder& binder, const PixelGrid& grid, std::int64_t t
 }
 
 Drops24 DropScale::drops(double percent) const {
-  constexpr Wide kAny = Wide{1} << (20 + kDropBits);
-  const Wide drops = (static_cast<Wide>(target_of(percent)) * of_millionth_ + (Wide{1} << 63)) >> 64;
+  constexpr Uint128 kAny = Uint128{1} << (20 + kDropBits);
+  const Uint128 drops = (static_cast<Uint128>(target_of(percent)) * of_millionth_ + (Uint128{1} << 63)) >> 64;
   return static_cast<Drops24>(std::min(drops, kAny));
 }
 

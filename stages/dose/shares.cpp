@@ -222,9 +222,9 @@ ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& do
       core += pixels * (zones.level[i] - full);
     }
   }
-  using Wide = unsigned __int128;
-  const Wide requested = Wide{dose.requested_shell} * shell + Wide{dose.requested_inside} * core;
-  const Wide one = Wide{kOneDrop} * full;
+  using Product = unsigned __int128;
+  const Product requested = Product{dose.requested_shell} * shell + Product{dose.requested_inside} * core;
+  const Product one = Product{kOneDrop} * full;
   return {(2 * (shell + core) + full) / (2 * full), static_cast<std::uint64_t>((2 * requested + one) / (2 * one))};
 }
 

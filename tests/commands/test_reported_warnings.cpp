@@ -60,7 +60,7 @@ TEST_F(ReportedWarnings, ArePowdersDropsNozzlesAndMaintenanceOfTheJob) {
   write_text(
       directory_ / "idle.toml",
       "inherits = \"nuferbj\"\n[machine]\nname = \"idle\"\n[head]\nblocked = [10, 11, 12, 13]\nblocked_rule = \"neighbour\"\n"
-      "max_drop_sweeps = 1\n[powder]\nleast_saturation_percent = 60\n[maintenance]\nspit_mm = [-40, 5]\n");
+      "max_drop_sweeps = 1\n[powder]\nmin_saturation_percent = 60\n[maintenance]\nspit_mm = [-40, 5]\n");
   expect_alike("a.stl --machine idle.toml --layer 0.1 --saturation 40 --allow-unbound",
                {"maintenance", "saturation", "lost-pixels"});
 }

@@ -56,7 +56,7 @@ CommandSpec permeability_spec() {
       {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
       {"--beads",
        "WORD",
-       "spread: as the printer's melt lags and spreads; laid: no spread along lines; told: by the file; default: spread by known printers",
+       "spread: as the printer's melt lags and spreads; deposited: no spread along lines; stated: by the file; default: spread by known printers",
        "",
        "Toolpaths",
        {"deposited", "spread", "stated"}},

@@ -249,7 +249,7 @@ void warn_of_idle_maintenance(const Machine& machine, std::vector<Warning>& warn
       "nothing is switched on before a layer dries: powder.dry_on_lines is empty");
   const double dries_s = maintenance.spit_seconds > 0 ? maintenance.spit_seconds : maintenance.wipe_seconds;
   add(dries_s > 0 && powder.dry_s > dries_s, maintenance.cap_mm.has_value(),
-      fmt::format("nozzles wait uncapped for {:g} s while a layer dries, and care.{} is {:g}: give maintenance.cap_mm",
+      fmt::format("nozzles wait uncapped for {:g} s while a layer dries, and maintenance.{} is {:g}: give maintenance.cap_mm",
                   powder.dry_s, maintenance.spit_seconds > 0 ? "spit_seconds" : "wipe_seconds", dries_s));
   if (!idle.empty()) warnings.push_back({"maintenance", fmt::format("{}: {}", machine.name, idle)});
 }

@@ -187,7 +187,7 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsReportedOrRefused) {
       {"a pause longer than nozzles may wait", "dry_s = 90\n" + maintenance + "spit_seconds = 60\n", block, 0, "maintenance"},
       {"the same under a cap", "dry_s = 90\n" + maintenance + "spit_seconds = 60\ncap_mm = [-40, 5]\n", block, 0, ""},
       {"a pause to fill vats of no depth", "refill = \"pause\"\n", block, 2, "pauses need powder.vat_depth_mm"},
-      {"joints that shift by a whole swath", "[mounting]\njoint_shift_lines = 128\n", block, 0, "joints"},
+      {"joints that shift by a whole swath", "[mounting]\njoint_shift_lines = 128\n", block, 0, "stitching"},
       {"the same by less", "[mounting]\njoint_shift_lines = 48\n", block, 0, ""},
       {"a part higher than the machine builds", "", tall, 2, "above the build height"},
       {"nozzles that are faster than they fire", "", block + " --scan-speed 900", 2, "fires a nozzle"},

@@ -27,7 +27,7 @@ class RefusedJobs : public testing::Test {
 };
 
 TEST_F(RefusedJobs, SaveNoJob) {
-  save("weak.toml", "inherits = \"jet1000\"\n[machine]\nname = \"weak\"\n[powder]\nleast_saturation_percent = 50\n");
+  save("weak.toml", "inherits = \"jet1000\"\n[machine]\nname = \"weak\"\n[powder]\nmin_saturation_percent = 50\n");
   const std::string refused = "jet box.stl --layer 0.1 --machine weak.toml --saturation 20 --save-job job.toml ";
   for (const char* how : {"-o out", "--dry-run"}) {
     EXPECT_EQ(lamina(refused + how).code, 2);
@@ -89,7 +89,7 @@ TEST_F(RefusedJobs, OfAnErrorInALayerLeaveNothingButWhatOthersMade) {
 }
 
 TEST_F(RefusedJobs, LayersOfOtherRunsAreNotWarnedOf) {
-  save("thick.toml", "inherits = \"jet1000\"\n[machine]\nname = \"thick\"\n[head]\nmost_drop_sweeps = 1\n");
+  save("thick.toml", "inherits = \"jet1000\"\n[machine]\nname = \"thick\"\n[head]\nmax_drop_sweeps = 1\n");
   const std::string job = "jet box.stl --layer 0.1 --machine thick.toml --saturation 300 --dry-run ";
   EXPECT_NE(lamina(job).err.find("layers 0:40 "), std::string::npos) << lamina(job).err;
   EXPECT_NE(lamina(job + "--layers 3:9").err.find("layers 3:9 "), std::string::npos) << lamina(job + "--layers 3:9").err;
