@@ -164,9 +164,9 @@ def inspection(browser, page, layer, shots, only_open):
         browser.click("#warnings button")
         steps["warning"] = browser.value(STATE)
         said["warning"] = browser.value("document.querySelector('#warnings button').textContent")
-    said["locations"] = browser.value("[...document.querySelectorAll('#places button')].map(b => b.textContent)")
+    said["locations"] = browser.value("[...document.querySelectorAll('#locations button')].map(b => b.textContent)")
     if said["locations"]:
-        browser.click("#places li:last-child button")
+        browser.click("#locations li:last-child button")
         steps["position"] = browser.value(STATE)
         # Each frame of the picture in pixels of the image: left, top, right, bottom.
         said["frames"] = browser.value("(() => { const s = laminaReport.state, v = document.getElementById('view'), h = laminaReport.head,"
