@@ -151,9 +151,9 @@ class Module(unittest.TestCase):
             self.assertEqual(points.dtype, np.int32)
             x, y = points.astype(float).T / 1e6
             area += 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-        self.assertAlmostEqual(area, contours.area_mm2, positions=6)
+        self.assertAlmostEqual(area, contours.area_mm2, delta=5e-7)
         pixel = 25.4 ** 2 / (self.plan.dpi[0] * self.plan.dpi[1])
-        self.assertAlmostEqual(layer.set_pixels * pixel / area, 1, positions=2)
+        self.assertAlmostEqual(layer.set_pixels * pixel / area, 1, delta=5e-3)
         self.assertEqual(contours.offset[-1], len(contours.point))
         self.assertIs(contours.point.base, contours)
 
