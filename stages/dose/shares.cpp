@@ -222,9 +222,9 @@ ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& do
       core += pixels * (zones.level[i] - full);
     }
   }
-  using Wide = unsigned __int128;
-  const Wide requested = Wide{dose.requested_shell} * shell + Wide{dose.requested_inside} * core;
-  const Wide one = Wide{kOneDrop} * full;
+  using Wide128 = unsigned __int128;
+  const Wide128 requested = Wide128{dose.requested_shell} * shell + Wide128{dose.requested_inside} * core;
+  const Wide128 one = Wide128{kOneDrop} * full;
   return {(2 * (shell + core) + full) / (2 * full), static_cast<std::uint64_t>((2 * requested + one) / (2 * one))};
 }
 
