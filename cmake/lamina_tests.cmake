@@ -142,4 +142,5 @@ if(LAMINA_PYTHON)
   set_tests_properties(Python.ArraysAreTheDecodedFilesOfTheProgram PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300
                        ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
 endif()
+add_test(NAME House.EveryRuleFindsThePlantedFault COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/house/test_check_house)
 add_test(NAME Landing.FilesOfThreeCommitsAreFound COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/landing/three_commits ${PROJECT_SOURCE_DIR})

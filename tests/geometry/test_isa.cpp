@@ -29,8 +29,8 @@ TEST(Isa, WhatIsInTheWayIsNamed) {
   EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx2, "plain").error().message,
             "run.isa: avx512 is more than this processor has; use auto, or plain at most");
   EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx512, "avx2").error().message,
-            "run.isa: avx512 is more than the environment variable LAMINA_ISA=avx2 allows; unset it, or use auto, or avx2 at "
-            "most");
+            "run.isa: avx512 is more than the environment variable LAMINA_ISA=avx2 allows; unset it, or use auto, or "
+            "avx2 at most");
   EXPECT_EQ(*usable_isa(Isa::kAuto, Isa::kAvx512, "plain"), Isa::kPlain);
   EXPECT_EQ(*usable_isa(Isa::kAvx2, Isa::kAvx512, "avx2"), Isa::kAvx2);
 }

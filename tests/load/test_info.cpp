@@ -164,7 +164,7 @@ TEST(Info, ManyShellsThatOverlapTakeBoundedWork) {
   }
   load::Diagnosis found;
   const Mesh mesh = stairs(2000, found);
-  const auto none = [](auto, auto, auto) -> Result<std::vector<double>> { return Error{Fault::kInternal, "asked"}; };
+  const auto none = [](auto, auto, auto) -> Result<std::vector<double>> { return Error{Fault::kInternal, "called"}; };
   const auto volumes =
       load::planned_volumes(std::span(&mesh, 1), std::span(&alone, 1), std::span(&found, 1), none, load::Effort{1e5, 16});
   ASSERT_TRUE(volumes.ok());

@@ -411,7 +411,7 @@ TEST(File, WhatIsKeptIsContinuedFromAnyOfItsBytes) {
   const std::string whole = "layer 0\nlayer 1\nlayer 2\n";
   EXPECT_EQ(in_a_process([&] {
               auto file = File::open(path, {.keep_part = true});
-              if (!file || !file->append(whole.substr(0, 16)) || !file->flush() || !file->append("lay")) return 1;
+              if (!file || !file->append(whole.substr(0, 16)) || !file->flush() || !file->append("stop")) return 1;
               ::kill(::getpid(), SIGKILL);
               return 2;
             }),

@@ -36,9 +36,9 @@ TEST(CalibrateScan, APhotographBecomesAProfile) {
                                                            << picture.width << ' ' << picture.height << "\n255\n"
                                                            << std::string(picture.grey.begin(), picture.grey.end());
   const Outcome detected = run_lamina(
-      words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay seen.png"), directory.path());
+      words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay detected.png"), directory.path());
   ASSERT_EQ(detected.code, 0) << detected.err;
-  EXPECT_TRUE(std::filesystem::exists(directory / "seen.png"));
+  EXPECT_TRUE(std::filesystem::exists(directory / "detected.png"));
   const auto mine = pipeline::find_machine(directory / "mine.toml");
   ASSERT_TRUE(mine) << mine.error().message;
   EXPECT_EQ(mine->head.blocked, (std::vector<std::uint32_t>{17, 93}));
