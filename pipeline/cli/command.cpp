@@ -145,7 +145,7 @@ namespace {
   } catch (const std::exception& error) {
     if (!is_shortage(error)) std::abort();
     constexpr std::string_view kLine = "lamina: out of memory; give a smaller --memory or fewer --threads\n";
-    write_all(2, std::as_bytes(std::span(kLine)));
+    lamina::write_all(2, std::as_bytes(std::span(kLine)));
     std::_Exit(static_cast<int>(Fault::kMemory));
   } catch (...) {
   }
