@@ -172,10 +172,6 @@ else()
   message(WARNING "OpenCV is not there: lamina-scan and its tests are NOT built. Debian: libopencv-core-dev libopencv-imgproc-dev")
 endif()
 
-if(LAMINA_TEST_SIDE STREQUAL "sanitized")
-  set_target_properties(lamina-preview PROPERTIES EXCLUDE_FROM_ALL ON)
-endif()
-
 if(LAMINA_BENCH)
   find_package(benchmark REQUIRED)
   lamina_sources(bench_sources "bench/*.cpp")

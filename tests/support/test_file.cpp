@@ -1,6 +1,5 @@
 #include "stages/support/io/file.h"
 
-#include "pipeline/cli/console.h"
 #include "stages/support/io/temporary.h"
 
 #include <fcntl.h>
