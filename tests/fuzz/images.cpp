@@ -248,9 +248,9 @@ std::size_t mutate_png(std::uint8_t* bytes, std::size_t size, std::size_t, std::
 }
 
 constexpr std::string_view kImageSources =
-    "stages/formats/images/image stages/formats/tiff/read_tiff stages/formats/g4/decode stages/formats/png/read_png stages/formats/pbm/read_pbm stages/formats/bmp/read_bmp stages/geometry/bits";
+    "stages/formats/images/image stages/formats/tiff stages/formats/g4/decode stages/formats/png/png_format stages/formats/pbm stages/formats/bmp stages/geometry/bits";
 constexpr std::string_view kGreySources =
-    "stages/formats/images/image stages/formats/images/grey stages/formats/tiff/read_tiff stages/formats/png/read_png stages/formats/pbm/read_pbm stages/formats/bmp/read_bmp stages/geometry/bits";
+    "stages/formats/images/image stages/formats/tiff stages/formats/png/png_format stages/formats/pbm stages/formats/bmp stages/geometry/bits";
 const Registered kTiff({"image_tiff", read_image, tiff_seeds, kImageSources, ".tif", "tiff.dict", 1024});
 const Registered kPng({"image_png", read_image, png_seeds, kImageSources, ".png", "png.dict", 1024, mutate_png});
 const Registered kGrey({"image_grey", read_grey, grey_seeds, kGreySources, ".tif .png .bmp .pgm", "tiff.dict", 1024});

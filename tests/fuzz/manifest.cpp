@@ -104,7 +104,7 @@ std::vector<std::string> seeds_of(bool ended) {
 std::vector<std::string> whole_seeds() { return seeds_of(true); }
 std::vector<std::string> partial_seeds() { return seeds_of(false); }
 
-constexpr std::string_view kManifestSources = "pipeline/manifest stages/support/text stages/data/hash stages/data/layer";
+constexpr std::string_view kManifestSources = "pipeline/manifest stages/support/text stages/support/hash stages/data/layer";
 const Registered kWhole({"manifest", read_finished, whole_seeds, kManifestSources, "", "manifest.dict", 6000});
 const Registered kPartial({"manifest_part", read_partial, partial_seeds, kManifestSources, "", "manifest.dict", 6000});
 

@@ -91,7 +91,7 @@ std::vector<std::string> tree_seeds() {
   return {"a = 1\nb = [1, 2.5, \"x\"]\n[c.d]\ne = { f = true, g = 1979-05-27T07:32:00Z }\n[[h]]\ni = '''x'''\n"};
 }
 
-const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/expression", "", "formula.dict", 256});
+const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/spacing", "", "formula.dict", 256});
 const Registered kTexts({"texts", read_texts, text_seeds, "stages/support/text stages/heights/thickness_set", "", {}, 256});
 const Registered kTree({"toml", read_tree, tree_seeds, "stages/support/text/toml", ".toml", "toml.dict", 2048});
 
