@@ -8,6 +8,7 @@
 
 #include "pipeline/cli/console.h"
 #include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 #include "tests/formats/images.h"
 
 namespace lamina {
