@@ -14,6 +14,7 @@ NAMES = set(PROSE) | set("""least most place places stretch stretches stretched 
     judging judgement room rooms roomy care cares joints ways""".split())
 # Whole names that tell a tale instead of the thing.
 TALES = {"LayerWorkshop", "layer_workshop", "keep_what_is_done", "something_to_keep", "at_work", "AtWork"}
+LEAST_SQUARES = re.compile(r"least_?squares", re.I)  # the method has no other name
 # Names of the standard library and of others.
 OTHERS = re.compile(r"^(?:in_place(?:_t|_type|_index)?|u?int_least\d+_t|ZIP_SOURCE_TELL)$")
 
@@ -29,6 +30,7 @@ def counted(name):
     """The counted words in an identifier; `lookup` and `emplace` are other words."""
     if OTHERS.match(name):
         return []
+    name = LEAST_SQUARES.sub("", name)
     return [part for part in map(str.lower, PARTS.findall(name)) if part in NAMES] + [tale for tale in TALES if tale in name]
 
 
