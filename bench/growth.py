@@ -140,7 +140,7 @@ def slope(entries, measure):
 
 def measure_series(name, options, work):
     entries = []
-    for x, words in getattr(Jobs(work, options.maximum), name)():
+    for x, words in getattr(Jobs(work, options.max), name)():
         entry = dict(run_job(options, words, work), x=x)
         say(f"  {name} {x:>11,}: {entry['wall']:7.3f} s, processor {entry['processor']:7.3f} s, "
             f"{entry['peak'] / 2**20:7.1f} MiB, {entry['layers']} layers")
