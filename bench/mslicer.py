@@ -60,7 +60,7 @@ class Goo:
                 size, magic = struct.unpack(">IB", file.read(LAYER_HEAD + 5)[LAYER_HEAD:])
                 if magic != 0x55:
                     raise ValueError(f"{path}: layer {len(self.positions)} does not begin as a layer of a .goo does")
-                self.positions.append((file.tell(), size - 2))
+                self.positions.append((file.seek(0, os.SEEK_CUR), size - 2))
                 file.seek(size - 2 + 1 + 2, os.SEEK_CUR)  # checksum, delimiter
 
     def runs(self, layer):

@@ -52,7 +52,7 @@ def write_facets(path, count, blocks):
         file.write(HEADER + struct.pack("<I", count))
         for block in blocks:
             file.write(block)
-        size = file.tell()
+        size = file.seek(0, os.SEEK_CUR)
     if size != 84 + 50 * count:
         raise ValueError(f"{path}: {size} bytes for {count} facets")
     os.replace(path + ".part", path)
