@@ -12,17 +12,21 @@ struct Mask {
   Whole part[kParts];
 };
 
-/// Parts that lie anywhere.
-using LoosePart = Part __attribute__((aligned(8), may_alias));
-using LooseWhole = Whole __attribute__((aligned(8), may_alias));
+/// A part at any address. Not a type with the attribute aligned(8): clang 14 may copy such a part by an aligned load.
+struct __attribute__((packed, may_alias)) LoosePart {
+  Part value;
+};
+struct __attribute__((packed, may_alias)) LooseWhole {
+  Whole value;
+};
 
 LAMINA_LANES Eight load(const double* at) {
   Eight a;
-  for (int i = 0; i < kParts; ++i) a.part[i] = *reinterpret_cast<const LoosePart*>(at + i * kWidth);
+  for (int i = 0; i < kParts; ++i) a.part[i] = reinterpret_cast<const LoosePart*>(at + i * kWidth)->value;
   return a;
 }
 LAMINA_LANES void store(double* at, const Eight& a) {
-  for (int i = 0; i < kParts; ++i) *reinterpret_cast<LoosePart*>(at + i * kWidth) = a.part[i];
+  for (int i = 0; i < kParts; ++i) reinterpret_cast<LoosePart*>(at + i * kWidth)->value = a.part[i];
 }
 
 #define LAMINA_EACH(expression)                                 \
@@ -60,7 +64,7 @@ LAMINA_LANES Eight drop(const Mask& mask, const Eight& a) { LAMINA_EACH(mask.par
 LAMINA_LANES Mask first_lanes(std::uint32_t count) {
   static constexpr std::int64_t kOnes[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
   Mask mask;
-  for (int i = 0; i < kParts; ++i) mask.part[i] = *reinterpret_cast<const LooseWhole*>(kOnes + 8 - count + i * kWidth);
+  for (int i = 0; i < kParts; ++i) mask.part[i] = reinterpret_cast<const LooseWhole*>(kOnes + 8 - count + i * kWidth)->value;
   return mask;
 }
 LAMINA_LANES Eight keep_first(std::uint32_t count, const Eight& a) { return keep(first_lanes(count), a); }
