@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "stages/load/kernels/census_hash.h"
 #include "stages/load/repair/diagnose.h"
 
 namespace lamina::load {

@@ -36,8 +36,8 @@ struct RepairReport {
 ///  2. open edges that were meant to be one are joined, over growing distances (weld.h has the rule);
 ///  3. facets are turned over so that neighbours across two-facet edges agree; per connected component the
 ///     orientation of the larger area wins; undone if it would leave more unmatched than before;
-///  4. stray sheets, attached to a solid with a rim that is open, and loose flat pieces are dropped (sheets.h has the
-///     rules);
+///  4. stray sheets, attached to a solid with a rim that is open, and loose flat pieces are dropped (repair.cpp has
+///     the rules);
 ///  5. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
 ///     fan of triangles from its smallest vertex.
 /// After step 5 every edge is balanced, for any input: the boundary of a chain of triangles is a set of cycles,

@@ -40,9 +40,8 @@ constexpr ExtensionRow kExtensions[] = {
 };
 
 const ExtensionRow* find_row(std::string_view space) {
-  for (const ExtensionRow& row : kExtensions) {
+  for (const ExtensionRow& row : kExtensions)
     if (space.starts_with(row.space)) return &row;
-  }
   return nullptr;
 }
 

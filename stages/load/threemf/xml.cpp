@@ -16,6 +16,12 @@ constexpr std::uint64_t kLongestTag = std::uint64_t{1} << 20;
 
 }  // namespace
 
+const char* find_attribute(XmlAttributes attributes, std::string_view name) {
+  for (; *attributes != nullptr; attributes += 2)
+    if (attributes[0] == name) return attributes[1];
+  return nullptr;
+}
+
 struct XmlReader::Callbacks {
   static void start(void* user, const char* name, const char** attributes) {
     XmlReader& reader = *static_cast<XmlReader*>(user);

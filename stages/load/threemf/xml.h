@@ -23,6 +23,9 @@ struct XmlName {
   bool declared = true;  // whether its prefix, if it has one, leads to a namespace
 };
 
+/// The value of an attribute; null where the element does not have it.
+const char* find_attribute(XmlAttributes attributes, std::string_view name);
+
 class XmlHandler {
  public:
   virtual ~XmlHandler() = default;
