@@ -4,10 +4,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <exception>
-#include <string_view>
 
 #include "stages/data/shortage.h"
 #include "stages/load/repair/finish.h"

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 
 #include "stages/data/mesh.h"
 #include "stages/load/load.h"

@@ -1,13 +1,11 @@
 #include "stages/slice/loops.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 namespace lamina::slice {
 namespace {

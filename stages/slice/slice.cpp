@@ -8,7 +8,6 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/simplify.h"
 
 namespace lamina::slice {
 namespace {

@@ -4,8 +4,6 @@
 // Each lane is summed apart, cluster after cluster, and the lanes then in a fixed order, so every width rounds alike.
 #include "stages/load/kernels/kernels.h"
 
-#include <cstring>
-
 namespace lamina::load {
 namespace {
 

@@ -4,7 +4,6 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "stages/load/repair/diagnose.h"
 

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "stages/data/mesh.h"
 #include "stages/load/repair/weld.h"

@@ -8,7 +8,6 @@
 #include <atomic>
 #include <numeric>
 #include <tuple>
-#include <utility>
 
 namespace lamina::load {
 

@@ -2,7 +2,6 @@
 // surface in it.
 #include "stages/load/winding/winding.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 

@@ -6,7 +6,6 @@
 //         van Oosterom, Strackee, "The Solid Angle of a Plane Triangle" (1983)
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
