@@ -31,7 +31,7 @@ std::string quoted(std::string_view word) {
 }
 
 std::string extension_label(std::string_view space) {
-  const std::string_view name = extension_name(space);
+  const std::string_view name = extension_of(space).name;
   return name.empty() ? std::string(space) : fmt::format("{} ({})", name, space);
 }
 

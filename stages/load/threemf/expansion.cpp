@@ -82,7 +82,7 @@ bool is_box(const ModelObject& object) {
 Status check_content(const Source& source, const ModelPackage& package, const ModelObject& object) {
   const auto refused = [&](std::string_view space, std::string_view what) {
     return source.error(fmt::format("{} {} the extension {}, which lamina does not read; {}", label(package, object), what,
-                                    extension_label(space), extension_remedy(space)));
+                                    extension_label(space), extension_of(space).remedy));
   };
   const bool has_mesh = !object.triangles.empty();
   if (object.beams > 0 && (package.needs_beams || !has_mesh))

@@ -374,13 +374,14 @@ class ModelParser : public XmlHandler {
   }
 
   void pass_over_attribute(const XmlName& name) {
-    if (!name.space.empty() && extension_of(name.space) == Extension::kUnknown && package_.unsupported.size() < kMaxReported)
+    if (!name.space.empty() && extension_of(name.space).kind == Extension::kUnknown &&
+        package_.unsupported.size() < kMaxReported)
       package_.unsupported.emplace(name.space);
   }
 
   Element in_extension(const XmlName& name, XmlAttributes attributes) {
     const Element position = elements_.back();
-    const Extension kind = extension_of(name.space);
+    const Extension kind = extension_of(name.space).kind;
     if (position == Element::kLattice) {
       if (name.local == "beam") ++current().beams;
       return Element::kLattice;
@@ -428,10 +429,10 @@ class ModelParser : public XmlHandler {
         return refuse(fmt::format("requires an extension of the prefix {}, which it does not declare; export it again",
                                   quoted(std::string_view(prefix))));
       const std::string_view space = required.space;
-      package_.needs_beams = package_.needs_beams || extension_of(space) == Extension::kBeams;
-      if (extension_of(space) == Extension::kUnknown)
+      package_.needs_beams = package_.needs_beams || extension_of(space).kind == Extension::kBeams;
+      if (extension_of(space).kind == Extension::kUnknown)
         return refuse(fmt::format("requires the extension {}, which lamina does not read; {}", extension_label(space),
-                                  extension_remedy(space)));
+                                  extension_of(space).remedy));
     }
   }
 
@@ -484,7 +485,7 @@ class ModelParser : public XmlHandler {
           object.type = ModelObject::Type::kSupport;
         else if (value != "model")
           refuse(fmt::format("the type {} of an object is none of 3MF; export it again", quoted(value)));
-      } else if (const XmlName is = attribute_name(attributes[0]); extension_of(is.space) == Extension::kSlices) {
+      } else if (const XmlName is = attribute_name(attributes[0]); extension_of(is.space).kind == Extension::kSlices) {
         object.sliced = object.sliced || is.local == "slicestackid";
         object.low_resolution = object.low_resolution || (is.local == "meshresolution" && value == "lowres");
       } else {
