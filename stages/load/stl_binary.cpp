@@ -20,7 +20,6 @@
 #include "stages/load/repair/census.h"
 
 namespace lamina::load {
-
 namespace {
 
 /// The coordinates are millimetres and stay where they are.

@@ -203,8 +203,8 @@ class MatchSearch {
   std::span<const float> shortest_;
   std::int64_t distance_nm_;
   double distance_;
-  std::vector<EndCells>
-      cells_;  // as wide as their own edges let sides be joined: what is found does not grow with the distance
+  /// As wide as the own edges of sides let them be joined: what is found does not grow with the distance.
+  std::vector<EndCells> cells_;
 };
 
 /// Open sides in the order of `sides`.
