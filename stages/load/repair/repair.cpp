@@ -14,7 +14,7 @@ namespace {
 
 struct StraySheets {
   Buffer<std::uint8_t> drop;  // for each facet whether it belongs to one
-  std::uint64_t sheets = 0, facets = 0;
+  std::uint64_t sheets = 0;
 };
 
 /// A patch is what hangs together over edges with two facets. A stray sheet is a patch with an open rim that meets
@@ -73,7 +73,6 @@ StraySheets find_stray_sheets(std::size_t facet_count, std::span<const Side> sid
   for (std::uint32_t facet = 0; facet < facet_count; ++facet) {
     const std::uint32_t patch = patches.find(facet);
     stray.drop[facet] = is_candidate(patch);
-    stray.facets += stray.drop[facet];
     stray.sheets += stray.drop[facet] && patch == facet;
   }
   return stray;
@@ -133,7 +132,6 @@ StraySheets find_flat_pieces(const Indexed& mesh, std::span<const Side> sides, s
   for (std::size_t f = 0; f < mesh.facet.size(); ++f) {
     const std::uint32_t representative = pieces.find(mesh.facet[f][0]);
     stray.drop[f] = piece[representative].open && piece[representative].flat;
-    stray.facets += stray.drop[f];
     stray.sheets += stray.drop[f] && !counted[representative];
     counted[representative] = 1;
   }
@@ -341,7 +339,6 @@ void cap(RepairWork& work, RepairReport& report) {
   for_each_loop(work.sides, [&](std::span<const std::uint32_t> loop) {
     Box box;
     for (const std::uint32_t v : loop) box.add(vertex[v]);
-    report.capped.add(box);
     const double width = mm(box.width()), depth = mm(box.depth()), height = mm(box.height());
     const double diagonal = std::sqrt(width * width + depth * depth + height * height);
     if (diagonal > report.largest_opening_mm) {

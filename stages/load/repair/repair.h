@@ -21,12 +21,8 @@ struct RepairReport {
   double volume_before_mm3 = 0;       // an estimate (census), before flat pieces were dropped and openings capped
   std::uint64_t openings_capped = 0;  // loops of unmatched edges
   std::uint64_t cap_triangles = 0;
-  Box capped;                     // around all caps
   double largest_opening_mm = 0;  // largest box diagonal of one loop
   Box largest_opening;            // around that loop
-  bool changed() const {
-    return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + flat_dropped + openings_capped > 0;
-  }
 };
 
 /// Repairs a mesh that is not balanced (diagnose.h), in this order, each step only while the mesh is unbalanced:
