@@ -61,7 +61,6 @@ list(FILTER stage_sources EXCLUDE REGEX "/stages/(view/picture|calibration/scan)
 add_library(lamina_stages STATIC ${stage_sources})
 add_library(lamina::stages ALIAS lamina_stages)
 if(LAMINA_UNITY STREQUAL "all")
-  list(FILTER stage_sources EXCLUDE REGEX "/slice/gaps\\.cpp$")  # names of their own
   lamina_unity(lamina_stages ${stage_sources})
 endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>

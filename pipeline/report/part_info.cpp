@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "stages/load/diagnosis/chunk_edges.h"
-#include "stages/load/reader.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
@@ -84,7 +83,7 @@ Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& optio
   as_is.repair = false;
   as_is.blocks = true;
   Result<Part> part =
-      load::load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspect(first, facets); });
+      load::load(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspect(first, facets); });
   if (!part) return part;
   as_is.blocks = false;
   sound = false;

@@ -8,7 +8,7 @@
 #include "stages/checks/solid_checks.h"
 #include "stages/load/planned.h"
 #include "stages/slice/bodies.h"
-#include "stages/slice/surplus.h"
+#include "stages/slice/slice.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

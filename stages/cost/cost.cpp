@@ -96,9 +96,8 @@ Quote Tally::quote() const {
   job.powder_cents = whole(100 * powder_price_l(cost) * spent_nl / kNlPerLitre);
 
   std::vector<std::uint64_t> pixels, drops, pixel_nm, time, fed;
-  for (const PartTotals& part : parts_) {
+  for (const PartTotals& part : parts_)
     pixels.push_back(part.pixels), drops.push_back(part.drops), pixel_nm.push_back(part.pixel_nm);
-  }
   const auto further_time = shares(unshared_microseconds_, pixels), further_fed = shares(unshared_nl_, pixels);
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     time.push_back(static_cast<std::uint64_t>(parts_[p].microseconds + further_time[p]));

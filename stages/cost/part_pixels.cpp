@@ -95,9 +95,8 @@ std::vector<std::uint64_t> PartPixels::sums(const Layer& layer, std::uint32_t ro
       continue;
     }
     weights.assign(group.bodies.size(), 0);
-    for (std::size_t i = 0; i < group.bodies.size(); ++i) {
+    for (std::size_t i = 0; i < group.bodies.size(); ++i)
       if (reaches(group.bodies[i])) weights[i] = sum_in(group.bodies[i], rows, row_of);
-    }
     const auto share = shares(static_cast<std::int64_t>(together), weights);
     for (std::size_t i = 0; i < group.bodies.size(); ++i) sums[group.bodies[i].part] += static_cast<std::uint64_t>(share[i]);
   }

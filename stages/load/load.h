@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -48,6 +50,9 @@ struct LoadOptions {
   std::uint64_t expanded_limit = 8ull << 30;  // bytes a compressed file may expand to
 };
 
+/// Is shown the triangles of a file in pieces, each in the order of the file, by any thread. first  the number of the first
+using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Triangle>)>;
+
 /// Reads a part file; the format follows from its content first, then from its name: STL (binary, ASCII), OBJ, 3MF,
 /// and gzip of STL or OBJ.
 ///
@@ -60,7 +65,8 @@ struct LoadOptions {
 /// cost     two passes over the triangles, parallel; 36 bytes a triangle, 150 more while a mesh is repaired, and the
 ///          inflated bytes while a compressed file is read. A binary STL with options.blocks: one pass, 13 to 38 bytes a
 ///          triangle, if it is sound; else it is read a second time for its list
-Result<Part> load(const std::string& path, const LoadOptions& options);
+/// see      is shown all triangles of a mesh that comes as blocks, while they are in a core's cache
+Result<Part> load(const std::string& path, const LoadOptions& options, const SeeTriangles& see = {});
 
 /// What load() would take the file for, in words: "binary STL", "ASCII STL, gzip", "OBJ", "3MF".
 /// errors  kInput as load()

@@ -11,7 +11,7 @@
 
 namespace lamina::load {
 
-/// For each plane, mm2: what is solid less the sum of winding numbers, of all instances together (stages/slice/surplus.h).
+/// For each plane, mm2: what is solid less the sum of winding numbers, of all instances together (stages/slice/slice.h).
 using SurplusAreas =
     std::function<Result<std::vector<double>>(std::span<const Mesh>, std::span<const Instance>, std::span<const Nm> planes)>;
 

@@ -1,17 +1,15 @@
 // stages/load/reader.h: what the readers of formats return; internal to load.
 #pragma once
 
-#include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 #include "stages/load/load.h"
-#include "stages/load/snap.h"
 #include "stages/load/source.h"
+#include "stages/load/transform.h"
 
 namespace lamina::load {
 
@@ -34,11 +32,5 @@ struct Facets {
   std::vector<Note> notes;
   std::optional<ReadWarning> warning;
 };
-
-/// Is shown the triangles of a file in pieces, each in the order of the file, by any thread. first  the number of the first
-using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Triangle>)>;
-
-/// As load(), and `see` is shown all triangles of a mesh that comes as blocks, while they are in a core's cache.
-Result<Part> load_and_see(const std::string& path, const LoadOptions& options, const SeeTriangles& see);
 
 }  // namespace lamina::load

@@ -20,6 +20,37 @@
 #include "stages/load/repair/census.h"
 
 namespace lamina::load {
+namespace {
+
+/// The coordinates are millimetres and stay where they are.
+bool is_plain(const Snapper& snapper) { return snapper.plain() && !snapper.mirrors(); }
+
+/// The box around facets; boxes of parts of a file add up in any order.
+struct FacetBox {
+  CoordinateBox plain;  // of a file in plain millimetres
+  Box transformed;      // nm, of any other
+
+  void add(const FacetBox& other) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      plain.lo[k] = std::min(plain.lo[k], other.plain.lo[k]);
+      plain.hi[k] = std::max(plain.hi[k], other.plain.hi[k]);
+    }
+    transformed.add(other.transformed);
+  }
+  Box nm(const Snapper& snapper) const {
+    if (!is_plain(snapper)) return transformed;
+    Box box;
+    if (plain.lo[0] > plain.hi[0]) return box;
+    for (const auto& corner : {plain.lo, plain.hi}) {
+      Point3 at{};
+      snapper.snap(static_cast<double>(corner[0]), static_cast<double>(corner[1]), static_cast<double>(corner[2]), at);
+      box.add(at);
+    }
+    return box;
+  }
+};
+
+}  // namespace
 
 struct Scratch {
   /// What a thread needs for a block, and what it found in all of its blocks.
@@ -43,26 +74,31 @@ std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch
 
 namespace {
 
-bool snap_transformed(const char* facets, std::size_t count, const Snapper& snapper, Triangle* out, Box& box) {
-  for (std::size_t i = 0; i < count; ++i) {
-    if (snap_facet(facets + i * kFacetBytes, snapper, out[i]) != Snapped::kYes) return false;
-    box.add(out[i].a);
-    box.add(out[i].b);
-    box.add(out[i].c);
+/// Snaps one facet, turned over if the transform mirrors.
+Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
+  std::array<float, 9> corner;
+  std::memcpy(corner.data(), facet + 12, 36);
+  Triangle triangle{};
+  const std::array<Point3*, 3> points =
+      snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b} : std::array{&triangle.a, &triangle.b, &triangle.c};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Snapped snapped = snapper.snap(static_cast<double>(corner[3 * i]), static_cast<double>(corner[3 * i + 1]),
+                                         static_cast<double>(corner[3 * i + 2]), *points[i]);
+    if (snapped != Snapped::kYes) return snapped;
   }
-  return true;
+  out = triangle;
+  return Snapped::kYes;
 }
 
-/// The bounds of a file in plain millimetres, in nm.
-Box snapped_box(const CoordinateBox& from, const Snapper& snapper) {
-  Box box;
-  if (from.lo[0] > from.hi[0]) return box;
-  for (const auto& corner : {from.lo, from.hi}) {
-    Point3 at{};
-    snapper.snap(static_cast<double>(corner[0]), static_cast<double>(corner[1]), static_cast<double>(corner[2]), at);
-    box.add(at);
+/// Snaps facets that follow each other, and grows the box by them. isa  the widest instruction set to use
+/// false  one of them cannot be snapped
+bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box) {
+  if (is_plain(snapper)) return load_kernels_for(limited_isa(isa)).snap(facets, count, out, box.plain);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (snap_facet(facets + i * kFacetBytes, snapper, out[i]) != Snapped::kYes) return false;
+    for (const Point3& corner : {out[i].a, out[i].b, out[i].c}) box.transformed.add(corner);
   }
-  return box;
+  return true;
 }
 
 constexpr std::size_t kFacetsOfBlock = 5120;  // facets, 250 KiB: a block and its triangles stay in a core's cache
@@ -157,25 +193,25 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     return source.error(fmt::format("is {} bytes long, too short for an STL file", source.size()));
   const std::uint64_t claimed = little_endian(bytes.data());
   const std::uint64_t body = source.size() - kHeaderBytes, held = body / kFacetBytes, stray = body % kFacetBytes;
-  const std::uint64_t count = held;
   if (claimed > held && (held == 0 || stray > 0)) return source.error(cut_short(source, claimed, held));
   if (held == 0 || (claimed == 0 && stray > 0)) return source.error("holds no facets");
   if (claimed == 0) {
     facets.notes.push_back({false, fmt::format("the header says 0 facets, the file holds {}: all are read", held)});
   } else if (claimed == held && stray > 0) {
     facets.notes.push_back({false, stray_bytes(stray, claimed)});
-  } else if (claimed < held) {
-    const std::string differ = fmt::format("the header says {} facets, the file holds {}", claimed, held);
-    facets.warning =
-        ReadWarning{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacetBytes, claimed)};
-  } else if (claimed > held) {
-    facets.warning =
-        ReadWarning{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
-                    cut_short(source, claimed, held), 0, ""};
+  } else if (claimed != held) {
+    facets.warning.emplace().note =
+        fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held);
+    if (claimed < held) {
+      facets.warning->claimed = claimed;
+      facets.warning->rest_left_out = stray_bytes(body - claimed * kFacetBytes, claimed);
+    } else {
+      facets.warning->error = cut_short(source, claimed, held);
+    }
   }
-  if (count > options.triangle_limit)
-    return source.error(fmt::format("{} facets are more than the limit of {}", count, options.triangle_limit));
-  return count;
+  if (held > options.triangle_limit)
+    return source.error(fmt::format("{} facets are more than the limit of {}", held, options.triangle_limit));
+  return held;
 }
 
 /// Reads one block. false  it cannot be read or snapped
@@ -192,58 +228,7 @@ bool read_block(const Source& source, const Snapper& snapper, std::uint32_t bloc
   return true;
 }
 
-/// Whether too many blocks are in disorder to inspect edges: such a file is better read as a list.
-class Disorder {
- public:
-  bool is_found(const MeshBlocks& blocks, std::uint32_t block) {
-    constexpr std::uint32_t kFew = 8;
-    const std::uint32_t visited = ++detected_;
-    if (blocks.indexed(block * MeshBlocks::kClusters).cluster != nullptr) return false;
-    return ++listed_ > kFew + visited / 4;
-  }
-
- private:
-  std::atomic<std::uint32_t> detected_{0}, listed_{0};
-};
-
-/// Of all facets, nm3; the sum is taken in the order of blocks, whichever thread read them.
-double sixfold_volume(const Buffer<Prisms>& pieces, Nm plane) {
-  double sum = 0;
-  for (const Prisms& piece : pieces) sum += piece.sixfold_volume_above(plane);
-  return sum;
-}
-
 }  // namespace
-
-void FacetBox::add(const FacetBox& other) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    plain.lo[k] = std::min(plain.lo[k], other.plain.lo[k]);
-    plain.hi[k] = std::max(plain.hi[k], other.plain.hi[k]);
-  }
-  transformed.add(other.transformed);
-}
-
-Box FacetBox::nm(const Snapper& snapper) const { return is_plain(snapper) ? snapped_box(plain, snapper) : transformed; }
-
-Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
-  std::array<float, 9> corner;
-  std::memcpy(corner.data(), facet + 12, 36);
-  Triangle triangle{};
-  const std::array<Point3*, 3> points =
-      snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b} : std::array{&triangle.a, &triangle.b, &triangle.c};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Snapped snapped = snapper.snap(static_cast<double>(corner[3 * i]), static_cast<double>(corner[3 * i + 1]),
-                                         static_cast<double>(corner[3 * i + 2]), *points[i]);
-    if (snapped != Snapped::kYes) return snapped;
-  }
-  out = triangle;
-  return Snapped::kYes;
-}
-
-bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box) {
-  return is_plain(snapper) ? load_kernels_for(limited_isa(isa)).snap(facets, count, out, box.plain)
-                           : snap_transformed(facets, count, snapper, out, box.transformed);
-}
 
 Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options) {
   Facets facets;
@@ -278,13 +263,19 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
     worker->box = {};
   }
   std::atomic<bool> failed{false};
-  Disorder disorder;
+  std::atomic<std::uint32_t> visited{0}, listed{0};
+  // Whether too many blocks are in disorder to inspect edges: such a file is better read as a list.
+  const auto in_disorder = [&](std::uint32_t block) {
+    constexpr std::uint32_t kFew = 8;
+    const std::uint32_t so_far = ++visited;
+    return blocks->indexed(block * MeshBlocks::kClusters).cluster == nullptr && ++listed > kFew + so_far / 4;
+  };
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
                       Scratch::Worker& worker = *workers.local();
                       for (std::uint32_t b = range.begin(); b != range.end() && !failed; ++b) {
                         if (!read_block(source, snapper, b, share, see, worker, *blocks, pieces[b])) failed = true;
-                        if (see && !failed && disorder.is_found(*blocks, b)) failed = true;
+                        if (see && !failed && in_disorder(b)) failed = true;
                       }
                     });
   if (failed) return std::nullopt;
@@ -299,7 +290,9 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   Mesh mesh;
   mesh.bounds = box.nm(snapper);
   mesh.fingerprint = sums.fingerprint;
-  mesh.volume_mm3 = sixfold_volume(pieces, mesh.bounds.middle().z) / 6e18;
+  double sixfold_volume = 0;  // nm3; the sum is taken in the order of blocks, whichever thread read them
+  for (const Prisms& piece : pieces) sixfold_volume += piece.sixfold_volume_above(mesh.bounds.middle().z);
+  mesh.volume_mm3 = sixfold_volume / 6e18;
   const double of_box = mm(mesh.bounds.width()) * mm(mesh.bounds.depth()) * mm(mesh.bounds.height());
   const bool sound = sums.boundary == 0 && mesh.volume_mm3 > kHardlyAny * of_box && !any_reversed(sums.sampled);
   if (!sound) return std::nullopt;

@@ -22,25 +22,6 @@ struct CoordinateBox {
   }
 };
 
-/// The box around facets; boxes of parts of a file add up in any order.
-struct FacetBox {
-  CoordinateBox plain;  // of a file in plain millimetres
-  Box transformed;      // nm, of any other
-
-  void add(const FacetBox& other);
-  Box nm(const Snapper& snapper) const;
-};
-
-/// The coordinates are millimetres and stay where they are.
-inline bool is_plain(const Snapper& snapper) { return snapper.plain() && !snapper.mirrors(); }
-
-/// Snaps one facet, turned over if the transform mirrors.
-Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out);
-
-/// Snaps facets that follow each other, and grows the box by them. isa  the widest instruction set to use
-/// false  one of them cannot be snapped
-bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box);
-
 /// Facets of 50 bytes behind a header of 84: normal (12), three corners of three floats (36), attributes (2).
 /// cost    one pass, parallel; 256 KiB a thread besides the triangles
 /// source  3D Systems, "StereoLithography Interface Specification" (1989)

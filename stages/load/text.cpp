@@ -1,5 +1,9 @@
-// stages/load/text.cpp: where a byte of a text file is, in a person's terms.
 #include "stages/load/text.h"
+
+#include <fmt/core.h>
+
+#include "stages/load/threemf/extensions.h"
+#include "stages/load/threemf/model.h"
 
 namespace lamina::load {
 
@@ -18,6 +22,23 @@ std::uint64_t line_of(const Source& source, std::uint64_t offset) {
     at += count;
   }
   return line;
+}
+
+std::string quoted(std::string_view word) {
+  std::string text = "'";
+  for (const char c : word.substr(0, 24)) text += (c >= ' ' && c <= '~') ? c : '?';
+  return text + (word.size() > 24 ? "...'" : "'");
+}
+
+std::string extension_label(std::string_view space) {
+  const std::string_view name = extension_of(space).name;
+  return name.empty() ? std::string(space) : fmt::format("{} ({})", name, space);
+}
+
+std::string label(const ModelPackage& package, const ModelObject& object) {
+  std::string text = fmt::format("object {}", object.id);
+  if (!object.name.empty()) text += fmt::format(" \"{}\"", object.name);
+  return object.file == 0 ? text : fmt::format("{} in {}", text, package.files[object.file].name.substr(1));
 }
 
 }  // namespace lamina::load

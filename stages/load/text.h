@@ -1,18 +1,21 @@
-// stages/load/text.h: words, numbers and windows of text files; internal to load.
+// stages/load/text.h: words, numbers and windows of text files, and how messages quote them; internal to load.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <string_view>
 
 #include "stages/data/buffer.h"
 #include "stages/load/source.h"
 
 namespace lamina::load {
+
+struct ModelObject;
+struct ModelPackage;
 
 inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 /// ^Z, the end of a text in DOS, counts too.
@@ -44,6 +47,15 @@ inline bool parse_number(std::string_view word, double& value) {
 
 /// The line, from 1, that holds a byte. Reads the file again up to there: only errors need it.
 std::uint64_t line_of(const Source& source, std::uint64_t offset);
+
+/// A word of the file for messages: short, and without bytes that a terminal would act on.
+std::string quoted(std::string_view word);
+
+/// An extension of 3MF by its namespace: "beam lattice (http://...)", or the namespace alone where it has no known name.
+std::string extension_label(std::string_view space);
+
+/// An object of a package: "object 3 "cap"", or with its file where that is not the first one.
+std::string label(const ModelPackage& package, const ModelObject& object);
 
 /// Gives a text to `handle(begin, end, offset of begin)` window by window, each cut where `cut(begin, end)` says: how
 /// many bytes, from the beginning, can be handled alone; 0 requests a larger window. A byte order mark is left out.

@@ -1,23 +1,26 @@
 #include "stages/slice/slice.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <map>
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
-#include "stages/geometry/contours/simplify.h"
 
 namespace lamina::slice {
 namespace {
 
-void append_moved(const Contours& from, Point2 by, Contours& to) {
-  to.point.reserve(to.point.size() + from.point.size());
-  for (std::uint32_t c = 0; c < from.size(); ++c) {
-    for (const Point2 p : from[c]) to.point.push_back({p.x + by.x, p.y + by.y});
-    to.close();
-  }
+/// The cuts of a source at a plane become chains: `closed`, and scratch.open.
+void find_loops(std::span<const Triangle> triangles, const SourceMesh& source, std::span<const Nm> planes, std::uint32_t plane,
+                SectionScratch& scratch, Contours& closed) {
+  const std::int64_t z = std::int64_t{planes[plane]} - source.z;
+  scratch.facets.clear();
+  source.index.append(plane, scratch.facets);
+  cut(triangles, scratch.facets, z, scratch.cuts);
+  scratch.open.clear();
+  chain(scratch.cuts, z, scratch.chain, closed, scratch.open);
 }
 
 }  // namespace
@@ -42,19 +45,10 @@ Result<Slicer> Slicer::build(std::span<const Mesh> meshes, std::span<const Insta
   slicer.planes_.assign(planes.begin(), planes.end());
   slicer.options_ = options;
 
-  std::map<std::pair<std::uint32_t, Nm>, std::uint32_t> known;
-  std::vector<std::int64_t> own_planes(planes.size());
-  std::vector<SourceMesh> sources;
-  for (const Instance& instance : instances) {
-    const Nm z = instance.offset.z;
-    const auto [found, is_new] = known.emplace(std::pair(instance.mesh, z), static_cast<std::uint32_t>(sources.size()));
-    if (is_new) {
-      std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return std::int64_t{plane} - z; });
-      sources.push_back({instance.mesh, z, index_crossings(meshes[instance.mesh].triangles, own_planes)});
-    }
-    slicer.instances_.push_back({found->second, {instance.offset.x, instance.offset.y}});
-  }
-  slicer.sources_ = std::make_shared<const std::vector<SourceMesh>>(std::move(sources));
+  std::vector<std::uint32_t> source_of;
+  slicer.sources_ = std::make_shared<const std::vector<SourceMesh>>(find_sources(meshes, instances, planes, source_of));
+  for (std::size_t i = 0; i < instances.size(); ++i)
+    slicer.instances_.push_back({source_of[i], {instances[i].offset.x, instances[i].offset.y}});
   slicer.group(body_of);
   return slicer;
 }
@@ -67,34 +61,24 @@ Slicer Slicer::regrouped(std::span<const std::uint32_t> body_of) const {
 
 void Slicer::group(std::span<const std::uint32_t> body_of) {
   bodies_ = 0;
-  for (const std::uint32_t body : body_of) {
+  for (const std::uint32_t body : body_of)
     if (body != kLeftOut) bodies_ = std::max(bodies_, body + 1);
-  }
   body_offset_.assign(bodies_ + 1, 0);
-  for (const std::uint32_t body : body_of) {
+  for (const std::uint32_t body : body_of)
     if (body != kLeftOut) ++body_offset_[body + 1];
-  }
   for (std::uint32_t b = 0; b < bodies_; ++b) body_offset_[b + 1] += body_offset_[b];
   placed_.resize(body_offset_.back());
   std::vector<std::uint32_t> position(body_offset_.begin(), body_offset_.end() - 1);
-  for (std::size_t i = 0; i < body_of.size(); ++i) {
+  for (std::size_t i = 0; i < body_of.size(); ++i)
     if (body_of[i] != kLeftOut) placed_[position[body_of[i]]++] = instances_[i];
-  }
 }
 
 void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
                       SectionReport& report) const {
-  const std::int64_t z = std::int64_t{planes_[plane]} - source.z;
-  const std::span<const Triangle> triangles = meshes_[source.mesh].triangles;
-  scratch.facets.clear();
-  source.index.append(plane, scratch.facets);
-  cut(triangles, scratch.facets, z, scratch.cuts);
-  scratch.open.clear();
-  chain(scratch.cuts, z, scratch.chain, closed, scratch.open);
+  find_loops(meshes_[source.mesh].triangles, source, planes_, plane, scratch, closed);
   report.cuts += scratch.cuts.size();
   if (scratch.open.size() == 0) return;
-  const GapReport gaps = close_gaps(scratch.open, options_.gap, closed);
-  report.gaps.add(gaps);
+  report.gaps.add(close_gaps(scratch.open, options_.gap, closed));
 }
 
 Status Slicer::clean(Contours& contours, SectionScratch& scratch, SectionReport& report) const {
@@ -163,12 +147,62 @@ std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
   std::uint64_t maximum = 0;
   std::vector<std::uint8_t> visited(sources_->size(), 0);
   for (const Placed& placed : placed_) visited[placed.source] = 1;
-  for (std::size_t s = 0; s < visited.size(); ++s) {
+  for (std::size_t s = 0; s < visited.size(); ++s)
     if (visited[s] != 0) maximum += (*sources_)[s].index.max_found(plane) * of_cut;
-  }
   std::uint64_t points = 0;
   for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.max_found(plane);
   return maximum + points * sizeof(Point2);
+}
+
+namespace {
+
+/// A mesh at a height, and where its copies stand.
+struct SharedMesh {
+  std::span<const Triangle> triangles;
+  const SourceMesh& source;
+  std::vector<Point2> by;
+};
+
+Result<double> surplus_area(std::span<const SharedMesh> shared, std::span<const Nm> planes, std::uint32_t plane,
+                            SectionScratch& scratch, Contours& all) {
+  all.clear();
+  for (const auto& [triangles, source, offsets] : shared) {
+    scratch.closed.clear();
+    find_loops(triangles, source, planes, plane, scratch, scratch.closed);
+    for (const Point2 by : offsets) append_moved(scratch.closed, by, all);
+  }
+  const __int128 wound = doubled_area(all);
+  tidy(all);
+  if (!find_contacts(all, scratch.contact, scratch.group)) scratch.group.clear();
+  if (const auto merged = nest(all, FillRule::kNonzero, scratch.group); !merged) return merged.error();
+  return square_mm(doubled_area(all) - wound);
+}
+
+}  // namespace
+
+Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                          std::span<const Nm> planes) {
+  std::vector<std::uint32_t> source_of;
+  const std::vector<SourceMesh> sources = find_sources(meshes, instances, planes, source_of);
+  std::vector<SharedMesh> shared;
+  for (const SourceMesh& source : sources) shared.push_back({meshes[source.mesh].triangles, source, {}});
+  for (std::size_t i = 0; i < instances.size(); ++i)
+    shared[source_of[i]].by.push_back({instances[i].offset.x, instances[i].offset.y});
+  std::vector<double> areas(planes.size());
+  std::vector<Status> status(planes.size());
+  struct Scratch {
+    SectionScratch section;
+    Contours all;
+  };
+  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(planes.size()), [&](std::uint32_t plane) {
+    Scratch& own = scratches.local();
+    const Result<double> area = surplus_area(shared, planes, plane, own.section, own.all);
+    area ? void(areas[plane] = *area) : void(status[plane] = area.error());
+  });
+  for (const Status& each : status)
+    if (!each) return each.error();
+  return areas;
 }
 
 }  // namespace lamina::slice

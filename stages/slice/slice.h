@@ -22,9 +22,7 @@
 #include "stages/data/status.h"
 #include "stages/geometry/contours/contact.h"
 #include "stages/geometry/contours/simplify.h"
-#include "stages/slice/chain.h"
-#include "stages/slice/cut.h"
-#include "stages/slice/gaps.h"
+#include "stages/slice/loops.h"
 
 namespace lamina::slice {
 
@@ -90,12 +88,6 @@ class Slicer {
   std::uint64_t layer_bytes_bound(std::uint32_t plane) const;
 
  private:
-  /// A mesh at a height: what copies share.
-  struct SourceMesh {
-    std::uint32_t mesh;
-    Nm z;
-    PlaneIndex index;
-  };
   /// One instance of a body.
   struct Placed {
     std::uint32_t source;
@@ -116,5 +108,19 @@ class Slicer {
   std::vector<std::uint32_t> body_offset_;  // bodies + 1, into placed_
   std::uint32_t bodies_ = 0;
 };
+
+// --- where shells overlap or are inside out, what is solid is not what their volumes add up to.
+
+/// For each plane, mm2: the area that is solid by the rule `nonzero`, less the sum of all winding numbers over the plane.
+/// Exactly 0 where closed meshes neither overlap nor lie inside out; its integral over the height is what the union of meshes
+/// has more than the sum of their signed volumes.
+///
+/// meshes     closed
+/// instances  all of them stand together
+/// planes     nm, strictly increasing
+/// errors     kInternal of the clipping library
+/// cost       that of slicing the planes, in parallel; the same for any number of threads
+Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                          std::span<const Nm> planes);
 
 }  // namespace lamina::slice

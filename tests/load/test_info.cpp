@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "stages/slice/surplus.h"
+#include "stages/slice/slice.h"
 #include "tests/load/archives.h"
 #include "tests/load/broken_files.h"
 

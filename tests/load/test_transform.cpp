@@ -1,7 +1,7 @@
 // tests/load/test_transform.cpp: scale, rotation, shrink factors and units.
 #include <cmath>
 
-#include "stages/load/snap.h"
+#include "stages/load/transform.h"
 #include "tests/load/files.h"
 
 namespace lamina::test {

@@ -1,5 +1,4 @@
 // tests/load/test_winding.cpp: the winding number of closed and open surfaces, and the solid that is made of it.
-#include "stages/load/winding/remesh.h"
 #include "stages/load/winding/winding.h"
 
 #include <oneapi/tbb/global_control.h>

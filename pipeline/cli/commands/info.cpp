@@ -11,7 +11,7 @@
 #include "pipeline/report/part_info.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/formats/images/stack_info.h"
-#include "stages/slice/surplus.h"
+#include "stages/slice/slice.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

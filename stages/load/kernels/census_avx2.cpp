@@ -2,7 +2,6 @@
 //
 // Whole numbers modulo 2^64 only, the same in each lane as plain::census() takes; full products are put together from four of
 // half the width.
-#include "stages/load/kernels/census_hash.h"
 #include "stages/load/kernels/kernels.h"
 
 #if defined(LAMINA_WIDE_KERNELS)

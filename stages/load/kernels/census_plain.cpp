@@ -1,4 +1,3 @@
-#include "stages/load/kernels/census_hash.h"
 #include "stages/load/kernels/kernels.h"
 
 namespace lamina::load {

@@ -1,7 +1,7 @@
 // Coordinates are snapped eight at a time with AVX-512.
 //
-// Each lane does what plain::snap() does, and of that only one step rounds (snap.h).
-#include "stages/load/kernels/snap.h"
+// Each lane does what plain::snap() does, and of that only one step rounds (kernels.h).
+#include "stages/load/kernels/kernels.h"
 
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>

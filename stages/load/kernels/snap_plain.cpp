@@ -1,4 +1,4 @@
-#include "stages/load/kernels/snap.h"
+#include "stages/load/kernels/kernels.h"
 
 namespace lamina::load::plain {
 namespace {

@@ -4,9 +4,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <vector>
 
-#include "stages/load/kernels/census_hash.h"
 #include "stages/load/repair/diagnose.h"
 
 namespace lamina::load {

@@ -12,7 +12,6 @@
 
 #include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
-#include "stages/load/diagnosis/side_lists.h"
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/topology.h"
@@ -64,16 +63,6 @@ constexpr std::size_t kGrain = std::size_t{1} << 13;  // facets or vertices a ta
 using BlockedRange = tbb::blocked_range<std::uint32_t>;
 BlockedRange all_of(std::size_t count) { return {0, static_cast<std::uint32_t>(count), kGrain}; }
 
-/// The box around points.
-struct PointFindings {
-  Box box;
-
-  void inspect(std::span<const Point3> points, const BlockedRange& range) {
-    for (std::uint32_t i = range.begin(); i != range.end(); ++i) box.add(points[i]);
-  }
-  void add(const PointFindings& other) { box.add(other.box); }
-};
-
 /// What several tasks write while edges are inspected.
 struct Joined {
   explicit Joined(std::size_t facets) : sets(facets), unbalanced(facets, 0) {}
@@ -116,17 +105,6 @@ struct EdgeFindings {
       if (!inspect(mesh, begin, end, joined)) return;
       for (const Side* side = begin; side != end; ++side) may_repeat.push_back(side->facet);
     });
-  }
-  void add_repeats(const Numbered& mesh, std::span<const std::uint32_t> repeats) {
-    for (const std::uint32_t i : repeats) {
-      const Point3 corner = mesh.triangle(i).a;
-      duplicate.add(mesh.listed(i), corner, corner);
-    }
-  }
-
-  /// Of vertices whose sides chunks could not settle.
-  void inspect(const Numbered& mesh, const SideLists& lists, const BlockedRange& range, Joined& joined) {
-    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) inspect(mesh, lists.of(vertex), joined);
   }
   void add(const EdgeFindings& other) {
     open.add(other.open);
@@ -184,10 +162,13 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   const SideLists lists(vertices, rest);
   std::vector<Buffer<Side>>().swap(rest);
   EdgeFindings visited = find_in(all_of(vertices), EdgeFindings(positions), [&](const BlockedRange& range, EdgeFindings& some) {
-    some.inspect(mesh, lists, range, joined);
+    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) some.inspect(mesh, lists.of(vertex), joined);
   });
   visited.add(within);
-  visited.add_repeats(mesh, repeats_among(mesh, visited.may_repeat));
+  for (const std::uint32_t i : repeats_among(mesh, visited.may_repeat)) {
+    const Point3 corner = mesh.triangle(i).a;
+    visited.duplicate.add(mesh.listed(i), corner, corner);
+  }
   return visited;
 }
 
@@ -224,19 +205,16 @@ struct ShellFindings {
   }
 
  private:
-  static Triangle triangle(std::span<const Point3> points, const Numbered::Local& facet) {
-    return {points[facet[0]], points[facet[1]], points[facet[2]]};
-  }
-
   void inspect(std::span<const Point3> points, std::span<const Numbered::Local> facets, std::span<const std::uint32_t> shell_of,
                std::span<const std::uint8_t> unbalanced, const Point3& from) {
+    const auto triangle = [&](const Numbered::Local& facet) {
+      return Triangle{points[facet[0]], points[facet[1]], points[facet[2]]};
+    };
     const std::uint32_t only = shell_of.front();
-    const bool all_in_one =
-        only != UINT32_MAX && std::all_of(shell_of.begin(), shell_of.end(), [&](auto s) { return s == only; });
-    if (!all_in_one) {
+    if (only == UINT32_MAX || std::ranges::any_of(shell_of, [&](auto s) { return s != only; })) {
       for (std::size_t i = 0; i < facets.size(); ++i) {
         if (shell_of[i] == UINT32_MAX) continue;
-        const Triangle t = triangle(points, facets[i]);
+        const Triangle t = triangle(facets[i]);
         Shell& one = shell[shell_of[i]];
         one.volume += load::sixfold_volume(t, from);
         for (const Point3& corner : {t.a, t.b, t.c}) one.box.add(corner);
@@ -245,7 +223,7 @@ struct ShellFindings {
       return;
     }
     Shell here;
-    for (const Numbered::Local& facet : facets) here.volume += load::sixfold_volume(triangle(points, facet), from);
+    for (const Numbered::Local& facet : facets) here.volume += load::sixfold_volume(triangle(facet), from);
     for (const Point3& point : points) here.box.add(point);
     here.closed = std::all_of(unbalanced.begin(), unbalanced.end(), [](std::uint8_t is) { return is == 0; });
     shell[only].add(here);
@@ -270,9 +248,9 @@ Diagnosis diagnose_facets(std::span<const Triangle> triangles, std::size_t posit
 /// What edges and shells show.
 void diagnose_edges(const Numbered& mesh, std::size_t positions, Diagnosis& result) {
   result.vertices = mesh.vertices().size();
-  result.bounds = find_in(all_of(result.vertices), PointFindings(), [&](const BlockedRange& range, PointFindings& visited) {
-                    visited.inspect(mesh.vertices(), range);
-                  }).box;
+  result.bounds = find_in(all_of(result.vertices), Box(), [&](const BlockedRange& range, Box& box) {
+    for (std::uint32_t i = range.begin(); i != range.end(); ++i) box.add(mesh.vertices()[i]);
+  });
   Joined joined(mesh.size());
   {
     const EdgeFindings edges = edges_of(mesh, positions, joined);

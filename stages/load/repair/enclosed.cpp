@@ -4,7 +4,6 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <tuple>
 #include <vector>
@@ -21,8 +20,7 @@ Enclosed enclosed(const Mesh& mesh) {
     pieces.join(facet[0], facet[1]);
     pieces.join(facet[1], facet[2]);
   }
-  Buffer<double> volume(indexed.vertex.size());
-  std::fill(volume.begin(), volume.end(), 0.0);
+  Buffer<double> volume(indexed.vertex.size(), 0.0);
   Enclosed result;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     if (collapsed(indexed.facet[i])) continue;
@@ -57,8 +55,7 @@ Buffer<std::uint8_t> reversed_twins(const Indexed& mesh) {
   tbb::parallel_sort(keys.begin(), keys.end(), [](const Key& one, const Key& other) {
     return std::tie(one.corner, one.even, one.facet) < std::tie(other.corner, other.even, other.facet);
   });
-  Buffer<std::uint8_t> twin(mesh.facet.size());
-  std::fill(twin.begin(), twin.end(), std::uint8_t{0});
+  Buffer<std::uint8_t> twin(mesh.facet.size(), std::uint8_t{0});
   for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
     std::size_t odd = begin;
     while (odd < keys.size() && keys[odd].corner == keys[begin].corner && !keys[odd].even) ++odd;
@@ -81,8 +78,7 @@ Cancelled find_cancelled(const Mesh& mesh) {
   for_each_edge(sides, [&](const Side* begin, const Side* end) {
     for (const Side* side = begin + 1; side < end; ++side) shells.join(begin->facet, side->facet);
   });
-  Buffer<std::uint8_t> stays(indexed.facet.size());  // by representative
-  std::fill(stays.begin(), stays.end(), std::uint8_t{0});
+  Buffer<std::uint8_t> stays(indexed.facet.size(), 0);  // by representative
   for (std::uint32_t f = 0; f < twin.size(); ++f)
     if (!twin[f] && !collapsed(indexed.facet[f])) stays[shells.find(f)] = 1;
   std::uint32_t first = UINT32_MAX;

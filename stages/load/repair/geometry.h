@@ -15,14 +15,14 @@ __extension__ using Int128 = __int128;
 /// is less than 1.07 m long, and 128 elsewhere.
 template <class Use>
 auto with_doubled_area(const Triangle& t, const Use& use) {
-  using Vector = std::array<std::int64_t, 3>;
+  using Whole = std::array<std::int64_t, 3>;
   const auto difference = [](const Point3& p, const Point3& q) {
-    return Vector{std::int64_t{p.x} - q.x, std::int64_t{p.y} - q.y, std::int64_t{p.z} - q.z};
+    return Whole{std::int64_t{p.x} - q.x, std::int64_t{p.y} - q.y, std::int64_t{p.z} - q.z};
   };
   const auto cross = []<class Number>(const std::array<Number, 3>& u, const std::array<Number, 3>& v) {
     return std::array<Number, 3>{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
   };
-  const Vector u = difference(t.b, t.a), v = difference(t.c, t.a);
+  const Whole u = difference(t.b, t.a), v = difference(t.c, t.a);
   // Products of two numbers of at most 2^30 and a sign, and differences of these, have 62 bits. One test serves all six: a
   // number is within if, 2^30 added, it has no bit above the lowest 31.
   constexpr std::int64_t kMax = std::int64_t{1} << 30;

@@ -3,15 +3,140 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
-#include "stages/load/repair/sheets.h"
 #include "stages/load/repair/topology.h"
-#include "stages/load/repair/weld.h"
 
 namespace lamina::load {
 namespace {
+
+struct StraySheets {
+  Buffer<std::uint8_t> drop;  // for each facet whether it belongs to one
+  std::uint64_t sheets = 0;
+};
+
+/// A patch is what hangs together over edges with two facets. A stray sheet is a patch with an open rim that meets
+/// other facets only along edges which are unmatched with it and balanced without it: a fin that was left on a solid.
+/// Capping its rim would invent a body as wide as the fin. An open shell that merely touches another one is none: it
+/// leaves the edges where they touch as balanced as they are. Where two such patches meet, neither is dropped.
+/// cost  O(T) after sorting
+StraySheets find_stray_sheets(std::size_t facet_count, std::span<const Side> sides) {
+  DisjointSets patches(facet_count);
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    if (end - begin == 2) patches.join(begin[0].facet, begin[1].facet);
+  });
+
+  struct Rim {
+    bool open = false, glued = false, needed = false;  // needed: something would be unbalanced without the patch
+  };
+  Buffer<Rim> rims(facet_count, Rim{});
+  struct OwnSides {
+    std::uint32_t patch;
+    std::int32_t direction;  // 1 from low to high, -1 back
+  };
+  std::vector<OwnSides> meeting;  // at one edge; a broken file may have all its facets there
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    if (end - begin == 2) return;
+    meeting.clear();
+    for (const Side* side = begin; side != end; ++side) meeting.push_back({patches.find(side->facet), side->forward ? 1 : -1});
+    std::ranges::sort(meeting, {}, &OwnSides::patch);
+    const std::int64_t all = surplus(begin, end);
+    for (auto first = meeting.begin(), last = first; first != meeting.end(); first = last) {
+      std::int64_t own = 0;
+      for (; last != meeting.end() && last->patch == first->patch; ++last) own += last->direction;
+      Rim& rim = rims[first->patch];
+      if (last - first == end - begin) {
+        rim.open = rim.open || all != 0;
+      } else {
+        rim.glued = true;
+        rim.needed = rim.needed || all == 0 || all != own;
+      }
+    }
+  });
+  const auto is_candidate = [&](std::uint32_t patch) {
+    const Rim& rim = rims[patch];
+    return rim.open && rim.glued && !rim.needed;
+  };
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    const std::uint32_t first = patches.find(begin->facet);
+    for (const Side* side = begin + 1; side < end; ++side) {
+      const std::uint32_t patch = patches.find(side->facet);
+      if (patch == first || !is_candidate(patch) || !is_candidate(first)) continue;
+      rims[patch].needed = rims[first].needed = true;
+    }
+  });
+
+  StraySheets stray;
+  stray.drop.resize(facet_count);
+  for (std::uint32_t facet = 0; facet < facet_count; ++facet) {
+    const std::uint32_t patch = patches.find(facet);
+    stray.drop[facet] = is_candidate(patch);
+    stray.sheets += stray.drop[facet] && patch == facet;
+  }
+  return stray;
+}
+
+/// A piece's plane: through a vertex, with the sum of all normals turned to the side of the first.
+struct SheetPiece {
+  bool open = false, flat = true;
+  Point3 at{};
+  std::array<double, 3> normal{};
+  Box box;
+};
+
+std::array<double, 3> doubled_normal(const Indexed& mesh, const Indexed::Facet& facet) {
+  const auto area = doubled_area({mesh.vertex[facet[0]], mesh.vertex[facet[1]], mesh.vertex[facet[2]]});
+  return {static_cast<double>(area[0]), static_cast<double>(area[1]), static_cast<double>(area[2])};
+}
+
+/// Pieces that cannot enclose anything: facets that hang together over vertices, with open edges, all of whose vertices
+/// lie within `tolerance_nm` or a thousandth of the piece's size of a plane. A loose facet is one. A cap would put a
+/// second sheet upon them.
+/// cost  O(T) after sorting
+StraySheets find_flat_pieces(const Indexed& mesh, std::span<const Side> sides, std::int64_t tolerance_nm) {
+  DisjointSets pieces(mesh.vertex.size());
+  for (const Indexed::Facet& facet : mesh.facet) {
+    pieces.join(facet[0], facet[1]);
+    pieces.join(facet[1], facet[2]);
+  }
+  std::vector<SheetPiece> piece(mesh.vertex.size());
+  for (const Indexed::Facet& facet : mesh.facet) {
+    SheetPiece& own = piece[pieces.find(facet[0])];
+    own.at = mesh.vertex[facet[0]];
+    for (const std::uint32_t corner : facet) own.box.add(mesh.vertex[corner]);
+    const auto normal = doubled_normal(mesh, facet);
+    const double along = normal[0] * own.normal[0] + normal[1] * own.normal[1] + normal[2] * own.normal[2];
+    for (std::size_t k = 0; k < 3; ++k) own.normal[k] += along < 0 ? -normal[k] : normal[k];
+  }
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    if (surplus(begin, end) != 0) piece[pieces.find(begin->low)].open = true;
+  });
+  for (const Indexed::Facet& facet : mesh.facet) {
+    SheetPiece& own = piece[pieces.find(facet[0])];
+    const auto& n = own.normal;
+    const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    const double maximum = std::max(static_cast<double>(tolerance_nm), diagonal_nm(own.box) / 1000) * length;
+    for (const std::uint32_t corner : facet) {
+      const Point3& p = mesh.vertex[corner];
+      const double off = n[0] * (static_cast<double>(p.x) - own.at.x) + n[1] * (static_cast<double>(p.y) - own.at.y) +
+                         n[2] * (static_cast<double>(p.z) - own.at.z);
+      own.flat = own.flat && std::fabs(off) <= maximum;
+    }
+  }
+
+  StraySheets stray;
+  stray.drop.resize(mesh.facet.size());
+  Buffer<std::uint8_t> counted(mesh.vertex.size(), std::uint8_t{0});
+  for (std::size_t f = 0; f < mesh.facet.size(); ++f) {
+    const std::uint32_t representative = pieces.find(mesh.facet[f][0]);
+    stray.drop[f] = piece[representative].open && piece[representative].flat;
+    stray.sheets += stray.drop[f] && !counted[representative];
+    counted[representative] = 1;
+  }
+  return stray;
+}
 
 using Facet = Indexed::Facet;
 
@@ -91,10 +216,7 @@ Buffer<std::uint8_t> find_orientation(const RepairWork& work) {
     bool agrees = true;
   };
   Buffer<std::array<Neighbour, 3>> neighbours(count);
-  Buffer<std::uint8_t> used(count), turn(count), visited(count);
-  std::fill(used.begin(), used.end(), std::uint8_t{0});
-  std::fill(turn.begin(), turn.end(), std::uint8_t{0});
-  std::fill(visited.begin(), visited.end(), std::uint8_t{0});
+  Buffer<std::uint8_t> used(count, 0), turn(count, 0), visited(count, 0);
   for_each_edge(work.sides, [&](const Side* begin, const Side* end) {
     if (end - begin != 2 || begin[0].facet == begin[1].facet) return;
     const bool agrees = begin[0].forward != begin[1].forward;
@@ -147,12 +269,76 @@ std::uint64_t orient(RepairWork& work) {
   return 0;
 }
 
+/// Takes the edges that facets walk more often one way than the other, turned around, apart into loops that visit no
+/// vertex twice, and calls cap(loop) for each: vertices in order, the smallest first, at least three. Walks begin at
+/// the smallest vertex and go to the smallest next one; a loop is cut off as soon as a vertex comes again, so that
+/// openings that touch in a vertex stay apart.
+///
+/// Every edge finds its loop: a facet enters and leaves each of its vertices equally often, hence so do the surplus
+/// edges, and a walk that entered a vertex can leave it.
+/// source  a walk with a stack, after Hierholzer (1873), cut at every vertex that comes again
+template <class Cap>
+void for_each_loop(std::span<const Side> sides, const Cap& cap) {
+  Buffer<std::pair<std::uint32_t, std::uint32_t>> edges;  // as caps walk them
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    for (std::int64_t left = surplus(begin, end); left != 0; left -= left > 0 ? 1 : -1)
+      edges.push_back(left > 0 ? std::pair{begin->high, begin->low} : std::pair{begin->low, begin->high});
+  });
+  std::sort(edges.begin(), edges.end());
+
+  // Vertices as positions in a short list, each with the range of its edges that are still to be walked.
+  Buffer<std::uint32_t> vertices, next, end;
+  for (std::uint32_t i = 0; i < edges.size(); ++i) {
+    if (i == 0 || edges[i].first != edges[i - 1].first) {
+      vertices.push_back(edges[i].first);
+      next.push_back(i);
+      end.push_back(i);
+    }
+    ++end.back();
+  }
+  const auto position = [&](std::uint32_t vertex) {
+    return static_cast<std::uint32_t>(std::lower_bound(vertices.begin(), vertices.end(), vertex) - vertices.begin());
+  };
+  Buffer<std::uint8_t> on_stack(vertices.size(), std::uint8_t{0});
+  Buffer<std::uint32_t> stack, loop;
+  for (std::uint32_t start = 0; start < vertices.size(); ++start) {
+    while (next[start] != end[start] || !stack.empty()) {
+      if (stack.empty()) {
+        stack.push_back(start);
+        on_stack[start] = 1;
+      }
+      const std::uint32_t at = stack.back();
+      if (next[at] == end[at]) {  // only the start can be left without edges, when its loops are done
+        stack.clear();
+        on_stack[at] = 0;
+        break;
+      }
+      const std::uint32_t to = position(edges[next[at]++].second);
+      if (!on_stack[to]) {
+        on_stack[to] = 1;
+        stack.push_back(to);
+        continue;
+      }
+      loop.clear();
+      while (true) {
+        const std::uint32_t back = stack.back();
+        loop.push_back(vertices[back]);
+        if (back == to) break;
+        on_stack[back] = 0;
+        stack.pop_back();
+      }
+      std::reverse(loop.begin(), loop.end());
+      std::rotate(loop.begin(), std::min_element(loop.begin(), loop.end()), loop.end());
+      cap(loop);
+    }
+  }
+}
+
 void cap(RepairWork& work, RepairReport& report) {
   const auto& vertex = work.indexed.vertex;
   for_each_loop(work.sides, [&](std::span<const std::uint32_t> loop) {
     Box box;
     for (const std::uint32_t v : loop) box.add(vertex[v]);
-    report.capped.add(box);
     const double width = mm(box.width()), depth = mm(box.depth()), height = mm(box.height());
     const double diagonal = std::sqrt(width * width + depth * depth + height * height);
     if (diagonal > report.largest_opening_mm) {

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "stages/data/mesh.h"
 #include "stages/load/repair/weld.h"
@@ -23,12 +21,8 @@ struct RepairReport {
   double volume_before_mm3 = 0;       // an estimate (census), before flat pieces were dropped and openings capped
   std::uint64_t openings_capped = 0;  // loops of unmatched edges
   std::uint64_t cap_triangles = 0;
-  Box capped;                     // around all caps
   double largest_opening_mm = 0;  // largest box diagonal of one loop
   Box largest_opening;            // around that loop
-  bool changed() const {
-    return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + flat_dropped + openings_capped > 0;
-  }
 };
 
 /// Repairs a mesh that is not balanced (diagnose.h), in this order, each step only while the mesh is unbalanced:
@@ -36,8 +30,8 @@ struct RepairReport {
 ///  2. open edges that were meant to be one are joined, over growing distances (weld.h has the rule);
 ///  3. facets are turned over so that neighbours across two-facet edges agree; per connected component the
 ///     orientation of the larger area wins; undone if it would leave more unmatched than before;
-///  4. stray sheets, attached to a solid with a rim that is open, and loose flat pieces are dropped (sheets.h has the
-///     rules);
+///  4. stray sheets, attached to a solid with a rim that is open, and loose flat pieces are dropped (repair.cpp has
+///     the rules);
 ///  5. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
 ///     fan of triangles from its smallest vertex.
 /// After step 5 every edge is balanced, for any input: the boundary of a chain of triangles is a set of cycles,

@@ -9,17 +9,14 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <array>
 #include <atomic>
+#include <bit>
 #include <cstring>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "stages/geometry/blocks/pages.h"
-#include "stages/load/diagnosis/chunk_edges.h"
-#include "stages/load/diagnosis/spatial_order.h"
 
 namespace lamina::load {
 namespace {
@@ -32,6 +29,68 @@ static_assert(kChunk == kBlockSize);
 static_assert(3 * kChunk <= std::size_t{1} << kNameBits);
 
 using Local = Numbered::Local;
+
+/// The upper bits depend on all of the point.
+std::uint64_t hash_of(const Point3& p) {
+  const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
+  const std::uint64_t mixed = (xy ^ xy >> 29) * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(p.z) * 0x2d358dccaa6c78a5u;
+  return (mixed ^ mixed >> 32) * 0x8bb84b93962eacc9;
+}
+
+/// Numbers the corners of one chunk after the other, in memory that stays in a core's cache. Corners find the first corner that
+/// is the same point through a table in which the first corner of each hash stands: it is written from the last corner to the
+/// first, so no branch depends on what it held. Points whose slot another one has are few, and are found by probing.
+class ChunkNumbers {
+ public:
+  /// point  where to write the points, at most as many as corners; may be where the triangles begin, or before
+  /// returns  how many there are
+  std::uint32_t number(std::span<const Triangle> triangles, Numbered::Local* facets, Point3* point) {
+    const auto corners = static_cast<std::uint32_t>(3 * triangles.size());
+    const Point3* const corner = &triangles.front().a;
+    match({corner, corners});
+    std::uint32_t count = 0;
+    std::uint16_t* const number = facets->data();
+    for (std::uint32_t i = 0; i < corners; ++i) {
+      number_[i] = static_cast<std::uint16_t>(count);  // of a first corner
+      number[i] = number_[first_[i]];
+      const Point3 at = corner[i];  // not behind point[count], which is read no more
+      point[count] = at;
+      count += first_[i] == i;
+    }
+    return count;
+  }
+
+ private:
+  static constexpr std::uint16_t kNone = UINT16_MAX;
+  static constexpr int kSlotBits = 15;
+  static constexpr std::size_t kSlots = std::size_t{1} << kSlotBits;
+
+  static bool same(const Point3& p, const Point3& q) { return ((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z)) == 0; }
+
+  void match(std::span<const Point3> corner) {
+    const auto corners = static_cast<std::uint32_t>(corner.size());
+    for (std::uint32_t i = 0; i < corners; ++i) hash_[i] = static_cast<std::uint16_t>(hash_of(corner[i]) >> (64 - kSlotBits));
+    for (std::uint32_t i = corners; i-- > 0;) slot_[hash_[i]] = static_cast<std::uint16_t>(i);
+    std::uint32_t unmatched = 0;
+    for (std::uint32_t i = 0; i < corners; ++i) {
+      first_[i] = slot_[hash_[i]];
+      rest_[unmatched] = static_cast<std::uint16_t>(i);
+      unmatched += !same(corner[i], corner[first_[i]]);
+    }
+    if (unmatched == 0) return;
+    slot_.fill(kNone);
+    for (std::uint32_t r = 0; r < unmatched; ++r) {
+      const std::uint16_t i = rest_[r];
+      std::size_t at = hash_[i];
+      while (slot_[at] != kNone && !same(corner[i], corner[slot_[at]])) at = (at + 1) % kSlots;
+      if (slot_[at] == kNone) slot_[at] = i;
+      first_[i] = slot_[at];
+    }
+  }
+
+  std::array<std::uint16_t, kSlots> slot_;
+  std::array<std::uint16_t, 3 * Numbered::kChunk> hash_, first_, number_, rest_;
+};
 
 /// The points of a chunk, each once, in the order in which its facets name them.
 struct Chunk {
@@ -183,8 +242,8 @@ class Numbering {
     });
   }
 
-  /// Numbers the points of all chunks. returns  the vertices
-  Buffer<Point3> join() {
+  /// Numbers the points of all chunks, and gives all to `to`.
+  void join(Numbered& to) {
     std::size_t points = 0, slots = 64;
     for (Chunk& chunk : chunks_) chunk.before = std::exchange(points, points + chunk.count);
     slot_.resize(points);
@@ -209,27 +268,22 @@ class Numbering {
     Buffer<Point3> vertices(count);
     prefer_large_pages(vertices);
     for_each_chunk([&](std::uint32_t c) { number(chunks_[c], *table, vertices); });
-    in_several_.resize(count);
-    std::fill(in_several_.begin(), in_several_.end(), std::uint8_t{0});
+    in_several_.assign(count, std::uint8_t{0});
     for_each_chunk([&](std::uint32_t c) {
       for (std::size_t i = chunks_[c].before, end = i + chunks_[c].count; i < end; ++i) {
         slot_[i] = (*table)[slot_[i]];
         if (first_[i] == 0) std::atomic_ref<std::uint8_t>(in_several_[slot_[i]]).store(1, std::memory_order_relaxed);
       }
     });
-    return vertices;
+    for (const Chunk& chunk : chunks_) to.begin_.push_back(chunk.before);
+    to.begin_.push_back(points);
+    to.vertices_ = std::move(vertices);
+    to.numbers_ = std::move(slot_);
+    to.in_several_ = std::move(in_several_);
+    to.local_ = std::move(facets_);
   }
 
   std::size_t chunks() const { return chunks_.size(); }
-  Buffer<Local> take_local() { return std::move(facets_); }
-  Buffer<std::uint32_t> take_numbers() { return std::move(slot_); }
-  Buffer<std::uint8_t> take_in_several() { return std::move(in_several_); }
-  Buffer<std::size_t> begins() const {
-    Buffer<std::size_t> begins;
-    for (const Chunk& chunk : chunks_) begins.push_back(chunk.before);
-    begins.push_back(slot_.size());
-    return begins;
-  }
 
  private:
   template <class Visit>
@@ -271,6 +325,94 @@ class Numbering {
 
 namespace {
 
+// --- a counting sort by coarse cells, each part of the list on its own, then one by fine cells in each coarse one.
+
+constexpr std::uint32_t kParts = 16;
+constexpr unsigned kBits = 7, kFineBits = 6;  // of a cell along an axis; of its Morton code within the coarse cell
+constexpr std::uint32_t kCoarse = 1u << (3 * kBits - kFineBits), kFine = 1u << kFineBits;
+
+/// A cube around a box, divided into 2^kBits cells along each axis.
+class CubeCells {
+ public:
+  explicit CubeCells(const Box& bounds) : lo_(bounds.lo) {
+    const std::uint64_t side = std::max({reach(lo_.x, bounds.hi.x), reach(lo_.y, bounds.hi.y), reach(lo_.z, bounds.hi.z)});
+    shift_ = std::max(static_cast<int>(std::bit_width(side)) - static_cast<int>(kBits), 0);
+    for (std::uint32_t i = 0; i < spread_.size(); ++i) {
+      spread_[i] = 0;
+      for (unsigned bit = 0; bit < kBits; ++bit) spread_[i] |= (i >> bit & 1) << 3 * bit;
+    }
+  }
+  /// The Morton code of a point's cell.
+  std::uint32_t operator()(const Point3& p) const {
+    return along(lo_.x, p.x) | along(lo_.y, p.y) << 1 | along(lo_.z, p.z) << 2;
+  }
+
+ private:
+  static std::uint64_t reach(Nm lo, Nm hi) { return hi > lo ? static_cast<std::uint64_t>(std::int64_t{hi} - lo) : 0; }
+  std::uint32_t along(Nm lo, Nm at) const {
+    return spread_[std::min<std::uint64_t>(reach(lo, at) >> shift_, spread_.size() - 1)];
+  }
+
+  Point3 lo_;
+  int shift_;
+  std::array<std::uint32_t, 1u << kBits> spread_;  // Morton codes of cells along x
+};
+
+/// Turns how many facets each part has in each coarse cell into where they go. returns  the ends of cells
+Buffer<std::uint32_t> begin_cells(Buffer<std::uint32_t>& parts) {
+  Buffer<std::uint32_t> at(kCoarse, 0u);
+  for (std::size_t i = 0; i < parts.size(); ++i) at[i % kCoarse] += parts[i];
+  std::uint32_t end = 0;
+  for (std::uint32_t& here : at) end += std::exchange(here, end);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    std::uint32_t& here = at[i % kCoarse];
+    here += std::exchange(parts[i], here);
+  }
+  return at;
+}
+
+/// Puts facets of one coarse cell in the order of its fine ones.
+void order_finely(std::span<std::uint32_t> facets, std::span<const std::uint32_t> code, Buffer<std::uint32_t>& scratch) {
+  std::array<std::uint32_t, kFine> next{};
+  for (const std::uint32_t f : facets) ++next[code[f] % kFine];
+  std::uint32_t end = 0;
+  for (std::uint32_t& here : next) end += std::exchange(here, end);
+  scratch.assign(facets.begin(), facets.end());
+  for (const std::uint32_t f : scratch) facets[next[code[f] % kFine]++] = f;
+}
+
+/// The facets of a list by the cells of a grid in which their first corners lie, cells in Morton order, of one cell in the
+/// order of the list.
+///
+/// bounds   of the list; no facet is lost where it is wrong
+/// returns  numbers of facets; the same for any number of threads
+/// cost     O(T), parallel; 8 bytes a triangle, 4 of them kept, and 2 MiB
+Buffer<std::uint32_t> spatial_order(std::span<const Triangle> triangles, const Box& bounds) {
+  const CubeCells cells(bounds);
+  const auto from = [&](std::uint32_t part) { return triangles.size() * part / kParts; };
+  Buffer<std::uint32_t> code(triangles.size()), next(std::size_t{kParts} * kCoarse), order(triangles.size());
+  prefer_large_pages(code);
+  prefer_large_pages(order);
+  tbb::parallel_for(std::uint32_t{0}, kParts, [&](std::uint32_t part) {
+    std::uint32_t* const in = next.data() + std::size_t{part} * kCoarse;
+    std::fill(in, in + kCoarse, 0u);
+    for (std::size_t i = from(part); i < from(part + 1); ++i) ++in[(code[i] = cells(triangles[i].a)) / kFine];
+  });
+  const Buffer<std::uint32_t> ends = begin_cells(next);
+  tbb::parallel_for(std::uint32_t{0}, kParts, [&](std::uint32_t part) {
+    std::uint32_t* const in = next.data() + std::size_t{part} * kCoarse;
+    for (std::size_t i = from(part); i < from(part + 1); ++i) order[in[code[i] / kFine]++] = static_cast<std::uint32_t>(i);
+  });
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, kCoarse, 256), [&](const auto& range) {
+    Buffer<std::uint32_t> scratch;
+    for (std::uint32_t c = range.begin(); c != range.end(); ++c) {
+      const std::uint32_t begin = c == 0 ? 0 : ends[c - 1];
+      if (ends[c] - begin > 1) order_finely({order.data() + begin, ends[c] - begin}, code, scratch);
+    }
+  });
+  return order;
+}
+
 /// Whether a few chunks, spread over a list, have points of their own for most of their facets.
 bool in_disorder(std::span<const Triangle> triangles) {
   constexpr std::size_t kProbes = 4;
@@ -288,36 +430,25 @@ bool in_disorder(std::span<const Triangle> triangles) {
 
 }  // namespace
 
-void Numbered::take(Numbering& numbering) {
-  begin_ = numbering.begins();
-  numbers_ = numbering.take_numbers();
-  in_several_ = numbering.take_in_several();
-  local_ = numbering.take_local();
-}
-
 Numbered::Numbered(std::span<const Triangle> triangles, const Box& bounds) {
   Numbering numbering(triangles.size());
   if (in_disorder(triangles)) {
     order_ = spatial_order(triangles, bounds);
     std::vector<Buffer<Point3>> listed(numbering.chunks());
     numbering.read(triangles, order_, listed);
-    vertices_ = numbering.join();
+    numbering.join(*this);
   } else {
     Buffer<Point3> points(3 * triangles.size());  // of whose memory little is touched
     numbering.read(triangles, points.data(), [](Point3*, std::size_t) {});
-    vertices_ = numbering.join();
+    numbering.join(*this);
   }
-  take(numbering);
 }
 
 Numbered::Numbered(const MeshBlocks& blocks) {
   Numbering numbering(blocks.triangle_count());
-  {
-    std::vector<Buffer<Point3>> listed(blocks.block_count());
-    numbering.read(blocks, listed);
-    vertices_ = numbering.join();
-  }
-  take(numbering);
+  std::vector<Buffer<Point3>> listed(blocks.block_count());
+  numbering.read(blocks, listed);
+  numbering.join(*this);
 }
 
 // Points of a list in order lie where their triangles were until vertices are known.
@@ -329,14 +460,13 @@ Numbered::Numbered(Buffer<Triangle>&& triangles, const Box& bounds) : taken_(std
     std::vector<Buffer<Point3>> listed(numbering.chunks());
     numbering.read(taken_, order_, listed);
     forget_pages(taken_.data(), end_of_list);
-    vertices_ = numbering.join();
+    numbering.join(*this);
   } else {
     numbering.read(taken_, reinterpret_cast<Point3*>(taken_.data()),
                    [&](Point3* points_end, std::size_t end) { forget_pages(points_end, taken_.data() + end); });
-    vertices_ = numbering.join();
+    numbering.join(*this);
     if (!taken_.empty()) forget_pages(taken_.data(), end_of_list);
   }
-  take(numbering);
 }
 
 Buffer<Triangle> Numbered::give_back_list() {

@@ -70,7 +70,7 @@ class Numbered {
   Buffer<Triangle> give_back_list();
 
  private:
-  void take(Numbering& numbering);
+  friend Numbering;
 
   Buffer<Triangle> taken_;
   Buffer<std::uint32_t> order_;  // of facets in the list; none where they count as it does

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
-#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/support/late/zip.h"
 #include "stages/support/text/part_name.h"
@@ -21,30 +20,30 @@ struct CloseEntry {
 
 struct SourceOfZip {
   const Source* source;
-  std::uint64_t* position;
+  std::uint64_t position = 0;
 };
 
-zip_int64_t read_source(const SourceOfZip& from, void* data, zip_uint64_t count) {
-  const std::uint64_t maximum = std::min<std::uint64_t>(count, from.source->size() - *from.position);
-  if (!from.source->read(*from.position, static_cast<char*>(data), static_cast<std::size_t>(maximum))) return -1;
-  *from.position += maximum;
+zip_int64_t read_source(SourceOfZip& from, void* data, zip_uint64_t count) {
+  const std::uint64_t maximum = std::min<std::uint64_t>(count, from.source->size() - from.position);
+  if (!from.source->read(from.position, static_cast<char*>(data), static_cast<std::size_t>(maximum))) return -1;
+  from.position += maximum;
   return static_cast<zip_int64_t>(maximum);
 }
 
 /// libzip reads from a Source, on disk or in memory, by these commands.
 zip_int64_t serve_zip(void* user, void* data, zip_uint64_t count, zip_source_cmd_t command) {
-  const auto& from = *static_cast<SourceOfZip*>(user);
+  auto& from = *static_cast<SourceOfZip*>(user);
   switch (command) {
-    case ZIP_SOURCE_OPEN: *from.position = 0; return 0;
+    case ZIP_SOURCE_OPEN: from.position = 0; return 0;
     case ZIP_SOURCE_CLOSE: return 0;
     case ZIP_SOURCE_READ: return read_source(from, data, count);
-    case ZIP_SOURCE_TELL: return static_cast<zip_int64_t>(*from.position);
+    case ZIP_SOURCE_TELL: return static_cast<zip_int64_t>(from.position);
     case ZIP_SOURCE_SEEK: {
       zip_error_t error;
       zip_error_init(&error);
-      const zip_int64_t position = zip_source_seek_compute_offset(*from.position, from.source->size(), data, count, &error);
+      const zip_int64_t position = zip_source_seek_compute_offset(from.position, from.source->size(), data, count, &error);
       zip_error_fini(&error);
-      if (position >= 0) *from.position = static_cast<std::uint64_t>(position);
+      if (position >= 0) from.position = static_cast<std::uint64_t>(position);
       return position < 0 ? -1 : 0;
     }
     case ZIP_SOURCE_STAT: {
@@ -75,10 +74,9 @@ void Archive::Discard::operator()(zip* archive) const { zip_discard(archive); }
 Result<Archive> Archive::open(const Source& source, const LoadOptions& options) {
   if (const Status loaded = load_zip(); !loaded) return loaded.error();
   Archive archive(source, options);
-  archive.position_ = std::make_unique<std::uint64_t>(0);
   zip_error_t why;
   zip_error_init(&why);
-  auto user = std::make_unique<SourceOfZip>(SourceOfZip{&source, archive.position_.get()});
+  auto user = std::make_unique<SourceOfZip>(SourceOfZip{&source});
   zip_source_t* const from = zip_source_function_create(serve_zip, user.get(), &why);
   if (from != nullptr) {
     static_cast<void>(user.release());  // freed by ZIP_SOURCE_FREE
@@ -139,6 +137,112 @@ Status Archive::read(const std::string& name, const std::function<Status(std::st
     if (const Status fits = check_sizes(entry.packed, expanded, inflated_); !fits) return fits;
     if (const Status taken = take({block.data(), static_cast<std::size_t>(got)}); !taken) return taken;
   }
+}
+
+Status Archive::read_xml(const std::string& name, XmlReader& reader) {
+  const auto faulty = [&] { return source_->error(fmt::format("{}, {}", name.substr(1), reader.fault())); };
+  const Status fed = read(name, [&](std::string_view bytes) { return reader.feed(bytes) ? Status() : faulty(); });
+  return !fed || reader.finish() ? fed : faulty();
+}
+
+// --- what leads from a package to its model.
+
+namespace {
+
+constexpr std::string_view kModelRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
+constexpr std::string_view kPrintTicketRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/printticket";
+constexpr std::string_view kTextureRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dtexture";
+constexpr std::string_view kThumbnailRelationship =
+    "http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail";
+
+struct Relationship {
+  std::string type, target;
+  bool external = false;
+};
+
+class RelationshipHandler : public XmlHandler {
+ public:
+  std::vector<Relationship> relationships;
+
+  void start(const XmlName& name, XmlAttributes attributes) override {
+    if (name.local != "Relationship") return;
+    Relationship& one = relationships.emplace_back();
+    for (; *attributes != nullptr; attributes += 2) {
+      const std::string_view attribute = attributes[0], value = attributes[1];
+      if (attribute == "Type") one.type = value;
+      if (attribute == "Target") one.target = value;
+      if (attribute == "TargetMode") one.external = value == "External";
+    }
+  }
+  void end() override {}
+};
+
+Result<std::vector<Relationship>> read_relationships(Archive& archive, const std::string& part) {
+  RelationshipHandler handler;
+  XmlReader reader(handler);
+  if (const Status read = archive.read_xml(part, reader); !read) return read.error();
+  return std::move(handler.relationships);
+}
+
+/// "/3d/_rels/3dmodel.model.rels" of "/3d/3dmodel.model"
+std::string relationships_of(const std::string& part) {
+  const std::size_t slash = part.rfind('/') + 1;
+  return part.substr(0, slash) + "_rels/" + part.substr(slash) + ".rels";
+}
+
+/// Whether a target is a whole address, which nothing within a package has.
+bool leads_out(const Relationship& one) {
+  const std::size_t colon = one.target.find(':');
+  return one.external || (colon != 0 && colon < one.target.find_first_of("/?#"));
+}
+
+/// What a model consists of has to be in the package (core 2.1.1). Links to anything else are not for lamina.
+Status check_inside(const Source& source, std::string_view part, const Relationship& one) {
+  const bool of_payload = one.type == kModelRelationship || one.type == kPrintTicketRelationship ||
+                          one.type == kThumbnailRelationship || one.type == kTextureRelationship;
+  if (!of_payload || !leads_out(one)) return {};
+  return source.error(fmt::format("{} names {}, which lies outside of the file; 3MF forbids this (core 2.1.1): export it again",
+                                  part.substr(1), quoted(std::string_view(one.target))));
+}
+
+/// A second print ticket makes a file invalid; its requests are not for lamina.
+Status check_model_relationships(const Source& source, Archive& archive, const std::string& model) {
+  const std::string part = relationships_of(model);
+  if (!archive.has(part)) return {};
+  const auto relationships = read_relationships(archive, part);
+  if (!relationships) return relationships.error();
+  std::size_t tickets = 0;
+  for (const Relationship& one : *relationships) {
+    if (const Status inside = check_inside(source, part, one); !inside) return inside;
+    tickets += one.type == kPrintTicketRelationship ? 1 : 0;
+  }
+  if (tickets > 1) return source.error("has more than one print ticket, which 3MF forbids; export it again");
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> find_start_part(const Source& source, Archive& archive) {
+  const std::string root = "/_rels/.rels";
+  if (!archive.has(root)) return source.error("is a zip file, but no 3MF: it has no _rels/.rels; unzip it, or export it again");
+  const auto relationships = read_relationships(archive, root);
+  if (!relationships) return relationships.error();
+  std::string model;
+  for (const Relationship& one : *relationships) {
+    const bool is_model = one.type == kModelRelationship;
+    if (const Status inside = check_inside(source, root, one); !inside) return inside.error();
+    const std::string target = part_name(one.target);
+    const bool needed = is_model || one.type == kThumbnailRelationship;  // what others lead to is not for lamina
+    if (needed && !archive.has(target))
+      return source.error(fmt::format("_rels/.rels names {}, which the file does not hold; export it again",
+                                      quoted(std::string_view(one.target))));
+    if (is_model && !model.empty())
+      return source.error("names more than one 3D model to start from, which 3MF forbids; export it again");
+    if (is_model) model = target;
+  }
+  if (model.empty()) return source.error("is a zip file, but no 3MF: it names no 3D model; unzip it, or export it again");
+  if (const Status known = check_model_relationships(source, archive, model); !known) return known.error();
+  return model;
 }
 
 }  // namespace lamina::load

@@ -1,4 +1,5 @@
-// stages/load/threemf/archive.h: the entries of a ZIP file, inflated piece by piece; internal to load.
+// stages/load/threemf/archive.h: the entries of a ZIP file, inflated piece by piece, and which of them is the model; internal
+// to load.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include "stages/data/status.h"
 #include "stages/load/load.h"
 #include "stages/load/source.h"
+#include "stages/load/threemf/xml.h"
 
 struct zip;
 
@@ -30,6 +32,8 @@ class Archive {
   /// name    as part_name() gives it; has to be there
   /// errors  those of `take`; kInput: damaged, too large
   Status read(const std::string& name, const std::function<Status(std::string_view)>& take);
+  /// Gives an entry to a reader. errors  kInput: damaged, too large, or what the reader refuses
+  Status read_xml(const std::string& name, XmlReader& reader);
 
  private:
   struct PackedFile {
@@ -44,10 +48,16 @@ class Archive {
 
   const Source* source_;
   std::uint64_t limit_;
-  std::unique_ptr<std::uint64_t> position_;  // where libzip reads in the source
   std::unique_ptr<zip, Discard> archive_;
   std::map<std::string, PackedFile> entries_;
   std::uint64_t inflated_ = 0;
 };
+
+/// The one part of a package that is its model, as part_name() gives it.
+///
+/// errors  kInput: no relationships, none or more than one to a 3D model, one that leads out of the package or to nothing, more
+///         than one print ticket
+/// source  3MF Consortium, Core Specification 1.3, section 2.1
+Result<std::string> find_start_part(const Source& source, Archive& archive);
 
 }  // namespace lamina::load

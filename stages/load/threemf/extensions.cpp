@@ -3,12 +3,6 @@
 namespace lamina::load {
 namespace {
 
-struct ExtensionRow {
-  std::string_view space;  // its beginning: versions follow
-  std::string_view name, remedy;
-  Extension kind;
-};
-
 constexpr std::string_view kAsMesh = "export it with this geometry turned into triangles";
 
 /// source  https://3mf.io/spec/ and the specifications there
@@ -39,28 +33,14 @@ constexpr ExtensionRow kExtensions[] = {
     {"http://purl.org/", "Dublin Core", "", Extension::kSettings},
 };
 
-const ExtensionRow* find_row(std::string_view space) {
-  for (const ExtensionRow& row : kExtensions) {
-    if (space.starts_with(row.space)) return &row;
-  }
-  return nullptr;
-}
+constexpr ExtensionRow kNotKnown{"", "", "export it without this extension", Extension::kUnknown};
 
 }  // namespace
 
-Extension extension_of(std::string_view space) {
-  const ExtensionRow* const row = find_row(space);
-  return row == nullptr ? Extension::kUnknown : row->kind;
-}
-
-std::string_view extension_name(std::string_view space) {
-  const ExtensionRow* const row = find_row(space);
-  return row == nullptr ? std::string_view() : row->name;
-}
-
-std::string_view extension_remedy(std::string_view space) {
-  const ExtensionRow* const row = find_row(space);
-  return row == nullptr || row->remedy.empty() ? "export it without this extension" : row->remedy;
+const ExtensionRow& extension_of(std::string_view space) {
+  for (const ExtensionRow& row : kExtensions)
+    if (space.starts_with(row.space)) return row;
+  return kNotKnown;
 }
 
 /// That of the extension's first version; there is no other yet.

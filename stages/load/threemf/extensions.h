@@ -18,13 +18,14 @@ enum class Extension {
   kSlices,      // refused where nothing else says what an object is
   kUnknown      // refused where a package requires it, reported where it is used
 };
-Extension extension_of(std::string_view space);
 
-/// Its name in the specifications: "beam lattice"; "" where none is known.
-std::string_view extension_name(std::string_view space);
-
-/// What to do about a file that needs it.
-std::string_view extension_remedy(std::string_view space);
+struct ExtensionRow {
+  std::string_view space;   // its beginning: versions follow
+  std::string_view name;    // in the specifications: "beam lattice"; "" where none is known
+  std::string_view remedy;  // what to do about a file that needs it
+  Extension kind;
+};
+const ExtensionRow& extension_of(std::string_view space);
 
 bool is_material(std::string_view space);
 bool is_slic3r(std::string_view space);

@@ -1,6 +1,7 @@
 // stages/load/threemf/model.h: what lamina takes from the models of a 3MF package; internal to load.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <map>
@@ -12,7 +13,6 @@
 
 #include "stages/data/buffer.h"
 #include "stages/load/load.h"
-#include "stages/load/threemf/xml.h"
 
 namespace lamina::load {
 
@@ -84,31 +84,17 @@ struct ModelPackage {
   bool has_forward_references = false;  // a component stands before the object that it names
 
   /// Adds to the departures from a rule.
-  void depart(std::string_view rule, std::string_view what);
+  void depart(std::string_view rule, std::string_view what) {
+    auto at = std::ranges::find(departures, rule, &Departure::rule);
+    if (at == departures.end()) at = departures.insert(at, {std::string(rule), std::string(what), 0});
+    ++at->count;
+  }
   /// The index of a file, which is added if it is new.
-  std::uint32_t file_of(const std::string& name);
-};
-
-// --- what a model, an object or a build item says about itself; internal to load.
-
-/// The metadata of one element. Names that violate the specification are reported: many programs write such ones, and
-/// readers should ignore them.
-///
-/// source  3MF Consortium, Core Specification 1.3, section 3.4.1
-class Metadata {
- public:
-  /// A <metadata> begins. errors  it has no name
-  std::string begin(const XmlReader& reader, XmlAttributes attributes, ModelPackage& package);
-  /// What older releases of Cura have instead.
-  void begin_setting(XmlAttributes attributes);
-  /// A piece of its text; long texts are not needed.
-  void text(std::string_view piece);
-  /// It ends; an object learns what Cura says of it.
-  void end(ModelObject* object);
-
- private:
-  std::set<std::string> names_;
-  std::string name_, text_;
+  std::uint32_t file_of(const std::string& name) {
+    const auto [found, is_new] = file_of_name.emplace(name, static_cast<std::uint32_t>(files.size()));
+    if (is_new) files.push_back({name, 1});
+    return found->second;
+  }
 };
 
 }  // namespace lamina::load

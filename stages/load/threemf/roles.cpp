@@ -6,7 +6,6 @@
 #include <charconv>
 #include <utility>
 
-#include "stages/load/messages.h"
 #include "stages/load/text.h"
 #include "stages/load/threemf/xml.h"
 
@@ -58,10 +57,8 @@ class SettingsHandler : public XmlHandler {
 
  private:
   static std::string_view value(XmlAttributes attributes, std::string_view name) {
-    for (; *attributes != nullptr; attributes += 2) {
-      if (attributes[0] == name) return attributes[1];
-    }
-    return {};
+    const char* const found = find_attribute(attributes, name);
+    return found != nullptr ? found : "";
   }
 
   std::uint32_t depth_ = 0;
@@ -75,9 +72,8 @@ void give(const Named& named, ModelPackage& package) {
   if (at == package.object_of_id.end()) return;
   ModelObject& object = package.objects[at->second];
   if (named.part == 0) return object.volumes.push_back(named.volume);
-  for (ObjectReference& component : object.components) {
+  for (ObjectReference& component : object.components)
     if (component.id == named.part) component.role = named.volume.role;
-  }
   if (object.components.empty() && object.id == named.part) object.role = named.volume.role;
 }
 

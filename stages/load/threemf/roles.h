@@ -1,7 +1,6 @@
 // stages/load/threemf/roles.h: what the program that wrote a package does with its volumes; internal to load.
 #pragma once
 
-#include <string>
 #include <string_view>
 #include <vector>
 

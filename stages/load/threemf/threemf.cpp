@@ -3,34 +3,15 @@
 
 #include <fmt/core.h>
 
-#include "stages/load/messages.h"
 #include "stages/load/text.h"
-#include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/expansion.h"
 #include "stages/load/threemf/extensions.h"
 #include "stages/load/threemf/model_parser.h"
 #include "stages/load/threemf/placement.h"
-#include "stages/load/threemf/relationships.h"
 #include "stages/load/threemf/roles.h"
 
 namespace lamina::load {
 namespace {
-
-Status parse_model(const Source& source, Archive& archive, std::uint32_t file, std::uint64_t triangle_limit,
-                   ModelPackage& package) {
-  const std::string name = package.files[file].name;
-  if (!archive.has(name))
-    return source.error(fmt::format("names {}, which the file does not hold; export it again", name.substr(1)));
-  ModelParser parser(package, file, triangle_limit);
-  XmlReader reader(parser);
-  parser.attach(reader);
-  const auto faulty = [&] { return source.error(fmt::format("{}, {}", name.substr(1), reader.fault())); };
-  const Status read = archive.read(name, [&](std::string_view bytes) { return reader.feed(bytes) ? Status() : faulty(); });
-  if (!read) return read;
-  if (!reader.finish()) return faulty();
-  if (file == 0 && !parser.has_build()) return source.error(fmt::format("{} has no <build>; export it again", name.substr(1)));
-  return {};
-}
 
 /// What was passed over, for a person.
 void report_of_model(const ModelPackage& model, std::vector<Note>& notes) {
@@ -77,8 +58,7 @@ Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
   const Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
   if (!leaves) return leaves.error();
   if (leaves->empty()) return source.error("its build items hold no triangles to print");
-  Placement placement(source, model, options, package);
-  if (const Status placed = placement.add(*leaves); !placed) return placed.error();
+  if (const Status placed = snap_leaves(source, model, *leaves, options, package); !placed) return placed.error();
   return package;
 }
 

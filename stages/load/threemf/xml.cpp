@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <new>
-#include <utility>
 
 namespace lamina::load {
 namespace {
@@ -15,6 +14,12 @@ constexpr std::size_t kMaxNames = 4096, kMaxNamespaces = 64, kLongestName = 1024
 constexpr std::uint64_t kLongestTag = std::uint64_t{1} << 20;
 
 }  // namespace
+
+const char* find_attribute(XmlAttributes attributes, std::string_view name) {
+  for (; *attributes != nullptr; attributes += 2)
+    if (attributes[0] == name) return attributes[1];
+  return nullptr;
+}
 
 struct XmlReader::Callbacks {
   static void start(void* user, const char* name, const char** attributes) {

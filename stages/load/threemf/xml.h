@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <unordered_set>
@@ -22,6 +21,9 @@ struct XmlName {
   std::string_view local;
   bool declared = true;  // whether its prefix, if it has one, leads to a namespace
 };
+
+/// The value of an attribute; null where the element does not have it.
+const char* find_attribute(XmlAttributes attributes, std::string_view name);
 
 class XmlHandler {
  public:

@@ -1,0 +1,289 @@
+#include "stages/slice/loops.h"
+
+#include <bit>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace lamina::slice {
+namespace {
+
+std::uint64_t hash_of(const Point3& p) {
+  const auto word = [](Nm v) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(v)); };
+  std::uint64_t h = (word(p.x) | word(p.y) << 32) * 0x9E3779B97F4A7C15ull;
+  h ^= h >> 29;
+  return (h + word(p.z)) * 0xBF58476D1CE4E5B9ull;
+}
+
+std::uint64_t hash_of(std::uint64_t low, std::uint64_t high) {
+  const std::uint64_t h = (low ^ (high >> 31) ^ (high << 33)) * 0x94D049BB133111EBull;
+  return h ^ (h >> 32);
+}
+
+/// from + the share num / den of the way to `to`, rounded; 0 <= num < den.
+Nm exact_between(Nm from, Nm to, std::int64_t num, std::int64_t den) {
+  const __int128 way = static_cast<__int128>(std::int64_t{to} - from) * num * 2 + den;
+  return static_cast<Nm>(from + static_cast<std::int64_t>(floor_div<__int128>(way, static_cast<__int128>(den) * 2)));
+}
+
+/// The product of two doubles that are each off by at most 2^-53 of themselves, for ways below 2^31, then one addition: off by
+/// less than 2^-19. Values near a half are decided in integers.
+Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
+  constexpr double kNear = 0x1p-17, kPositive = 0x1p32;
+  const double way = share * static_cast<double>(std::int64_t{to} - from) + 0.5 + kPositive;
+  const auto whole = static_cast<std::int64_t>(way);
+  const double rest = way - static_cast<double>(whole);
+  if (rest < kNear || rest > 1 - kNear) [[unlikely]]
+    return exact_between(from, to, num, den);
+  return static_cast<Nm>(from + whole - static_cast<std::int64_t>(kPositive));
+}
+
+}  // namespace
+
+Point2 crossing(const Edge& edge, std::int64_t z) {
+  const std::int64_t num = z - edge.low.z, den = std::int64_t{edge.high.z} - edge.low.z;
+  const double share = static_cast<double>(num) / static_cast<double>(den);
+  return {between(edge.low.x, edge.high.x, share, num, den), between(edge.low.y, edge.high.y, share, num, den)};
+}
+
+void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> facets, std::int64_t z, Cuts& cuts) {
+  constexpr std::size_t kAhead = 16;  // facets are anywhere in memory: prefetched before they are needed
+  const std::size_t count = facets.size();
+  cuts.from.resize(count);
+  cuts.to.resize(count);
+  cuts.from_hash.resize(count);
+  cuts.to_hash.resize(count);
+  cuts.at.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i + kAhead < count) {
+      const auto* next = reinterpret_cast<const char*>(&triangles[facets[i + kAhead]]);
+      __builtin_prefetch(next);
+      __builtin_prefetch(next + sizeof(Triangle) - 1);
+    }
+    const Point3* corner = &triangles[facets[i]].a;
+    const bool a = corner[0].z > z, b = corner[1].z > z, c = corner[2].z > z;
+    // The tip is alone on its side; the plane cuts the two edges that start there.
+    const std::uint32_t tip = a == b ? 2 : a == c ? 1 : 0;
+    const Point3& own = corner[tip];
+    const Point3& next = corner[tip == 2 ? 0 : tip + 1];
+    const Point3& previous = corner[tip == 0 ? 2 : tip - 1];
+    const std::uint64_t own_hash = hash_of(own), next_hash = hash_of(next), previous_hash = hash_of(previous);
+    if (own.z > z) {
+      cuts.from[i] = {next, own};
+      cuts.to[i] = {previous, own};
+      cuts.from_hash[i] = hash_of(next_hash, own_hash);
+      cuts.to_hash[i] = hash_of(previous_hash, own_hash);
+    } else {
+      cuts.from[i] = {own, previous};
+      cuts.to[i] = {own, next};
+      cuts.from_hash[i] = hash_of(own_hash, previous_hash);
+      cuts.to_hash[i] = hash_of(own_hash, next_hash);
+    }
+    cuts.at[i] = crossing(cuts.from[i], z);
+  }
+}
+
+namespace {
+
+/// Finds the first plane at or above a height: a table of equal steps leads to the place, comparisons decide.
+class PlaneFinder {
+ public:
+  explicit PlaneFinder(std::span<const std::int64_t> planes) : planes_(planes) {
+    if (planes.empty()) return;
+    const auto range = static_cast<std::uint64_t>(planes.back() - planes.front());
+    while ((range >> shift_) > 4 * planes.size()) ++shift_;
+    position_.resize(static_cast<std::size_t>(range >> shift_) + 1);
+    std::uint32_t plane = 0;
+    for (std::size_t cell = 0; cell < position_.size(); ++cell) {
+      while (planes[plane] < planes.front() + static_cast<std::int64_t>(cell << shift_)) ++plane;
+      position_[cell] = plane;
+    }
+  }
+
+  std::uint32_t operator()(std::int64_t z) const {
+    if (planes_.empty() || z <= planes_.front()) return 0;
+    if (z > planes_.back()) return static_cast<std::uint32_t>(planes_.size());
+    std::uint32_t plane = position_[static_cast<std::size_t>(static_cast<std::uint64_t>(z - planes_.front()) >> shift_)];
+    while (planes_[plane] < z) ++plane;
+    return plane;
+  }
+
+ private:
+  std::span<const std::int64_t> planes_;
+  std::uint32_t shift_ = 0;
+  Buffer<std::uint32_t> position_;
+};
+
+}  // namespace
+
+PlaneIndex index_crossings(std::span<const Triangle> triangles, std::span<const std::int64_t> planes) {
+  const PlaneFinder first_at_or_above(planes);
+  return {0, static_cast<std::int64_t>(planes.size()) - 1, 0, [&](auto use) {
+            for (std::uint32_t facet = 0; facet < triangles.size(); ++facet) {
+              const Triangle& t = triangles[facet];
+              const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
+              const std::uint32_t first = first_at_or_above(low), last = first_at_or_above(high);
+              if (first < last) use({first, last, facet});
+            }
+          }};
+}
+
+namespace {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+constexpr std::uint32_t kTaken = UINT32_MAX;  // of a slot: passed over, but the search continues after it
+constexpr std::uint8_t kHasPrevious = 1, kVisited = 2;
+
+/// For each cut the one that starts at the edge where it ends. Where several start there, at an edge of four or more
+/// facets, the first that is free.
+void find_successors(const Cuts& cuts, ChainScratch& scratch) {
+  const std::size_t count = cuts.size();
+  const std::size_t slots = std::bit_ceil(2 * count + 2);
+  const std::size_t mask = slots - 1;
+  scratch.slot.assign(slots, 0);
+  scratch.next.resize(count);
+  scratch.state.assign(count, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::size_t position = cuts.from_hash[i] & mask;
+    while (scratch.slot[position] != 0) position = (position + 1) & mask;
+    scratch.slot[position] = static_cast<std::uint32_t>(i + 1);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t hash = cuts.to_hash[i];
+    std::uint32_t found = kNone;
+    for (std::size_t position = hash & mask; scratch.slot[position] != 0; position = (position + 1) & mask) {
+      if (scratch.slot[position] == kTaken) continue;
+      const std::uint32_t other = scratch.slot[position] - 1;
+      if (cuts.from_hash[other] != hash || !(cuts.from[other] == cuts.to[i])) continue;
+      scratch.slot[position] = kTaken;
+      scratch.state[other] |= kHasPrevious;
+      found = other;
+      break;
+    }
+    scratch.next[i] = found;
+  }
+}
+
+}  // namespace
+
+void chain(const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed, Contours& open) {
+  find_successors(cuts, scratch);
+  const auto count = static_cast<std::uint32_t>(cuts.size());
+  for (std::uint32_t first = 0; first < count; ++first) {
+    if ((scratch.state[first] & kHasPrevious) != 0) continue;
+    std::uint32_t last = first;
+    for (std::uint32_t i = first; i != kNone; i = scratch.next[i]) {
+      open.point.push_back(cuts.at[i]);
+      scratch.state[i] |= kVisited;
+      last = i;
+    }
+    open.point.push_back(crossing(cuts.to[last], z));
+    open.close();
+  }
+  for (std::uint32_t first = 0; first < count; ++first) {
+    if ((scratch.state[first] & kVisited) != 0) continue;
+    std::uint32_t i = first;
+    do {
+      closed.point.push_back(cuts.at[i]);
+      scratch.state[i] |= kVisited;
+      i = scratch.next[i];
+    } while (i != first);
+    closed.close();
+  }
+}
+
+namespace {
+
+struct Bridge {
+  __int128 squared;  // nm^2
+  std::uint32_t from, to;
+};
+
+/// All bridges that are short enough, shortest first.
+std::vector<Bridge> find_bridges(const Contours& open, Nm maximum) {
+  const std::uint32_t count = open.size();
+  std::vector<std::uint32_t> by_x(count);  // chains by the x of their start
+  std::iota(by_x.begin(), by_x.end(), 0u);
+  const auto start_x = [&](std::uint32_t chain) { return open[chain].front().x; };
+  std::ranges::sort(by_x, {}, [&](std::uint32_t chain) { return std::pair(start_x(chain), chain); });
+  std::vector<Bridge> bridges;
+  for (std::uint32_t from = 0; from < count; ++from) {
+    const Point2 end = open[from].back();
+    const auto first = std::ranges::lower_bound(by_x, std::int64_t{end.x} - maximum, {},
+                                                [&](std::uint32_t chain) { return std::int64_t{start_x(chain)}; });
+    for (auto it = first; it != by_x.end() && start_x(*it) <= std::int64_t{end.x} + maximum; ++it) {
+      const Point2 start = open[*it].front();
+      const std::int64_t dx = std::int64_t{start.x} - end.x, dy = std::int64_t{start.y} - end.y;
+      const __int128 squared = static_cast<__int128>(dx) * dx + static_cast<__int128>(dy) * dy;
+      if (squared <= static_cast<__int128>(maximum) * maximum) bridges.push_back({squared, from, *it});
+    }
+  }
+  std::ranges::sort(bridges, [](const Bridge& a, const Bridge& b) {
+    return std::tie(a.squared, a.from, a.to) < std::tie(b.squared, b.from, b.to);
+  });
+  return bridges;
+}
+
+}  // namespace
+
+GapReport close_gaps(Contours& open, Nm maximum, Contours& closed) {
+  GapReport report;
+  const std::uint32_t count = open.size();
+  if (count == 0) return report;
+  std::vector<std::uint32_t> next(count, kNone), previous(count, kNone);
+  for (const Bridge& bridge : find_bridges(open, maximum)) {
+    if (next[bridge.from] != kNone || previous[bridge.to] != kNone) continue;
+    next[bridge.from] = bridge.to;
+    previous[bridge.to] = bridge.from;
+    ++report.closed;
+    const auto length = static_cast<std::int64_t>(std::ceil(std::sqrt(static_cast<double>(bridge.squared))));
+    report.largest_closed = std::max(report.largest_closed, length);
+  }
+  Contours rest;
+  std::vector<std::uint8_t> done(count, 0);
+  const auto walk = [&](std::uint32_t first, Contours& out) {
+    for (std::uint32_t chain = first; chain != kNone && done[chain] == 0; chain = next[chain]) {
+      done[chain] = 1;
+      const auto points = open[chain];
+      out.point.insert(out.point.end(), points.begin(), points.end());
+    }
+    out.close();
+  };
+  for (std::uint32_t chain = 0; chain < count; ++chain)
+    if (previous[chain] == kNone) walk(chain, rest);
+  for (std::uint32_t chain = 0; chain < count; ++chain)
+    if (done[chain] == 0) walk(chain, closed);
+  report.open = rest.size();
+  if (rest.size() > 0) report.first_open = rest[0].front();
+  open = std::move(rest);
+  return report;
+}
+
+std::vector<SourceMesh> find_sources(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                     std::span<const Nm> planes, std::vector<std::uint32_t>& source_of) {
+  std::map<std::pair<std::uint32_t, Nm>, std::uint32_t> known;
+  std::vector<std::int64_t> own_planes(planes.size());
+  std::vector<SourceMesh> sources;
+  for (const Instance& instance : instances) {
+    const Nm z = instance.offset.z;
+    const auto [found, is_new] = known.emplace(std::pair(instance.mesh, z), static_cast<std::uint32_t>(sources.size()));
+    if (is_new) {
+      std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return std::int64_t{plane} - z; });
+      sources.push_back({instance.mesh, z, index_crossings(meshes[instance.mesh].triangles, own_planes)});
+    }
+    source_of.push_back(found->second);
+  }
+  return sources;
+}
+
+void append_moved(const Contours& from, Point2 by, Contours& to) {
+  to.point.reserve(to.point.size() + from.point.size());
+  for (std::uint32_t c = 0; c < from.size(); ++c) {
+    for (const Point2 p : from[c]) to.point.push_back({p.x + by.x, p.y + by.y});
+    to.close();
+  }
+}
+
+}  // namespace lamina::slice

@@ -1,0 +1,120 @@
+// stages/slice/loops.h: one plane cuts the facets that it crosses, cuts are joined to chains, and gaps between chains are
+// closed.
+//
+// A corner with z <= Z is below the plane, as for the bitmaps; so a facet is cut through exactly two edges or not at
+// all. A crossing belongs to the mesh edge that carries it and is computed from that edge's lower end, in the same bits
+// for both facets that share it.
+//
+// Edges are found by their names, the two ends; points are never compared, so there is no tolerance and two crossings
+// that round to the same nanometre stay apart. On a closed mesh every cut has a successor and every chain is a loop.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/contours.h"
+#include "stages/data/mesh.h"
+#include "stages/geometry/interval_table.h"
+
+namespace lamina::slice {
+
+/// A mesh edge that a plane crosses: its name is its two ends, the one below the plane first.
+struct Edge {
+  Point3 low, high;
+  friend bool operator==(const Edge&, const Edge&) = default;
+};
+
+/// The cuts of one layer, in the order of the facets. Cut i is walked from edge from[i] to edge to[i] with the solid on
+/// its left.
+struct Cuts {
+  Buffer<Edge> from, to;
+  Buffer<std::uint64_t> from_hash, to_hash;  // of the edges' names
+  Buffer<Point2> at;                         // nm, where from[i] meets the plane
+
+  std::size_t size() const { return at.size(); }
+  std::uint64_t bytes() const {
+    return bytes_held(from) + bytes_held(to) + bytes_held(from_hash) + bytes_held(to_hash) + bytes_held(at);
+  }
+};
+
+/// Where an edge meets height z: low.z <= z < high.z. Rounded to the nearest nm, halves towards +infinity on the way
+/// from the lower end; decided in integers.
+Point2 crossing(const Edge& edge, std::int64_t z);
+
+/// Cuts `facets` of `triangles`, all of which the plane crosses. `cuts` is overwritten.
+/// cost  one division for a facet
+void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> facets, std::int64_t z, Cuts& cuts);
+
+// --- which facets a plane crosses, for planes known beforehand.
+
+/// The planes [first, last) that each facet crosses, by their numbers; facets between planes are not in it. A corner at a plane
+/// is below it.
+using PlaneIndex = IntervalTable<std::uint32_t>;
+
+/// triangles  nm, frame of the mesh; fewer than 2^32
+/// planes     nm, same frame, strictly increasing
+/// cost       O(triangles + planes)
+PlaneIndex index_crossings(std::span<const Triangle> triangles, std::span<const std::int64_t> planes);
+
+// --- chains of cuts.
+
+/// Reused from layer to layer.
+struct ChainScratch {
+  Buffer<std::uint32_t> slot;  // open addressing: cut + 1, or 0
+  Buffer<std::uint32_t> next;  // of each cut
+  Buffer<std::uint8_t> state;
+
+  std::uint64_t bytes() const { return bytes_held(slot) + bytes_held(next) + bytes_held(state); }
+};
+
+/// Joins the cuts at height z. Appends closed chains to `closed`, in the order of their first cut; chains that end at
+/// an edge without a neighbour, of open meshes only, go to `open`, from their first to their last point. Both may hold
+/// repeated and collinear points, and chains of fewer than three.
+/// cost  O(C) for C cuts; the table of edges is that of one layer and stays in the cache
+/// source  R. Minetto, N. Volpato, J. Stolfi et al., "An optimal algorithm for 3D triangle mesh slicing", Computer-Aided Design
+/// 92 (2017), for
+///         loop closure by a table; naming crossings by their edges in place of hashing points is ours
+void chain(const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed, Contours& open);
+
+// --- open chains of a mesh that is not closed, joined over short gaps.
+
+struct GapReport {
+  std::uint32_t closed = 0;         // gaps that were bridged
+  std::int64_t largest_closed = 0;  // nm, the longest bridge, rounded up
+  std::uint32_t open = 0;           // chains that stay open
+  Point2 first_open{};              // start of the first of these
+
+  void add(const GapReport& other) {
+    if (open == 0) first_open = other.first_open;
+    closed += other.closed;
+    largest_closed = std::max(largest_closed, other.largest_closed);
+    open += other.open;
+  }
+};
+
+/// Joins ends of chains to starts of chains that are at most `maximum` nm away by a straight segment, shortest first
+/// (then by the chains' order); every end and start once. What has become a loop goes to `closed`; what has not stays
+/// in `open`, joined.
+/// cost  O(K log K) for K chains as a rule
+GapReport close_gaps(Contours& open, Nm maximum, Contours& closed);
+
+// --- meshes whose copies share their cuts.
+
+/// A mesh at a height, and the planes of the bed that its facets cross.
+struct SourceMesh {
+  std::uint32_t mesh;
+  Nm z;
+  PlaneIndex index;
+};
+
+/// The meshes at the heights at which instances stand, in the order of the instances. source_of  becomes that of each instance
+std::vector<SourceMesh> find_sources(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                                     std::span<const Nm> planes, std::vector<std::uint32_t>& source_of);
+
+/// Appends contours, moved.
+void append_moved(const Contours& from, Point2 by, Contours& to);
+
+}  // namespace lamina::slice
