@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "stages/formats/images/image.h"
-#include "stages/formats/images/numbered.h"
+#include "stages/formats/images/layer_images.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::formats {
