@@ -17,7 +17,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/formats/slice_format.h"
-#include "stages/formats/threemf/slice3mf.h"
+#include "stages/formats/threemf/threemf.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/io/temporary.h"

@@ -10,7 +10,7 @@
 #include "pipeline/show/series.h"
 #include "pipeline/show/swath.h"
 #include "stages/formats/images/image.h"
-#include "stages/formats/svg/drawing.h"
+#include "stages/formats/svg/svg.h"
 #include "stages/support/text/readable.h"
 #include "stages/view/picture/canvas.h"  // have_font
 #include "stages/view/picture/contact_sheet.h"
@@ -94,7 +94,7 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
   if (!shapes) return shapes.error();
   const std::string said = fmt::format("{}: {}", request.output, shapes->title);
   if (svg) {
-    const std::string text = formats::svg::drawing(*shapes);
+    const std::string text = formats::svg_drawing(*shapes);
     const auto bytes = std::as_bytes(std::span(text));
     return Preview{{bytes.begin(), bytes.end()}, said};
   }

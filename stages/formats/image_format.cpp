@@ -1,5 +1,7 @@
 #include "stages/formats/image_format.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -7,13 +9,37 @@
 #include <string_view>
 
 #include "stages/formats/bmp/bmp.h"
-#include "stages/formats/null/null.h"
 #include "stages/formats/pbm/pbm.h"
 #include "stages/formats/png/png_format.h"
 #include "stages/formats/tiff/tiff.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats {
+
+Error cannot_hold(std::string_view format, std::uint32_t columns, std::uint32_t rows, std::string_view why) {
+  return {Fault::kOutput, fmt::format("{} cannot hold a layer of {} x {} pixels: {}", format, columns, rows, why)};
+}
+
+Status check_size(std::string_view format, std::uint32_t columns, std::uint32_t rows) {
+  if (columns == 0 || rows == 0) return cannot_hold(format, columns, rows, "it has no pixels");
+  if (columns > kMaxPixelsASide || rows > kMaxPixelsASide) {
+    return cannot_hold(format, columns, rows, fmt::format("a side has at most {} pixels", kMaxPixelsASide));
+  }
+  return {};
+}
+
 namespace {
+
+/// No file at all, for timing what comes before it.
+class NullEncoder : public ImageEncoder {
+ public:
+  Status encode(const RunsView&, double, double, Bytes& file) override {
+    file.clear();
+    return {};
+  }
+};
+
+std::unique_ptr<ImageEncoder> make_null_encoder() { return std::make_unique<NullEncoder>(); }
 
 using Count = std::uint64_t;
 
@@ -50,7 +76,7 @@ constexpr std::array<ImageFormat, 7> kFormats = {{
     {"png", ".png", "PNG, 1 bit", png::make_encoder, max_png},
     {"pbm", ".pbm", "portable bitmap, uncompressed", pbm::make_encoder, max_bits},
     {"bmp", ".bmp", "Windows bitmap, 1 bit, uncompressed", bmp::make_encoder, max_bmp},
-    {"null", "", "no image files: for timing", null::make_encoder, max_null},
+    {"null", "", "no image files: for timing", make_null_encoder, max_null},
 }};
 
 }  // namespace

@@ -48,6 +48,10 @@ class ImageEncoder {
   virtual void tag(const LayerTags&) {}
 };
 
+/// For encoders. errors  kOutput, "PNG cannot hold a layer of 3 x 0 pixels: it has no pixels"
+Error cannot_hold(std::string_view format, std::uint32_t columns, std::uint32_t rows, std::string_view why);
+Status check_size(std::string_view format, std::uint32_t columns, std::uint32_t rows);
+
 /// One row of the registry.
 struct ImageFormat {
   std::string_view id;           // as on the command line: tiff-g4, tiff-packbits, tiff-none, png, pbm, null

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "stages/formats/threemf/mesh3mf.h"
+#include "stages/formats/threemf/threemf.h"
 #include "stages/formats/zip/zip.h"
 #include "stages/load/load.h"
 

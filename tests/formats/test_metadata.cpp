@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "stages/formats/images/image.h"
-#include "stages/formats/png/coloured.h"
+#include "stages/formats/png/png_format.h"
 #include "tests/formats/images.h"
 
 namespace lamina::formats {

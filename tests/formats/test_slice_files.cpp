@@ -19,7 +19,7 @@
 #include "stages/formats/cli/cli.h"
 #include "stages/formats/slice_format.h"
 #include "stages/formats/svg/svg.h"
-#include "stages/formats/threemf/slice3mf.h"
+#include "stages/formats/threemf/threemf.h"
 #include "stages/support/text/decimal.h"
 
 namespace lamina::test {

@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <unistd.h>
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -75,17 +73,6 @@ namespace lamina::formats {
 
 namespace {
 
-bool read_whole(int file, std::span<std::byte> to, std::uint64_t offset) {
-  while (!to.empty()) {
-    const ssize_t got = ::pread(file, to.data(), to.size(), static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return false;
-    to = to.subspan(static_cast<std::size_t>(got));
-    offset += static_cast<std::uint64_t>(got);
-  }
-  return true;
-}
-
 std::uint32_t number(std::span<const std::byte> bytes, std::size_t at, std::size_t size = 4) {
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < size; ++i) value |= std::to_integer<std::uint32_t>(bytes[at + i]) << (8 * i);
@@ -94,12 +81,13 @@ std::uint32_t number(std::span<const std::byte> bytes, std::size_t at, std::size
 
 }  // namespace
 
-Result<Image> read_bmp(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink) {
   const auto failure = [&](std::string_view why) {
-    return Error{Fault::kVerification, fmt::format("{}: not a whole BMP: {}; plan the layer again", path, why)};
+    return Error{Fault::kVerification, fmt::format("{}: not a whole BMP: {}; plan the layer again", file.path(), why)};
   };
   std::array<std::byte, 54> head{};
-  if (bytes < head.size() || !read_whole(file, head, 0)) return failure("truncated");
+  const std::uint64_t bytes = file.size();
+  if (bytes < head.size() || !read_bytes_at(file, 0, head)) return failure("truncated");
   const std::uint64_t begin = number(head, 10), info = number(head, 14);
   const auto width = static_cast<std::int32_t>(number(head, 18)), height = static_cast<std::int32_t>(number(head, 22));
   const std::uint32_t bits = number(head, 28, 2), compression = number(head, 30);
@@ -114,7 +102,7 @@ Result<Image> read_bmp(int file, std::uint64_t bytes, const std::string& path, i
   const std::uint32_t named = number(head, 46), colours = named == 0 ? 1u << bits : named;
   if (colours > 1u << bits || (bits == 1 && colours < 2)) return failure(fmt::format("{} colours", colours));
   std::array<std::byte, 1024> palette{};
-  if (14 + info + 4 * colours > begin || !read_whole(file, std::span(palette).first(4 * std::size_t{colours}), 14 + info))
+  if (14 + info + 4 * colours > begin || !read_bytes_at(file, 14 + info, std::span(palette).first(4 * std::size_t{colours})))
     return failure("its colours are not whole");
   std::array<std::uint8_t, 256> light{};
   for (std::size_t c = 0; c < colours; ++c) {
@@ -134,7 +122,7 @@ Result<Image> read_bmp(int file, std::uint64_t bytes, const std::string& path, i
   for (std::uint32_t first = 0; first < rows; first += at_once) {
     const std::uint32_t count = std::min(at_once, rows - first);
     const std::span<std::byte> strip = std::span(buffer).first(stride * count);
-    if (!read_whole(file, strip, begin + stride * (from_top ? first : rows - first - count))) return failure("cannot read");
+    if (!read_bytes_at(file, begin + stride * (from_top ? first : rows - first - count), strip)) return failure("cannot read");
     for (std::uint32_t r = 0; r < count; ++r) {
       const std::span<std::byte> row = strip.subspan(stride * (from_top ? r : count - 1 - r), stride);
       if (grey) {

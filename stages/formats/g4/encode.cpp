@@ -10,14 +10,62 @@
 #include <span>
 #include <utility>
 
-#include "stages/formats/g4/bit_writer.h"
-#include "stages/formats/g4/empty_rows.h"
-#include "stages/formats/g4/horizontal.h"
-#include "stages/formats/g4/steady_rows.h"
+#include "stages/formats/g4/steps.h"
 #include "stages/geometry/isa.h"
+#include "stages/geometry/targets.h"
 
 namespace lamina::formats::g4 {
 namespace {
+
+// T.6's horizontal mode, two runs by their lengths.
+
+struct RunWord {
+  std::uint64_t bits;
+  std::uint32_t length;
+};
+
+inline RunWord run_word(const RunCodes& codes, std::uint32_t run) {
+  const Code make_up = codes.make_up[run >> 6], terminating = codes.terminating[run & 63];
+  return {std::uint64_t{make_up.bits()} << terminating.length() | terminating.bits(), make_up.length() + terminating.length()};
+}
+
+/// The make-up code for 2560 `times` after each other, at most four of them.
+constexpr RunWord longest_make_ups(std::uint32_t times) {
+  constexpr Code kOne = kRunCodes[0].make_up[kLongestMakeUp / 64];  // of both colours
+  std::uint64_t four = 0;
+  for (int i = 0; i < 4; ++i) four = four << kOne.length() | kOne.bits();
+  return {four & ((std::uint64_t{1} << times * kOne.length()) - 1), times * kOne.length()};
+}
+
+inline void put_run(BitWriter& writer, const RunCodes& codes, std::uint32_t run) {
+  if (run >= kLongestMakeUp + 64) {
+    std::uint32_t times = (run - 64) / kLongestMakeUp;  // leaves 64 .. 2623
+    run -= times * kLongestMakeUp;
+    for (; times > 4; times -= 4) writer.put(longest_make_ups(4).bits, longest_make_ups(4).length);
+    const RunWord make_ups = longest_make_ups(times);
+    writer.put(make_ups.bits, make_ups.length);
+  }
+  const RunWord word = run_word(codes, run);
+  writer.put(word.bits, word.length);
+}
+
+/// `first` in the colour `black`, then `second` in the other.
+inline void put_horizontal(BitWriter& writer, unsigned black, std::uint32_t first, std::uint32_t second) {
+  const RunCodes &codes = kRunCodes[black], &other = kRunCodes[black ^ 1];
+  if ((first | second) < 64) [[likely]] {
+    const Code one = codes.terminating[first], two = other.terminating[second];
+    const std::uint64_t bits = (std::uint64_t{kHorizontal.bits()} << one.length() | one.bits()) << two.length() | two.bits();
+    writer.put(bits, kHorizontal.length() + one.length() + two.length());
+  } else if ((first | second) < kLongestMakeUp) {
+    const RunWord one = run_word(codes, first), two = run_word(other, second);
+    const std::uint64_t bits = (std::uint64_t{kHorizontal.bits()} << one.length | one.bits) << two.length | two.bits;
+    writer.put(bits, kHorizontal.length() + one.length + two.length);
+  } else {
+    writer.put(kHorizontal);
+    put_run(writer, codes, first);
+    put_run(writer, other, second);
+  }
+}
 
 // A scratch row is: one 0, the changes, and `columns` this many times. The 0 is read as the change before the first
 // one; the tail stands for T.6's imaginary change after the last pixel and is as long as eight changes read at once
@@ -218,6 +266,76 @@ std::uint32_t put_few_rows(BitWriter& writer, const RunsView& runs, std::uint32_
   }
   writer = out;
   return r;
+}
+
+// Rows that have as many changes as those above them, many changes at a time.
+
+/// The body for an instruction set that this processor has (geometry/isa.h), not kAuto; nullptr: none is faster than coding
+/// row by row.
+const StepsBody* steps_body([[maybe_unused]] Isa isa) {
+#if defined(LAMINA_WIDE_KERNELS)
+  static constexpr StepsBody kAvx2{8, avx2::put_steps}, kAvx512{16, avx512::put_steps};
+  if (isa == Isa::kAvx512) return &kAvx512;
+  if (isa == Isa::kAvx2) return &kAvx2;
+#endif
+  return nullptr;
+}
+
+/// From change `at` of a task on, those that take horizontal mode: a far one, and with it the next of its row.
+/// returns  the first that does not, or that is the last of `count` and not of its row
+std::uint32_t put_horizontals(BitWriter& writer, const StepsTask& task, const Steps& steps, std::uint32_t at,
+                              std::uint32_t count) {
+  const std::uint32_t usable = steps.keeps & steps.far, ends = task.ends.bits();
+  while (at < count && (usable >> at & 1) != 0) {
+    const std::uint32_t* const change = task.change + at;
+    const bool first = at == 0 ? task.ends.position() == 0 : (ends >> (at - 1) & 1) != 0;
+    const std::uint32_t before = first ? 0 : change[-1];
+    if ((ends >> at & 1) != 0) {  // the other run reaches the end of the row; rows have pairs of changes, so it is white
+      put_horizontal(writer, 1, change[0] - before, task.columns - change[0]);
+      at += 1;
+      continue;
+    }
+    if ((steps.keeps >> (at + 1) & 1) == 0) break;
+    put_horizontal(writer, (task.ends.position() + at) & 1, change[0] - before, change[1] - change[0]);
+    if ((ends >> (at + 1) & 1) != 0) writer.put(kVertical[3]);
+    at += 2;
+  }
+  return at;
+}
+
+/// Rows that follow each other; the first has a row above, and all have the same number of changes.
+struct SteadyRows {
+  const std::uint32_t* change;  // the first of the first row
+  std::uint32_t changes;        // of a row, 2 or more
+  std::uint32_t rows;
+  std::uint32_t columns;
+};
+
+/// Codes changes from the first on as long as none needs pass mode. needs  room for all of them
+/// returns  how many are coded; each row whose last change is among them is whole. The first that is not coded has the change
+///          above of the same number as T.6's b1, the one before it as a0
+std::uint32_t put_steady_rows(BitWriter& writer, const SteadyRows& rows, const StepsBody& body) {
+  const std::uint32_t total = rows.changes * rows.rows;
+  BitWriter out = writer;
+  StepsTask task{rows.change, total, rows.changes, rows.columns, RowEnds(rows.changes, body.lanes)};
+  Steps steps;
+  for (;;) {
+    body.put(out, task, steps);
+    if (task.left == 0) break;
+    const std::uint32_t count = std::min(body.lanes, task.left);
+    std::uint32_t at = steps.count;
+    if (at != 0) put_words(out, steps);
+    if (at < count) at = put_horizontals(out, task, steps, at, count);
+    task.left -= at;
+    // A change that keeps no step stops, and so does a far one before such.
+    const bool stops = at < count && (steps.keeps >> at & 1) == 0;
+    const bool before_stop = at + 1 < count && (steps.keeps >> at & steps.far >> at & 1) != 0;
+    if (stops || before_stop || task.left == 0) break;
+    task.change += at;
+    task.ends.advance(at);
+  }
+  writer = out;
+  return total - task.left;
 }
 
 /// Rows from `r` on that have as many changes as that one, as many as need little room.

@@ -1,8 +1,10 @@
 // stages/formats/g4/encode.h: CCITT Group 4 (ITU-T T.6) straight from runs.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "stages/data/buffer.h"
 #include "stages/data/choices.h"
@@ -30,5 +32,20 @@ class Encoder {
   const StepsBody* body_;
   Buffer<std::uint32_t> coding_, reference_;  // 0, the changes of a row, then `columns` some times
 };
+
+/// The row after `row` and all empty rows that follow it. Offsets (data/runs.h) never fall, so a search by doubling finds
+/// the end. cost: the logarithm of the stretch
+inline std::uint32_t end_of_empty_rows(std::span<const std::uint32_t> row_offset, std::uint32_t row) {
+  const std::uint32_t offset = row_offset[row];
+  const std::size_t last = row_offset.size() - 1;
+  std::size_t known = row + 1, step = 1;
+  while (known + step <= last && row_offset[known + step] == offset) {
+    known += step;
+    step *= 2;
+  }
+  const auto limit = row_offset.begin() + static_cast<std::ptrdiff_t>(std::min(known + step, last + 1));
+  const auto past = std::upper_bound(row_offset.begin() + static_cast<std::ptrdiff_t>(known), limit, offset);
+  return static_cast<std::uint32_t>(past - row_offset.begin() - 1);
+}
 
 }  // namespace lamina::formats::g4

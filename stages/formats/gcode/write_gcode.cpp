@@ -70,6 +70,25 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
   totals_.seconds += mm(layer.thickness) / machine.speed.lift_mm_s;
 }
 
+char* LayerWriter::retract(char* text) {
+  const auto& retraction = machine_.retraction;
+  const std::int64_t back = nearest(retraction.length_mm * 1e5);
+  text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
+  ++totals_.retractions;
+  retracted_ = true;
+  return feed_retraction(text);
+}
+
+/// The end of a line that moves the filament alone.
+char* LayerWriter::feed_retraction(char* text) {
+  feed_rate_ = nearest(machine_.retraction.speed_mm_s * 60);
+  text = put_fixed<0>(feed_rate_, put(text, " F"));
+  *text++ = '\n';
+  totals_.seconds += machine_.retraction.length_mm / machine_.retraction.speed_mm_s;
+  last_speed_ = 0;
+  return text;
+}
+
 void LayerWriter::extrude_to(double filament_mm, char*& text) {
   fed_ += filament_mm;
   const std::int64_t now = nearest(fed_ * 1e5);
@@ -121,17 +140,7 @@ void LayerWriter::travel(Point2 to) {
   const auto& retraction = machine_.retraction;
   const bool draws_back = !retracted_ && retraction.length_mm > 0 && placed_ && length >= retraction.min_travel_mm;
   append_written(out_, kMaxLine * 2, [&](char* text) {
-    if (draws_back) {
-      retracted_ = true;
-      ++totals_.retractions;
-      const std::int64_t back = nearest(retraction.length_mm * 1e5);
-      text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
-      feed_rate_ = nearest(retraction.speed_mm_s * 60);
-      text = put_fixed<0>(feed_rate_, put(text, " F"));
-      *text++ = '\n';
-      totals_.seconds += retraction.length_mm / retraction.speed_mm_s;
-      last_speed_ = 0;
-    }
+    if (draws_back) text = retract(text);
     text = put_fixed<3>(micrometres(to.x + corner_x_), put(text, "G0 X"));
     text = put_fixed<3>(micrometres(to.y + corner_y_), put(text, " Y"));
     const std::int64_t rate = nearest(machine_.speed.travel_mm_s * 60);
@@ -163,13 +172,8 @@ double LayerWriter::deposit(const BeadMove& move) {
         }
         text = put_fixed<5>(written_, put(text, "G1 E"));
       }
-      feed_rate_ = nearest(machine_.retraction.speed_mm_s * 60);
-      text = put_fixed<0>(feed_rate_, put(text, " F"));
-      *text++ = '\n';
-      return text;
+      return feed_retraction(text);
     });
-    totals_.seconds += machine_.retraction.length_mm / machine_.retraction.speed_mm_s;
-    last_speed_ = 0;
     retracted_ = false;
   }
   tags(move);
@@ -193,16 +197,7 @@ double LayerWriter::deposit(const BeadMove& move) {
 
 const MoveTotals& LayerWriter::finish() {
   if (!retracted_ && machine_.retraction.length_mm > 0) {
-    append_written(out_, kMaxLine, [&](char* text) {
-      const std::int64_t back = nearest(machine_.retraction.length_mm * 1e5);
-      text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
-      text = put_fixed<0>(nearest(machine_.retraction.speed_mm_s * 60), put(text, " F"));
-      *text++ = '\n';
-      return text;
-    });
-    ++totals_.retractions;
-    totals_.seconds += machine_.retraction.length_mm / machine_.retraction.speed_mm_s;
-    retracted_ = true;
+    append_written(out_, kMaxLine, [&](char* text) { return retract(text); });
   }
   return totals_;
 }

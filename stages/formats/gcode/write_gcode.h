@@ -26,6 +26,8 @@ class LayerWriter final : public LayerMoves {
 
  private:
   void travel(Point2 to);
+  char* retract(char* text);
+  char* feed_retraction(char* text);
   void extrude_to(double filament_mm, char*& text);
   void tags(const BeadMove& move);
   void time(double length_mm, double speed_mm_s, double unit_x, double unit_y);

@@ -12,7 +12,6 @@
 
 #include "stages/data/units.h"
 #include "stages/formats/images/image_formats.h"
-#include "stages/formats/images/numbered.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
 
@@ -20,19 +19,19 @@ namespace lamina::formats {
 namespace {
 
 /// By the first bytes, regardless of the file name.
-Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
-                            LevelSink* sink) {
+Result<Image> read_by_magic(const FileReader& file, int threshold, std::uint64_t page, LevelSink* sink) {
+  const std::string& path = file.path();
   unsigned char magic[8] = {};
-  if (::pread(file, magic, sizeof magic, 0) < 0) {
+  if (::pread(file.descriptor(), magic, sizeof magic, 0) < 0) {
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return read_tiff(file, bytes, path, threshold, page, sink);
-  if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file, bytes, path, threshold, sink);
+  if (begins("II", 2) || begins("MM", 2)) return read_tiff(file.descriptor(), file.size(), path, threshold, page, sink);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file.descriptor(), file.size(), path, threshold, sink);
   if (sink != nullptr && !sink->nearest)
     return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
-  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return read_pbm(file, bytes, path, threshold, sink);
-  if (begins("BM", 2)) return read_bmp(file, bytes, path, threshold, sink);
+  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return read_pbm(file, threshold, sink);
+  if (begins("BM", 2)) return read_bmp(file, threshold, sink);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
 
@@ -40,7 +39,7 @@ Result<Image> read_image(const std::string& path, int threshold, std::uint64_t p
   const auto file = FileReader::open(path, {});
   if (!file) return file.error();
   try {
-    return read_by_magic(file->descriptor(), file->size(), path, threshold, page, sink);
+    return read_by_magic(*file, threshold, page, sink);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }
@@ -147,30 +146,50 @@ std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t 
                        : fmt::format("{} set pixels, the manifest says {}", is_set, set);
 }
 
-// Rows of grey values become bits or levels.
-
-void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t step, bool second, int threshold) {
-  const std::size_t offset = second ? 1 : 0;
-  for (std::uint32_t first = 0; first < columns; first += 8) {
-    unsigned bits = 0;
-    for (std::uint32_t i = 0; i < 8 && first + i < columns; ++i) {
-      const int value = std::to_integer<int>(row[(std::size_t{first} + i) * step + offset]);
-      bits |= static_cast<unsigned>(value < threshold) << (7 - i);
-    }
-    row[first / 8] = static_cast<std::byte>(bits);  // before all values that are still to be read
+Runs inverse(const Runs& image) {
+  Runs out;
+  out.columns = image.columns;
+  out.row_offset.assign(1, 0);
+  for (std::uint32_t r = 0; r < image.view().rows(); ++r) {
+    const auto row = image.view().row(r);
+    const bool from_first = row.empty() || row.front() > 0, to_last = row.empty() || row.back() < image.columns;
+    if (from_first) out.change.push_back(0);
+    for (const std::uint32_t c : row)
+      if (c > 0 && c < image.columns) out.change.push_back(c);
+    if (to_last) out.change.push_back(image.columns);
+    out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
   }
+  return out;
 }
 
-void bits_of_nibbles(std::span<std::byte> row, std::uint32_t columns, int threshold) {
+// Rows of grey values become bits or levels.
+
+namespace {
+
+/// Bits before all values that are still to be read.
+template <class ValueAt>
+void put_bits(std::span<std::byte> row, std::uint32_t columns, int threshold, const ValueAt& value_at) {
   for (std::uint32_t first = 0; first < columns; first += 8) {
     unsigned bits = 0;
     for (std::uint32_t i = 0; i < 8 && first + i < columns; ++i) {
-      const auto pair = std::to_integer<unsigned>(row[(first + i) / 2]);
-      const auto value = static_cast<int>(i % 2 == 0 ? pair >> 4 : pair & 15u);
-      bits |= static_cast<unsigned>(17 * value < threshold) << (7 - i);
+      bits |= static_cast<unsigned>(value_at(first + i) < threshold) << (7 - i);
     }
     row[first / 8] = static_cast<std::byte>(bits);
   }
+}
+
+}  // namespace
+
+void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t step, bool second, int threshold) {
+  const std::size_t offset = second ? 1 : 0;
+  put_bits(row, columns, threshold, [&](std::size_t i) { return std::to_integer<int>(row[i * step + offset]); });
+}
+
+void bits_of_nibbles(std::span<std::byte> row, std::uint32_t columns, int threshold) {
+  put_bits(row, columns, threshold, [&](std::size_t i) {
+    const auto pair = std::to_integer<int>(row[i / 2]);
+    return 17 * (i % 2 == 0 ? pair >> 4 : pair & 15);
+  });
 }
 
 namespace {

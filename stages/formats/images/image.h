@@ -61,6 +61,9 @@ Result<Image> nearest_levels(const std::string& path, const LevelsRequest& reque
 /// errors  kInput: not readable, or more than 2^20 images
 Result<std::vector<std::uint64_t>> pages_of(const std::string& path);
 
+/// What is not set of an image.
+Runs inverse(const Runs& image);
+
 /// What an image differs from its manifest in, its pixels or their size first: "12 x 10 pixels, the manifest says 12 x 11";
 /// or "".
 /// set    pixels that are to be set

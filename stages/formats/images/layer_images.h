@@ -1,4 +1,4 @@
-// stages/formats/images/layer_images.h: a stack of layer images, of which one layer is read at a time.
+// stages/formats/images/layer_images.h: numbered layer images, and a stack of them of which one layer is read at a time.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,17 @@ struct Image;
 
 /// Whether a name is that of layer images: a folder, or a file that ends in .tif, .tiff, .png, .bmp, .pbm or .pgm.
 bool names_images(const std::string& path);
+
+struct Numbered {
+  std::uint64_t number;
+  std::string path;
+};
+
+/// Images .png, .tif, .tiff, .bmp, .pbm, .pgm of a folder in the order of the last numbers in their names; at least one.
+/// Hidden files, folders and files of other kinds are passed over.
+/// gaps    numbers may be missing
+/// errors  kInput: no such images, no number in a name, two of one number, a number missing, a numbered JPEG, GIF or the like
+Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool gaps = false);
 
 /// Facts that the files do not state.
 struct LayerImagesRequest {

@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 
 #include "stages/formats/images/image.h"
-#include "stages/formats/images/numbered.h"
+#include "stages/formats/images/layer_images.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::formats {

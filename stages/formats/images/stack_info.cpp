@@ -11,7 +11,7 @@
 
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
-#include "stages/formats/images/numbered.h"
+#include "stages/formats/images/layer_images.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/late/tiff.h"
 #include "stages/support/text/json_value.h"

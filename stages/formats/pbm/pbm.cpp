@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <unistd.h>
-#include <cerrno>
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <optional>
@@ -88,25 +87,16 @@ std::optional<PbmHeader> parse_head(std::string_view text) {
   return head;
 }
 
-bool read_all_at(int file, std::span<std::byte> to, std::uint64_t offset) {
-  while (!to.empty()) {
-    const ssize_t got = ::pread(file, to.data(), to.size(), static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return false;
-    to = to.subspan(static_cast<std::size_t>(got));
-    offset += static_cast<std::uint64_t>(got);
-  }
-  return true;
-}
-
 }  // namespace
 
-Result<Image> read_pbm(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+Result<Image> read_pbm(const FileReader& file, int threshold, LevelSink* sink) {
   const auto failure = [&](std::string_view why) {
-    return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4) or PGM: {}; plan the layer again", path, why)};
+    return Error{Fault::kVerification,
+                 fmt::format("{}: not a whole PBM (P4) or PGM: {}; plan the layer again", file.path(), why)};
   };
+  const std::uint64_t bytes = file.size();
   Buffer<std::byte> buffer(std::min<std::uint64_t>(bytes, kMaxHeadBytes));
-  if (!read_all_at(file, buffer, 0)) return failure("cannot read");
+  if (!read_bytes_at(file, 0, buffer)) return failure("cannot read");
   const auto head = parse_head({reinterpret_cast<const char*>(buffer.data()), buffer.size()});
   if (!head) return failure("its header is not one");
   if (head->columns == 0 || head->rows == 0 || head->columns > kMaxPixelsASide || head->rows > kMaxPixelsASide) {
@@ -126,7 +116,7 @@ Result<Image> read_pbm(int file, std::uint64_t bytes, const std::string& path, i
   for (std::uint32_t first = 0; first < rows; first += rows_at_once) {
     const std::uint32_t count = std::min(rows_at_once, rows - first);
     const std::span<std::byte> strip = std::span(buffer).first(stride * count);
-    if (!read_all_at(file, strip, head->bytes + std::uint64_t{stride} * first)) return failure("cannot read");
+    if (!read_bytes_at(file, head->bytes + std::uint64_t{stride} * first, strip)) return failure("cannot read");
     for (std::uint32_t r = 0; r < count; ++r) {
       const std::span<std::byte> row = strip.subspan(stride * r, stride);
       if (to_sink) {

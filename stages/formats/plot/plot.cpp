@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stages/formats/image_format.h"
-#include "stages/formats/png/coloured.h"
+#include "stages/formats/png/png_format.h"
 #include "stages/formats/svg/svg_writer.h"
 #include "stages/support/text/escape.h"
 #include "stages/support/text/json_text.h"

@@ -10,27 +10,23 @@
 #include <csetjmp>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <new>
 #include <optional>
 #include <string_view>
 
-#include "stages/formats/image_format.h"
 #include "stages/formats/images/image_formats.h"
-#include "stages/formats/png/chunk.h"
-#include "stages/formats/png/deflate.h"
 #include "stages/formats/png/image_data.h"
 #include "stages/geometry/bits.h"
 
 namespace lamina::formats::png {
 namespace {
 
-constexpr std::size_t kHeadBytes = 128;  // of what stands before the image data, and of IEND, at most
+using namespace std::string_view_literals;
 
-std::byte* put_byte(std::byte* at, unsigned byte) {
-  *at = static_cast<std::byte>(byte);
-  return at + 1;
-}
+constexpr std::size_t kHeadBytes = 128;  // of what stands before the image data at most
+constexpr std::string_view kSignature = "\x89PNG\r\n\x1A\n";
 
 std::byte* put_text(std::byte* at, std::string_view bytes) {
   std::memcpy(at, bytes.data(), bytes.size());
@@ -40,36 +36,32 @@ std::byte* put_text(std::byte* at, std::string_view bytes) {
 /// Pixels a metre, as pHYs has them, rounded to the nearest.
 std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
 
-/// Signature, IHDR, PLTE, pHYs. returns  where the image data begin
-std::byte* put_first_chunks(std::byte* at, const RunsView& runs, double dpi_x, double dpi_y) {
-  using namespace std::string_view_literals;
-  std::byte* chunk = put_text(at, "\x89PNG\r\n\x1A\n");
-  at = put_number(chunk + kChunkHead, runs.columns);
-  at = put_number(at, runs.rows());
-  chunk = close_chunk(chunk, put_text(at, "\x01\x03\0\0\0"sv), "IHDR");  // 1 bit, palette, deflate, filters, not interlaced
-  at = put_text(chunk + kChunkHead, "\xFF\xFF\xFF\0\0\0"sv);
-  chunk = close_chunk(chunk, at, "PLTE");
-  at = put_number(chunk + kChunkHead, per_metre(dpi_x));
-  at = put_number(at, per_metre(dpi_y));
-  return close_chunk(chunk, put_byte(at, 1), "pHYs");
+/// Signature, IHDR, PLTE if any, pHYs.
+/// kind     the bytes of IHDR after the size
+/// returns  where the image data begin
+std::size_t put_first_chunks(Bytes& file, std::uint32_t columns, std::uint32_t rows, std::string_view kind,
+                             std::string_view palette, double dpi_x, double dpi_y) {
+  file.resize(std::max(file.capacity(), kHeadBytes));
+  std::byte* chunk = put_text(file.data(), kSignature);
+  std::byte* at = put_number(put_number(chunk + kChunkHead, columns), rows);
+  chunk = close_chunk(chunk, put_text(at, kind), "IHDR");
+  if (!palette.empty()) chunk = close_chunk(chunk, put_text(chunk + kChunkHead, palette), "PLTE");
+  at = put_number(put_number(chunk + kChunkHead, per_metre(dpi_x)), per_metre(dpi_y));
+  return static_cast<std::size_t>(close_chunk(chunk, put_text(at, "\x01"sv), "pHYs") - file.data());
+}
+
+void put_last_chunk(Bytes& file, std::size_t end) {
+  file.resize(end + kChunkHead + kChunkTail);
+  close_chunk(file.data() + end, file.data() + end + kChunkHead, "IEND");
 }
 
 class PngEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    const auto failure = [&](std::string_view why) {
-      return Error{Fault::kOutput,
-                   fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", runs.columns, runs.rows(), why)};
-    };
-    if (runs.columns == 0 || runs.rows() == 0) return failure("it has no pixels");
-    if (runs.columns > kMaxPixelsASide || runs.rows() > kMaxPixelsASide) {
-      return failure(fmt::format("a side has at most {} pixels", kMaxPixelsASide));
-    }
-    file.resize(std::max(file.capacity(), kHeadBytes));
-    const std::byte* data = put_first_chunks(file.data(), runs, dpi_x, dpi_y);
-    const std::size_t end = put_image_data(runs, file, static_cast<std::size_t>(data - file.data()));
-    file.resize(end + kChunkHead + kChunkTail);
-    close_chunk(file.data() + end, file.data() + end + kChunkHead, "IEND");
+    if (Status status = check_size("PNG", runs.columns, runs.rows()); !status) return status;
+    constexpr std::string_view kKind = "\x01\x03\0\0\0"sv;  // 1 bit, palette, deflate, filters, not interlaced
+    const std::size_t data = put_first_chunks(file, runs.columns, runs.rows(), kKind, "\xFF\xFF\xFF\0\0\0"sv, dpi_x, dpi_y);
+    put_last_chunk(file, put_image_data(runs, file, data));
     return {};
   }
 };
@@ -85,8 +77,6 @@ std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<PngEncode
 
 namespace {
 
-constexpr std::uint32_t kMaxEqual = 258, kEndOfBlock = 256, kLengthOf258 = 285;
-
 constexpr std::array<std::uint8_t, 288> fixed_lengths() {
   std::array<std::uint8_t, 288> lengths{};
   for (std::size_t s = 0; s < lengths.size(); ++s) lengths[s] = s < 144 ? 8 : s < 256 ? 9 : s < 280 ? 7 : 8;
@@ -94,23 +84,15 @@ constexpr std::array<std::uint8_t, 288> fixed_lengths() {
 }
 constexpr auto kFixed = words_of(fixed_lengths());
 
-/// A match of `length` 3 .. 257 bytes of distance 1, whose own word is five zeros.
-constexpr BitString match_word(std::uint32_t length) {
-  std::uint32_t symbol = 257, base = 3, extra = 0;
-  for (;; ++symbol) {
-    extra = symbol < 265 ? 0 : (symbol - 261) / 4;
-    if (length < base + (1u << extra)) break;
-    base += 1u << extra;
+/// Matches of distance 1, whose own word is five zeros, by length.
+constexpr auto kMatch = [] {
+  std::array<BitString, kLongestMatch + 1> words{};
+  for (std::uint32_t length = kShortestMatch; length <= kLongestMatch; ++length) {
+    const LengthClass found = length_class(length);
+    words[length] = join(join(kFixed[found.symbol], BitString(found.extra, found.extra_bits)), BitString(0, 5));
   }
-  return join(join(kFixed[symbol], BitString(length - base, extra)), BitString(0, 5));
-}
-constexpr std::array<BitString, kMaxEqual + 1> match_words() {
-  std::array<BitString, kMaxEqual + 1> words{};
-  for (std::uint32_t length = 3; length < kMaxEqual; ++length) words[length] = match_word(length);
-  words[kMaxEqual] = join(kFixed[kLengthOf258], BitString(0, 5));
   return words;
-}
-constexpr auto kMatch = match_words();
+}();
 
 /// Adler's check (RFC 1950, section 9) of runs of equal bytes.
 class Check {
@@ -132,81 +114,44 @@ class Check {
 class GreyEncoder : public LevelEncoder {
  public:
   Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) override {
-    const auto failure = [&](std::string_view why) {
-      return Error{Fault::kOutput,
-                   fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", image.columns, image.rows(), why)};
-    };
-    if (image.columns == 0 || image.rows() == 0) return failure("it has no pixels");
-    if (image.columns > kMaxPixelsASide || image.rows() > kMaxPixelsASide) {
-      return failure(fmt::format("a side has at most {} pixels", kMaxPixelsASide));
+    if (Status status = check_size("PNG", image.columns, image.rows()); !status) return status;
+    if (full == 0 || 255 % full != 0) {
+      return cannot_hold("PNG", image.columns, image.rows(), fmt::format("{} levels are no whole steps of 8 bits", full + 1));
     }
-    if (full == 0 || 255 % full != 0) return failure(fmt::format("{} levels are no whole steps of 8 bits", full + 1));
-    file.resize(std::max<std::size_t>(file.capacity(), 4096));
-    const std::size_t data = put_head(image, dpi_x, dpi_y, file);
-    chunk_ = data;
-    BitWriter out(file.data() + chunk_ + kChunkHead);
-    out.put(0x0178, 16);  // zlib's header: deflate, a window of 32 KiB, the fastest level
-    out.put(0b011, 3);    // the last block, of the fixed code
+    constexpr std::string_view kKind = "\x08\0\0\0\0"sv;  // 8 bits, grey, deflate, filters, not interlaced
+    Chunks chunks(file, put_first_chunks(file, image.columns, image.rows(), kKind, {}, dpi_x, dpi_y));
+    BitWriter out(chunks.content());
+    out.put(kZlibHeader, 16);
+    out.put(0b011, 3);  // the last block, of the fixed code
     check_ = Check();
     for (std::uint32_t r = 0; r < image.rows(); ++r) {
-      put(0, 1, out, file);  // no filter
+      put(0, 1, out, chunks);  // no filter
       std::uint32_t at = 0;
       for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
-        put(255, image.change[2 * i] - at, out, file);
+        put(255, image.change[2 * i] - at, out, chunks);
         at = image.change[2 * i + 1];
-        put(255u - image.level[i] * (255u / full), at - image.change[2 * i], out, file);
+        put(255u - image.level[i] * (255u / full), at - image.change[2 * i], out, chunks);
       }
-      put(255, image.columns - at, out, file);
+      put(255, image.columns - at, out, chunks);
     }
-    ensure_capacity(out, file);
+    chunks.ensure_capacity(out, kWords);
     out.put(kFixed[kEndOfBlock]);
-    std::byte* end = close_chunk(file.data() + chunk_, put_number(out.finish(), check_.value()), "IDAT");
-    const std::size_t last = static_cast<std::size_t>(end - file.data());
-    file.resize(last + kChunkHead + kChunkTail);
-    close_chunk(file.data() + last, file.data() + last + kChunkHead, "IEND");
+    put_last_chunk(file, chunks.close(put_number(out.finish(), check_.value())));
     return {};
   }
 
  private:
-  static constexpr std::size_t kSlack = 128, kChunkContent = std::size_t{1} << 16;
+  static constexpr std::size_t kWords = 16;  // bytes, of the words between two tests of the capacity at most
 
-  static std::size_t put_head(const LevelsView& image, double dpi_x, double dpi_y, Bytes& file) {
-    using namespace std::string_view_literals;
-    const auto text = [](std::byte* at, std::string_view bytes) {
-      std::memcpy(at, bytes.data(), bytes.size());
-      return at + bytes.size();
-    };
-    std::byte* chunk = text(file.data(), "\x89PNG\r\n\x1A\n"sv);
-    std::byte* at = put_number(put_number(chunk + kChunkHead, image.columns), image.rows());
-    chunk = close_chunk(chunk, text(at, "\x08\0\0\0\0"sv), "IHDR");  // 8 bits, grey, deflate, filters, not interlaced
-    at = put_number(put_number(chunk + kChunkHead, per_metre(dpi_x)), per_metre(dpi_y));
-    *at++ = std::byte{1};
-    return static_cast<std::size_t>(close_chunk(chunk, at, "pHYs") - file.data());
-  }
-  /// Pixels a metre, as pHYs has them, rounded to the nearest.
-  static std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
-
-  /// Closes a chunk that is long enough, and makes room for some words.
-  void ensure_capacity(BitWriter& out, Bytes& file) {
-    std::size_t used = static_cast<std::size_t>(out.next() - file.data());
-    if (used - chunk_ < kChunkContent && used + kSlack <= file.size()) return;
-    if (file.size() < used + 2 * kSlack) file.resize(2 * file.size() + 2 * kSlack);
-    if (used - chunk_ >= kChunkContent) {
-      chunk_ = static_cast<std::size_t>(close_chunk(file.data() + chunk_, file.data() + used, "IDAT") - file.data());
-      used = chunk_ + kChunkHead;
-    }
-    out.move_to(file.data() + used);
-  }
-
-  void put(std::uint32_t byte, std::uint64_t count, BitWriter& out, Bytes& file) {
+  void put(std::uint32_t byte, std::uint64_t count, BitWriter& out, Chunks& chunks) {
     if (count == 0) return;
     check_.add(byte, count);
-    ensure_capacity(out, file);
+    chunks.ensure_capacity(out, kWords);
     out.put(kFixed[byte]);
     for (--count; count > 0;) {
-      ensure_capacity(out, file);
-      const auto length = static_cast<std::uint32_t>(std::min<std::uint64_t>(count, kMaxEqual));
-      if (length < 3) {
+      chunks.ensure_capacity(out, kWords);
+      const auto length = static_cast<std::uint32_t>(std::min<std::uint64_t>(count, kLongestMatch));
+      if (length < kShortestMatch) {
         for (std::uint32_t i = 0; i < length; ++i) out.put(kFixed[byte]);
       } else {
         out.put(kMatch[length]);
@@ -215,13 +160,53 @@ class GreyEncoder : public LevelEncoder {
     }
   }
 
-  std::size_t chunk_ = 0;  // where it begins
   Check check_;
 };
 
 }  // namespace
 
 std::unique_ptr<LevelEncoder> make_8_bit_encoder() { return std::make_unique<GreyEncoder>(); }
+
+namespace {
+
+void add_chunk(Buffer<std::byte>& file, std::string_view name, std::span<const std::byte> content) {
+  const std::size_t begin = file.size();
+  file.resize(begin + kChunkHead);
+  file.insert(file.end(), content.begin(), content.end());
+  file.resize(file.size() + kChunkTail);
+  close_chunk(file.data() + begin, file.data() + file.size() - kChunkTail, name);
+}
+
+}  // namespace
+
+Buffer<std::byte> coloured(std::uint32_t columns, std::span<const std::string> colours, std::span<const std::uint8_t> pixels) {
+  const auto rows = static_cast<std::uint32_t>(pixels.size() / columns);
+  const auto signature = std::as_bytes(std::span(kSignature));
+  Buffer<std::byte> file(signature.begin(), signature.end()), part(13, std::byte{});
+  put_number(put_number(part.data(), columns), rows);
+  part[8] = std::byte{8};  // bits a pixel
+  part[9] = std::byte{3};  // numbers of a palette
+  add_chunk(file, "IHDR", part);
+  part.clear();
+  for (const std::string& colour : colours) {
+    const unsigned long rgb = std::strtoul(colour.c_str(), nullptr, 16);
+    for (const int shift : {16, 8, 0}) part.push_back(static_cast<std::byte>(rgb >> shift));
+  }
+  add_chunk(file, "PLTE", part);
+  Buffer<std::byte> plain;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    plain.push_back(std::byte{0});
+    const auto row = std::as_bytes(pixels.subspan(std::size_t{columns} * r, columns));
+    plain.insert(plain.end(), row.begin(), row.end());
+  }
+  uLongf size = ::compressBound(plain.size());
+  part.resize(size);
+  ::compress2(reinterpret_cast<Bytef*>(part.data()), &size, reinterpret_cast<const Bytef*>(plain.data()), plain.size(), 9);
+  part.resize(size);
+  add_chunk(file, "IDAT", part);
+  add_chunk(file, "IEND", {});
+  return file;
+}
 
 }  // namespace lamina::formats::png
 

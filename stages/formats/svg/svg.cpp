@@ -15,36 +15,30 @@ namespace lamina::formats {
 
 namespace {
 
-std::string_view colour_of(PathKind kind) {
-  switch (kind) {
-    case PathKind::kOuter: return "#c0392b";
-    case PathKind::kInner: return "#e67e22";
-    case PathKind::kRaster: return "#2980b9";
-    case PathKind::kContour: return "#16a085";
-    case PathKind::kLink: return "#8e44ad";
-    case PathKind::kSkirt: return "#7f8c8d";
-  }
-  return "#000000";
-}
+constexpr std::string_view kDeclaration =
+    "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\"?>\n"
+    "<!DOCTYPE svg PUBLIC \"-//W3C//DTD SVG 1.0//EN\" \"http://www.w3.org/TR/2001/REC-SVG-20010904/DTD/svg10.dtd\">\n";
 
-std::string_view name_of(PathKind kind) {
+struct PathStyle {
+  std::string_view name, colour;
+};
+
+PathStyle style_of(PathKind kind) {
   switch (kind) {
-    case PathKind::kOuter: return "outer";
-    case PathKind::kInner: return "inner";
-    case PathKind::kRaster: return "raster";
-    case PathKind::kContour: return "contour";
-    case PathKind::kLink: return "link";
-    case PathKind::kSkirt: return "skirt";
+    case PathKind::kOuter: return {"outer", "#c0392b"};
+    case PathKind::kInner: return {"inner", "#e67e22"};
+    case PathKind::kRaster: return {"raster", "#2980b9"};
+    case PathKind::kContour: return {"contour", "#16a085"};
+    case PathKind::kLink: return {"link", "#8e44ad"};
+    case PathKind::kSkirt: return {"skirt", "#7f8c8d"};
   }
-  return "";
+  return {"", "#000000"};
 }
 
 class SvgEncoder : public SliceEncoder {
  public:
   void head(const SliceHead& head, Buffer<char>& out) const override {
-    append(out,
-           "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\"?>\n"
-           "<!DOCTYPE svg PUBLIC \"-//W3C//DTD SVG 1.0//EN\" \"http://www.w3.org/TR/2001/REC-SVG-20010904/DTD/svg10.dtd\">\n");
+    append(out, kDeclaration);
     SvgWriter svg(out);
     svg.begin("svg");
     svg.millimetres("width", head.bounds.width());
@@ -111,11 +105,12 @@ class SvgEncoder : public SliceEncoder {
       svg.begin_data();
       svg.line({&paths.point[begin], &paths.point[end] + 1}, frame);
       svg.end_data();
-      svg.attribute("class", name_of(paths.kind[begin]));
+      const PathStyle style = style_of(paths.kind[begin]);
+      svg.attribute("class", style.name);
       char width[kMaxDecimal];
       svg.attribute("style",
                     fmt::format("fill: none; stroke: {}; stroke-linecap: round; stroke-linejoin: round; stroke-width: {}",
-                                colour_of(paths.kind[begin]), std::string_view(width, put_mm(paths.width[begin], width))));
+                                style.colour, std::string_view(width, put_mm(paths.width[begin], width))));
       svg.end();
       begin = end;
     }
@@ -171,9 +166,7 @@ std::vector<Outline> outermost_first(const ContoursView& contours) {
 class SvgPolygonEncoder : public SliceEncoder {
  public:
   void head(const SliceHead& head, Buffer<char>& out) const override {
-    append(out,
-           "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\"?>\n"
-           "<!DOCTYPE svg PUBLIC \"-//W3C//DTD SVG 1.0//EN\" \"http://www.w3.org/TR/2001/REC-SVG-20010904/DTD/svg10.dtd\">\n");
+    append(out, kDeclaration);
     append(out, fmt::format("<svg width=\"{}\" height=\"{}\" xmlns=\"http://www.w3.org/2000/svg\" "
                             "xmlns:svg=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" "
                             "xmlns:slic3r=\"http://slic3r.org/namespaces/slic3r\">\n  <!-- \n  Generated using {}\n   -->\n",
@@ -212,5 +205,40 @@ class SvgPolygonEncoder : public SliceEncoder {
 }  // namespace
 
 std::unique_ptr<SliceEncoder> make_svg_polygon_encoder() { return std::make_unique<SvgPolygonEncoder>(); }
+
+namespace {
+
+void write_region(SvgWriter& svg, const SvgFrame& frame, const std::string& name, const Ink& ink, const Contours& contours) {
+  svg.begin("path");
+  svg.attribute("class", svg_escaped(name));
+  svg.attribute("fill", fmt::format("#{:02x}{:02x}{:02x}", ink[0], ink[1], ink[2]));
+  svg.attribute("fill-rule", "nonzero");
+  svg.begin_data();
+  for (std::uint32_t c = 0; c < contours.size(); ++c) svg.contour(contours[c], frame);
+  svg.end_data();
+  svg.end();
+}
+
+}  // namespace
+
+std::string svg_drawing(const LayerShapes& shapes) {
+  const Box& box = shapes.box;
+  const std::int64_t margin = std::max(box.width(), box.depth()) / 50;
+  const std::int64_t width = box.width() + 2 * margin, height = box.depth() + 2 * margin;
+  const SvgFrame frame{box.lo.x - margin, box.hi.y + margin};
+  Buffer<char> out;
+  SvgWriter svg(out);
+  svg.begin("svg");
+  svg.attribute("xmlns", "http://www.w3.org/2000/svg");
+  svg.millimetres("width", width, "mm");
+  svg.millimetres("height", height, "mm");
+  svg.attribute("viewBox", fmt::format("0 0 {} {}", mm(width), mm(height)));
+  svg.open();
+  svg.comment("drawn by lamina");
+  write_region(svg, frame, "solid", {205, 209, 216}, shapes.contours);
+  for (const LayerShapes::Beads& beads : shapes.beads) write_region(svg, frame, beads.name, beads.ink, beads.outline);
+  svg.close("svg");
+  return {out.begin(), out.end()};
+}
 
 }  // namespace lamina::formats

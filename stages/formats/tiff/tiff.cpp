@@ -1,28 +1,306 @@
 #include "stages/formats/tiff/tiff.h"
 
 #include <fmt/format.h>
+#include <tiff.h>
 
 #include <unistd.h>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <new>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "stages/data/units.h"
 #include "stages/formats/g4/decode.h"
 #include "stages/formats/g4/encode.h"
-#include "stages/formats/image_format.h"
 #include "stages/formats/images/image_formats.h"
-#include "stages/formats/tiff/tags.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
+#include "stages/support/text/decimal.h"
 
 namespace lamina::formats::tiff {
 namespace {
 
-// libtiff's header of a classic TIFF. The first strip follows it.
-constexpr std::size_t kHeaderBytes = 8;
+/// Content is bytes[0 .. size); the buffer may be larger, so that it need not grow with every write.
+struct MemoryFile {
+  Buffer<std::byte>& bytes;
+  std::uint64_t size = 0;
+  std::uint64_t position = 0;
+};
+
+/// Largest size of a file whose offsets have 32 bits.
+constexpr std::uint64_t kMaxClassicBytes = 0xFFFFFFFF;
+
+MemoryFile& file_of(thandle_t handle) { return *static_cast<MemoryFile*>(handle); }
+
+tmsize_t read_nothing(thandle_t, void*, tmsize_t) { return 0; }
+
+tmsize_t write_bytes(thandle_t handle, void* from, tmsize_t count) {
+  MemoryFile& file = file_of(handle);
+  const std::uint64_t end = file.position + static_cast<std::uint64_t>(count);
+  if (end > kMaxClassicBytes) return 0;
+  std::byte* to = file.bytes.data() + file.position;
+  // Strips that were encoded in the place where libtiff puts them are there already.
+  const bool in_place = from == to && end <= file.bytes.size();
+  if (!in_place) {
+    if (end > file.bytes.size()) {
+      try {
+        file.bytes.resize(std::max<std::size_t>({end, file.bytes.size() * 2, std::size_t{4096}}));
+      } catch (const std::bad_alloc&) {
+        return 0;
+      }
+      to = file.bytes.data() + file.position;
+    }
+    std::memcpy(to, from, static_cast<std::size_t>(count));
+  }
+  // libtiff begins its directory at an even offset and skips a byte for that; in a buffer used before, that byte is
+  // one of an older image.
+  if (file.position > file.size) std::memset(file.bytes.data() + file.size, 0, file.position - file.size);
+  file.position = end;
+  file.size = std::max(file.size, end);
+  return count;
+}
+
+toff_t seek(thandle_t handle, toff_t offset, int whence) {
+  MemoryFile& file = file_of(handle);
+  const std::uint64_t base = whence == SEEK_SET ? 0 : whence == SEEK_CUR ? file.position : file.size;
+  file.position = base + offset;
+  return file.position;
+}
+
+int close_nothing(thandle_t) { return 0; }
+
+toff_t size_of(thandle_t handle) { return file_of(handle).size; }
+
+/// A little-endian classic TIFF to be written into `file`, which must outlive the handle, as must `message`: libtiff's
+/// own words on the first thing that goes wrong. nullptr if memory ran out.
+TiffHandle open_for_writing(MemoryFile& file, std::string& message) {
+  const auto options = strict_tiff_options(message);
+  if (options == nullptr) return nullptr;
+  return TiffHandle(TIFFClientOpenExt("layer", "wl", &file, read_nothing, write_bytes, seek, close_nothing, size_of, nullptr,
+                                      nullptr, options.get()));
+}
+
+/// A strip of bits is at most this long, unless a row is longer: it stays in the second-level cache between being
+/// filled and being read, and a reader needs no more memory than that.
+constexpr std::size_t kStripBytes = 256 * 1024;
+/// Room for the directory and what it points to, so that libtiff's last writes do not grow the buffer.
+constexpr std::size_t kDirectoryBytes = 1024;
+
+/// Min-is-white, one sample of so many bits.
+struct TagFrame {
+  std::uint32_t columns, rows;
+  double dpi_x, dpi_y;
+  std::uint16_t bits, compression;
+  std::size_t stride = (std::size_t{columns} * bits + 7) / 8;
+  std::uint32_t rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, rows));
+};
+
+Error refused(const TagFrame& frame, std::string_view why) { return cannot_hold("TIFF", frame.columns, frame.rows, why); }
+
+void set_tags(TIFF* tiff, const TagFrame& frame) {
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, frame.columns);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, frame.rows);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, static_cast<int>(frame.bits));
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, static_cast<int>(frame.compression));
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+  TIFFSetField(tiff, TIFFTAG_FILLORDER, FILLORDER_MSB2LSB);
+  TIFFSetField(tiff, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, frame.rows_per_strip);
+  TIFFSetField(tiff, TIFFTAG_XRESOLUTION, frame.dpi_x);
+  TIFFSetField(tiff, TIFFTAG_YRESOLUTION, frame.dpi_y);
+  TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, RESUNIT_INCH);
+  TIFFSetField(tiff, TIFFTAG_SOFTWARE, "lamina");  // without a version: releases do not change the bytes of layers
+}
+
+/// Keeps what files say of their layers, without an allocation a layer.
+class LayerText {
+ public:
+  void take(const LayerTags& tags) {
+    constexpr std::size_t kLongestTitle = 128;
+    char bottom[kMaxDecimal], top[kMaxDecimal];
+    *put_mm(tags.bottom, bottom) = *put_mm(tags.top, top) = 0;
+    const std::string_view title = std::string_view(tags.title).substr(0, kLongestTitle);
+    const auto put =
+        fmt::format_to_n(text_, sizeof text_ - 1, "{}{}layer {} of {}, z {} to {} mm{}{}{}{}", title, title.empty() ? "" : ", ",
+                         tags.layer + 1, tags.layers, bottom, top, tags.material.empty() ? "" : ", ", tags.material,
+                         tags.mirror.empty() ? "" : ", mirrored in ", tags.mirror);
+    for (char* c = text_; c != put.out; ++c) *c = *c >= ' ' && *c <= '~' ? *c : '?';  // 7-bit ASCII, TIFF 6.0 section 2
+    *put.out = 0;
+    page_ = tags.layer;
+    pages_ = tags.layers;
+  }
+  /// Whether there is something to be said.
+  bool any() const { return pages_ != 0; }
+  void put(TIFF* tiff) const {
+    if (pages_ == 0) return;
+    TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, text_);
+    if (pages_ <= UINT16_MAX) TIFFSetField(tiff, TIFFTAG_PAGENUMBER, static_cast<int>(page_), static_cast<int>(pages_));
+  }
+
+ private:
+  char text_[256] = "";
+  std::uint32_t page_ = 0, pages_ = 0;
+};
+
+/// The whole file of an image. put_strips(TIFF*)  returns false where libtiff does not take them
+template <class PutStrips>
+Status write_file(Bytes& file, const TagFrame& frame, const LayerText& text, const PutStrips& put_strips) {
+  MemoryFile memory{file};
+  std::string message;
+  TiffHandle tiff = open_for_writing(memory, message);
+  if (tiff == nullptr) return refused(frame, message);
+  set_tags(tiff.get(), frame);
+  text.put(tiff.get());
+  const bool written = put_strips(tiff.get()) && TIFFFlush(tiff.get()) != 0;
+  tiff.reset();
+  if (!written) {
+    if (memory.position > kMaxClassicBytes - kStripBytes - kDirectoryBytes) {
+      return refused(frame, "the file would exceed 4 GiB; use --format tiff-g4");
+    }
+    return refused(frame, message.empty() ? "out of memory" : message);
+  }
+  file.resize(memory.size);
+  return {};
+}
+
+/// The same with strips of rows that fill(row, bytes) makes. strip  scratch, kept from one image to the next
+template <class Fill>
+Status write_rows(Bytes& file, const TagFrame& frame, const LayerText& text, Bytes& strip, const Fill& fill) {
+  return write_file(file, frame, text, [&](TIFF* tiff) {
+    strip.resize(frame.stride * frame.rows_per_strip);
+    for (std::uint32_t row = 0, number = 0; row < frame.rows; ++number) {
+      const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, frame.rows - row);
+      for (; row < end; ++row) fill(row, std::span(strip).subspan(frame.stride * (row - begin), frame.stride));
+      const auto length = static_cast<tmsize_t>(frame.stride * (end - begin));
+      const tmsize_t taken = frame.compression == COMPRESSION_NONE ? TIFFWriteRawStrip(tiff, number, strip.data(), length)
+                                                                   : TIFFWriteEncodedStrip(tiff, number, strip.data(), length);
+      if (taken != length) return false;
+    }
+    return true;
+  });
+}
+
+// --- what stands behind the only strip of a classic TIFF, kept from one layer to the next.
+//
+// libtiff sorts its table of fields for every file that it opens: some 60 us, which is what a small layer takes to be encoded.
+// Layers of a job differ in their strip alone, so libtiff writes the directory of the first one, and those of others are
+// copies, moved behind their strips, with the strip's length put in. Layout: TIFF 6.0 (Adobe 1992), section 2.
+
+// The first strip follows the header of a classic TIFF.
+constexpr std::size_t kStripAt = 8, kDirectoryAt = 4, kEntryBytes = 12, kMaxTail = 1024;
+
+template <class Number>
+Number number_at(std::span<const std::byte> bytes, std::size_t at) {
+  Number value = 0;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+template <class Number>
+void put_at(std::byte* bytes, std::size_t at, Number value) {
+  std::memcpy(bytes + at, &value, sizeof value);
+}
+
+/// Bytes of a value of a type; 0: no type of TIFF 6.0.
+std::size_t bytes_of(std::uint16_t type) {
+  constexpr std::array<std::uint8_t, 13> kBytes = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8};
+  return type < kBytes.size() ? kBytes[type] : 0;
+}
+
+/// libtiff begins what stands behind a strip at an even byte.
+std::size_t even(std::size_t at) { return (at + 1) & ~std::size_t{1}; }
+
+class Ending {
+ public:
+  /// What decides the directory, but for the length of the strip: lengths of 16 and of 32 bits are different fields.
+  struct TiffLayout {
+    std::uint32_t columns = 0, rows = 0;
+    double dpi_x = 0, dpi_y = 0;
+    bool long_strip = false;
+    bool operator==(const TiffLayout&) const = default;
+  };
+
+  /// Keeps the ending of a whole file, as libtiff wrote it, whose strip ends at `strip_end`. Keeps nothing of a file with
+  /// another layout than one strip from byte 8 on and all else after it.
+  void take(const TiffLayout& image, std::span<const std::byte> file, std::size_t strip_end) {
+    tail_.clear();
+    if (!find_fields(file, strip_end)) return;
+    image_ = image;
+    head_.assign(file.begin(), file.begin() + kStripAt);
+    tail_.assign(file.begin() + static_cast<std::ptrdiff_t>(tail_at_), file.end());
+  }
+
+  /// Ends another file, whose strip stands from byte 8 to `strip_end`. returns  false if no ending of such an image is kept
+  bool put(const TiffLayout& image, std::size_t strip_end, Bytes& file) const {
+    if (tail_.empty() || !(image == image_)) return false;
+    const std::size_t begin = even(strip_end);
+    file.resize(begin + tail_.size());
+    if (begin != strip_end) file[strip_end] = std::byte{0};
+    std::byte* const tail = file.data() + begin;
+    std::memcpy(file.data(), head_.data(), head_.size());
+    std::memcpy(tail, tail_.data(), tail_.size());
+    const auto moved = [&](std::byte* bytes, std::size_t at) {
+      std::uint32_t offset = 0;
+      std::memcpy(&offset, bytes + at, sizeof offset);
+      put_at(bytes, at, static_cast<std::uint32_t>(offset - tail_at_ + begin));
+    };
+    moved(file.data(), kDirectoryAt);
+    for (const std::size_t position : offsets_) moved(tail, position);
+    const std::size_t length = strip_end - kStripAt;
+    if (short_length_) {
+      put_at(tail, length_at_, static_cast<std::uint16_t>(length));
+    } else {
+      put_at(tail, length_at_, static_cast<std::uint32_t>(length));
+    }
+    return true;
+  }
+
+ private:
+  bool find_fields(std::span<const std::byte> file, std::size_t strip_end) {
+    tail_at_ = even(strip_end);
+    if (file.size() < tail_at_ + 2 || file.size() > tail_at_ + kMaxTail) return false;
+    const std::size_t directory = number_at<std::uint32_t>(file, kDirectoryAt);
+    if (directory < tail_at_ || directory + 2 > file.size()) return false;
+    const std::size_t entries = number_at<std::uint16_t>(file, directory);
+    if (directory + 2 + entries * kEntryBytes > file.size()) return false;
+    offsets_.clear();
+    length_at_ = 0;
+    for (std::size_t e = 0; e < entries; ++e) {
+      const std::size_t at = directory + 2 + e * kEntryBytes, value = at + 8;
+      const auto tag = number_at<std::uint16_t>(file, at), type = number_at<std::uint16_t>(file, at + 2);
+      const std::size_t bytes = bytes_of(type) * number_at<std::uint32_t>(file, at + 4);
+      if (bytes == 0) return false;
+      if (tag == TIFFTAG_STRIPBYTECOUNTS) {
+        if (type != TIFF_SHORT && type != TIFF_LONG) return false;
+        length_at_ = value - tail_at_;
+        short_length_ = type == TIFF_SHORT;
+      } else if (bytes > 4) {
+        const std::size_t offset = number_at<std::uint32_t>(file, value);
+        if (offset < tail_at_ || offset + bytes > file.size()) return false;
+        offsets_.push_back(value - tail_at_);
+      }
+      if ((tag == TIFFTAG_STRIPBYTECOUNTS || tag == TIFFTAG_STRIPOFFSETS) && bytes > 4) return false;
+    }
+    return length_at_ != 0;
+  }
+
+  TiffLayout image_;
+  std::vector<std::byte> head_, tail_;  // before and behind the strip
+  std::vector<std::size_t> offsets_;    // in tail_, of 32-bit offsets into the file
+  std::size_t tail_at_ = 0;             // where it stood
+  std::size_t length_at_ = 0;           // in tail_, of the strip's length
+  bool short_length_ = false;           // of 16 bits
+};
 
 class G4Encoder : public ImageEncoder {
  public:
@@ -30,23 +308,19 @@ class G4Encoder : public ImageEncoder {
   void use(Isa isa) override { encoder_ = g4::Encoder(isa); }
 
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (Status status = check_size(runs.columns, runs.rows()); !status) return status;
+    if (Status status = check_size("TIFF", runs.columns, runs.rows()); !status) return status;
+    TagFrame frame{runs.columns, runs.rows(), dpi_x, dpi_y, 1, COMPRESSION_CCITTFAX4};
+    frame.rows_per_strip = frame.rows;
     file.resize(file.capacity());
-    const std::size_t end = encoder_.encode(runs, file, kHeaderBytes);
-    if (end > kMaxClassicBytes - kDirectoryBytes) return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB");
-    const Ending::TiffLayout image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kHeaderBytes > UINT16_MAX};
+    const std::size_t end = encoder_.encode(runs, file, kStripAt);
+    if (end > kMaxClassicBytes - kDirectoryBytes) return refused(frame, "the file would exceed 4 GiB");
+    const Ending::TiffLayout image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kStripAt > UINT16_MAX};
     if (!text_.any() && ending_.put(image, end, file)) return {};
     if (file.size() < end + kDirectoryBytes) file.resize(end + kDirectoryBytes);
-
-    MemoryFile memory{file};
-    std::string message;
-    TiffHandle tiff = open_for_writing(memory, message);
-    if (tiff == nullptr) return cannot_hold(runs.columns, runs.rows(), message);
-    set_tags(tiff.get(), {runs.columns, runs.rows(), dpi_x, dpi_y}, 1, COMPRESSION_CCITTFAX4, runs.rows());
-    text_.put(tiff.get());
-    const auto length = static_cast<tmsize_t>(end - kHeaderBytes);
-    const bool written = TIFFWriteRawStrip(tiff.get(), 0, file.data() + kHeaderBytes, length) == length;
-    Status status = finish(std::move(tiff), written, memory, {runs.columns, runs.rows(), dpi_x, dpi_y}, message);
+    Status status = write_file(file, frame, text_, [&](TIFF* tiff) {
+      const auto length = static_cast<tmsize_t>(end - kStripAt);
+      return TIFFWriteRawStrip(tiff, 0, file.data() + kStripAt, length) == length;
+    });
     if (status && !text_.any()) ending_.take(image, file, end);
     return status;
   }
@@ -63,43 +337,25 @@ class StripEncoder : public ImageEncoder {
   explicit StripEncoder(std::uint16_t compression) : compression_(compression) {}
 
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (Status status = check_size(runs.columns, runs.rows()); !status) return status;
-    const std::size_t stride = row_bytes(runs.columns);
-    if (compression_ == COMPRESSION_NONE && stride * runs.rows() > kMaxClassicBytes - kStripBytes) {
-      return cannot_hold(runs.columns, runs.rows(), "the file would exceed 4 GiB; use --format tiff-g4");
-    }
-    const auto rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, runs.rows()));
+    if (Status status = check_size("TIFF", runs.columns, runs.rows()); !status) return status;
+    const TagFrame frame{runs.columns, runs.rows(), dpi_x, dpi_y, 1, compression_};
     if (compression_ == COMPRESSION_NONE) {  // its size is known: nothing has to grow, and no second copy exists meanwhile
-      const std::size_t strips = ceil_div<std::size_t>(runs.rows(), rows_per_strip);
+      if (frame.stride * frame.rows > kMaxClassicBytes - kStripBytes) {
+        return refused(frame, "the file would exceed 4 GiB; use --format tiff-g4");
+      }
+      const std::size_t strips = ceil_div<std::size_t>(frame.rows, frame.rows_per_strip);
       file.clear();
-      file.reserve(kHeaderBytes + stride * runs.rows() + kDirectoryBytes + strips * 2 * sizeof(std::uint32_t));
+      file.reserve(kStripAt + frame.stride * frame.rows + kDirectoryBytes + strips * 2 * sizeof(std::uint32_t));
     }
     file.resize(file.capacity());
-    MemoryFile memory{file};
-    std::string message;
-    TiffHandle tiff = open_for_writing(memory, message);
-    if (tiff == nullptr) return cannot_hold(runs.columns, runs.rows(), message);
-    set_tags(tiff.get(), {runs.columns, runs.rows(), dpi_x, dpi_y}, 1, compression_, rows_per_strip);
-    text_.put(tiff.get());
-
-    bool written = true;
-    bits_.resize(stride * rows_per_strip);
-    for (std::uint32_t first = 0, strip = 0; first < runs.rows() && written; first += rows_per_strip, ++strip) {
-      const std::uint32_t rows = std::min(rows_per_strip, runs.rows() - first);
-      for (std::uint32_t r = 0; r < rows; ++r) {
-        expand_row(runs.row(first + r), std::span(bits_).subspan(stride * r, stride));
-      }
-      const auto length = static_cast<tmsize_t>(stride * rows);
-      written = compression_ == COMPRESSION_NONE ? TIFFWriteRawStrip(tiff.get(), strip, bits_.data(), length) == length
-                                                 : TIFFWriteEncodedStrip(tiff.get(), strip, bits_.data(), length) == length;
-    }
-    return finish(std::move(tiff), written, memory, {runs.columns, runs.rows(), dpi_x, dpi_y}, message);
+    return write_rows(file, frame, text_, strip_,
+                      [&](std::uint32_t r, std::span<std::byte> to) { expand_row(runs.row(r), to); });
   }
 
  private:
   LayerText text_;
   std::uint16_t compression_;
-  Bytes bits_;  // of one strip
+  Bytes strip_;  // of bits
 };
 
 }  // namespace
@@ -118,31 +374,16 @@ class GreyEncoder : public LevelEncoder {
   void tag(const LayerTags& tags) override { text_.take(tags); }
 
   Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) override {
-    const TagFrame frame{image.columns, image.rows(), dpi_x, dpi_y};
-    if (Status status = check_size(frame.columns, frame.rows); !status) return status;
+    if (Status status = check_size("TIFF", image.columns, image.rows()); !status) return status;
+    const TagFrame frame{image.columns, image.rows(), dpi_x, dpi_y, static_cast<std::uint16_t>(bits_), COMPRESSION_PACKBITS};
     if (full == 0 || darkest_ % full != 0) {
-      return cannot_hold(frame.columns, frame.rows, fmt::format("{} levels are no whole steps of {} bits", full + 1, bits_));
+      return refused(frame, fmt::format("{} levels are no whole steps of {} bits", full + 1, bits_));
     }
-    const std::size_t stride = (std::size_t{image.columns} * bits_ + 7) / 8;
-    const auto rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, frame.rows));
     file.resize(file.capacity());
-    MemoryFile memory{file};
-    std::string message;
-    TiffHandle tiff = open_for_writing(memory, message);
-    if (tiff == nullptr) return cannot_hold(frame.columns, frame.rows, message);
-    set_tags(tiff.get(), frame, static_cast<std::uint16_t>(bits_), COMPRESSION_PACKBITS, rows_per_strip);
-    text_.put(tiff.get());
-    bool written = true;
-    strip_.resize(stride * rows_per_strip);
-    for (std::uint32_t first = 0, strip = 0; first < frame.rows && written; first += rows_per_strip, ++strip) {
-      const std::uint32_t rows = std::min(rows_per_strip, frame.rows - first);
-      const std::size_t length = stride * rows;
-      std::memset(strip_.data(), 0, length);
-      for (std::uint32_t r = 0; r < rows; ++r) put_row(image, first + r, darkest_ / full, strip_.data() + stride * r);
-      written = TIFFWriteEncodedStrip(tiff.get(), strip, strip_.data(), static_cast<tmsize_t>(length)) ==
-                static_cast<tmsize_t>(length);
-    }
-    return finish(std::move(tiff), written, memory, frame, message);
+    return write_rows(file, frame, text_, strip_, [&](std::uint32_t row, std::span<std::byte> to) {
+      std::memset(to.data(), 0, to.size());
+      put_row(image, row, darkest_ / full, to.data());
+    });
   }
 
  private:
@@ -210,9 +451,6 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
   return {};
 }
 
-/// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
-constexpr const char* kMode = "rCm";
-
 /// The image of a file in Group 4, without bits. false: libtiff has to say what is wrong with it, or to read it.
 bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bool white_is_set, Runs& runs) {
   std::uint32_t rows_per_strip = rows;
@@ -248,9 +486,24 @@ void read_resolution(TIFF* tiff, Image& image) {
   image.dpi_y = double{y} * to_inch;
 }
 
-}  // namespace
-
-namespace {
+/// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
+/// message  outlives the handle; if that is nullptr and libtiff gives no reason, `no_file` or `no_directory`
+TiffHandle open_for_reading(int file, const std::string& path, std::string& message, std::string_view no_file = {},
+                            std::string_view no_directory = {}) {
+  const auto options = strict_tiff_options(message);
+  const int own_file = options != nullptr ? ::dup(file) : -1;
+  if (own_file < 0) {
+    if (message.empty()) message = no_file;
+    return nullptr;
+  }
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
+  TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), "rCm", options.get()));
+  if (handle == nullptr) {
+    ::close(own_file);
+    if (message.empty()) message = no_directory;
+  }
+  return handle;
+}
 
 /// What no writer of layers says is longer.
 constexpr std::size_t kLongestDescription = 1000;
@@ -316,24 +569,15 @@ std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, in
 
 }  // namespace
 
-Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page, LevelSink* sink) {
+Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
+                        LevelSink* sink) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path,
                                                    threshold > 0 || sink != nullptr ? "" : "1-bit ", why)};
   };
-  const auto options = strict_tiff_options(message);
-  const int own_file = ::dup(file);
-  if (options == nullptr || own_file < 0) {
-    if (own_file >= 0) ::close(own_file);
-    return failure(message.empty() ? "out of memory or files" : message);
-  }
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
-  const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), kMode, options.get()));
-  if (handle == nullptr) {
-    ::close(own_file);
-    return failure(message.empty() ? "no directory" : message);
-  }
+  const TiffHandle handle = open_for_reading(file, path, message, "out of memory or files", "no directory");
+  if (handle == nullptr) return failure(message);
   if (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0) return failure(message.empty() ? "no such page" : message);
   if (!message.empty()) return failure(message);
   TiffHead head;
@@ -367,15 +611,8 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
 Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path) {
   constexpr std::size_t kMaxPages = 1 << 20;
   std::string message;
-  const auto options = strict_tiff_options(message);
-  const int own_file = ::dup(file);
-  if (options != nullptr) TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
-  const TiffHandle handle(options != nullptr && own_file >= 0 ? TIFFFdOpenExt(own_file, path.c_str(), kMode, options.get())
-                                                              : nullptr);
-  if (handle == nullptr) {
-    if (own_file >= 0) ::close(own_file);
-    return Error{Fault::kInput, fmt::format("{}: not a TIFF: {}; take a whole file", path, message)};
-  }
+  const TiffHandle handle = open_for_reading(file, path, message);
+  if (handle == nullptr) return Error{Fault::kInput, fmt::format("{}: not a TIFF: {}; take a whole file", path, message)};
   std::vector<std::uint64_t> pages;
   do {
     std::uint32_t kind = 0;

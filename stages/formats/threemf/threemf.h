@@ -1,16 +1,24 @@
-// stages/formats/threemf/mesh3mf.h: meshes as a 3MF file (core specification).
+// stages/formats/threemf/threemf.h: meshes, and slices by the slice extension, as 3MF files.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "stages/data/buffer.h"
+#include "stages/data/layer.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/formats/slice_format.h"
+#include "stages/formats/zip/zip.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::formats {
+
+/// Checks the date of the packages, before anything is made for one. errors  kUsage: SOURCE_DATE_EPOCH is no number
+Status check_3mf_date();
 
 /// An object of the file.
 struct Mesh3mfObject {
@@ -36,5 +44,34 @@ struct Mesh3mfCounts {
 /// source     3MF Consortium, Core Specification 1.3, sections 3 and 4
 Result<Mesh3mfCounts> write_mesh_3mf(File& file, std::span<const Mesh3mfObject> objects, std::span<const Instance> instances,
                                      std::string_view program);
+
+/// Gathers slices, deflated as they come, about 5 bytes a point, and writes the package at the end: each body's slices stand
+/// in one piece there, and a layer brings a slice of every body. Numbers are exact to the nanometre. Coordinates count from
+/// the whole mm below the front left of all parts, where the build items stand.
+class Slice3mfWriter {
+ public:
+  /// head  one object for each body, with a box as its mesh where none is given: the extension wants one
+  /// errors  of check_3mf_date
+  static Result<Slice3mfWriter> make(const SliceHead& head);
+
+  /// Layers from the bottom up. errors  kOutput
+  Status add(const SliceLayer& layer);
+  /// Writes the package; it takes its name when the file is finished. errors  kOutput
+  Result<File> write(const std::string& path, const FileOptions& options = {});
+
+ private:
+  struct PartBody {
+    std::string name;
+    Deflated slices;
+    Buffer<char> waiting;  // text that is deflated when there is enough of it
+  };
+  explicit Slice3mfWriter(const SliceHead& head);
+  std::string objects_and_build() const;
+
+  Box bounds_;
+  Nm first_bottom_;
+  std::int64_t left_, front_;  // nm, whole mm: where the items stand, and what their coordinates count from
+  std::vector<PartBody> bodies_;
+};
 
 }  // namespace lamina::formats
