@@ -56,10 +56,4 @@ void Follower::start(const Layer& layer) {
   hangs_.assign(pieces_.count(), 0);
 }
 
-void Follower::keep(const RunsView& image) {
-  below_.columns = image.columns;
-  below_.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
-  below_.change.assign(image.change.begin(), image.change.end());
-}
-
 }  // namespace lamina::checks

@@ -4,11 +4,10 @@
 #include <optional>
 #include <vector>
 
+#include "stages/calibration/scan/blocks.h"
 #include "stages/calibration/scan/dashes.h"
-#include "stages/calibration/scan/inks.h"
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/sheet_fit.h"
-#include "stages/calibration/scan/stitches.h"
 #include "stages/data/chart.h"
 #include "stages/data/status.h"
 
