@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/grid.h"
 #include "stages/data/layer.h"
+#include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 
 namespace lamina::checks {
@@ -37,6 +39,9 @@ struct PixelBox {
     return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
   }
 };
+
+/// The pixels of an image whose centres are in the box, in plan view, and `margin` more on each side, within the image.
+PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin);
 
 inline std::uint64_t bytes_of(const Runs& runs) { return bytes_held(runs.row_offset) + bytes_held(runs.change); }
 

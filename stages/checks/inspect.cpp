@@ -105,22 +105,10 @@ Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_
       max_bytes_(max_bytes) {
   std::ranges::stable_sort(placed_parts_, {}, [](const checks::Solid& placed_part) { return placed_part.box.lo.z; });
   for (const checks::Solid& placed_part : placed_parts_) {
-    window_.push_back(window_of(placed_part.box));
+    window_.push_back(pixels_of(placed_part.box, grid_, 1));
     all_.add(window_.back());
   }
   if (placed_parts_.empty()) all_ = {0, 0, 0, 0};
-}
-
-/// The pixels that the box may set, one more on each side, within the image.
-PixelBox Inspection::window_of(const Box& box) const {
-  const auto clamp = [](const PixelAxis& axis, std::int64_t i) {
-    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, axis.count));
-  };
-  const std::uint32_t front = clamp(grid_.y, grid_.y.first_at_or_beyond(box.lo.y) - 1);
-  const std::uint32_t back = clamp(grid_.y, grid_.y.first_at_or_beyond(std::int64_t{box.hi.y} + 1) + 1);
-  return {clamp(grid_.x, grid_.x.first_at_or_beyond(box.lo.x) - 1),
-          clamp(grid_.x, grid_.x.first_at_or_beyond(std::int64_t{box.hi.x} + 1) + 1), grid_.rows() - back,
-          grid_.rows() - front};
 }
 
 Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const {

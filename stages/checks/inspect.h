@@ -132,7 +132,6 @@ class Inspection {
   void note_thin(const Layer& layer, const ThinRegions& thin);
   void end_wall(const Wall& wall);
   void stop(const Layer& layer, std::uint64_t bytes);
-  PixelBox window_of(const Box& box) const;
   bool is_in(std::uint32_t placed_part, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
   std::uint32_t first_of_several(const Body& body);

@@ -224,39 +224,29 @@ Tally::Tally(std::vector<Solid> solids)
       planned_(groups_.size()),
       left_(groups_.size()) {}
 
-Tally::ImageWindow Tally::window_of(const Box& box) const {
-  const auto range = [](const PixelAxis& axis, Nm low, Nm high) {
-    const auto clamp = [&](std::int64_t i) { return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, axis.count)); };
-    return std::array{clamp(axis.first_at_or_beyond(low)), clamp(axis.first_at_or_beyond(std::int64_t{high} + 1))};
-  };
-  const auto [left, right] = range(grid_->x, box.lo.x, box.hi.x);
-  const auto [front, back] = range(grid_->y, box.lo.y, box.hi.y);
-  return {left, right, grid_->rows() - back, grid_->rows() - front};
-}
-
 void Tally::inspect_layers(const PixelGrid& grid) {
   grid_ = &grid;
-  for (const Solid& solid : solids_) solid_window_.push_back(window_of(solid.box));
-  for (const Group& group : groups_) group_window_.push_back(window_of(group.box));
+  for (const Solid& solid : solids_) solid_window_.push_back(pixels_of(solid.box, grid, 0));
+  for (const Group& group : groups_) group_window_.push_back(pixels_of(group.box, grid, 0));
 }
 
-Tally::ImageWindow Tally::mirrored(ImageWindow window, const RunsView& image, bool mirror_x, bool mirror_y) {
+PixelBox Tally::mirrored(PixelBox window, const RunsView& image, bool mirror_x, bool mirror_y) {
   const auto turn = [](std::uint32_t& first, std::uint32_t& last, std::uint32_t count) {
     const std::uint32_t end = count - first;
     first = count - last;
     last = end;
   };
-  if (mirror_x) turn(window.first_column, window.last_column, image.columns);
-  if (mirror_y) turn(window.first_row, window.last_row, image.rows());
+  if (mirror_x) turn(window.left, window.right, image.columns);
+  if (mirror_y) turn(window.top, window.bottom, image.rows());
   return window;
 }
 
 void Tally::add_image(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y) {
   for (std::uint32_t s = 0; s < solids_.size(); ++s) {
     if (detected(s) || !crosses(solids_[s].box, layer)) continue;
-    const ImageWindow window = mirrored(solid_window_[s], image, mirror_x, mirror_y);
-    for (std::uint32_t row = window.first_row; row < window.last_row; ++row) {
-      if (set_within(image.row(row), window.first_column, window.last_column) == 0) continue;
+    const PixelBox window = mirrored(solid_window_[s], image, mirror_x, mirror_y);
+    for (std::uint32_t row = window.top; row < window.bottom; ++row) {
+      if (set_within(image.row(row), window.left, window.right) == 0) continue;
       detected_[s].store(1, std::memory_order_relaxed);
       break;
     }
@@ -274,9 +264,9 @@ void Tally::add(const Layer& layer, const RunsView& image, bool mirror_x, bool m
   const auto measured = static_cast<std::uint32_t>(std::min<std::size_t>(groups_.size(), kMeasured));
   for (std::uint32_t g = 0; g < measured; ++g) {
     if (!crosses(groups_[g].box, layer)) continue;
-    const ImageWindow window = mirrored(group_window_[g], image, mirror_x, mirror_y);
-    const std::uint32_t rows = window.last_row - window.first_row;
-    if (rows == 0 || window.first_column == window.last_column) continue;
+    const PixelBox window = mirrored(group_window_[g], image, mirror_x, mirror_y);
+    const std::uint32_t rows = window.bottom - window.top;
+    if (rows == 0 || window.left == window.right) continue;
     const auto layers =
         static_cast<std::uint32_t>(std::max(std::int64_t{1}, std::int64_t{groups_[g].box.height()} / layer.thickness));
     const std::uint32_t step = std::max(1u, rows / std::max(kRows, kRowsInAll / layers / measured));
@@ -288,8 +278,8 @@ void Tally::add(const Layer& layer, const RunsView& image, bool mirror_x, bool m
       const std::uint32_t within = std::min(step, rows - first), position = (layer.index * 8191 + inspected) * 2654435769u;
       const std::uint32_t r = first + static_cast<std::uint32_t>(std::uint64_t{position} * within >> 32);
       // The same rows of the bed, whichever way the image is mirrored.
-      const std::uint32_t row = mirror_y ? window.last_row - 1 - r : window.first_row + r;
-      set += set_within(image.row(row), window.first_column, window.last_column);
+      const std::uint32_t row = mirror_y ? window.bottom - 1 - r : window.top + r;
+      set += set_within(image.row(row), window.left, window.right);
     }
     const double pixels = static_cast<double>(set) * rows / static_cast<double>(inspected);
     add_to(sums[g], pixels * pixel_mm2 * mm(layer.thickness));

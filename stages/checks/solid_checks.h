@@ -14,12 +14,12 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "stages/checks/bodies.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"
@@ -72,8 +72,8 @@ class Tally {
   }
   /// Whether a pixel's centre is in the solid's box, in plan view; of images.
   bool has_pixels(std::uint32_t solid) const {
-    const ImageWindow& window = solid_window_[solid];
-    return window.first_column < window.last_column && window.first_row < window.last_row;
+    const PixelBox& window = solid_window_[solid];
+    return window.left < window.right && window.top < window.bottom;
   }
   /// Groups beyond the first kMeasured are not measured in images.
   bool measured(std::uint32_t group) const { return !grid_ || group < kMeasured; }
@@ -83,22 +83,18 @@ class Tally {
 
  private:
   static constexpr std::uint32_t kMeasured = 4096;  // groups; the copies beyond them cost nothing
-  struct ImageWindow {
-    std::uint32_t first_column = 0, last_column = 0, first_row = 0, last_row = 0;  // [first, last), of the image
-  };
-  using Sum = std::atomic<std::uint64_t>;  // 1e-6 mm3
+  using Sum = std::atomic<std::uint64_t>;           // 1e-6 mm3
   static void add_to(Sum& sum, double mm3) {
     sum.fetch_add(static_cast<std::uint64_t>(std::llround(mm3 * 1e6)), std::memory_order_relaxed);
   }
   static double volume(const Sum& sum) { return static_cast<double>(sum.load(std::memory_order_relaxed)) * 1e-6; }
-  ImageWindow window_of(const Box& box) const;
-  static ImageWindow mirrored(ImageWindow window, const RunsView& image, bool mirror_x, bool mirror_y);
+  static PixelBox mirrored(PixelBox window, const RunsView& image, bool mirror_x, bool mirror_y);
   void add(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const;
 
   std::vector<Solid> solids_;
   std::vector<Group> groups_;
   const PixelGrid* grid_ = nullptr;
-  std::vector<ImageWindow> solid_window_, group_window_;
+  std::vector<PixelBox> solid_window_, group_window_;
   std::vector<std::atomic<std::uint8_t>> detected_;  // by solid
   std::vector<Sum> planned_, left_;                  // by group
   std::atomic<bool> bleeds_{false};

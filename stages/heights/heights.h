@@ -6,9 +6,7 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -75,9 +73,7 @@ class LayerTable {
   Buffer<LayerEntry> entries_;
 };
 
-// --- whether the build vat of a powder printer can make a table of layers.
-
-/// Empty, or a warning if some layers end between two steps of the vat.
+/// Empty, or a warning if some layers end between two steps of the build vat of a powder printer.
 /// errors  kUsage: a layer thinner than a step
 /// cost    O(layers)
 Result<std::string> check_build_steps(const Machine& machine, const LayerTable& table);

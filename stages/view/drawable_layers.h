@@ -26,8 +26,6 @@ struct LayerChoice {
 /// cost    O(layers)
 Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const std::vector<std::uint32_t>& layers);
 
-// --- drawable layers, and the inks of their beads.
-
 /// The ink for one of several widths of a kind: pale for the narrowest, step 0, and full for the widest.
 Ink shade(const Ink& ink, std::size_t step, std::size_t steps);
 
@@ -39,8 +37,6 @@ struct LayerSeries {
   std::function<Result<LayerShapes>(std::uint32_t)> layer;
   std::vector<std::string> notes = {};  // for a person, one line each
 };
-
-// ---
 
 /// Adds the areas of planned beads to `shapes`, one per kind. errors  kInternal if Clipper refuses them
 Status add_paths(const ToolpathsView& paths, LayerShapes& shapes);

@@ -1,7 +1,6 @@
 // stages/calibration/scan/reading.h: reads a photograph of a chart, and reports on the head that printed it.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "stages/calibration/scan/blocks.h"

@@ -99,6 +99,19 @@ Status for_each_image(const SheetRequest& request, const ReadImage& read, const 
   return {};
 }
 
+/// `window` and a margin around it, within the bed. The whole bed if the window is empty.
+PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid) {
+  const PixelWindow bed{0, grid.columns(), 0, grid.rows()};
+  if (window.empty()) return bed;
+  // 4 % of the longer side in mm, at least 3 pixels.
+  const double side =
+      std::max(static_cast<double>(window.width()) / grid.x.dpi(), static_cast<double>(window.height()) / grid.y.dpi());
+  const auto x = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.x.dpi()));
+  const auto y = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.y.dpi()));
+  return {window.left - std::min(window.left, x), std::min(bed.right, window.right + x), window.top - std::min(window.top, y),
+          std::min(bed.bottom, window.bottom + y)};
+}
+
 Result<PixelWindow> shown_window(const SheetRequest& request, const ReadImage& read) {
   const PixelWindow bed{0, request.grid.columns(), 0, request.grid.rows()};
   if (request.whole_bed) return bed;
@@ -140,18 +153,6 @@ void draw_frame(Canvas& canvas, const SheetRequest& request, const SheetLayout& 
 }
 
 }  // namespace
-
-PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid) {
-  const PixelWindow bed{0, grid.columns(), 0, grid.rows()};
-  if (window.empty()) return bed;
-  // 4 % of the longer side in mm, at least 3 pixels.
-  const double side =
-      std::max(static_cast<double>(window.width()) / grid.x.dpi(), static_cast<double>(window.height()) / grid.y.dpi());
-  const auto x = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.x.dpi()));
-  const auto y = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.y.dpi()));
-  return {window.left - std::min(window.left, x), std::min(bed.right, window.right + x), window.top - std::min(window.top, y),
-          std::min(bed.bottom, window.bottom + y)};
-}
 
 SheetLayout layout_chart(int cells, const PixelWindow& window, const PixelGrid& grid, int width) {
   const double scale = std::clamp(width / kDesignWidth, kMinScale, kMaxScale);

@@ -29,9 +29,6 @@ struct SheetLayout {
   int cell_top(int cell) const { return margin + title_height + cell / columns * (cell_height + caption_height + gap); }
 };
 
-/// `window` and a margin around it, within the bed. The whole bed if the window is empty.
-PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid);
-
 /// A sheet at most `width` wide of `cells` pictures of `window`, as near to the proportion 3 : 2 as their shape allows.
 SheetLayout layout_chart(int cells, const PixelWindow& window, const PixelGrid& grid, int width);
 
