@@ -4,7 +4,7 @@
 
 #include "bench/named_parts.h"
 #include "stages/coverage/coverage.h"
-#include "stages/heights/table.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::bench {
 namespace {

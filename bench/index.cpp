@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "bench/named_parts.h"
-#include "stages/heights/table.h"
+#include "stages/heights/heights.h"
 #include "stages/raster/beams.h"
 #include "stages/raster/height_runs.h"
 

@@ -1,7 +1,7 @@
 // bench/limits.cpp: the least that a job of scripts/bench could do: touch each crossing of a row with the surface once.
 // The parts are those of bench/make_parts.py (bench/named_parts.h).
 #include "bench/named_parts.h"
-#include "stages/heights/table.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::bench {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/run/run.h"
-#include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/formats/chart/chart.h"
 #include "stages/formats/image_format.h"

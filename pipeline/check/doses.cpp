@@ -8,7 +8,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/job/job.h"
-#include "stages/heights/on_record.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
 namespace {

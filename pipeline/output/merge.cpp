@@ -11,7 +11,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "stages/checks/records.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/support/io/file_target.h"
 #include "stages/support/io/sync.h"
 

@@ -28,7 +28,7 @@ struct MergeRequest {
 /// of an undivided run byte for byte. Files in other directories are linked, or copied where the file system cannot
 /// link; those directories do not change. In `output` the shards' manifests are removed once manifest.json exists. Where
 /// `output` alone is named and is whole already, of an earlier merge or undivided, only the sizes of its files are checked.
-/// The whole job is judged by its records before anything is written (stages/checks/records.h).
+/// The whole job is judged by its records before anything is written (stages/checks/layer_warnings.h).
 ///
 /// errors  kVerification, one line: a shard of another job or of contours, missing or duplicate layers, an unfinished
 ///         shard, a file that is missing, a link, or of the wrong size, a strict job with warnings. kUsage: no such directory;

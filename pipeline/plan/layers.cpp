@@ -6,7 +6,7 @@
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/job.h"
 #include "pipeline/plan/heights.h"
-#include "stages/heights/per_part.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -9,7 +9,7 @@
 #include "pipeline/plan/scene.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/heights/table.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
 
@@ -30,7 +30,7 @@ struct LayerSchedule {
   std::vector<Nm> planes;  // nm above the bed, strictly increasing
 };
 
-/// With job.heights.per_part every part has its own optimal layers between common slabs (stages/heights/per_part.h),
+/// With job.heights.per_part every part has its own optimal layers between common slabs (stages/heights/heights.h),
 /// printed in the order of their tops: the nozzle never moves more than one slab below printed material. Otherwise all
 /// parts share the layers of the table. Planes are those of plane_of(), each part with its own top.
 /// errors  of heights_options and heights::plan_per_part

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/checks/paths.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

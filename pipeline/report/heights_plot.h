@@ -6,7 +6,7 @@
 
 #include "stages/data/mesh.h"
 #include "stages/data/plot.h"
-#include "stages/heights/study/study.h"
+#include "stages/heights/evaluate.h"
 
 namespace lamina::pipeline {
 

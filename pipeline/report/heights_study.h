@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/heights/study/study.h"
+#include "stages/heights/evaluate.h"
 
 namespace lamina::pipeline {
 

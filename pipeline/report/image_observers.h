@@ -6,7 +6,7 @@
 
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/observer.h"
-#include "stages/checks/vanished.h"
+#include "stages/checks/thin.h"
 #include "stages/raster/raster.h"
 
 namespace lamina::pipeline {

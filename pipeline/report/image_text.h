@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/checks/mixed.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/share_count.h"
 #include "stages/support/text/json_value.h"

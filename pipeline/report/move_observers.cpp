@@ -7,7 +7,7 @@
 
 #include "pipeline/plan/heights.h"
 #include "pipeline/report/deposited_summary.h"
-#include "stages/checks/paths.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/formats/gcode/write_gcode.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

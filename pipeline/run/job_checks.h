@@ -11,7 +11,6 @@
 
 #include "pipeline/plan/plan.h"
 #include "stages/checks/solid_checks.h"
-#include "stages/checks/tally.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 

@@ -9,7 +9,7 @@
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/image_observers.h"
-#include "stages/checks/vanished.h"
+#include "stages/checks/thin.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/runs.h"
 #include "stages/raster/materials.h"

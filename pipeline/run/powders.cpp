@@ -9,7 +9,7 @@
 
 #include "pipeline/plan/heights.h"
 #include "pipeline/report/image_text.h"
-#include "stages/checks/mixed.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/program/vats.h"
 
 namespace lamina::pipeline {

@@ -22,7 +22,7 @@
 #include "pipeline/run/job_checks.h"
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/checks/records.h"
+#include "stages/checks/layer_warnings.h"
 
 namespace lamina::pipeline {
 namespace {

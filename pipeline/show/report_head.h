@@ -11,7 +11,7 @@
 #include "stages/data/status.h"
 #include "stages/geometry/coverage.h"  // PixelWindow
 #include "stages/support/hash/hash.h"
-#include "stages/view/report/held_layers.h"
+#include "stages/view/report/run_code.h"
 
 namespace lamina::pipeline {
 

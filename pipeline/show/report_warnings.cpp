@@ -5,10 +5,9 @@
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/run/job_checks.h"
-#include "stages/checks/paths.h"
-#include "stages/checks/records.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/checks/solid_checks.h"
-#include "stages/heights/table.h"
+#include "stages/heights/heights.h"
 #include "stages/program/head_grid.h"
 
 namespace lamina::pipeline {

@@ -10,7 +10,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/show/report_bleed.h"
-#include "stages/checks/tally.h"
+#include "stages/checks/solid_checks.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 

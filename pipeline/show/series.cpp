@@ -9,7 +9,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
-#include "stages/view/bead_shapes.h"
+#include "stages/view/drawable_layers.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "stages/data/status.h"
 #include "stages/formats/gcode/read_gcode.h"
-#include "stages/view/bead_shapes.h"
+#include "stages/view/drawable_layers.h"
 
 namespace lamina::pipeline {
 

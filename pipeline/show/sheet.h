@@ -9,7 +9,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/formats/gcode/read_gcode.h"
-#include "stages/view/choice.h"
+#include "stages/view/drawable_layers.h"
 
 namespace lamina::pipeline {
 

@@ -4,6 +4,17 @@
 
 namespace lamina::checks {
 
+PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin) {
+  const auto range = [&](const PixelAxis& axis, Nm low, Nm high) {
+    const auto clamp = [&](std::int64_t i) { return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, axis.count)); };
+    return std::pair(clamp(axis.first_at_or_beyond(low) - margin),
+                     clamp(axis.first_at_or_beyond(std::int64_t{high} + 1) + margin));
+  };
+  const auto [left, right] = range(grid.x, box.lo.x, box.hi.x);
+  const auto [front, back] = range(grid.y, box.lo.y, box.hi.y);
+  return {left, right, grid.rows() - back, grid.rows() - front};
+}
+
 void Pieces::find(const RunsView& image, bool diagonal) {
   const std::size_t runs = image.change.size() / 2;
   sets_.start(runs);
@@ -54,12 +65,6 @@ void Follower::start(const Layer& layer) {
   }
   sets_.start(old + pieces_.count());
   hangs_.assign(pieces_.count(), 0);
-}
-
-void Follower::keep(const RunsView& image) {
-  below_.columns = image.columns;
-  below_.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
-  below_.change.assign(image.change.begin(), image.change.end());
 }
 
 }  // namespace lamina::checks

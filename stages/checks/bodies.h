@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/grid.h"
 #include "stages/data/layer.h"
+#include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 
 namespace lamina::checks {
@@ -37,6 +39,18 @@ struct PixelBox {
     return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
   }
 };
+
+/// The pixels of an image whose centres are in the box, in plan view, and `margin` more on each side, within the image.
+PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin);
+
+inline std::uint64_t bytes_of(const Runs& runs) { return bytes_held(runs.row_offset) + bytes_held(runs.change); }
+
+/// Into buffers that keep their capacity.
+inline void copy_runs(const RunsView& from, Runs& to) {
+  to.columns = from.columns;
+  to.row_offset.assign(from.row_offset.begin(), from.row_offset.end());
+  to.change.assign(from.change.begin(), from.change.end());
+}
 
 /// Pieces that hang together.
 struct Body {
@@ -134,14 +148,12 @@ class Follower {
   std::span<Body> live() { return bodies_; }
 
   std::uint64_t bytes() const {
-    return pieces_.bytes() + sets_.bytes() + bytes_held(below_.change) + bytes_held(below_.row_offset) +
-           bytes_held(body_below_) + bytes_held(number_) + bytes_held(hangs_) +
-           (bodies_.capacity() + next_.capacity()) * sizeof(Body);
+    return pieces_.bytes() + sets_.bytes() + bytes_of(below_) + bytes_held(body_below_) + bytes_held(number_) +
+           bytes_held(hangs_) + (bodies_.capacity() + next_.capacity()) * sizeof(Body);
   }
 
  private:
   void start(const Layer& layer);
-  void keep(const RunsView& image);
 
   bool diagonal_;
   Pieces pieces_;
@@ -198,7 +210,7 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   body_below_.resize(pieces_.of_run.size());
   for (std::size_t i = 0; i < body_below_.size(); ++i) body_below_[i] = number_[sets_.find(old + pieces_.of_run[i])];
   std::swap(bodies_, next_);
-  keep(image);
+  copy_runs(image, below_);
 }
 
 }  // namespace lamina::checks

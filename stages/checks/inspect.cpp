@@ -1,7 +1,11 @@
 #include "stages/checks/inspect.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
+
+#include "stages/support/text/readable.h"
 
 namespace lamina::checks {
 namespace {
@@ -19,6 +23,18 @@ std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
   bodies += powder.need(between);
   // Image, powder, and scratch of thin places.
   return image.change.size_bytes() * 8 + image.row_offset.size_bytes() * 7 + bodies + bodies / 2;
+}
+
+std::string at(const Spot& spot) {
+  return fmt::format("at x {:.2f}, y {:.2f}, z {:.2f} mm (layer {})", spot.x_mm, spot.y_mm, spot.z_mm, spot.layer);
+}
+
+std::string of(std::uint64_t count, std::string_view one, std::string_view several) {
+  return count == 1 ? fmt::format("one {}", one) : fmt::format("{} {}", count, several);
+}
+
+std::string name_of(std::span<const std::string> part, std::uint32_t number) {
+  return number < part.size() ? part[number] : fmt::format("part {}", number);
 }
 
 }  // namespace
@@ -89,29 +105,15 @@ Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_
       max_bytes_(max_bytes) {
   std::ranges::stable_sort(placed_parts_, {}, [](const checks::Solid& placed_part) { return placed_part.box.lo.z; });
   for (const checks::Solid& placed_part : placed_parts_) {
-    window_.push_back(window_of(placed_part.box));
+    window_.push_back(pixels_of(placed_part.box, grid_, 1));
     all_.add(window_.back());
   }
   if (placed_parts_.empty()) all_ = {0, 0, 0, 0};
 }
 
-/// The pixels that the box may set, one more on each side, within the image.
-PixelBox Inspection::window_of(const Box& box) const {
-  const auto clamp = [](const PixelAxis& axis, std::int64_t i) {
-    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, axis.count));
-  };
-  const std::uint32_t front = clamp(grid_.y, grid_.y.first_at_or_beyond(box.lo.y) - 1);
-  const std::uint32_t back = clamp(grid_.y, grid_.y.first_at_or_beyond(std::int64_t{box.hi.y} + 1) + 1);
-  return {clamp(grid_.x, grid_.x.first_at_or_beyond(box.lo.x) - 1),
-          clamp(grid_.x, grid_.x.first_at_or_beyond(std::int64_t{box.hi.x} + 1) + 1), grid_.rows() - back,
-          grid_.rows() - front};
-}
-
 Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const {
   const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2, row = (std::int64_t{box.top} + box.bottom - 1) / 2;
-  return {static_cast<double>(grid_.x.centre(column)) / kNmPerMm,
-          static_cast<double>(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)) / kNmPerMm, layer,
-          static_cast<double>(z) / kNmPerMm};
+  return {mm(grid_.x.centre(column)), mm(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)), layer, mm(z)};
 }
 
 Location Inspection::position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
@@ -271,9 +273,7 @@ void Inspection::prepare(const RunsView& image, LayerInspection& inspection) con
     return;
   }
   inspection.min_bytes = 0;
-  inspection.image.columns = image.columns;
-  inspection.image.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
-  inspection.image.change.assign(image.change.begin(), image.change.end());
+  copy_runs(image, inspection.image);
   inspection.thin = thin_regions(image, stencils_, inspection.scratch);
 }
 
@@ -326,6 +326,63 @@ const Findings& Inspection::finish() {
   note_thin({}, {});
   for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.thin}) found->sort_locations();
   return findings_;
+}
+
+void report(const Findings& findings, std::span<const std::string> part, double min_mm, std::vector<Warning>& warnings) {
+  const auto& [layers, islands, loose, hollows, thin, touching, bed_edge, stop] = findings;
+  const auto warn = [&](const char* code, const Spot& spot, std::string text, std::string of_part = {}) {
+    warnings.push_back({code, std::move(text), std::move(of_part), spot.layer, spot.z_mm});
+  };
+  if (islands.count > 0) {
+    warn("islands", islands.spot,
+         fmt::format(
+             "{} of {} with nothing below, the largest of {:.3g} mm2 {}: powder alone holds them until they join a part; "
+             "turn the part, or spread the first layers above them with care",
+             of(islands.count, "piece", "pieces"), of(islands.layers, "layer", "layers"), islands.largest, at(islands.spot)));
+  }
+  if (loose.count > 0) {
+    warn("loose", loose.spot,
+         fmt::format("{} of {:.3g} mm3 that nothing joins to the bottom of a part, the largest {}: they fall off; repair the "
+                     "part or take them out of it",
+                     of(loose.count, "body", "bodies"), loose.amount, at(loose.spot)));
+  }
+  if (hollows.count > 0) {
+    warn("hollows", hollows.spot,
+         fmt::format("{} of {:.3g} mm3 that powder cannot leave, the largest of {:.3g} mm3 {}: open them by holes, or let them "
+                     "be solid",
+                     of(hollows.count, "closed hollow", "closed hollows"), hollows.amount, hollows.largest, at(hollows.spot)));
+  }
+  if (thin.count > 0) {
+    warn("thin", thin.spot,
+         fmt::format("{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may not hold; make them thicker, or "
+                     "tell a smaller --min-wall",
+                     of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)));
+  }
+  for (const Findings::Touching& pair : touching) {
+    const std::string parts = pair.part == pair.other
+                                  ? "copies of " + name_of(part, pair.part)
+                                  : fmt::format("{} and {}", name_of(part, pair.part), name_of(part, pair.other));
+    warn("touching", pair.spot, fmt::format("{} grow together {}: they come out as one; move them apart", parts, at(pair.spot)),
+         pair.part < part.size() ? part[pair.part] : std::string());
+  }
+  if (bed_edge) {
+    warn("bed-edge", *bed_edge,
+         fmt::format("pixels lie at the very edge of the bed, first {}: move the parts inwards", at(*bed_edge)));
+  }
+  if (stop) {
+    constexpr std::uint64_t kMega = 1 << 20;
+    warnings.push_back(
+        {"not-inspected",
+         fmt::format("{}: to look at layer {} takes about {}, and half of --memory is for that; give --memory {}M or more, or "
+                     "leave out --inspect",
+                     layers == 0 ? "no layer was looked at"
+                                 : fmt::format("layers from {} on were not looked at, and what is told is of those below it",
+                                               stop->layer),
+                     stop->layer, readable_bytes(stop->bytes), (2 * stop->bytes + kMega - 1) / kMega),
+         {},
+         stop->layer,
+         stop->z_mm});
+  }
 }
 
 }  // namespace lamina::checks

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "stages/checks/bodies.h"
-#include "stages/checks/tally.h"
+#include "stages/checks/solid_checks.h"
 #include "stages/checks/thin.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -83,7 +83,7 @@ struct LayerInspection {
   ThinScratch scratch;
   ThinRegions thin;
   std::uint64_t min_bytes = 0;  // to inspect it, if above the limit: then the rest is empty
-  std::uint64_t bytes() const { return bytes_held(image.row_offset) + bytes_held(image.change) + scratch.bytes(); }
+  std::uint64_t bytes() const { return bytes_of(image) + scratch.bytes(); }
 };
 
 /// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
@@ -114,9 +114,7 @@ class Inspection {
   const Findings& findings() const { return findings_; }
 
   /// Without LayerInspection.
-  std::uint64_t bytes() const {
-    return solid_.bytes() + powder_.bytes() + bytes_held(between_.change) + bytes_held(between_.row_offset);
-  }
+  std::uint64_t bytes() const { return solid_.bytes() + powder_.bytes() + bytes_of(between_); }
 
  private:
   struct Solids;
@@ -134,7 +132,6 @@ class Inspection {
   void note_thin(const Layer& layer, const ThinRegions& thin);
   void end_wall(const Wall& wall);
   void stop(const Layer& layer, std::uint64_t bytes);
-  PixelBox window_of(const Box& box) const;
   bool is_in(std::uint32_t placed_part, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
   std::uint32_t first_of_several(const Body& body);

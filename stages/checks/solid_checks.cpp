@@ -8,10 +8,48 @@
 #include <set>
 #include <utility>
 
+#include "stages/checks/layer_warnings.h"
 #include "stages/support/text/number_text.h"
 
 namespace lamina::checks {
 namespace {
+
+/// Rows of a group that are measured in one layer, each at another place of its stretch; more of them where layers are few.
+constexpr std::uint32_t kRows = 8, kRowsInAll = 2000;
+
+bool crosses(const Box& box, const Layer& layer) {
+  return box.lo.z < layer.bottom + layer.thickness && layer.bottom < box.hi.z;
+}
+
+/// Set pixels of a row within [first, last).
+std::uint64_t set_within(std::span<const std::uint32_t> row, std::uint32_t first, std::uint32_t last) {
+  std::uint64_t set = 0;
+  // An odd place is within a run, whose begin stands before it.
+  auto at = static_cast<std::size_t>(std::upper_bound(row.begin(), row.end(), first) - row.begin()) & ~std::size_t{1};
+  for (; at + 1 < row.size() && row[at] < last; at += 2) set += std::min(last, row[at + 1]) - std::max(first, row[at]);
+  return set;
+}
+
+std::vector<Group> groups_of(std::span<const Solid> solids) {
+  std::vector<Group> groups;
+  std::vector<double> sum, largest;
+  for (const Solid& solid : solids) {
+    if (solid.group >= groups.size()) groups.resize(solid.group + 1);
+    sum.resize(groups.size());
+    largest.resize(groups.size());
+    Group& group = groups[solid.group];
+    if (group.box.empty()) group.part = solid.part;
+    group.box.add(solid.box);
+    group.closed = group.closed && solid.closed;
+    sum[solid.group] += std::abs(solid.mesh_mm3);
+    largest[solid.group] = std::max(largest[solid.group], std::abs(solid.mesh_mm3));
+  }
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    groups[g].max_mm3 = sum[g];
+    groups[g].min_mm3 = largest[g];
+  }
+  return groups;
+}
 
 /// Sound jobs stay well between these shares of a mesh. Shells that overlap within a mesh make less of it.
 constexpr double kMin = 0.55, kMax = 1.2;
@@ -61,6 +99,13 @@ void note(WorstOfParts& worst, std::uint32_t part, std::uint32_t at, double badn
   if (worst[part].count == 1 || badness > worst[part].badness) worst[part].badness = badness, worst[part].at = at;
 }
 
+/// Calls warn(part, its worst) for each part with any.
+void for_each_part(const WorstOfParts& worst, const auto& warn) {
+  for (std::uint32_t part = 0; part < worst.size(); ++part) {
+    if (worst[part].count > 0) warn(part, worst[part]);
+  }
+}
+
 std::string and_more(const Worst& worst) {
   return worst.count > 1 ? fmt::format(" ({} of its copies or objects alike)", worst.count) : "";
 }
@@ -102,18 +147,17 @@ Status check_volumes(const Tally& tally, const Sampling& sampling, std::vector<W
     if (!badness) return badness.error();
     if (*badness > 1) note(worst, group.part, g, *badness);
   }
-  for (std::uint32_t part = 0; part < worst.size(); ++part) {
-    if (worst[part].count == 0) continue;
-    const Group& group = groups[worst[part].at];
-    const double planned = tally.planned_mm3(worst[part].at);
+  for_each_part(worst, [&](std::uint32_t part, const Worst& one) {
+    const Group& group = groups[one.at];
+    const double planned = tally.planned_mm3(one.at);
     std::string why = too_coarse(group.box, sampling);
     if (why.empty()) why = "its walls are too thin, or its shells overlap, cancel or are inside out: look at `lamina info`";
     const double mesh = planned > group.max_mm3 ? group.max_mm3 : group.min_mm3;
     warnings.push_back({"volume",
                         fmt::format("{}: {} are planned where the mesh holds {} ({:.0f} %){}; {}", sampling.part[part],
-                                    volume_text(planned), volume_text(mesh), 100 * planned / mesh, and_more(worst[part]), why),
+                                    volume_text(planned), volume_text(mesh), 100 * planned / mesh, and_more(one), why),
                         sampling.part[part]});
-  }
+  });
   return {};
 }
 
@@ -145,18 +189,16 @@ void check_lost(const Tally& tally, const Sampling& sampling, std::vector<Warnin
     if (tally.detected(s) || solid.box.empty()) continue;
     note(was_taken(tally, s, sampling) ? taken : worst, solid.part, s, std::abs(solid.mesh_mm3));
   }
-  for (std::uint32_t part = 0; part < taken.size() && sampling.bleeds; ++part) {
-    if (taken[part].count > 0) warn_of_bleed(sampling, part, 1, taken[part], warnings);
-  }
-  for (std::uint32_t part = 0; part < worst.size(); ++part) {
-    if (worst[part].count == 0) continue;
-    std::string why = too_coarse(tally.solids()[worst[part].at].box, sampling);
+  if (sampling.bleeds)
+    for_each_part(taken, [&](std::uint32_t part, const Worst& one) { warn_of_bleed(sampling, part, 1, one, warnings); });
+  for_each_part(worst, [&](std::uint32_t part, const Worst& one) {
+    std::string why = too_coarse(tally.solids()[one.at].box, sampling);
     if (why.empty() && sampling.offset_mm < 0) why = fmt::format("--offset {} leaves none", number_text(sampling.offset_mm));
     if (why.empty()) why = "its walls are too thin, or its shells cancel each other: look at `lamina info`";
     warnings.push_back({"part-lost",
-                        fmt::format("{}: no layer has anything of it{}; {}", sampling.part[part], and_more(worst[part]), why),
+                        fmt::format("{}: no layer has anything of it{}; {}", sampling.part[part], and_more(one), why),
                         sampling.part[part]});
-  }
+  });
 }
 
 void check_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
@@ -169,12 +211,84 @@ void check_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warni
     if (!tally.measured(g) || planned <= 0 || left >= kLeft * planned || (sampling.finished && left == 0)) continue;
     note(worst, group.part, g, 1 - left / planned);
   }
-  for (std::uint32_t part = 0; part < worst.size(); ++part) {
-    if (worst[part].count > 0) warn_of_bleed(sampling, part, worst[part].badness, worst[part], warnings);
-  }
+  for_each_part(worst,
+                [&](std::uint32_t part, const Worst& one) { warn_of_bleed(sampling, part, one.badness, one, warnings); });
 }
 
 }  // namespace
+
+Tally::Tally(std::vector<Solid> solids)
+    : solids_(std::move(solids)),
+      groups_(groups_of(solids_)),
+      detected_(solids_.size()),
+      planned_(groups_.size()),
+      left_(groups_.size()) {}
+
+void Tally::inspect_layers(const PixelGrid& grid) {
+  grid_ = &grid;
+  for (const Solid& solid : solids_) solid_window_.push_back(pixels_of(solid.box, grid, 0));
+  for (const Group& group : groups_) group_window_.push_back(pixels_of(group.box, grid, 0));
+}
+
+PixelBox Tally::mirrored(PixelBox window, const RunsView& image, bool mirror_x, bool mirror_y) {
+  const auto turn = [](std::uint32_t& first, std::uint32_t& last, std::uint32_t count) {
+    const std::uint32_t end = count - first;
+    first = count - last;
+    last = end;
+  };
+  if (mirror_x) turn(window.left, window.right, image.columns);
+  if (mirror_y) turn(window.top, window.bottom, image.rows());
+  return window;
+}
+
+void Tally::add_image(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y) {
+  for (std::uint32_t s = 0; s < solids_.size(); ++s) {
+    if (detected(s) || !crosses(solids_[s].box, layer)) continue;
+    const PixelBox window = mirrored(solid_window_[s], image, mirror_x, mirror_y);
+    for (std::uint32_t row = window.top; row < window.bottom; ++row) {
+      if (set_within(image.row(row), window.left, window.right) == 0) continue;
+      detected_[s].store(1, std::memory_order_relaxed);
+      break;
+    }
+  }
+  add(layer, image, mirror_x, mirror_y, planned_);
+}
+
+void Tally::add_left(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y) {
+  bleeds_.store(true, std::memory_order_relaxed);
+  add(layer, image, mirror_x, mirror_y, left_);
+}
+
+void Tally::add(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const {
+  const double pixel_mm2 = mm(1) * mm(1) / (grid_->x.pixels_per_nm() * grid_->y.pixels_per_nm());
+  const auto measured = static_cast<std::uint32_t>(std::min<std::size_t>(groups_.size(), kMeasured));
+  for (std::uint32_t g = 0; g < measured; ++g) {
+    if (!crosses(groups_[g].box, layer)) continue;
+    const PixelBox window = mirrored(group_window_[g], image, mirror_x, mirror_y);
+    const std::uint32_t rows = window.bottom - window.top;
+    if (rows == 0 || window.left == window.right) continue;
+    const auto layers =
+        static_cast<std::uint32_t>(std::max(std::int64_t{1}, std::int64_t{groups_[g].box.height()} / layer.thickness));
+    const std::uint32_t step = std::max(1u, rows / std::max(kRows, kRowsInAll / layers / measured));
+    std::uint64_t set = 0;
+    std::uint32_t inspected = 0;
+    for (std::uint32_t first = 0; first < rows; first += step, ++inspected) {
+      // Multiples of the golden section spread over a stretch of rows as layers and stretches go by: no period of a part
+      // falls in with them.
+      const std::uint32_t within = std::min(step, rows - first), position = (layer.index * 8191 + inspected) * 2654435769u;
+      const std::uint32_t r = first + static_cast<std::uint32_t>(std::uint64_t{position} * within >> 32);
+      // The same rows of the bed, whichever way the image is mirrored.
+      const std::uint32_t row = mirror_y ? window.bottom - 1 - r : window.top + r;
+      set += set_within(image.row(row), window.left, window.right);
+    }
+    const double pixels = static_cast<double>(set) * rows / static_cast<double>(inspected);
+    add_to(sums[g], pixels * pixel_mm2 * mm(layer.thickness));
+  }
+}
+
+void Tally::add_area(std::uint32_t group, const Layer& layer, double area_mm2) {
+  add_to(planned_[group], std::max(0.0, area_mm2) * mm(layer.thickness));
+}
 
 Status check_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   check_lost(tally, sampling, warnings);
@@ -190,24 +304,19 @@ void check_layers(std::span<const Solid> solids, std::span<const std::uint8_t> f
   const auto first = std::ranges::find(filled, 1);
   if (first == filled.end()) return;
   const auto begin = static_cast<std::uint32_t>(first - filled.begin());
-  std::uint32_t end = static_cast<std::uint32_t>(filled.size()), empty = 0;
+  auto end = static_cast<std::uint32_t>(filled.size());
   while (filled[end - 1] == 0) --end;
-  std::optional<Layer> lowest;
+  ReportedLayers empty;
   for (std::uint32_t i = begin; i < end; ++i) {
     if (filled[i] != 0) continue;
     const Layer at = layer(i);
     const auto within = [&](const Solid& solid) {
       return solid.box.lo.z < at.bottom && at.bottom + at.thickness < solid.box.hi.z;
     };
-    if (!std::ranges::any_of(solids, within)) continue;
-    if (empty++ == 0) lowest = at;
+    if (std::ranges::any_of(solids, within)) empty.add(at);
   }
-  if (empty == 0) return;
-  const double z = mm(lowest->plane());
-  warnings.push_back({"layers-empty",
-                      fmt::format("{} of {} layers are empty amid a part, first layer {} at z {:.3f} mm", empty, filled.size(),
-                                  lowest->index, z),
-                      "", lowest->index, z});
+  empty.warn("layers-empty",
+             fmt::format("{} of {} layers are empty amid a part, first {}", empty.count, filled.size(), empty.first), warnings);
 }
 
 void check_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {

@@ -1,5 +1,7 @@
 #include "stages/checks/thin.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <tuple>
 
@@ -54,6 +56,18 @@ Stencil Stencils::at(std::uint32_t number) const {
 
 namespace {
 
+/// Runs are added row by row: begin_rows() first, end_row() after each row.
+void begin_rows(std::uint32_t columns, Runs& result) {
+  result.columns = columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+}
+void end_row(Runs& result) { result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size())); }
+void add_run(std::uint32_t begin, std::uint32_t end, Runs& result) {
+  result.change.push_back(begin);
+  result.change.push_back(end);
+}
+
 /// Where the image has rows and columns that are set.
 PixelBox box_of(const RunsView& image) {
   PixelBox box;
@@ -76,9 +90,7 @@ enum class To { kPixels, kCorners };
 /// Of corners, all pixels of their stencils; of pixels, the corners of all stencils that hold one. Within the window.
 void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, Buffer<std::uint64_t>& spans,
             Runs& result) {
-  result.columns = image.columns;
-  result.row_offset.assign(1, 0);
-  result.change.clear();
+  begin_rows(image.columns, result);
   const std::int64_t left = window.left, right = window.right;
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     const std::size_t row_begin = result.change.size();
@@ -102,11 +114,10 @@ void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox
       if (result.change.size() > row_begin && begin <= result.change.back()) {
         result.change.back() = std::max(result.change.back(), end);
       } else {
-        result.change.push_back(begin);
-        result.change.push_back(end);
+        add_run(begin, end, result);
       }
     }
-    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+    end_row(result);
   }
 }
 
@@ -132,18 +143,15 @@ void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, c
 /// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
 std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t minimum, std::uint64_t maximum, Runs& result) {
   std::uint64_t largest = 0;
-  result.columns = image.columns;
-  result.row_offset.assign(1, 0);
-  result.change.clear();
+  begin_rows(image.columns, result);
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
       const std::uint64_t pixels = pieces.pixels[pieces.of_run[i]];
       if (pixels <= minimum || pixels > maximum) continue;
       largest = std::max(largest, pixels);
-      result.change.push_back(image.change[2 * i]);
-      result.change.push_back(image.change[2 * i + 1]);
+      add_run(image.change[2 * i], image.change[2 * i + 1], result);
     }
-    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+    end_row(result);
   }
   return largest;
 }
@@ -172,34 +180,25 @@ void take(const Pieces& pieces, std::uint64_t minimum, ThinRegions& locations) {
 }  // namespace
 
 void complement(const RunsView& image, const PixelBox& window, Runs& result) {
-  result.columns = image.columns;
-  result.row_offset.assign(1, 0);
-  result.change.clear();
+  begin_rows(image.columns, result);
   result.change.reserve(image.change.size() + 2 * (window.bottom - window.top));
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     if (r >= window.top && r < window.bottom) {
       std::uint32_t at = window.left;
       const auto row = image.row(r);
       for (std::size_t i = 0; i + 1 < row.size() && at < window.right; i += 2) {
-        if (at < row[i]) {
-          result.change.push_back(at);
-          result.change.push_back(std::min(row[i], window.right));
-        }
+        if (at < row[i]) add_run(at, std::min(row[i], window.right), result);
         at = std::max(at, row[i + 1]);
       }
-      if (at < window.right) {
-        result.change.push_back(at);
-        result.change.push_back(window.right);
-      }
+      if (at < window.right) add_run(at, window.right, result);
     }
-    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+    end_row(result);
   }
 }
 
 std::uint64_t ThinScratch::bytes() const {
   std::uint64_t total = bytes_held(spans) + pieces.bytes();
-  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending})
-    total += bytes_held(image->row_offset) + bytes_held(image->change);
+  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending}) total += bytes_of(*image);
   return total;
 }
 
@@ -232,6 +231,61 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
   }
   keep_largest(locations.largest, ThinRegions::kMax);
   return locations;
+}
+
+VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch) {
+  VanishedPieces found;
+  if (before.change.empty()) return found;
+  scratch.pieces.find(before, true);
+  scratch.stays.assign(scratch.pieces.count(), 0);
+  for (std::uint32_t r = 0; r < before.rows(); ++r) {
+    for_touching(before, r, after, r, false,
+                 [&](std::uint32_t run, std::uint32_t) { scratch.stays[scratch.pieces.of_run[run]] = 1; });
+  }
+  for (std::size_t p = 0; p < scratch.pieces.count(); ++p) {
+    const std::uint64_t pixels = scratch.pieces.pixels[p];
+    if (scratch.stays[p] != 0 || pixels <= minimum) continue;
+    ++found.count;
+    if (pixels <= found.largest) continue;
+    found.largest = pixels;
+    found.box = scratch.pieces.box[p];
+  }
+  return found;
+}
+
+void VanishCount::add(const Layer& layer, const VanishedPieces& found) {
+  if (found.count == 0 || layer.index != next_) now_ = {};
+  next_ = layer.index + 1;
+  if (found.count == 0) return;
+  ++now_.layers;
+  if (now_.layers == kLayers) layers_ += kLayers;
+  if (now_.layers > kLayers) ++layers_;
+  if (found.largest > now_.largest) {
+    now_.largest = found.largest;
+    now_.box = found.box;
+    now_.layer = layer;
+  }
+  if (now_.layers >= kLayers && now_.largest > worst_.largest) worst_ = now_;
+}
+
+void VanishCount::report(const PixelGrid& grid, bool mirrored_x, bool mirrored_y, std::vector<Warning>& warnings) const {
+  if (layers_ == 0) return;
+  std::int64_t column = (std::int64_t{worst_.box.left} + worst_.box.right - 1) / 2;
+  std::int64_t row = (std::int64_t{worst_.box.top} + worst_.box.bottom - 1) / 2;
+  if (mirrored_x) column = grid.columns() - 1 - column;
+  if (mirrored_y) row = grid.rows() - 1 - row;
+  const double mm2 = static_cast<double>(worst_.largest) / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * 1e12);
+  const double x = mm(grid.x.centre(column)), y = mm(grid.y.centre(std::int64_t{grid.rows()} - 1 - row)),
+               z = mm(worst_.layer.bottom);
+  warnings.push_back(
+      {"vanished",
+       fmt::format("the bleed leaves nothing of whole pieces of {} layers, the largest of {:.3g} mm2 at x {:.2f}, "
+                   "y {:.2f}, z {:.2f} mm (layer {}): walls narrower than twice the bleed; make them thicker, or "
+                   "give a smaller --bleed",
+                   layers_, mm2, x, y, z, worst_.layer.index),
+       {},
+       worst_.layer.index,
+       z});
 }
 
 }  // namespace lamina::checks

@@ -1,9 +1,14 @@
 #include "stages/heights/evaluate.h"
 
-#include <algorithm>
+#include <fmt/format.h>
 
-#include "stages/heights/section.h"
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
 #include "stages/heights/steepest.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::heights {
 
@@ -50,7 +55,7 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
     }
     result.above_limit += layer.cusp > options.cusp;
     steps += static_cast<double>(thickness) * (below[i + 1] - below[i]);
-    if (timed) result.seconds += seconds_of_layer(time, section[i]);
+    if (timed) result.seconds += time.seconds(section[i]);
   }
   if (index.area_mm2 > 0) result.mean_cusp = steps / index.area_mm2;
 
@@ -67,6 +72,114 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
   }
   result.top_miss = boundaries.back() - index.top;
   return result;
+}
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+Study study_of(const SurfaceIndex& index, const Options& options, Plan plan) {
+  Study study;
+  study.options = options;
+  study.boundaries = boundaries_of(plan.table);
+  for (std::uint32_t i = 0; i < plan.table.size(); ++i) study.reasons.push_back(plan.table[i].reason);
+  const auto start = Clock::now();
+  study.evaluation = evaluate(index, study.boundaries, options);
+  study.evaluate_seconds = seconds_since(start);
+  study.plan = std::move(plan);
+  return study;
+}
+
+}  // namespace
+
+Result<Study> study(const SurfaceIndex& index, const Options& options) {
+  const auto start = Clock::now();
+  Result<Plan> plan = plan_heights(index, options);
+  if (!plan) return plan.error();
+  const double seconds = seconds_since(start);
+  Study study = study_of(index, options, std::move(*plan));
+  study.plan_seconds = seconds;
+  study.name = mode_name(options.mode);
+  if (options.mode == Mode::kUniform) study.name += fmt::format(" {} mm", number_text(mm(options.set.minimum())));
+  return study;
+}
+
+Result<Study> study_table(const SurfaceIndex& index, const Options& options, const std::string& path) {
+  auto file = FileReader::open(path, {.fault = Fault::kInput,
+                                      .missing = "no such file; name a file of heights",
+                                      .max_bytes = kMaxTableBytes,
+                                      .streams = true});
+  if (!file) return file.error();
+  Study study;
+  study.name = "from " + path;
+  study.options = options;
+  study.boundaries.push_back(0);
+  for (std::string_view line; file->next(line);) {
+    const std::uint64_t number = file->line_number();
+    line = line.substr(0, line.find('#'));
+    while (!line.empty() && (line.back() == ' ' || line.back() == '\r' || line.back() == '\t')) line.remove_suffix(1);
+    if (line.empty()) continue;
+    double millimetres = 0;
+    if (const std::string wrong = read_number(line, 0, 2147, " mm", millimetres); !wrong.empty()) {
+      return Error{Fault::kInput, fmt::format("{}:{}: {}", path, number, wrong)};
+    }
+    const std::int64_t height = nm_of(millimetres);
+    if (height == 0 && study.boundaries.size() == 1) continue;
+    if (height <= study.boundaries.back()) {
+      return Error{Fault::kInput, fmt::format("{}:{}: {} mm is not above the height before it; list the tops of the layers "
+                                              "from the bottom up",
+                                              path, number, line)};
+    }
+    study.boundaries.push_back(height);
+  }
+  if (!file->status()) return file->status().error();
+  if (study.boundaries.size() < 2) return Error{Fault::kInput, fmt::format("{}: holds no layer; list their tops in mm", path)};
+  study.evaluation = evaluate(index, study.boundaries, options);
+  return study;
+}
+
+Result<std::vector<Study>> study_all_modes(const SurfaceIndex& index, const Options& options) {
+  std::vector<std::pair<Mode, ThicknessSet>> paths = {{Mode::kUniform, {{options.set.minimum()}}}};
+  if (options.set.size() > 1) paths.push_back({Mode::kUniform, {{options.set.maximum()}}});
+  for (const Mode mode : {Mode::kAngle, Mode::kStepwise, Mode::kCusp, Mode::kOptimal}) paths.push_back({mode, options.set});
+  std::vector<Study> studies;
+  Options way = options;
+  for (auto& [mode, set] : paths) {
+    way.mode = mode;
+    way.set = std::move(set);
+    Result<Study> made = study(index, way);
+    if (!made) return made.error();
+    studies.push_back(std::move(*made));
+  }
+  return studies;
+}
+
+Result<std::vector<Study>> study_per_part(SurfaceIndex index, Options options) {
+  options.mode = Mode::kOptimal;
+  if (Status status = check_slab(options.set); !status) return status.error();
+  Result<Study> common = study(index, options);
+  if (!common) return common.error();
+  common->name = "all parts in one table";
+  std::vector<Study> studies;
+  studies.push_back(std::move(*common));
+  Result<PerPartPlan> plan = plan_per_part(index, options);
+  if (!plan) return plan.error();
+  const std::vector<PartSurface> parts = std::exchange(index.parts, {});
+  for (std::uint32_t part = 0; part < parts.size(); ++part) {
+    index.parts = {parts[part]};
+    index.top = parts[part].top;
+    index.area_mm2 = 0;
+    for (const PlacedSurface& placed : parts[part].placed) {
+      index.area_mm2 += index.meshes[placed.mesh].area_mm2 * placed.copies;
+    }
+    Study study = study_of(index, options, std::move(plan->parts[part]));
+    for (LayerFacts& layer : study.evaluation.layers) layer.part = layer.part == kNoPart ? layer.part : part;
+    study.name = fmt::format("part {}, slabs of {} mm", part + 1, number_text(mm(plan->slab)));
+    studies.push_back(std::move(study));
+  }
+  return studies;
 }
 
 }  // namespace lamina::heights

@@ -6,25 +6,83 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "stages/data/buffer.h"
 #include "stages/data/choices.h"
+#include "stages/data/layer.h"
+#include "stages/data/machine.h"
 #include "stages/data/status.h"
 #include "stages/heights/candidate_heights.h"
-#include "stages/heights/flats.h"
 #include "stages/heights/settings.h"
 #include "stages/heights/surface.h"
-#include "stages/heights/table.h"
 
 namespace lamina::heights {
+
+/// Layers without gap or overlap, from height 0. A uniform table holds no layer and makes them on demand; any other one
+/// holds 12 bytes a layer.
+class LayerTable {
+ public:
+  /// height, thickness  nm, > 0
+  /// The last layer counts even where it is only partly filled: ceil(height / thickness) layers.
+  static LayerTable uniform(std::int64_t height, Nm thickness) {
+    LayerTable table;
+    table.thickness_ = thickness;
+    table.count_ = static_cast<std::uint32_t>(ceil_div<std::int64_t>(height, thickness));
+    return table;
+  }
+  LayerTable() = default;
+
+  /// Layers are then added without moving the others; not of a uniform table.
+  void reserve(std::uint32_t layers) { entries_.reserve(layers); }
+  std::size_t capacity() const { return entries_.capacity(); }
+  void add(Nm thickness, LayerReason reason) {
+    entries_.push_back({static_cast<Nm>(top()), thickness, reason});
+    ++count_;
+  }
+
+  /// Takes the last layer away; not of a uniform table.
+  void drop_last() {
+    entries_.pop_back();
+    --count_;
+  }
+
+  std::uint32_t size() const { return count_; }
+  Layer operator[](std::uint32_t index) const {
+    if (thickness_ > 0) {
+      return {index, static_cast<Nm>(std::int64_t{index} * thickness_), thickness_, LayerReason::kUniform};
+    }
+    const LayerEntry& entry = entries_[index];
+    return {index, entry.bottom, entry.thickness, entry.reason};
+  }
+  /// Where the last layer ends, nm.
+  std::int64_t top() const {
+    if (thickness_ > 0) return std::int64_t{count_} * thickness_;
+    return count_ == 0 ? 0 : std::int64_t{entries_.back().bottom} + entries_.back().thickness;
+  }
+
+ private:
+  struct LayerEntry {
+    Nm bottom, thickness;
+    LayerReason reason;
+  };
+  Nm thickness_ = 0;  // > 0: uniform, and nothing is stored
+  std::uint32_t count_ = 0;
+  Buffer<LayerEntry> entries_;
+};
+
+/// Empty, or a warning if some layers end between two steps of the build vat of a powder printer.
+/// errors  kUsage: a layer thinner than a step
+/// cost    O(layers)
+Result<std::string> check_build_steps(const Machine& machine, const LayerTable& table);
 
 /// What a layer costs; with both 0 every layer costs the same.
 struct TimeModel {
   double seconds_per_layer = 0;
   double seconds_per_mm2 = 0;  // of the section at the layer's bottom, of all copies
+  double seconds(double section_mm2) const { return seconds_per_layer + seconds_per_mm2 * section_mm2; }
   bool on() const { return seconds_per_layer > 0 || seconds_per_mm2 > 0; }
 };
 
@@ -77,5 +135,47 @@ Status check_options(const Options& options);
 /// errors  of check_options; kUsage if the thicknesses reach too many heights
 /// cost    uniform O(1); others O(facets + height / step), optimal times the number of thicknesses
 Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options);
+
+/// Every part is built in slabs that are common to all; within a slab each part has its own layers, so that a part
+/// with steep walls need not be built in the thin layers that its neighbour's slopes require.
+/// source  J. Tyberg and J. H. Bohn, "Local adaptive slicing", Rapid Prototyping Journal 4 (1998)
+struct PerPartPlan {
+  std::int64_t slab = 0;    // nm: every part has a boundary at each multiple of it, up to the least thickness
+                            // below its top
+  std::vector<Plan> parts;  // by part; the table ends at the part's top
+};
+
+/// The height of the slabs: the greatest thickness, rounded up to a multiple of the least one, where the thicknesses
+/// are a range; else the lowest height that both the least and the greatest thickness divide.
+std::int64_t slab_height(const ThicknessSet& set);
+
+/// Whether slabs of these thicknesses are low enough. errors  kUsage
+Status check_slab(const ThicknessSet& set);
+
+/// The best table for every part (see optimal.h) of those that keep to the slabs.
+/// index  used up
+/// errors  of check_slab; as plan_heights
+Result<PerPartPlan> plan_per_part(SurfaceIndex index, const Options& options);
+
+/// Holds layers, from the bottom up, to the options that decided them: each begins where the one before ends, the first on the
+/// bed, and has a thickness of the set, or of an even division of a slab. Which thickness of the set a layer has the parts
+/// decide, which are not at hand.
+class OnRecord {
+ public:
+  /// options  none: they are not known
+  explicit OnRecord(std::optional<Options> options) : options_(std::move(options)) {}
+
+  /// Takes the next layer. errors  kVerification: "layer 3: begins 300000 nm above the bed, the manifest says 300001"
+  Status check(const Layer& layer);
+
+ private:
+  Status check_thickness(const Layer& layer);
+  bool divides_slab(const Layer& layer);
+
+  std::optional<Options> options_;
+  std::optional<std::int64_t> begins_;  // the next layer
+  // Of a slab that is divided evenly: the layers of it so far, and into how many it can be divided.
+  std::int64_t count_ = -1, fewest_ = 1, max_ = 1;  // count_: below 0 within a slab whose first layers are not known
+};
 
 }  // namespace lamina::heights

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <type_traits>
 
-#include "stages/heights/section.h"
+#include "stages/data/buffer.h"
 #include "stages/heights/steepest.h"
 
 namespace lamina::heights {
@@ -47,6 +48,105 @@ Buffer<std::uint32_t> highest_by_cusp(const CandidateHeights& candidate_heights,
   }
   return highest;
 }
+
+/// Stacks on evenly spaced candidates. From candidate r a layer may end on any one from r + minimum to limit[r].
+struct Stacks {
+  std::span<const std::int32_t> layers;  // the fewest of any stack that ends there; above that of `end`: none does
+  std::span<const std::uint32_t> limit;  // by candidate; r or less where no layer starts, else it only grows
+  std::span<const double> below;         // mm2 of slopes below each candidate; only grows
+  std::uint32_t minimum;                 // candidates
+  std::uint32_t end;                     // the candidate on which the stack ends
+};
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+/// For each candidate on which some stack of the fewest layers to the end has a boundary, the next boundary of the one whose
+/// thickness times slopes, summed over its layers, is minimal from there on; other entries are UINT32_MAX.
+///
+/// Thickness times slopes is a product of two measures of the same interval, so that wide layer plus narrow layer within
+/// it cost no less than the two that cross. Hence the best next boundary only moves up with the candidate (F. F. Yao,
+/// "Efficient dynamic programming using quadrangle inequalities", 1980), and halving finds all of them.
+///
+/// cost  O(candidates * log(candidates of the same number of layers))
+class HeightSearch {
+ public:
+  explicit HeightSearch(const Stacks& stacks) : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, kNone) {}
+
+  Buffer<std::uint32_t> all() {
+    sort_by_layers();
+    steps_[stacks_.end] = 0;
+    columns_ = {stacks_.end};
+    for (std::int32_t layers = stacks_.layers[stacks_.end]; layers-- > 0;) {
+      find_rows(layers);
+      if (!rows_.empty()) halve(0, rows_.size(), 0, columns_.size() - 1);
+      columns_.clear();
+      for (const CandidateRow& row : rows_) columns_.push_back(row.candidate);
+    }
+    return std::move(via_);
+  }
+
+ private:
+  // A candidate and the columns, [first, last), on which a layer from it may end.
+  struct CandidateRow {
+    std::uint32_t candidate;
+    std::size_t first, last;
+  };
+
+  void sort_by_layers() {
+    const std::int32_t maximum = stacks_.layers[stacks_.end];
+    begin_.assign(maximum + 2, 0);
+    const auto counts = [&](std::uint32_t candidate) { return stacks_.layers[candidate] < maximum; };
+    for (std::uint32_t candidate = 0; candidate < stacks_.end; ++candidate) {
+      if (counts(candidate)) ++begin_[stacks_.layers[candidate] + 1];
+    }
+    for (std::int32_t layers = 0; layers < maximum; ++layers) begin_[layers + 1] += begin_[layers];
+    candidates_.resize(begin_[maximum]);
+    Buffer<std::uint32_t> next = begin_;
+    for (std::uint32_t candidate = 0; candidate < stacks_.end; ++candidate) {
+      if (counts(candidate)) candidates_[next[stacks_.layers[candidate]]++] = candidate;
+    }
+  }
+
+  // The candidates from which a layer reaches a column. Both ends of what they reach only move up.
+  void find_rows(std::int32_t layers) {
+    rows_.clear();
+    std::size_t first = 0, last = 0;
+    for (std::uint32_t i = begin_[layers]; i < begin_[layers + 1]; ++i) {
+      const std::uint32_t candidate = candidates_[i], limit = stacks_.limit[candidate];
+      if (limit < candidate + stacks_.minimum) continue;
+      while (first < columns_.size() && columns_[first] < candidate + stacks_.minimum) ++first;
+      while (last < columns_.size() && columns_[last] <= limit) ++last;
+      if (first < last) rows_.push_back({candidate, first, last});
+    }
+  }
+
+  // Rows [first, last), whose best columns lie in [low, high].
+  void halve(std::size_t first, std::size_t last, std::size_t low, std::size_t high) {
+    const std::size_t middle = first + (last - first) / 2;
+    const CandidateRow& row = rows_[middle];
+    const double below = stacks_.below[row.candidate];
+    std::size_t best = low;
+    double minimum = kFar;
+    for (std::size_t i = std::max(row.first, low); i <= std::min(row.last - 1, high); ++i) {
+      const std::uint32_t up = columns_[i];
+      const double value = steps_[up] + (up - row.candidate) * (stacks_.below[up] - below);
+      if (value > minimum) continue;  // of equal ones the thickest
+      minimum = value;
+      best = i;
+    }
+    steps_[row.candidate] = minimum;
+    via_[row.candidate] = columns_[best];
+    if (first < middle) halve(first, middle, low, best);
+    if (middle + 1 < last) halve(middle + 1, last, best, high);
+  }
+
+  const Stacks& stacks_;
+  Buffer<double> steps_;  // mm2 times steps, from a candidate to the end
+  Buffer<std::uint32_t> via_;
+  Buffer<std::uint32_t> candidates_, begin_;  // by number of layers below them, with the offset of each number
+  Buffer<std::uint32_t> columns_;             // those of one layer more from which the end is reached
+  Buffer<CandidateRow> rows_;
+};
 
 class Solver {
  public:
@@ -96,7 +196,7 @@ class Solver {
     const Buffer<double> section = section_at_candidates(index_, candidate_heights_, tolerance_);
     weights_.resize(candidate_heights_.candidates());
     for (std::uint32_t candidate = 0; candidate < candidate_heights_.candidates(); ++candidate) {
-      weights_[candidate] = std::max<std::int64_t>(1, std::llround(seconds_of_layer(options_.time, section[candidate]) * 1e6));
+      weights_[candidate] = std::max<std::int64_t>(1, std::llround(options_.time.seconds(section[candidate]) * 1e6));
     }
   }
 
@@ -186,8 +286,8 @@ class Solver {
   Buffer<Cost> costs_by_windows() const {
     Buffer<Cost> cost(candidate_heights_.candidates(), unreached<Cost>());
     cost[0] = 0;
-    Buffer<std::uint32_t> window(
-        candidate_heights_.candidates());  // of increasing cost of what is built on them, the first is the cheapest
+    // Of increasing cost of what is built on them, the first is the cheapest.
+    Buffer<std::uint32_t> window(candidate_heights_.candidates());
     Buffer<Cost> built(candidate_heights_.candidates());
     std::uint32_t front = 0, back = 0;
     for (std::uint32_t up = strides_.front(); up < candidate_heights_.candidates(); ++up) {
@@ -270,7 +370,7 @@ class Solver {
     const Buffer<double> below = projected_below(index_, index_.parts, candidate_heights_, Sign::kBoth);
     Buffer<std::uint32_t> via;  // the next candidate of the stack from each one
     if constexpr (std::is_same_v<Cost, Layers>) {
-      if (even_range()) via = fewest_steps({cost, limit_, below, strides_.front(), end});
+      if (even_range()) via = HeightSearch({cost, limit_, below, strides_.front(), end}).all();
     }
     if (via.empty()) via = fewest_steps_by_layers(cost, below, end);
     std::vector<std::uint32_t> thicknesses;
@@ -283,15 +383,14 @@ class Solver {
   }
   template <class Cost>
   Buffer<std::uint32_t> fewest_steps_by_layers(const Buffer<Cost>& cost, const Buffer<double>& below, std::uint32_t end) const {
-    constexpr double kNowhere = std::numeric_limits<double>::infinity();
-    Buffer<double> steps(end + 1, kNowhere);  // mm2 nm, from a candidate to the end
+    Buffer<double> steps(end + 1, kFar);  // mm2 nm, from a candidate to the end
     Buffer<std::uint32_t> via(end + 1, kNone);
     steps[end] = 0;
     for (std::uint32_t candidate = end; candidate-- > 0;) {
       if (cost[candidate] == unreached<Cost>() || is_last<Cost>(candidate)) continue;
       const std::size_t flat = first_flat_above_if<Cost>(candidate);
       for_each_layer(candidate, [&](std::uint32_t i, std::uint32_t up) {
-        if (up > end || steps[up] == kNowhere || cost[candidate] + weight<Cost>(candidate, flat, up) != cost[up]) return;
+        if (up > end || steps[up] == kFar || cost[candidate] + weight<Cost>(candidate, flat, up) != cost[up]) return;
         const double value = steps[up] + set_.values[i] * (below[up] - below[candidate]);
         if (value > steps[candidate]) return;  // of equal ones the thickest
         steps[candidate] = value;
@@ -335,94 +434,5 @@ class Solver {
 Plan plan_optimal(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights) {
   return Solver(index, options, candidate_heights).solve();
 }
-
-namespace {
-
-constexpr double kFar = std::numeric_limits<double>::infinity();
-
-class HeightSearch {
- public:
-  explicit HeightSearch(const Stacks& stacks)
-      : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, UINT32_MAX) {}
-
-  Buffer<std::uint32_t> all() {
-    sort_by_layers();
-    steps_[stacks_.end] = 0;
-    columns_ = {stacks_.end};
-    for (std::int32_t layers = stacks_.layers[stacks_.end]; layers-- > 0;) {
-      find_rows(layers);
-      if (!rows_.empty()) halve(0, rows_.size(), 0, columns_.size() - 1);
-      columns_.clear();
-      for (const CandidateRow& row : rows_) columns_.push_back(row.candidate);
-    }
-    return std::move(via_);
-  }
-
- private:
-  // A candidate and the columns, [first, last), on which a layer from it may end.
-  struct CandidateRow {
-    std::uint32_t candidate;
-    std::size_t first, last;
-  };
-
-  void sort_by_layers() {
-    const std::int32_t maximum = stacks_.layers[stacks_.end];
-    begin_.assign(maximum + 2, 0);
-    const auto counts = [&](std::uint32_t candidate) { return stacks_.layers[candidate] < maximum; };
-    for (std::uint32_t candidate = 0; candidate < stacks_.end; ++candidate) {
-      if (counts(candidate)) ++begin_[stacks_.layers[candidate] + 1];
-    }
-    for (std::int32_t layers = 0; layers < maximum; ++layers) begin_[layers + 1] += begin_[layers];
-    candidates_.resize(begin_[maximum]);
-    Buffer<std::uint32_t> next = begin_;
-    for (std::uint32_t candidate = 0; candidate < stacks_.end; ++candidate) {
-      if (counts(candidate)) candidates_[next[stacks_.layers[candidate]]++] = candidate;
-    }
-  }
-
-  // The candidates from which a layer reaches a column. Both ends of what they reach only move up.
-  void find_rows(std::int32_t layers) {
-    rows_.clear();
-    std::size_t first = 0, last = 0;
-    for (std::uint32_t i = begin_[layers]; i < begin_[layers + 1]; ++i) {
-      const std::uint32_t candidate = candidates_[i], limit = stacks_.limit[candidate];
-      if (limit < candidate + stacks_.minimum) continue;
-      while (first < columns_.size() && columns_[first] < candidate + stacks_.minimum) ++first;
-      while (last < columns_.size() && columns_[last] <= limit) ++last;
-      if (first < last) rows_.push_back({candidate, first, last});
-    }
-  }
-
-  // Rows [first, last), whose best columns lie in [low, high].
-  void halve(std::size_t first, std::size_t last, std::size_t low, std::size_t high) {
-    const std::size_t middle = first + (last - first) / 2;
-    const CandidateRow& row = rows_[middle];
-    const double below = stacks_.below[row.candidate];
-    std::size_t best = low;
-    double minimum = kFar;
-    for (std::size_t i = std::max(row.first, low); i <= std::min(row.last - 1, high); ++i) {
-      const std::uint32_t up = columns_[i];
-      const double value = steps_[up] + (up - row.candidate) * (stacks_.below[up] - below);
-      if (value > minimum) continue;  // of equal ones the thickest
-      minimum = value;
-      best = i;
-    }
-    steps_[row.candidate] = minimum;
-    via_[row.candidate] = columns_[best];
-    if (first < middle) halve(first, middle, low, best);
-    if (middle + 1 < last) halve(middle + 1, last, best, high);
-  }
-
-  const Stacks& stacks_;
-  Buffer<double> steps_;  // mm2 times steps, from a candidate to the end
-  Buffer<std::uint32_t> via_;
-  Buffer<std::uint32_t> candidates_, begin_;  // by number of layers below them, with the offset of each number
-  Buffer<std::uint32_t> columns_;             // those of one layer more from which the end is reached
-  Buffer<CandidateRow> rows_;
-};
-
-}  // namespace
-
-Buffer<std::uint32_t> fewest_steps(const Stacks& stacks) { return HeightSearch(stacks).all(); }
 
 }  // namespace lamina::heights

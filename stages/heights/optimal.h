@@ -1,10 +1,6 @@
 // stages/heights/optimal.h: the best of all layer tables.
 #pragma once
 
-#include <cstdint>
-#include <span>
-
-#include "stages/data/buffer.h"
 #include "stages/heights/candidate_heights.h"
 #include "stages/heights/heights.h"
 
@@ -29,26 +25,5 @@ namespace lamina::heights {
 /// cost  O(states * log thicknesses) where the thicknesses are all of a range and its flats can be hit, else
 ///       O(states * thicknesses)
 Plan plan_optimal(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights);
-
-// --- of all stacks with the fewest layers, the one with the smallest steps.
-
-/// Stacks on evenly spaced candidates. From candidate r a layer may end on any one from r + minimum to limit[r].
-struct Stacks {
-  std::span<const std::int32_t> layers;  // the fewest of any stack that ends there; above that of `end`: none does
-  std::span<const std::uint32_t> limit;  // by candidate; r or less where no layer starts, else it only grows
-  std::span<const double> below;         // mm2 of slopes below each candidate; only grows
-  std::uint32_t minimum;                 // candidates
-  std::uint32_t end;                     // the candidate on which the stack ends
-};
-
-/// For each candidate on which some stack of the fewest layers to the end has a boundary, the next boundary of the one whose
-/// thickness times slopes, summed over its layers, is minimal from there on; other entries are UINT32_MAX.
-///
-/// Thickness times slopes is a product of two measures of the same interval, so that wide layer plus narrow layer within
-/// it cost no less than the two that cross. Hence the best next boundary only moves up with the candidate (F. F. Yao,
-/// "Efficient dynamic programming using quadrangle inequalities", 1980), and halving finds all of them.
-///
-/// cost  O(candidates * log(candidates of the same number of layers))
-Buffer<std::uint32_t> fewest_steps(const Stacks& stacks);
 
 }  // namespace lamina::heights

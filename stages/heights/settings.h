@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -20,14 +21,8 @@ enum class Mode : std::uint8_t {
 
 /// The word that stands for it in options and job files.
 constexpr std::string_view mode_name(Mode mode) {
-  switch (mode) {
-    case Mode::kAngle: return "angle";
-    case Mode::kCusp: return "cusp";
-    case Mode::kStepwise: return "stepwise";
-    case Mode::kOptimal: return "optimal";
-    case Mode::kUniform: break;
-  }
-  return "uniform";
+  constexpr std::string_view kNames[] = {"uniform", "angle", "cusp", "stepwise", "optimal"};
+  return kNames[static_cast<std::size_t>(mode)];
 }
 
 /// Which slopes a layer considers: all that reach into it, or only those that its bounding plane cuts, as the cited

@@ -10,6 +10,7 @@
 #include <vector>
 
 namespace lamina::heights {
+
 namespace {
 
 // Raises ranges of an array to at least a value, many times, and then returns every entry: level l of the table contains
@@ -169,6 +170,27 @@ Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSu
         below[cell] + all.within[cell] + density * static_cast<double>(candidate_heights[cell + 1] - candidate_heights[cell]);
   }
   return below;
+}
+
+Buffer<double> section_at_candidates(const SurfaceIndex& index, const CandidateHeights& candidate_heights, Nm tolerance) {
+  Buffer<double> section = projected_below(index, index.parts, candidate_heights, Sign::kUpMinusDown);
+  std::vector<std::pair<std::int64_t, double>> faces;  // horizontal ones change the section at once
+  for (const PartSurface& part : index.parts) {
+    for (const PlacedSurface& placed : part.placed) {
+      for (const FlatFacet& flat : index.meshes[placed.mesh].flats) {
+        faces.emplace_back(std::int64_t{flat.height} + placed.raise, (flat.up ? flat.mm2 : -flat.mm2) * placed.copies);
+      }
+    }
+  }
+  std::ranges::stable_sort(faces, {}, &std::pair<std::int64_t, double>::first);
+  double flat = 0;
+  std::size_t next = 0;
+  for (std::uint32_t candidate = 0; candidate < candidate_heights.candidates(); ++candidate) {
+    for (; next < faces.size() && faces[next].first <= candidate_heights[candidate] + tolerance; ++next)
+      flat += faces[next].second;
+    section[candidate] = std::max(0.0, -flat - section[candidate]);
+  }
+  return section;
 }
 
 }  // namespace lamina::heights

@@ -1,4 +1,4 @@
-// stages/heights/steepest.h: the flattest slope between any two candidate heights.
+// stages/heights/steepest.h: the flattest slope between any two candidate heights, and the area of the sections there.
 #pragma once
 
 #include <span>
@@ -28,5 +28,10 @@ enum class Sign { kBoth, kUpMinusDown };
 /// its height. With kBoth, differences times the thickness add up to the mean cusp; areas are weighed by their step_share.
 Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts,
                                const CandidateHeights& candidate_heights, Sign sign);
+
+/// mm2 of the section just above each candidate, of all copies: downward facets below it minus upward ones. Horizontal
+/// facets up to `tolerance` above a candidate count as below it. Right for closed meshes, but that a facet's area counts as
+/// evenly spread over its height; never below 0.
+Buffer<double> section_at_candidates(const SurfaceIndex& index, const CandidateHeights& candidate_heights, Nm tolerance);
 
 }  // namespace lamina::heights

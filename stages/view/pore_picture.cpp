@@ -251,6 +251,13 @@ void add_legend(const PorePicture& picture, int top, Plot& plot) {
   entry(kClosed, fmt::format("void that does not {:.2f} %", percent(rest, picture.solid)));
 }
 
+/// Of linear light 0 .. 1, as sRGB has it (IEC 61966-2-1).
+int byte_of(double light) {
+  light = std::clamp(light, 0.0, 1.0);
+  const double value = light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+  return static_cast<int>(std::lround(255 * value));
+}
+
 }  // namespace
 
 Plot draw_pores(const PorePicture& picture) {
@@ -298,17 +305,6 @@ Plot draw_pores(const PorePicture& picture) {
   plot.height = top + 40;
   return plot;
 }
-
-namespace {
-
-/// Of linear light 0 .. 1, as sRGB has it (IEC 61966-2-1).
-int byte_of(double light) {
-  light = std::clamp(light, 0.0, 1.0);
-  const double value = light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
-  return static_cast<int>(std::lround(255 * value));
-}
-
-}  // namespace
 
 std::string scale_colour(double share) {
   share = std::clamp(share, 0.0, 1.0);

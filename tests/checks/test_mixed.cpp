@@ -5,7 +5,7 @@
 #include <set>
 
 #include "pipeline/report/image_text.h"
-#include "stages/checks/mixed.h"
+#include "stages/checks/layer_warnings.h"
 
 namespace lamina::checks {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "stages/checks/tally.h"
+#include "stages/checks/solid_checks.h"
 
 namespace lamina::checks {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "pipeline/calibrate/pieces_text.h"
-#include "stages/heights/study/study.h"
+#include "stages/heights/evaluate.h"
 #include "stages/segment/flows.h"
 #include "stages/segment/measured.h"
 #include "stages/segment/samples.h"

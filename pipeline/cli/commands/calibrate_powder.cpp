@@ -7,7 +7,7 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/calibration/chart/draw.h"
+#include "stages/calibration/chart/layout.h"
 #include "stages/formats/chart/chart.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"

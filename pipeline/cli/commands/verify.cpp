@@ -6,7 +6,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/report/replay_text.h"
-#include "stages/checks/records.h"
+#include "stages/checks/layer_warnings.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"

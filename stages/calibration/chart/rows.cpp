@@ -3,28 +3,22 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/calibration/within.h"
+#include "stages/calibration/robust.h"
 
 namespace lamina::calibration {
 namespace {
 
-double middle_of(std::vector<double> values) {
-  std::ranges::sort(values);
-  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
-}
-
 std::optional<Located> mean_of(const std::vector<Located>& row) {
   constexpr double kFar = 4;  // standard errors
   if (row.empty()) return std::nullopt;
-  std::vector<double> positions, distances, errors;
-  for (const Located& one : row) positions.push_back(one.um);
-  const double middle = middle_of(positions);
+  std::vector<double> positions, errors;
   for (const Located& one : row) {
-    distances.push_back(std::abs(one.um - middle));
+    positions.push_back(one.um);
     errors.push_back(one.error_um);
   }
   // Of the head's own: the standard deviation that normal values have, less what errors make of it.
-  const double all = 1.4826 * middle_of(distances), error = middle_of(errors), own = std::max(all * all - error * error, 0.0);
+  const double middle = median_of(positions);
+  const double all = scatter_of(positions, middle), error = median_of(errors), own = std::max(all * all - error * error, 0.0);
   double weights = 0, sum = 0, squares = 0, count = 0;
   for (const Located& one : row) {
     const double off = one.um - middle, variance = std::max(one.error_um * one.error_um + own, 1e-6);

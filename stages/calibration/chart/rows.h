@@ -7,7 +7,7 @@
 
 namespace lamina::calibration {
 
-/// A length with its standard error, um. within_um  99 in 100 of them lie nearer to the truth (stages/calibration/within.h)
+/// A length with its standard error, um. within_um  99 in 100 of them lie nearer to the truth (stages/calibration/robust.h)
 struct Located {
   double um = 0, error_um = 0, within_um = 0;
 };

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
-#include "stages/calibration/scan/robust.h"
+#include "stages/calibration/robust.h"
 #include "stages/geometry/least_squares.h"
 
 namespace lamina::calibration {
@@ -346,14 +346,7 @@ ColourField field_of(const Photo& photo, const ExpectedLayer& layer, const View&
     }
   }
   cv::dilate(field.wanted, field.wanted, disc_of(2 * kAwayMm / field.side));
-  field.light = cv::Mat(rows, columns, CV_32F);
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      const Spot p = view.at((x + 0.5) * field.side, (y + 0.5) * field.side);
-      const bool inside = p.x >= 0 && p.y >= 0 && p.x < photo.light.cols - 1 && p.y < photo.light.rows - 1;
-      field.light.at<float>(y, x) = inside ? static_cast<float>(darkness_at(photo.light, p.x, p.y)) : -1.0f;
-    }
-  }
+  field.light = in_cells(photo.light, {field.wanted, 0, 0, field.side}, view);
   return field;
 }
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stages/calibration/scan/photo.h"
-#include "stages/calibration/scan/view.h"
+#include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "stages/calibration/robust.h"
 #include "stages/calibration/scan/marks.h"
 #include "stages/geometry/least_squares.h"
 
@@ -115,12 +116,6 @@ bool inspection(const Photo& photo, const View& view, const Spot& middle, bool a
   return true;
 }
 
-double middle_value(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// The centre of what is above the ground within `reach` of `about`.
 double centre(const std::vector<double>& profile, double step, double ground, double about, double reach) {
   double sum = 0, moment = 0;
@@ -188,10 +183,7 @@ class Inspect {
   }
 
  private:
-  double length_of(const ChartDash& dash) const {
-    return chart_.scan_along_x ? (dash.box.right - dash.box.left) * 1e-6 * chart_.pixel_x_nm
-                               : (dash.box.bottom - dash.box.top) * 1e-6 * chart_.pixel_y_nm;
-  }
+  double length_of(const ChartDash& dash) const { return along_of(chart_, size_of(dash.box, chart_)); }
 
   void sum_across(double length, double half_across, DashReading& detected) {
     across_.value.assign(static_cast<std::size_t>(w_.across), 0);
@@ -208,7 +200,7 @@ class Inspect {
       }
       across_.value[static_cast<std::size_t>(v)] = sum / std::max(count, 1);
     }
-    detected.ground = edge_.empty() ? 0 : middle_value(edge_);
+    detected.ground = upper_median_of(edge_);
     for (int v = 0; v < w_.across; ++v) {
       if (std::abs(w_.v_of(v)) <= 0.7 * half_across)
         detected.mass += (across_.value[static_cast<std::size_t>(v)] - detected.ground) * w_.step_across;
@@ -274,7 +266,7 @@ void check_dashes(const Photo& photo, const Chart& chart, std::vector<DashReadin
   if (masses.empty()) return;
   const auto rank = masses.begin() + static_cast<std::ptrdiff_t>(masses.size() * 3 / 4);
   std::nth_element(masses.begin(), rank, masses.end());
-  const double pitch = 1e-6 * (chart.scan_along_x ? chart.pixel_y_nm : chart.pixel_x_nm);
+  const double pitch = 1e-6 * across_of(chart, {chart.pixel_x_nm, chart.pixel_y_nm});
   const double usual = std::max(*rank, 0.5 * photo.ink * pitch);
   for (DashReading& one : detected) {
     one.there = !one.hidden && one.mass > kThere * usual;
@@ -282,7 +274,7 @@ void check_dashes(const Photo& photo, const Chart& chart, std::vector<DashReadin
     if (one.there && !one.hidden) misfits.push_back(one.misfit);
   }
   if (misfits.empty()) return;
-  const double maximum = kMarred * middle_value(misfits);
+  const double maximum = kMarred * upper_median_of(misfits);
   for (DashReading& one : detected) one.marred = one.misfit > maximum;
 }
 

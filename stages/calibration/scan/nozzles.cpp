@@ -6,9 +6,8 @@
 #include <random>
 #include <utility>
 
+#include "stages/calibration/robust.h"
 #include "stages/calibration/scan/marks.h"
-#include "stages/calibration/scan/robust.h"
-#include "stages/calibration/within.h"
 
 namespace lamina::calibration {
 namespace {
@@ -19,8 +18,7 @@ constexpr double kReportedPixels = 0.1, kErrors = 4;
 using Axes = std::array<double, 2>;
 
 Axes axes_of(const Chart& chart, const Spot& mm) {
-  const double along = chart.scan_along_x ? mm.x : mm.y, across = chart.scan_along_x ? mm.y : mm.x;
-  return {1000 * along * chart.along_sign, 1000 * across * chart.across_sign};
+  return {1000 * along_of(chart, mm) * chart.along_sign, 1000 * across_of(chart, mm) * chart.across_sign};
 }
 
 Measure measured(double um, double error_um, double freedom, double pitch_nm) {
@@ -29,9 +27,9 @@ Measure measured(double um, double error_um, double freedom, double pitch_nm) {
 
 /// freedom  degrees of it that the errors have
 Offset offset_of(const Chart& chart, const Axes& um, const Axes& error_um, const Axes& freedom) {
-  const double along_nm = chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm,
-               across_nm = chart.scan_along_x ? chart.pixel_y_nm : chart.pixel_x_nm;
-  return {measured(um[0], error_um[0], freedom[0], along_nm), measured(um[1], error_um[1], freedom[1], across_nm)};
+  const Spot nm{chart.pixel_x_nm, chart.pixel_y_nm};
+  return {measured(um[0], error_um[0], freedom[0], along_of(chart, nm)),
+          measured(um[1], error_um[1], freedom[1], across_of(chart, nm))};
 }
 
 /// The detected dashes of a nozzle. um  distance of each from its position in the swath, along and across

@@ -11,7 +11,7 @@
 
 namespace lamina::calibration {
 
-/// A length with its standard error. within_um  99 in 100 of them are nearer to the true value (stages/calibration/within.h)
+/// A length with its standard error. within_um  99 in 100 of them are nearer to the true value (stages/calibration/robust.h)
 /// reported  four standard errors are at most a tenth of a pixel of the layer
 struct Measure {
   double um = 0, error_um = 0, within_um = 0;

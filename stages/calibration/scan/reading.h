@@ -1,14 +1,12 @@
 // stages/calibration/scan/reading.h: reads a photograph of a chart, and reports on the head that printed it.
 #pragma once
 
-#include <optional>
 #include <vector>
 
+#include "stages/calibration/scan/blocks.h"
 #include "stages/calibration/scan/dashes.h"
-#include "stages/calibration/scan/inks.h"
 #include "stages/calibration/scan/nozzles.h"
 #include "stages/calibration/scan/sheet_fit.h"
-#include "stages/calibration/scan/stitches.h"
 #include "stages/data/chart.h"
 #include "stages/data/status.h"
 

@@ -1,4 +1,4 @@
-// stages/view/picture/canvas.h: an RGB picture on OpenImageIO: boxes, coverage, text, PNG.
+// stages/view/picture/canvas.h: an RGB picture on OpenImageIO: boxes, coverage, contours, text, PNG.
 #pragma once
 
 #include <OpenImageIO/imagebuf.h>
@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/contours.h"
 #include "stages/data/status.h"
 
 namespace lamina::view::picture {
@@ -46,5 +48,15 @@ bool have_font();
 
 /// Pixels from the start to the end of a line; 0 without a font.
 int text_width(const std::string& line, int size);
+
+/// Pixels of a panel: x from its left, y from its top, which lie at `left` and `top` nm.
+struct Scale {
+  double left, top, pixels_per_nm;
+  double x(Nm at) const { return (at - left) * pixels_per_nm; }
+  double y(Nm at) const { return (top - at) * pixels_per_nm; }
+};
+
+/// Shares of 0 .. 255 of a panel of width x height pixels that lie within contours, by the nonzero rule, to 1/8 of a row.
+std::vector<std::uint8_t> contour_shares(const ContoursView& contours, const Scale& scale, int width, int height);
 
 }  // namespace lamina::view::picture

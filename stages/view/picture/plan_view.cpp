@@ -7,8 +7,7 @@
 
 #include "stages/data/grid.h"
 #include "stages/view/picture/canvas.h"
-#include "stages/view/picture/contour_shares.h"
-#include "stages/view/picture/layout.h"
+#include "stages/view/picture/contact_sheet.h"
 
 namespace lamina::view::picture {
 namespace {

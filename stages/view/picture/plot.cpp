@@ -7,7 +7,6 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/view/picture/canvas.h"
-#include "stages/view/picture/contour_shares.h"
 
 namespace lamina::view::picture {
 namespace {

@@ -1,7 +1,6 @@
 // stages/view/report/page.h: the page of a report, put together.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 namespace lamina::view::report {
+
 namespace {
 
 void add_number(std::uint64_t value, Buffer<std::byte>& code) {

@@ -13,7 +13,6 @@
 
 #include "pipeline/calibrate/chart_reading.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/data/runs.h"
 #include "stages/formats/chart/chart.h"

@@ -11,7 +11,6 @@
 #include <random>
 #include <vector>
 
-#include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/calibration/chart/rows.h"
 #include "stages/calibration/scan/photo.h"

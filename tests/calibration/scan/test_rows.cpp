@@ -10,7 +10,6 @@
 
 #include "pipeline/calibrate/chart_reading.h"
 #include "pipeline/calibrate/scan_answer.h"
-#include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/calibration/scan/photo.h"
 #include "stages/calibration/scan/reading.h"

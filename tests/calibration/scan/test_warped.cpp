@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "stages/calibration/chart/draw.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/calibration/chart/rows.h"
 #include "stages/calibration/scan/compare.h"

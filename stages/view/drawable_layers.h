@@ -1,8 +1,9 @@
-// stages/view/bead_shapes.h: the areas of a layer's beads, as shapes to draw.
+// stages/view/drawable_layers.h: layers of a job to draw: which of them, and the areas of their beads as shapes.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,10 +14,17 @@
 
 namespace lamina::view {
 
-// --- drawable layers, and the inks of their beads.
+inline constexpr std::uint32_t kMaxCells = 400;  // of a picture
 
-/// The ink of a kind of bead, equal in all pictures.
-Ink ink_of(PathKind kind);
+/// One layer, every n-th layer, or a number of layers over the height (default 12); at most one is set.
+struct LayerChoice {
+  std::optional<std::uint32_t> layer, every, count;
+};
+
+/// Indices into the list of a job's layer numbers, which must not be empty.
+/// errors  kUsage: several choices, no such layer, too many for a picture
+/// cost    O(layers)
+Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const std::vector<std::uint32_t>& layers);
 
 /// The ink for one of several widths of a kind: pale for the narrowest, step 0, and full for the widest.
 Ink shade(const Ink& ink, std::size_t step, std::size_t steps);
@@ -29,8 +37,6 @@ struct LayerSeries {
   std::function<Result<LayerShapes>(std::uint32_t)> layer;
   std::vector<std::string> notes = {};  // for a person, one line each
 };
-
-// ---
 
 /// Adds the areas of planned beads to `shapes`, one per kind. errors  kInternal if Clipper refuses them
 Status add_paths(const ToolpathsView& paths, LayerShapes& shapes);

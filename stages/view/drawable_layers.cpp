@@ -1,4 +1,4 @@
-#include "stages/view/bead_shapes.h"
+#include "stages/view/drawable_layers.h"
 
 #include <fmt/format.h>
 
@@ -7,15 +7,36 @@
 #include <cmath>
 #include <map>
 #include <utility>
-#include <vector>
 
 #include "stages/geometry/clipping.h"
 
 namespace lamina::view {
 
-Ink ink_of(PathKind kind) {
-  constexpr Ink kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}, {127, 140, 141}};
-  return kInks[static_cast<std::size_t>(kind)];
+Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const std::vector<std::uint32_t>& layers) {
+  if (choice.layer.has_value() + choice.every.has_value() + choice.count.has_value() > 1) {
+    return Error{Fault::kUsage, "--layer, --every and --count exclude each other; give one of them"};
+  }
+  std::vector<std::size_t> chosen;
+  if (choice.layer) {
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      if (layers[i] == *choice.layer) return std::vector<std::size_t>{i};
+    }
+    return Error{Fault::kUsage,
+                 fmt::format("--layer {}: the job has layers {} to {}", *choice.layer, layers.front(), layers.back())};
+  }
+  if (const auto every = choice.every) {
+    const std::size_t cells = (layers.size() + *every - 1) / *every;
+    if (cells > kMaxCells) {
+      return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more", *every,
+                                              cells, (layers.size() + kMaxCells - 1) / kMaxCells)};
+    }
+    for (std::size_t i = 0; i < layers.size(); i += *every) chosen.push_back(i);
+    return chosen;
+  }
+  // The middle one of each of `cells` equal stretches of the height.
+  const std::size_t cells = std::min<std::size_t>(choice.count.value_or(12), layers.size());
+  for (std::size_t cell = 0; cell < cells; ++cell) chosen.push_back((2 * cell + 1) * layers.size() / (2 * cells));
+  return chosen;
 }
 
 Ink shade(const Ink& ink, std::size_t step, std::size_t steps) {
@@ -60,6 +81,12 @@ Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
 }
 
 constexpr std::size_t kMaxShades = 4;
+
+/// Equal in all pictures.
+Ink ink_of(PathKind kind) {
+  constexpr Ink kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}, {127, 140, 141}};
+  return kInks[static_cast<std::size_t>(kind)];
+}
 
 /// The words that slicers use: PrusaSlicer and Slic3r, CuraEngine, Orca.
 PathKind kind_of(const std::string& type) {
