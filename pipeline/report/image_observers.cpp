@@ -15,7 +15,7 @@
 #include "stages/checks/records.h"
 #include "stages/checks/rows.h"
 #include "stages/dose/budget.h"
-#include "stages/dose/share_count.h"
+#include "stages/dose/shares.h"
 #include "stages/geometry/isa.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "stages/dose/edges/dilate.h"
+#include "stages/dose/edges.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
