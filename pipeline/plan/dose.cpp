@@ -11,7 +11,7 @@
 #include "stages/dose/dither.h"
 #include "stages/formats/image_format.h"
 #include "stages/program/head_grid.h"
-#include "stages/program/maintenance/maintenance_check.h"
+#include "stages/program/maintenance.h"
 
 namespace lamina::pipeline {
 
