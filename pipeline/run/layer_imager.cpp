@@ -9,7 +9,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
-#include "stages/program/reach.h"
+#include "stages/program/bed.h"
 #include "stages/raster/mirror.h"
 
 namespace lamina::pipeline {
