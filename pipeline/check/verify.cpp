@@ -17,8 +17,8 @@
 #include "pipeline/report/job_cost.h"
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
-#include "stages/replay/feeding.h"
-#include "stages/replay/frame/frame.h"
+#include "stages/replay/frame.h"
+#include "stages/replay/totals.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {

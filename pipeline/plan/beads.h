@@ -17,7 +17,7 @@
 #include "pipeline/plan/segment.h"
 #include "stages/data/grid.h"
 #include "stages/data/runs.h"
-#include "stages/dose/edges/erode.h"
+#include "stages/dose/edges.h"
 #include "stages/raster/beads.h"
 
 namespace lamina::pipeline {

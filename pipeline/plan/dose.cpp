@@ -8,10 +8,10 @@
 
 #include "pipeline/plan/sections.h"
 #include "stages/data/mesh.h"
-#include "stages/dose/saturate.h"
+#include "stages/dose/dither.h"
 #include "stages/formats/image_format.h"
 #include "stages/program/head_grid.h"
-#include "stages/program/maintenance/maintenance_check.h"
+#include "stages/program/maintenance.h"
 
 namespace lamina::pipeline {
 

@@ -17,12 +17,9 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/dose/budget.h"
-#include "stages/dose/covered_spans.h"
-#include "stages/dose/dose_target.h"
-#include "stages/dose/edges/bleed.h"
-#include "stages/dose/edges/erode.h"
+#include "stages/dose/edges.h"
 #include "stages/dose/layer_drops.h"
-#include "stages/dose/zones.h"
+#include "stages/dose/saturation.h"
 
 namespace lamina::pipeline {
 

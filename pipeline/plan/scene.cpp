@@ -12,7 +12,7 @@
 #include "stages/arrange/placement.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/load.h"
-#include "stages/program/reach.h"
+#include "stages/program/bed.h"
 
 namespace lamina::pipeline {
 namespace {

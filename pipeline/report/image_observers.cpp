@@ -14,7 +14,7 @@
 #include "pipeline/report/replay_text.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/dose/budget.h"
-#include "stages/dose/share_count.h"
+#include "stages/dose/shares.h"
 #include "stages/geometry/isa.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

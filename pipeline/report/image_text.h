@@ -9,7 +9,7 @@
 
 #include "stages/checks/layer_warnings.h"
 #include "stages/dose/budget.h"
-#include "stages/dose/share_count.h"
+#include "stages/dose/shares.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <numbers>
 
-#include "stages/dose/edges/dilate.h"
+#include "stages/dose/edges.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
-#include "stages/program/reach.h"
+#include "stages/program/bed.h"
 #include "stages/raster/mirror.h"
 
 namespace lamina::pipeline {

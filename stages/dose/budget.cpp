@@ -4,12 +4,29 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::dose {
 namespace {
+
+/// How wide all is that a box is part of, along an axis, where boxes closer than `gap` are one.
+std::vector<std::int64_t> widths(std::span<const ZoneBox> boxes, std::size_t axis, std::int64_t gap) {
+  std::vector<std::uint32_t> order(boxes.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return boxes[i].low[axis]; });
+  std::vector<std::int64_t> width(boxes.size());
+  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+    const std::int64_t low = boxes[order[begin]].low[axis];
+    std::int64_t high = boxes[order[begin]].high[axis];
+    for (; end < order.size() && boxes[order[end]].low[axis] <= high + gap; ++end)
+      high = std::max(high, boxes[order[end]].high[axis]);
+    for (std::size_t i = begin; i < end; ++i) width[order[i]] = high - low;
+  }
+  return width;
+}
 
 /// "layers 3:9 (z 0.3 to 0.9 mm)", and how many others there are.
 std::string where(const std::vector<LayerSpan>& spans) {
@@ -31,16 +48,46 @@ std::string_view key_of(std::size_t position, const DoseTargets& targets, bool c
 
 }  // namespace
 
+CoveredSpans::CoveredSpans(std::span<const ZoneBox> boxes, std::uint32_t zones, std::int64_t shell_nm, std::int64_t pixel_nm)
+    : everywhere_(false), all_(zones), core_(zones) {
+  // A pixel more at either end of a box, and a reach that is rounded down to pixels.
+  const std::int64_t margin = 4 * pixel_nm;
+  const std::vector<std::int64_t> along_x = widths(boxes, 0, margin), along_y = widths(boxes, 1, margin);
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const ZoneBox& box = boxes[i];
+    all_[box.zone].push_back({box.low[2], box.high[2]});
+    if (std::min(along_x[i], along_y[i]) + margin > 2 * shell_nm) core_[box.zone].push_back({box.low[2], box.high[2]});
+  }
+  std::ranges::for_each(all_, merge);
+  std::ranges::for_each(core_, merge);
+}
+
+void CoveredSpans::merge(Spans& spans) {
+  std::ranges::sort(spans, {}, &Span::from);
+  std::size_t kept = 0;
+  for (std::size_t i = 1; i < spans.size(); ++i) {
+    if (spans[i].from <= spans[kept].to) {
+      spans[kept].to = std::max(spans[kept].to, spans[i].to);
+    } else {
+      spans[++kept] = spans[i];
+    }
+  }
+  if (!spans.empty()) spans.resize(kept + 1);
+}
+
+bool CoveredSpans::meets(const Spans& spans, const Layer& layer) {
+  const auto above =
+      std::ranges::upper_bound(spans, std::int64_t{layer.bottom}, {}, &Span::to);  // ends above the layer's bottom
+  return above != spans.end() && above->from < std::int64_t{layer.bottom} + layer.thickness;
+}
+
 void DoseFault::add(const Layer& layer, double requested_percent, double gets_percent, double requested_drops, bool worse) {
-  const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
   if (!where.empty() && gets_percent != gets) alike = false;
   if (where.empty() || worse) requested = requested_percent, gets = gets_percent, drops = requested_drops;
-  if (!where.empty() && (where.back().last == layer.index || where.back().last == layer.index + 1)) {
-    where.back().last = layer.index + 1;
-    where.back().to_nm = top;
-  } else {
-    where.push_back({layer.index, layer.index + 1, layer.bottom, top});
-  }
+  if (where.empty() || (where.back().last != layer.index && where.back().last != layer.index + 1))
+    where.push_back({layer.index, 0, layer.bottom, 0});
+  where.back().last = layer.index + 1;
+  where.back().to_nm = std::int64_t{layer.bottom} + layer.thickness;
 }
 
 Budget::Budget(const Binder& binder, const PixelGrid& grid, std::optional<DoseTargets> targets, std::uint32_t max_drops,
@@ -68,26 +115,17 @@ const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
   return dose;
 }
 
-void Budget::survey(std::vector<ZoneBox> boxes, std::uint32_t layers) {
-  boxes_ = std::move(boxes);
-  layers_ = layers;
-}
-
 void Budget::foresee(const Layer& layer, bool made) {
   made_ = made;
   for (std::uint32_t zone = 0; zone < (targets_ ? targets_->zones() : 1); ++zone) {
     if (!spans_.any(zone, layer)) continue;
-    if (targets_ && targets_->of(layer, zone).has_formula()) {
-      const DoseTarget& target = targets_->of(layer, zone);
-      const bool differ = !(target.percent == target.of_core());
-      if (jetting_.shell || !differ) inspect_field(layer, zone, false);
-      if (differ && (!jetting_.shell || spans_.core(zone, layer))) inspect_field(layer, zone, true);
-      continue;
+    const DoseTarget* const target = targets_ ? &targets_->of(layer, zone) : nullptr;
+    const LayerDose* const of = target == nullptr || !target->has_formula() ? &dose(layer, zone) : nullptr;
+    const bool differ = of != nullptr ? of->requested != of->requested_core : !(target->percent == target->of_core());
+    for (const bool core : {false, true}) {
+      if (core ? !differ || (jetting_.shell && !spans_.core(zone, layer)) : differ && !jetting_.shell) continue;
+      of != nullptr ? check_dose(layer, zone, *of, core, cut_) : inspect_field(layer, zone, core);
     }
-    const LayerDose& of = dose(layer, zone);
-    const bool differ = of.requested != of.requested_core;
-    if (jetting_.shell || !differ) check_dose(layer, zone, of, false, cut_);
-    if (differ && (!jetting_.shell || spans_.core(zone, layer))) check_dose(layer, zone, of, true, cut_);
   }
 }
 
@@ -203,18 +241,9 @@ void BinderCount::add(const Budget& budget, const Layer& layer, std::uint64_t do
   voids_pl_ += static_cast<double>(dosed_pixels) * dose::voids_pl(budget.binder(), budget.grid(), layer.thickness);
 }
 
-double BinderCount::binder_ml(const Budget& budget) const {
-  return static_cast<double>(drops_) * budget.binder().drop_pl * 1e-9;
-}
-
-double BinderCount::requested_percent(const Budget& budget) const {
+double BinderCount::percent(const Budget& budget, std::uint64_t drops) const {
   const double stays = budget.binder().drop_pl * (1 - budget.binder().evaporates);
-  return voids_pl_ > 0 ? 100 * static_cast<double>(requested_drops_) * stays / voids_pl_ : 0;
-}
-
-double BinderCount::reached_percent(const Budget& budget) const {
-  const double stays = budget.binder().drop_pl * (1 - budget.binder().evaporates);
-  return voids_pl_ > 0 ? 100 * static_cast<double>(drops_) * stays / voids_pl_ : 0;
+  return voids_pl_ > 0 ? 100 * static_cast<double>(drops) * stays / voids_pl_ : 0;
 }
 
 }  // namespace lamina::dose

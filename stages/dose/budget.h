@@ -1,20 +1,46 @@
 // stages/dose/budget.h: requested and reached binder of a job, before it is made and after.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/dose/covered_spans.h"
-#include "stages/dose/dose_target.h"
 #include "stages/dose/field.h"
+#include "stages/dose/saturation.h"
 
 namespace lamina::dose {
+
+/// A bound by boxes: zones reported as absent are absent; zones reported as present may be absent.
+class CoveredSpans {
+ public:
+  /// Every zone at all heights, with a core.
+  CoveredSpans() = default;
+  /// shell_nm  a core lies deeper than that; parts that may touch have one together. pixel_nm  the larger pitch
+  /// cost      O(boxes log boxes)
+  CoveredSpans(std::span<const ZoneBox> boxes, std::uint32_t zones, std::int64_t shell_nm, std::int64_t pixel_nm);
+
+  bool any(std::uint32_t zone, const Layer& layer) const { return everywhere_ || meets(all_[zone], layer); }
+  bool core(std::uint32_t zone, const Layer& layer) const { return everywhere_ || meets(core_[zone], layer); }
+
+ private:
+  struct Span {
+    std::int64_t from = 0, to = 0;
+  };
+  using Spans = std::vector<Span>;  // in order, apart
+  static void merge(Spans& spans);
+  static bool meets(const Spans& spans, const Layer& layer);
+
+  bool everywhere_ = true;
+  std::vector<Spans> all_, core_;  // by zone
+};
 
 /// Layers [first, last) that follow each other.
 struct LayerSpan {
@@ -50,7 +76,7 @@ class Budget {
          double min_percent, const Jetting& jetting = {true, true, 1}, CoveredSpans covered = {});
 
   /// Before foresee(), of targets that are formulas: positions of the parts, and number of layers.
-  void survey(std::vector<ZoneBox> boxes, std::uint32_t layers);
+  void survey(std::vector<ZoneBox> boxes, std::uint32_t layers) { boxes_ = std::move(boxes), layers_ = layers; }
 
   /// Layers in their order. cost  that of dose_of(), once for equal layers; of formulas that of FieldSurvey
   /// made  false: by another run of the same job, which reports its warnings
@@ -111,12 +137,13 @@ class BinderCount {
   std::uint64_t drops() const { return drops_; }
   /// Of any pixel; a dithered target plans for one more than a small part may get.
   std::uint32_t max_drops() const { return max_drops_; }
-  double binder_ml(const Budget& budget) const;
+  double binder_ml(const Budget& budget) const { return static_cast<double>(drops_) * budget.binder().drop_pl * 1e-9; }
   /// Per cent of the voids of all dosed pixels, by the target and by the drops.
-  double requested_percent(const Budget& budget) const;
-  double reached_percent(const Budget& budget) const;
+  double requested_percent(const Budget& budget) const { return percent(budget, requested_drops_); }
+  double reached_percent(const Budget& budget) const { return percent(budget, drops_); }
 
  private:
+  double percent(const Budget& budget, std::uint64_t drops) const;
   std::uint64_t drops_ = 0, requested_drops_ = 0;
   std::uint32_t max_drops_ = 0;
   double voids_pl_ = 0;

@@ -100,15 +100,13 @@ void Field::blame(double value, bool binds) {
   if (std::isnan(value)) value = std::abs(value);  // written without a sign
   const std::string where = fmt::format("{} '{}': is {:.6g} % in layer {} at x {:.3f}, y {:.3f}, z {:.3f} mm", key_,
                                         formula_->text(), value, sheet_->layer.index, position_[0], position_[1], position_[2]);
-  if (binds) {
-    fault_ = Error{Fault::kUsage,
-                   fmt::format("{}; it has to be a number from 0 to {:g}: put it into max(0, ...)", where, kMaxPercent)};
-  } else {
-    fault_ = Error{Fault::kUsage,
-                   fmt::format("{}, and the powder binds from {} % on (powder.min_saturation_percent); give a higher "
-                               "saturation, or --allow-unbound",
-                               where, number_text(sheet_->min_percent))};
-  }
+  const std::string what =
+      binds ? fmt::format("; it has to be a number from 0 to {:g}: put it into max(0, ...)", kMaxPercent)
+            : fmt::format(
+                  ", and the powder binds from {} % on (powder.min_saturation_percent); give a higher saturation, or "
+                  "--allow-unbound",
+                  number_text(sheet_->min_percent));
+  fault_ = Error{Fault::kUsage, where + what};
 }
 
 Result<FieldSurvey> FieldSurvey::make(const std::string& formula, const PixelGrid& grid, std::vector<ZoneBox> boxes, bool own,

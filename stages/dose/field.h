@@ -15,7 +15,6 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/dose/covered_spans.h"
 #include "stages/dose/saturation.h"
 #include "stages/support/text/formula.h"
 
@@ -25,6 +24,13 @@ inline constexpr std::uint32_t kBlockSide = 4;
 
 /// Most per cent that a formula may give.
 inline constexpr double kMaxPercent = 10'000;
+
+/// A part, at most: everything of it lies within the box. nm along x, y and z; grown by its bleed.
+struct ZoneBox {
+  std::uint32_t zone = 0;
+  std::array<std::int64_t, 3> low{}, high{};
+  std::array<std::int64_t, 3> origin{};  // corner of the part, from which a formula of its own counts
+};
 
 /// A formula of x, y and z.
 Result<Formula> parse_saturation(const std::string& text);

@@ -1,4 +1,4 @@
-// stages/dose/layer_drops.h: the image of a layer, or how full its voxels are, becomes the images of its drops.
+// stages/dose/layer_drops.h: the image of a layer, or the fill fractions of its voxels, becomes the images of its drops.
 #pragma once
 
 #include <array>
@@ -8,15 +8,63 @@
 
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/data/status.h"
 #include "stages/dose/dither.h"
-#include "stages/dose/dose_target.h"
-#include "stages/dose/edges/erode.h"
+#include "stages/dose/edges.h"
 #include "stages/dose/field.h"
-#include "stages/dose/pour.h"
+#include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
-#include "stages/dose/zones.h"
 
 namespace lamina::dose {
+
+/// A piece of a row; scratch of join_zones().
+struct ZonePiece {
+  std::uint32_t begin = 0, end = 0;
+  std::uint8_t level = 0;
+};
+
+/// Image i at level i + 1.
+/// images  of one size, no pixel is set in two; at most 255
+/// cost    O(rows x images + changes x log(images))
+void join_zones(std::span<const Runs> images, std::vector<ZonePiece>& scratch, Levels& result);
+
+/// The request of a full pixel, without the limit of drops: a number of them, or a formula's.
+struct DropRequest {
+  Drops24 drops = 0;
+  Field* field = nullptr;
+};
+
+/// A part of a layer: levels 1 .. full in its shell, full more in its core.
+struct Dosed {
+  LevelsView zones;
+  DropRequest shell, core;
+};
+
+/// Scratch; keeps its capacity.
+struct PourScratch {
+  struct DosePiece {
+    std::uint32_t begin = 0, end = 0;
+    std::uint32_t level = 0;
+    Drops24 drops = 0;  // at most as many as may be jetted
+  };
+  struct Change {
+    std::uint32_t at = 0;
+    std::int32_t level = 0;
+    std::int64_t drops = 0;
+  };
+  std::vector<DosePiece> pieces;
+  std::vector<Change> changes;
+  Thresholds thresholds;
+  std::uint64_t bytes() const;
+};
+
+/// Drops of each pixel: those of its parts, each in proportion to its level, dithered (dither.h) or rounded as a sum.
+/// parts   of one size; where several share a voxel, their levels come to `full` at most
+/// result  drops a pixel; levels  of all parts together, 1 .. full
+/// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
+/// cost    O(rows x parts + runs log(parts) + blocks of formulas + dithered pixels)
+Result<ZoneSums> pour(std::span<const Dosed> parts, std::uint8_t full, const Sheet& sheet, PourScratch& scratch, Levels& result,
+                      Levels& levels);
 
 /// A part of a layer that has a dose, or shares of voxels, of its own.
 struct DepositedPart {

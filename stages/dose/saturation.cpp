@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/data/units.h"
+
 namespace lamina::dose {
 namespace {
 
@@ -10,9 +12,11 @@ constexpr std::int64_t kMillion = 1'000'000;
 
 std::int64_t millionths(double value) { return std::llround(value * kMillion); }
 
-/// floor(2^bits a / b + 1/2) for a < b, by long division: no product of both fits into 128 bits.
-std::uint64_t fraction_of(unsigned __int128 a, unsigned __int128 b, unsigned bits) {
-  std::uint64_t quotient = 0;
+using Uint128 = unsigned __int128;
+
+/// floor(2^bits a / b) for a < b, by long division: no product of both fits into 128 bits. a  becomes the rest
+Uint128 fraction_of(Uint128& a, Uint128 b, unsigned bits) {
+  Uint128 quotient = 0;
   for (unsigned bit = 0; bit < bits; ++bit) {
     a *= 2;
     quotient *= 2;
@@ -20,10 +24,8 @@ std::uint64_t fraction_of(unsigned __int128 a, unsigned __int128 b, unsigned bit
     a -= b;
     ++quotient;
   }
-  return 2 * a >= b ? quotient + 1 : quotient;
+  return quotient;
 }
-
-using Uint128 = unsigned __int128;
 
 /// Both in millionths.
 std::int64_t voids_of(const Binder& binder) {
@@ -47,6 +49,17 @@ Uint128 one_of(const Binder& binder) {
          (static_cast<Uint128>(kMillion) * kMillion * 1000);
 }
 
+bool any_target(const DoseTargets& targets, bool (*has)(const DoseTarget&)) {
+  return has(targets.all) || std::ranges::any_of(targets.ranges, has, &DoseTargetRange::target) ||
+         std::ranges::any_of(targets.own, [&](const std::optional<DoseTarget>& target) { return target && has(*target); });
+}
+
+void set_gets(LayerDose& dose, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
+  const auto per_cent = [&](Drops24 drops) { return saturation_of(double(drops) / kOneDrop, binder, grid, thickness_nm); };
+  dose.gets = per_cent(dose.shell);
+  dose.gets_core = per_cent(dose.core);
+}
+
 }  // namespace
 
 Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm,
@@ -59,7 +72,9 @@ Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, s
   const Uint128 requested = voxel_of(grid, thickness_nm) * static_cast<Uint128>(target) * static_cast<Uint128>(voids);
   const Uint128 whole = requested / one;
   if (whole >= maximum) return limit;
-  return std::min(limit, (static_cast<Drops24>(whole) << kDropBits) + fraction_of(requested % one, one, kDropBits));
+  Uint128 rest = requested % one;
+  const Uint128 drops = (whole << kDropBits) + fraction_of(rest, one, kDropBits);
+  return std::min(limit, static_cast<Drops24>(drops + (2 * rest >= one ? 1 : 0)));
 }
 
 DropScale::DropScale(const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
@@ -68,16 +83,7 @@ DropScale::DropScale(const Binder& binder, const PixelGrid& grid, std::int64_t t
   Uint128 requested = voxel_of(grid, thickness_nm) * static_cast<Uint128>(voids_of(binder));
   const Uint128 one = one_of(binder);
   if (requested == 0) return;
-  of_millionth_ = kMax;
-  if (requested >= one / 4) return;
-  of_millionth_ = 0;
-  for (unsigned bit = 0; bit < kBits; ++bit) {
-    requested *= 2;
-    of_millionth_ *= 2;
-    if (requested < one) continue;
-    requested -= one;
-    ++of_millionth_;
-  }
+  of_millionth_ = requested >= one / 4 ? kMax : fraction_of(requested, one, kBits);
 }
 
 Drops24 DropScale::drops(double percent) const {
@@ -94,6 +100,45 @@ double voids_pl(const Binder& binder, const PixelGrid& grid, std::int64_t thickn
 double saturation_of(double drops, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
   const double voids = voids_pl(binder, grid, thickness_nm);
   return voids > 0 ? 100 * drops * binder.drop_pl * (1 - binder.evaporates) / voids : 0;
+}
+
+std::size_t DoseTargets::target_index(const Layer& layer, std::uint32_t zone) const {
+  if (is_own(zone)) return ranges.size() + zone;
+  const Nm plane = layer.plane();
+  for (std::size_t position = ranges.size(); position > 0; --position) {
+    const DoseTargetRange& range = ranges[position - 1];
+    if (plane >= nm_of(range.from_mm) && plane < nm_of(range.to_mm)) return position;
+  }
+  return 0;
+}
+
+bool DoseTargets::has_core() const {
+  return any_target(*this, [](const DoseTarget& target) { return !(target.of_core() == target.percent); });
+}
+
+bool DoseTargets::has_formula() const {
+  return any_target(*this, [](const DoseTarget& target) { return target.has_formula(); });
+}
+
+LayerDose dose_of(const Layer& layer, const DoseTargets& targets, const Binder& binder, const PixelGrid& grid,
+                  std::uint32_t maximum, std::uint32_t zone) {
+  const DoseTarget& target = targets.of(layer, zone);
+  LayerDose dose;
+  dose.requested = target.percent.percent;
+  dose.requested_core = target.of_core().percent;
+  constexpr std::uint32_t kAny = 1u << 20;
+  dose.requested_shell = drops_for(dose.requested, binder, grid, layer.thickness, kAny);
+  dose.requested_inside = drops_for(dose.requested_core, binder, grid, layer.thickness, kAny);
+  const Drops24 limit = Drops24{maximum} << kDropBits;
+  dose.shell = std::min(dose.requested_shell, limit);
+  dose.core = std::min(dose.requested_inside, limit);
+  set_gets(dose, binder, grid, layer.thickness);
+  return dose;
+}
+
+void round_drops(LayerDose& dose, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
+  for (Drops24* of : {&dose.shell, &dose.core}) *of = rounded(*of);
+  set_gets(dose, binder, grid, thickness_nm);
 }
 
 }  // namespace lamina::dose

@@ -17,31 +17,37 @@ bool alike_around(const RunsView& image, std::uint32_t row, std::uint32_t column
   for (std::int64_t r = std::int64_t{row} - 1; r <= std::int64_t{row} + 1; ++r) {
     const bool outside = r < 0 || r >= image.rows();
     for (std::int64_t c = std::int64_t{column} - 1; c <= std::int64_t{column} + 1; ++c) {
-      const bool set = !outside && is_set(image.row(static_cast<std::uint32_t>(r)), c);
-      if (set != here) return false;
+      if ((!outside && is_set(image.row(static_cast<std::uint32_t>(r)), c)) != here) return false;
     }
   }
   return true;
 }
 
-/// Appends the runs of a row with what `level_in` gives for each inside of the mask, and `level_out` outside.
+/// The runs with what `level_in` gives for each inside of the mask, and `level_out` outside.
 template <class In, class Out>
-void append_masked(const LevelsView& image, std::uint32_t row, std::span<const std::uint32_t> mask, In level_in, Out level_out,
-                   Levels& result) {
-  std::size_t k = 0;
-  for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
-    const std::uint32_t end = image.change[2 * i + 1];
-    std::uint32_t at = image.change[2 * i];
-    while (k + 1 < mask.size() && mask[k + 1] <= at) k += 2;
-    for (std::size_t m = k; m + 1 < mask.size() && mask[m] < end; m += 2) {
-      const std::uint32_t begin = std::max(at, mask[m]), stop = std::min(end, mask[m + 1]);
-      result.append(at, begin, level_out(image.level[i]));
-      result.append(begin, stop, level_in(image.level[i]));
-      at = stop;
+void apply_mask(const LevelsView& image, const RunsView& masks, In level_in, Out level_out, Levels& result) {
+  result.start(image.columns);
+  for (std::uint32_t row = 0; row < image.rows(); ++row) {
+    const auto mask = masks.row(row);
+    std::size_t k = 0;
+    for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
+      const std::uint32_t end = image.change[2 * i + 1];
+      std::uint32_t at = image.change[2 * i];
+      while (k + 1 < mask.size() && mask[k + 1] <= at) k += 2;
+      for (std::size_t m = k; m + 1 < mask.size() && mask[m] < end; m += 2) {
+        const std::uint32_t begin = std::max(at, mask[m]), stop = std::min(end, mask[m + 1]);
+        result.append(at, begin, level_out(image.level[i]));
+        result.append(begin, stop, level_in(image.level[i]));
+        at = stop;
+      }
+      result.append(at, end, level_out(image.level[i]));
     }
-    result.append(at, end, level_out(image.level[i]));
+    result.end_row();
   }
 }
+
+constexpr auto kKept = [](std::uint8_t level) { return level; };
+constexpr auto kLeftOut = [](std::uint8_t) { return std::uint8_t{0}; };
 
 /// How many changes two rows have in common at their beginning; eight are compared at once.
 std::size_t same_changes(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
@@ -60,10 +66,9 @@ std::size_t same_changes(std::span<const std::uint32_t> a, std::span<const std::
 void append_run(std::uint32_t row_begin, std::uint32_t begin, std::uint32_t end, Runs& image) {
   if (image.change.size() > row_begin && image.change.back() == begin) {
     image.change.back() = end;
-    return;
+  } else {
+    image.change.insert(image.change.end(), {begin, end});
   }
-  image.change.push_back(begin);
-  image.change.push_back(end);
 }
 
 /// Goes through a row of several parts from column to column at which any of them changes.
@@ -175,31 +180,14 @@ void mirror(const LevelsView& image, bool x, bool y, Levels& result) {
 }
 
 void without(const LevelsView& image, const RunsView& mask, Levels& result) {
-  result.start(image.columns);
-  for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    append_masked(
-        image, r, mask.row(r), [](std::uint8_t) { return std::uint8_t{0}; }, [](std::uint8_t level) { return level; }, result);
-    result.end_row();
-  }
+  apply_mask(image, mask, kLeftOut, kKept, result);
 }
 
-void within(const LevelsView& image, const RunsView& mask, Levels& result) {
-  result.start(image.columns);
-  for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    append_masked(
-        image, r, mask.row(r), [](std::uint8_t level) { return level; }, [](std::uint8_t) { return std::uint8_t{0}; }, result);
-    result.end_row();
-  }
-}
+void within(const LevelsView& image, const RunsView& mask, Levels& result) { apply_mask(image, mask, kKept, kLeftOut, result); }
 
 void mark_core(const LevelsView& image, const RunsView& core, std::uint8_t full, Levels& result) {
-  result.start(image.columns);
-  for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    append_masked(
-        image, r, core.row(r), [full](std::uint8_t level) { return static_cast<std::uint8_t>(level + full); },
-        [](std::uint8_t level) { return level; }, result);
-    result.end_row();
-  }
+  const auto more = [full](std::uint8_t level) { return static_cast<std::uint8_t>(level + full); };
+  apply_mask(image, core, more, kKept, result);
 }
 
 void drops_of_zones(const LayerDose& dose, std::uint8_t full, bool dithered, std::span<Drops24> drops) {
@@ -208,19 +196,14 @@ void drops_of_zones(const LayerDose& dose, std::uint8_t full, bool dithered, std
     drops[level] = dose.shell * level / full;
     drops[full + level] = dose.core * level / full;
   }
-  if (dithered) return;
-  for (Drops24& of : drops) of = rounded(of);
+  if (!dithered) std::ranges::transform(drops, drops.begin(), rounded);
 }
 
 ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose) {
   std::uint64_t shell = 0, core = 0;
   for (std::size_t i = 0; i < zones.level.size(); ++i) {
-    const std::uint64_t pixels = zones.change[2 * i + 1] - zones.change[2 * i];
-    if (zones.level[i] <= full) {
-      shell += pixels * zones.level[i];
-    } else {
-      core += pixels * (zones.level[i] - full);
-    }
+    const std::uint64_t pixels = zones.change[2 * i + 1] - zones.change[2 * i], level = zones.level[i];
+    (level <= full ? shell : core) += pixels * (level <= full ? level : level - full);
   }
   using Product = unsigned __int128;
   const Product requested = Product{dose.requested_shell} * shell + Product{dose.requested_inside} * core;

@@ -9,7 +9,6 @@
 
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
-#include "stages/dose/dose_target.h"
 #include "stages/dose/saturation.h"
 
 namespace lamina::dose {
@@ -61,5 +60,17 @@ struct Difference {
 };
 /// a, b  of the same size. cost  O(changes + differing pixels x log(changes of a row))
 Difference difference(const RunsView& a, const RunsView& b);
+
+struct ShareCount {
+  std::uint64_t full_voxels = 0;   // that the levels come to
+  std::uint64_t half_differs = 0;  // of take_half(): voxels half full or more against pixels whose centre is set
+  std::uint64_t half_far = 0;      // of these, those away from any boundary
+  double differing_share() const {
+    return full_voxels > 0 ? static_cast<double>(half_differs) / static_cast<double>(full_voxels) : 0;
+  }
+  void add(std::uint64_t more_full, std::uint64_t more_differs, std::uint64_t more_far) {
+    full_voxels += more_full, half_differs += more_differs, half_far += more_far;
+  }
+};
 
 }  // namespace lamina::dose

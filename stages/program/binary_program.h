@@ -1,27 +1,27 @@
-// stages/program/binary_program.h: what binary dialects have in common: little-endian numbers and segments.
+// stages/program/binary_program.h: what binary dialects have in common: numbers, segments, records of head maintenance.
 #pragma once
 
 #include <bit>
 #include <cstring>
-#include <type_traits>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "stages/program/dialect.h"
+#include "stages/program/maintenance.h"
+#include "stages/program/program_text.h"
 
 namespace lamina::program {
 
-/// Appends a whole number, lowest byte first.
-template <class Integer>
-void put_little(ProgramBytes& out, std::type_identity_t<Integer> value) {
-  const std::size_t at = out.size();
-  out.resize(at + sizeof(Integer));
-  for (std::size_t byte = 0; byte < sizeof(Integer); ++byte) {
-    out[at + byte] = static_cast<std::byte>(static_cast<std::make_unsigned_t<Integer>>(value) >> (8 * byte) & 255);
-  }
+/// Appends numbers of 32 bits, lowest byte first.
+inline void put_numbers(ProgramBytes& out, std::span<const std::uint32_t> numbers) {
+  static_assert(std::endian::native == std::endian::little);
+  const auto bytes = std::as_bytes(numbers);
+  out.insert(out.end(), bytes.begin(), bytes.end());
 }
-
-/// Appends four letters.
-inline void put_tag(ProgramBytes& out, const char (&tag)[5]) {
-  for (int i = 0; i < 4; ++i) out.push_back(static_cast<std::byte>(tag[i]));
+inline void put_numbers(ProgramBytes& out, std::initializer_list<std::uint32_t> numbers) {
+  put_numbers(out, std::span(numbers.begin(), numbers.size()));
 }
 
 /// The vats that feed a layer, a bit each.
@@ -84,5 +84,34 @@ inline std::int64_t across_nm(const Machine& machine, const HeadGrid& grid, std:
   const double nm = grid.line_position_nm(line) + offset;
   return static_cast<std::int64_t>(nm + (nm < 0 ? -0.5 : 0.5));
 }
+
+/// What a record of head maintenance or powder states; the READMEs of raw and planes have the numbers that follow each.
+enum class MaintenanceRecord : std::uint8_t { kGo, kFill, kBase, kRoller, kWipe, kShot, kDry, kOwn };
+
+/// A writer whose head maintenance is records for the host, a layer's by that layer alone.
+class BinaryWriter : public ProgramWriter {
+ public:
+  /// machine and grid outlive this object. ids  the first number of each record, by MaintenanceRecord
+  BinaryWriter(const Machine& machine, const HeadGrid& grid, std::array<std::uint32_t, 8> ids)
+      : machine_(machine), grid_(grid), carriage_(machine, grid), clock_(machine, shot_seconds(machine)), ids_(ids) {}
+
+  void maintenance_of_layer(const LayerCycle& cycle, ProgramBytes& out) final;
+  void maintenance_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) final;
+  void maintenance_after(ProgramBytes& out) final;
+
+ protected:
+  const Machine& machine_;
+  const HeadGrid& grid_;
+
+ private:
+  void serve(MaintenanceClock::Due due, ProgramBytes& out) const;
+  void put_own(const std::vector<std::string>& lines, ProgramBytes& out) const;
+  void go(MachinePoint to, ProgramBytes& out) const;
+  void put(MaintenanceRecord kind, std::initializer_list<std::uint32_t> numbers, ProgramBytes& out) const;
+
+  Carriage carriage_;
+  MaintenanceClock clock_;
+  std::array<std::uint32_t, 8> ids_;
+};
 
 }  // namespace lamina::program

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stages/program/line_sets.h"
+#include "stages/program/lines.h"
 
 namespace lamina::program {
 namespace {

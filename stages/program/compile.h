@@ -10,8 +10,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/fire.h"
-#include "stages/program/line_sets.h"
-#include "stages/program/scan_frame.h"
+#include "stages/program/lines.h"
 
 namespace lamina::program {
 

@@ -1,17 +1,12 @@
+#include "stages/program/dialect.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 
-#include "stages/program/brundlefab/brundlefab.h"
-#include "stages/program/dialect.h"
-#include "stages/program/hp45/hp45.h"
-#include "stages/program/m578/m578.h"
-#include "stages/program/maintenance/maintenance_check.h"
-#include "stages/program/nuferbj/nuferbj.h"
-#include "stages/program/oasis/oasis.h"
-#include "stages/program/planes/planes.h"
-#include "stages/program/raw/raw.h"
+#include "stages/program/maintenance.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program {
 namespace {
@@ -27,26 +22,12 @@ constexpr std::array<Dialect, 7> kDialects = {{
      true, kSaysBase | kSaysMaintenance | kSaysSeconds | kSaysCap, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
      kSaysAll, oasis::make_writer, oasis::check},
-    {"brundlefab",
-     ".gcode",
-     "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles",
-     12,
-     0,
-     true,
-     kSaysBase | kSaysShots | kSaysSeconds,
-     brundlefab::make_writer,
-     brundlefab::check,
-     {.own_positions = true}},
-    {"m578",
-     ".gcode",
-     "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
-     12,
-     0,
-     true,
-     kSaysAll & ~std::uint32_t{kSaysRoller},
-     m578::make_writer,
-     m578::check,
-     {.shot_s = m578::shot_s, .longest_sweep_s = m578::longest_sweep_s}},
+    {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true,
+     kSaysBase | kSaysShots | kSaysSeconds, brundlefab::make_writer, brundlefab::check,
+     MaintenanceRules{.own_positions = true}},
+    {"m578", ".gcode", "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
+     12, 0, true, kSaysAll & ~std::uint32_t{kSaysRoller}, m578::make_writer, m578::check,
+     MaintenanceRules{.shot_s = m578::shot_s, .longest_sweep_s = m578::longest_sweep_s}},
 }};
 
 }  // namespace
@@ -54,7 +35,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
 std::span<const Dialect> dialects() { return kDialects; }
 
 const Dialect* find_dialect(std::string_view id) {
-  const auto found = std::find_if(kDialects.begin(), kDialects.end(), [&](const Dialect& d) { return d.id == id; });
+  const auto found = std::ranges::find(kDialects, id, &Dialect::id);
   return found == kDialects.end() ? nullptr : &*found;
 }
 
@@ -65,12 +46,12 @@ Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadG
                              "each drop of a pixel is a sweep",
                              machine.name, machine.head.max_drops, dialect.id)};
   }
-  if (grid.nozzles <= dialect.max_nozzles) {
-    if (Status status = check_maintenance(dialect, machine, grid); !status) return status;
-    return dialect.check != nullptr ? dialect.check(machine, grid) : Status();
+  if (grid.nozzles > dialect.max_nozzles) {
+    return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}",
+                                            machine.name, dialect.id, dialect.max_nozzles, grid.nozzles)};
   }
-  return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}", machine.name,
-                                          dialect.id, dialect.max_nozzles, grid.nozzles)};
+  if (Status status = check_maintenance(dialect, machine, grid); !status) return status;
+  return dialect.check != nullptr ? dialect.check(machine, grid) : Status();
 }
 
 }  // namespace lamina::program

@@ -30,7 +30,7 @@ class ProgramWriter {
   virtual void end_layer(const LayerCycle& cycle, ProgramBytes& out) = 0;
   virtual void end(ProgramBytes& out) = 0;
 
-  // --- care in dialects of vectors alone, as records of their own; all others spell it within the lines above
+  /// Maintenance in dialects of vectors alone, as records of their own; all others spell it within the lines above.
   /// Behind begin_layer(), before each sweep(), before end_layer().
   virtual void maintenance_of_layer(const LayerCycle&, ProgramBytes&) {}
   virtual void maintenance_before(const Sweep&, const SweepVectors&, ProgramBytes&) {}

@@ -24,6 +24,27 @@ void put(ProgramBytes& out, fmt::format_string<Values...> format, Values&&... va
   std::memcpy(out.data() + at, text.data(), text.size());
 }
 
+/// "machine: key: what".
+inline Error wrong_key(const Machine& machine, std::string_view key, std::string_view what) {
+  return {Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
+}
+
+/// Of the carriage, x and y in mm.
+using MachinePoint = std::array<double, 2>;
+
+/// A movement of the head, as "G0 X10 Y20 F3000".
+inline void put_move(const Machine& machine, std::string_view command, MachinePoint to, double mm_s, ProgramBytes& out) {
+  put(out, "{} {}{} {}{} F{}\n", command, machine.motion.x_axis, mm_text(to[0]), machine.motion.y_axis, mm_text(to[1]),
+      feed_text(mm_s));
+}
+
+/// The bits of all nozzles that are not blocked, of a head of at most 32.
+inline std::uint32_t working_nozzles(const Machine& machine) {
+  std::uint32_t all = (std::uint32_t{1} << machine.head.nozzles) - 1;
+  for (const std::uint32_t nozzle : machine.head.blocked) all &= ~(1u << nozzle);
+  return all;
+}
+
 /// Positions of the carriage for sweeps, in mm.
 class Carriage {
  public:
@@ -41,14 +62,16 @@ class Carriage {
   double across(std::int64_t line) const {
     return grid_.line_position_nm(line) / kNmPerMm + machine_.mounting.offset_mm[grid_.scan_axis == ScanAxis::kX ? 1 : 0];
   }
-  /// x and y of the carriage.
-  std::array<double, 2> position(double along_mm, std::int64_t line) const {
+  MachinePoint position(double along_mm, std::int64_t line) const {
     const double across_mm = across(line);
-    return grid_.scan_axis == ScanAxis::kX ? std::array{along_mm, across_mm} : std::array{across_mm, along_mm};
+    return grid_.scan_axis == ScanAxis::kX ? MachinePoint{along_mm, across_mm} : MachinePoint{across_mm, along_mm};
   }
   /// Where a sweep's movement begins and ends: the ramp before its first and behind its last step.
   double begin(const Sweep& sweep, const SweepVectors& vectors) const { return end_of(vectors, sweep.backward); }
   double end(const Sweep& sweep, const SweepVectors& vectors) const { return end_of(vectors, !sweep.backward); }
+  std::array<MachinePoint, 2> ends(const Sweep& sweep, const SweepVectors& vectors) const {
+    return {position(begin(sweep, vectors), sweep.first_line), position(end(sweep, vectors), sweep.first_line)};
+  }
 
  private:
   double end_of(const SweepVectors& vectors, bool last) const {

@@ -1,4 +1,4 @@
-// stages/replay/bytes.h: readers shared by the binary dialects of print programs.
+// stages/replay/bytes.h: readers shared by the binary dialects: numbers, the head's way, records of head maintenance.
 #pragma once
 
 #include <fmt/format.h>
@@ -60,7 +60,7 @@ class Passes {
 
   /// Ends the sweep before. across_mm  of the carriage
   void begin(double across_mm, bool backward) {
-    make();
+    stop();
     across_ = across_mm;
     backward_ = backward;
     left_out_ = printing_.leaves_out_sweep();
@@ -70,7 +70,7 @@ class Passes {
   }
   /// The head goes to a position off the bed. works_mm_s  how fast over its wiper; 0: as it travels
   void visit(double x_mm, double y_mm, double works_mm_s) {
-    make();
+    stop();
     const double along = along_ ? x_mm : y_mm, across = along_ ? y_mm : x_mm;
     const double speed = works_mm_s > 0 ? works_mm_s : printing_.profile().motion.travel_speed_mm_s;
     go(along, across, speed);
@@ -85,18 +85,7 @@ class Passes {
     any_ = true;
   }
   /// Ends the sweep before; the head stays where that ends.
-  void stop() { make(); }
-  /// Where the carriage stands.
-  double x_mm() const { return along_ ? at_along_ : at_across_; }
-  double y_mm() const { return along_ ? at_across_ : at_along_; }
-  /// Ends the last sweep; the head goes back.
-  void end() {
-    const AxisPositions position = printing_.axis_positions();
-    visit(position.x_mm, position.y_mm, 0);
-  }
-
- private:
-  void make() {
+  void stop() {
     if (!any_) return;
     const auto& motion = printing_.profile().motion;
     if (turned_) std::swap(first_, last_);
@@ -111,6 +100,16 @@ class Passes {
     any_ = false;
     printing_.head_is_at(along_ ? to : across_, along_ ? across_ : to, 0);
   }
+  /// Where the carriage stands.
+  double x_mm() const { return along_ ? at_along_ : at_across_; }
+  double y_mm() const { return along_ ? at_across_ : at_along_; }
+  /// Ends the last sweep; the head goes back.
+  void end() {
+    const AxisPositions position = printing_.axis_positions();
+    visit(position.x_mm, position.y_mm, 0);
+  }
+
+ private:
   void go(double along, double across, double mm_s) {
     printing_.head_moves(std::hypot(along - at_along_, across - at_across_), mm_s, false);
     at_along_ = along;
@@ -125,5 +124,8 @@ class Passes {
   bool backward_ = false, any_ = false;
   bool left_out_ = false, turned_ = false, anew_ = false;  // anew_: the next one of those that are left runs back
 };
+
+/// Carries out the records of care that follow, as many as there are. The dialect is that of the profile.
+void take_maintenance_records(ByteReader& reader, Printing& printing, Passes& passes);
 
 }  // namespace lamina::replay

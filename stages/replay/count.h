@@ -4,12 +4,6 @@
 #include <array>
 #include <cstdint>
 
-#include "stages/data/status.h"
-
-namespace lamina {
-struct Machine;
-}
-
 namespace lamina::replay {
 
 /// A layer that is said to take longer takes so long: a program may say anything, and sums must hold.
@@ -34,10 +28,6 @@ struct Count {
   double seconds() const { return static_cast<double>(microseconds) * 1e-6; }
   void add(const Count& other);
 };
-
-/// Compares a program's numbers with what is recorded of it; a time of 0 is not recorded.
-/// errors  kVerification: the first that differs: drops, sweeps, added sweeps, times
-Status check_count(const Machine& machine, const Count& reported, const Count& found);
 
 /// Binder and powder used by a program.
 struct Material {

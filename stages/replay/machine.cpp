@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "stages/replay/dialects.h"
+#include "stages/replay/printing.h"
 
 namespace lamina::replay {
 namespace {
@@ -34,29 +34,6 @@ Status read(std::string_view dialect, std::string_view program, Printing& printi
 }  // namespace
 
 std::uint32_t drop_bits(std::uint32_t max_drops) { return max_drops < 2 ? 1 : max_drops < 4 ? 2 : 4; }
-
-void Count::add(const Count& other) {
-  drops += other.drops;
-  vectors += other.vectors;
-  sweeps += other.sweeps;
-  added += other.added;
-  max_per_position = std::max(max_per_position, other.max_per_position);
-  scan_mm += other.scan_mm;
-  travel_mm += other.travel_mm;
-  microseconds += other.microseconds;
-  added_microseconds += other.added_microseconds;
-  fed_mm[0] += other.fed_mm[0];
-  fed_mm[1] += other.fed_mm[1];
-  vats |= other.vats;
-  spat += other.spat;
-  spits += other.spits;
-  wipes += other.wipes;
-  refills += other.refills;
-  moves |= other.moves;
-  build_mm = std::max(build_mm, other.build_mm);
-  farthest_along_um = std::max(farthest_along_um, other.farthest_along_um);
-  farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
-}
 
 Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32_t columns, std::uint32_t rows,
                                              std::uint32_t layers) {
@@ -132,9 +109,8 @@ std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double 
       (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / position_um_;
   const bool x = machine_.mounting.scan_axis == ScanAxis::kX;
   double column = x ? position : line, row = x ? line : position;
-  const auto has = [&](Side side) { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; };
-  if (has(Side::kRight)) column = columns_ - 1 - column;
-  if (has(Side::kFront)) row = rows_ - 1 - row;
+  if (begins_at(Side::kRight)) column = columns_ - 1 - column;
+  if (begins_at(Side::kFront)) row = rows_ - 1 - row;
   return {column, row};
 }
 

@@ -80,6 +80,9 @@ class VirtualMachine {
 
  private:
   friend class Printing;
+  /// Whether sweeps or nozzles count from a side.
+  bool begins_at(Side side) const { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; }
+
   Machine machine_;
   std::uint32_t columns_ = 0, rows_ = 0, layers_ = 0;
   double line_um_ = 0, position_um_ = 0, step_um_ = 0;

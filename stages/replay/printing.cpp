@@ -29,10 +29,6 @@ AxisPositions Printing::axis_positions() const {
           profile().powder.roller_mm[0]};
 }
 
-void Printing::fail(std::string what) {
-  if (ok()) fault_ = std::move(what);
-}
-
 void Printing::fault(std::string_view what) {
   if (!ok()) return;
   const bool ahead = reading_sweep_ != INT64_MIN;  // its words are read, and it has not begun
@@ -52,12 +48,9 @@ void Printing::fault(std::string_view what) {
 
 void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<std::uint32_t> of) {
   leave_sweep();
-  if (sweeping_ && number <= sweep_ && !(sweeps_.empty())) {
-    // Further sweeps for blocked nozzles have higher numbers than the regular ones that follow them.
-    for (const Sweep& sweep : sweeps_) {
-      if (sweep.number == number) return fault(fmt::format("swath {} begins a second time", number));
-    }
-  }
+  // Further sweeps for blocked nozzles have higher numbers than the regular ones that follow them.
+  if (sweeping_ && number <= sweep_ && std::ranges::find(sweeps_, number, &Sweep::number) != sweeps_.end())
+    return fault(fmt::format("swath {} begins a second time", number));
   sweep_ = number;
   reading_sweep_ = INT64_MIN;
   backward_ = backward;
@@ -70,14 +63,16 @@ void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<st
   check_spread();
 }
 
-void Printing::go_across(double carriage_mm) {
+// From the side of nozzle 0: back and right are the far ends.
+double Printing::across_um(double carriage_mm) const {
   const auto& mount = profile().mounting;
-  const bool x = mount.scan_axis == ScanAxis::kX;
-  double um = (carriage_mm - mount.offset_mm[x ? 1 : 0]) * 1000;
-  // From the side of nozzle 0: back and right are the far ends.
+  const double um = (carriage_mm - mount.offset_mm[mount.scan_axis == ScanAxis::kX ? 1 : 0]) * 1000;
   const bool far = mount.nozzle_0 == Side::kBack || mount.nozzle_0 == Side::kRight;
-  if (far) um = machine_.lines_ * machine_.line_um_ - um;
-  const double line = um / machine_.line_um_ - 0.5;
+  return far ? machine_.lines_ * machine_.line_um_ - um : um;
+}
+
+void Printing::go_across(double carriage_mm) {
+  const double line = across_um(carriage_mm) / machine_.line_um_ - 0.5;
   first_line_ = std::llround(line);
   if (std::abs(line - static_cast<double>(first_line_)) > 0.02) {
     fault(fmt::format("the head stands {:.2f} lines beside line {}", line - static_cast<double>(first_line_), first_line_));
@@ -115,12 +110,10 @@ void Printing::at_step(std::int64_t step) {
 
 bool Printing::pixel(std::int64_t line, std::int64_t position, std::uint32_t& column, std::uint32_t& row) const {
   if (line < 0 || position < 0 || line >= machine_.lines_ || position >= machine_.positions_) return false;
-  const auto& mount = profile().mounting;
-  const bool x = mount.scan_axis == ScanAxis::kX;
+  const bool x = profile().mounting.scan_axis == ScanAxis::kX;
   const auto from_left = x ? position : line, from_back = x ? line : position;
-  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
-  column = static_cast<std::uint32_t>(has(Side::kRight) ? machine_.columns_ - 1 - from_left : from_left);
-  row = static_cast<std::uint32_t>(has(Side::kFront) ? machine_.rows_ - 1 - from_back : from_back);
+  column = static_cast<std::uint32_t>(machine_.begins_at(Side::kRight) ? machine_.columns_ - 1 - from_left : from_left);
+  row = static_cast<std::uint32_t>(machine_.begins_at(Side::kFront) ? machine_.rows_ - 1 - from_back : from_back);
   return true;
 }
 
@@ -254,8 +247,6 @@ void Printing::leave_sweep() {
   sweep_max_ = 0;
 }
 
-std::uint32_t Printing::drop_bits() const { return replay::drop_bits(profile().head.max_drops); }
-
 void Printing::fire_words(std::span<const std::uint64_t> words) {
   if (purpose_ == Purpose::kTime) return;
   for (std::size_t w = 0; w < words.size(); ++w) {
@@ -331,21 +322,16 @@ void Printing::check_numbers(std::span<const RunsView> planes) {
 
 // What a layer printed against its image: Printing::compare.
 
-std::int64_t Printing::line_of(std::uint32_t column, std::uint32_t row) const {
-  const auto& mount = profile().mounting;
-  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
-  if (mount.scan_axis == ScanAxis::kX) return has(Side::kFront) ? machine_.rows_ - 1 - row : row;
-  return has(Side::kRight) ? machine_.columns_ - 1 - column : column;
+std::array<std::int64_t, 2> Printing::line_and_position(std::uint32_t column, std::uint32_t row) const {
+  const std::int64_t from_left = machine_.begins_at(Side::kRight) ? machine_.columns_ - 1 - column : column;
+  const std::int64_t from_back = machine_.begins_at(Side::kFront) ? machine_.rows_ - 1 - row : row;
+  if (profile().mounting.scan_axis == ScanAxis::kX) return {from_back, from_left};
+  return {from_left, from_back};
 }
 
 // Where the nozzle is that has to see to a pixel.
 std::string Printing::describe_position(std::uint32_t column, std::uint32_t row) const {
-  const auto& mount = profile().mounting;
-  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
-  const std::int64_t from_left = has(Side::kRight) ? machine_.columns_ - 1 - column : column;
-  const std::int64_t from_back = has(Side::kFront) ? machine_.rows_ - 1 - row : row;
-  const bool x = mount.scan_axis == ScanAxis::kX;
-  const std::int64_t line = x ? from_back : from_left, position = x ? from_left : from_back;
+  const auto [line, position] = line_and_position(column, row);
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
       if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
@@ -490,11 +476,8 @@ void Printing::check_maintenance(std::string_view what, std::uint32_t every, dou
 }
 
 void Printing::outside_bed(double x_mm, double y_mm) {
-  const auto& mount = profile().mounting;
-  const bool x = mount.scan_axis == ScanAxis::kX;
-  double um = ((x ? y_mm : x_mm) - mount.offset_mm[x ? 1 : 0]) * 1000;
-  if (mount.nozzle_0 == Side::kBack || mount.nozzle_0 == Side::kRight) um = machine_.lines_ * machine_.line_um_ - um;
-  const auto line = static_cast<std::int64_t>(std::floor(um / machine_.line_um_));
+  const bool x = profile().mounting.scan_axis == ScanAxis::kX;
+  const auto line = static_cast<std::int64_t>(std::floor(across_um(x ? y_mm : x_mm) / machine_.line_um_));
   const double step = ((x ? x_mm : y_mm) - position_of(0)) / (position_of(1) - position_of(0));
   for (std::uint32_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
     const auto [column, row] = machine_.nozzle_at(line, step, nozzle);
@@ -526,17 +509,10 @@ void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double secon
   ++count.spits;
 }
 
-// Where the profile has the head wait in pauses.
-bool Printing::capped() const {
-  const auto at = profile().maintenance.cap_mm.value_or(profile().motion.safe_mm);
-  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
-  return std::hypot(x - at[0], y - at[1]) < 1e-3;
-}
-
 void Printing::waits_capped(std::string_view what) {
   const auto& cap = profile().maintenance.cap_mm;
   const auto at = cap.value_or(profile().motion.safe_mm);
-  if (capped()) return;
+  if (head_at(at)) return;
   fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe place", at[0], at[1]));
 }
 
@@ -571,8 +547,6 @@ bool Printing::takes_own(std::string_view line) {
   if (own_ > 0) fault(fmt::format("'{}' stands where the machine's own '{}' has to", line, lines[own_]));
   return false;
 }
-
-void Printing::roller_turns(double rpm) { rpm_ = rpm; }
 
 void Printing::state_host(std::string_view record, bool of_powder) {
   if (of_powder && host_spread_) return fault(fmt::format("{} stands behind the layer's powder", record));
@@ -616,21 +590,14 @@ void Printing::check_stated() {
 
 void Printing::wrong_cycle(std::string_view what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); }
 
-void Printing::wrong_powder(std::string what) {
-  if (spread_wrong_.empty()) spread_wrong_ = std::move(what);
-}
-
 bool Printing::roller_on_gantry() const {
   const auto& [powder, motion] = std::tie(profile().powder, profile().motion);
   return powder.roller_axis == motion.x_axis || powder.roller_axis == motion.y_axis;
 }
 
-bool Printing::roller_at_home() const { return std::abs(roller_mm_ - profile().powder.roller_mm[0]) < 1e-3; }
-
-bool Printing::head_at_safe() const {
-  const auto& safe = profile().motion.safe_mm;
-  const auto [x, y] = head_mm_.value_or(safe);
-  return std::hypot(x - safe[0], y - safe[1]) < 1e-3;
+bool Printing::head_at(const std::array<double, 2>& at) const {
+  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
+  return std::hypot(x - at[0], y - at[1]) < 1e-3;
 }
 
 void Printing::check_way(MovingPart part, double mm_s) {
@@ -676,11 +643,6 @@ void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
 void Printing::build_vat_is_at(double mm) {
   count.moves = moves_powder_ = true;
   count.build_mm = mm * profile().powder.build_sign;
-}
-
-void Printing::build_vat_goes_down(double mm) {
-  count.moves = moves_powder_ = true;
-  lowered_mm_ = mm;
 }
 
 void Printing::roller_is_at(double mm, bool may_spread) {
@@ -742,31 +704,30 @@ void Printing::pistons_came(double build_mm, double feed_mm) {
 
 void Printing::check_cycle() {
   const auto& powder = profile().powder;
-  const Layer& layer = layer_;
-  const auto wrong = [&](const std::string& what) { wrong_cycle(what); };
   if (const AxisPositions next = axis_positions();
       head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
-    wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
-                      (*head_mm_)[1], next.x_mm, next.y_mm));
+    wrong_cycle(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
+                            (*head_mm_)[1], next.x_mm, next.y_mm));
   }
-  if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
+  if (lowered_mm_) count.build_mm = mm(layer_.bottom) + *lowered_mm_;
   if (profile().dialect == "raw" || profile().dialect == "planes") {  // the head alone
-    if (!spread_wrong_.empty()) wrong(spread_wrong_);
+    if (!spread_wrong_.empty()) wrong_cycle(spread_wrong_);
     return check_stated();
   }
-  if (!count.moves) return wrong("the build vat does not move");
-  if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
-  if (!spread_wrong_.empty()) return wrong(spread_wrong_);
+  if (!count.moves) return wrong_cycle("the build vat does not move");
+  if (!rolled_) wrong_cycle(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
+  if (!spread_wrong_.empty()) return wrong_cycle(spread_wrong_);
   // Numbers are written to a tenth of a micrometre.
-  if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
-    wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
+  if (const double top = mm(std::int64_t{layer_.bottom} + layer_.thickness); std::abs(count.build_mm - top) > 1e-3) {
+    wrong_cycle(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
   }
-  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer.thickness) + base_mm());
-  if (std::abs(fed - dose) > 1e-3 * (1 + base_layers())) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
+  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer_.thickness) + base_mm());
+  if (std::abs(fed - dose) > 1e-3 * (1 + base_layers()))
+    wrong_cycle(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
   check_pauses();
-  if (rpm_ != 0) wrong(fmt::format("the roller still makes {:g} turns a minute when the layer ends", rpm_));
+  if (rpm_ != 0) wrong_cycle(fmt::format("the roller still makes {:g} turns a minute when the layer ends", rpm_));
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
-    wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
+    wrong_cycle(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
   }
 }
 

@@ -79,7 +79,7 @@ class Printing {
   /// Fires all nozzles with set bits; bit 63 of the first word is nozzle 0.
   void fire_words(std::span<const std::uint64_t> words);
   /// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
-  std::uint32_t drop_bits() const;
+  std::uint32_t drop_bits() const { return replay::drop_bits(profile().head.max_drops); }
 
   // --- what the program says of itself
   void state_layers(std::uint32_t layers);
@@ -103,11 +103,16 @@ class Printing {
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_is_at(double mm);
   /// The same, where a program states only the distance from where the layer before left it.
-  void build_vat_goes_down(double mm);
+  void build_vat_goes_down(double mm) {
+    count.moves = moves_powder_ = true;
+    lowered_mm_ = mm;
+  }
   /// may_spread  such a movement can be that over the powder
   void roller_is_at(double mm, bool may_spread = true);
   /// The first error of the powder; reported at the layer's end, where its true heights are known.
-  void wrong_powder(std::string what);
+  void wrong_powder(std::string what) {
+    if (spread_wrong_.empty()) spread_wrong_ = std::move(what);
+  }
   /// Powder is spread now: the build vat is at its stated position, vats have fed so much, and the spreader goes so far above
   /// both.
   void spreads(double build_mm, double fed_mm, double clearance_mm);
@@ -130,7 +135,7 @@ class Printing {
   /// layer dries. Whole blocks, in their order.
   bool takes_own(std::string_view line);
   /// The roller turns so fast against its way, or, at 0, no longer.
-  void roller_turns(double rpm);
+  void roller_turns(double rpm) { rpm_ = rpm; }
   /// A program that moves no powder has a record that the host carries out; it spreads the layer before the first one that is
   /// not of its powder.
   void state_host(std::string_view record, bool of_powder);
@@ -162,10 +167,14 @@ class Printing {
                      Differences& differ) const;
   /// The 64 pixels of a word that are fired more than so many times.
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
-  void fail(std::string what);  // takes the complete message
+  /// what  the complete message
+  void fail(std::string what) {
+    if (ok()) fault_ = std::move(what);
+  }
   void wrong_cycle(std::string_view what);
-  bool roller_at_home() const;
-  bool head_at_safe() const;
+  bool roller_at_home() const { return std::abs(roller_mm_ - profile().powder.roller_mm[0]) < 1e-3; }
+  bool head_at(const std::array<double, 2>& at) const;
+  bool head_at_safe() const { return head_at(profile().motion.safe_mm); }
   void check_spread();
   void check_speed(double mm_s, bool scanning);
   void state_sweep(std::uint32_t of);
@@ -180,13 +189,15 @@ class Printing {
   double base_mm() const { return layer_.index == 0 ? profile().powder.base_mm() : 0; }
   std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
   void strokes(double build_mm, double fed_mm);
-  bool capped() const;
   void waits_capped(std::string_view what);
   void check_pauses();
   void check_stated();
   void leaves_wiper(std::string_view what);
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
-  std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
+  /// Across and along the scan, of a pixel.
+  std::array<std::int64_t, 2> line_and_position(std::uint32_t column, std::uint32_t row) const;
+  std::int64_t line_of(std::uint32_t column, std::uint32_t row) const { return line_and_position(column, row)[0]; }
+  double across_um(double carriage_mm) const;
   bool pixel(std::int64_t line, std::int64_t position, std::uint32_t& column, std::uint32_t& row) const;
   std::string describe_position(std::uint32_t column, std::uint32_t row) const;
 
@@ -229,5 +240,15 @@ class Printing {
   std::string fault_;             // the first one
   std::string spread_wrong_;      // the first fault of spreading
 };
+
+/// The readers of dialects, whose formats stages/program/ documents: each reads a layer's program, the whole file. An invalid
+/// program sets the fault of the printing.
+void read_nuferbj(std::string_view text, Printing& printing);
+void read_raw(std::string_view text, Printing& printing);
+void read_planes(std::string_view text, Printing& printing);
+void read_hp45(std::string_view text, Printing& printing);
+void read_oasis(std::string_view text, Printing& printing);
+void read_brundlefab(std::string_view text, Printing& printing);
+void read_m578(std::string_view text, Printing& printing);
 
 }  // namespace lamina::replay

@@ -11,7 +11,6 @@
 #include "stages/data/layer.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
-#include "stages/dose/dose_target.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
 #include "stages/raster/raster.h"

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "stages/dose/edges/erode.h"
-#include "stages/dose/saturate.h"
+#include "stages/dose/dither.h"
+#include "stages/dose/edges.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {

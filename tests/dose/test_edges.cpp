@@ -9,10 +9,8 @@
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
-#include "stages/dose/edges/dilate.h"
-#include "stages/dose/edges/erode.h"
-#include "stages/dose/edges/holes.h"
-#include "stages/dose/zones.h"
+#include "stages/dose/edges.h"
+#include "stages/dose/layer_drops.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -133,7 +131,7 @@ Image flooded(const Image& image) {
 }
 
 TEST(Holes, AreWhatAFloodFromOutsideDoesNotReach) {
-  HoleScratch scratch;
+  Buffer<std::uint32_t> scratch;
   Runs filled;
   for (std::uint32_t seed = 0; seed < 200; ++seed) {
     Random random(seed);

@@ -10,10 +10,8 @@
 #include <vector>
 
 #include "stages/dose/budget.h"
-#include "stages/dose/covered_spans.h"
 #include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
-#include "stages/dose/pour.h"
 #include "stages/dose/shares.h"
 #include "tests/program/machines.h"
 

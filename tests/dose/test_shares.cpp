@@ -10,11 +10,9 @@
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
-#include "stages/dose/dose_target.h"
 #include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
-#include "stages/dose/share_count.h"
 #include "stages/dose/shares.h"
 #include "tests/program/machines.h"
 

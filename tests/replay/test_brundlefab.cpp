@@ -4,8 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "stages/replay/brundlefab/block.h"
-#include "stages/replay/brundlefab/ink_bar.h"
+#include "stages/replay/brundlefab/firmware.h"
 #include "tests/program/machines.h"
 #include "tests/replay/brundlefab_port.h"
 #include "tests/replay/printed_parts.h"

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "stages/replay/frame/frame.h"
+#include "stages/replay/frame.h"
 #include "tests/replay/tamper_bench.h"
 
 namespace lamina {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "stages/replay/feeding.h"
 #include "stages/replay/time/timer.h"
+#include "stages/replay/totals.h"
 #include "tests/replay/brundlefab_port.h"
 #include "tests/replay/maintenance_bench.h"
 

@@ -9,8 +9,8 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/report/machine_text.h"
+#include "stages/program/bed.h"
 #include "stages/program/dialect.h"
-#include "stages/program/orientation_target.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"
 

@@ -1,11 +1,10 @@
-#include "stages/program/brundlefab/brundlefab.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/maintenance.h"
 #include "stages/program/program_text.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program::brundlefab {
 namespace {
@@ -78,9 +77,9 @@ class BrundlefabWriter final : public ProgramWriter {
       last = std::max<std::int64_t>(last, dot);
     });
     const double across = carriage_.across(sweep.first_line);
-    const MaintenanceClock::MachinePoint position{across, 0};  // the bar's home
-    const std::int64_t end = band_end(last) + kWorthWiping;    // a shot before it may have been longer
-    if (clock_.before_sweep(position, position, 2 * bar_seconds(machine_, end)).shot) {
+    const MachinePoint position{across, 0};                  // the bar's home
+    const std::int64_t end = band_end(last) + kWorthWiping;  // a shot before it may have been longer
+    if (clock_.before_sweep({position, position}, 2 * bar_seconds(machine_, end)).shot) {
       const auto dots = dots_;
       shoot(out);
       dots_ = dots;
@@ -137,11 +136,7 @@ class BrundlefabWriter final : public ProgramWriter {
 
   /// All nozzles that are not blocked, a drop a dot, next to the bed.
   void shoot(ProgramBytes& out) {
-    std::uint16_t all = 0;
-    for (std::uint32_t nozzle = 0; nozzle < machine_.head.nozzles; ++nozzle) {
-      const bool blocked = std::ranges::find(machine_.head.blocked, nozzle) != machine_.head.blocked.end();
-      all = static_cast<std::uint16_t>(all | (blocked ? 0u : 1u << nozzle));
-    }
+    const auto all = static_cast<std::uint16_t>(working_nozzles(machine_));
     for (std::int64_t left = machine_.maintenance.spit_drops; left > 0; left -= kShotDots) {
       const std::int64_t drops = std::min(left, kShotDots);
       dots_.fill(0);
@@ -199,9 +194,7 @@ std::string wrong_bins(const Machine& machine) {
 /// The bar runs along the whole bed, for any Y: a shot has to be outside of it in X, and begins at the bar's home.
 Status check_shots(const Machine& machine, const Carriage& carriage, const HeadGrid& grid) {
   const auto& maintenance = machine.maintenance;
-  const auto wrong = [&](std::string_view key, const std::string& what) {
-    return Error{Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
-  };
+  const auto wrong = [&](std::string_view key, std::string_view what) { return wrong_key(machine, key, what); };
   if (!maintenance.spits()) return {};
   const auto& [x, y] = *maintenance.spit_mm;
   if (y != 0) return wrong("maintenance.spit_mm", "the ink bar runs from its home along Y; give 0 for y");
@@ -234,9 +227,7 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
 }
 
 Status check(const Machine& machine, const HeadGrid& grid) {
-  const auto wrong = [&](std::string_view key, const std::string& what) -> Status {
-    return Error{Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
-  };
+  const auto wrong = [&](std::string_view key, std::string_view what) { return wrong_key(machine, key, what); };
   const Carriage carriage(machine, grid);
   const auto& powder = machine.powder;
   if (carriage.scan_axis() != "Y" || carriage.line_axis() != "X" || powder.build_axis != "Z" || powder.feed_axes[0] != "E" ||

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <string>
 
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/maintenance.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program::hp45 {
 namespace {
@@ -31,8 +32,7 @@ class Hp45Writer final : public ProgramWriter {
     head_.sweep(sweep, vectors, maintenance_, out);
   }
   void end_layer(const LayerCycle&, ProgramBytes& out) override {
-    put(out, "G1 {}{} {}{} F{}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]), machine_.motion.y_axis,
-        mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s));
+    put_move(machine_, "G1", machine_.motion.safe_mm, machine_.motion.travel_speed_mm_s, out);
     Head::wait(out);
     put(out, "BRL\n");
   }
@@ -121,9 +121,7 @@ std::uint32_t repeat_of(const Machine& machine) {
 }  // namespace
 
 Status check(const Machine& machine, const HeadGrid& grid) {
-  const auto wrong = [&](std::string_view key, const std::string& what) {
-    return Error{Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
-  };
+  const auto wrong = [&](std::string_view key, std::string_view what) { return wrong_key(machine, key, what); };
   const auto& rows = machine.head.row_offset_um;
   if (std::ranges::any_of(rows, [](double offset) { return offset != 0; })) {
     return wrong("head.row_offset_um", "the HP45 controller fires its rows where they belong; give [0]");
@@ -211,8 +209,8 @@ void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, MaintenanceWri
   if (zero < 0 || um_of_counts(zero, counts_) > kMaxProduct / counts_) zero = 0;  // any count does that all lines start from
   const auto encoder = [&](double um) { return static_cast<double>(zero) * count_um + um - start; };
 
-  maintenance.before_sweep(carriage_.position(start / 1000, sweep.first_line), carriage_.position(end / 1000, sweep.first_line),
-                           out);
+  maintenance.before_sweep(
+      {carriage_.position(start / 1000, sweep.first_line), carriage_.position(end / 1000, sweep.first_line)}, out);
   put(out, "G1 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(start / 1000), carriage_.line_axis(),
       mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
   wait(out);

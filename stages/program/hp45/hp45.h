@@ -1,22 +1,13 @@
-// stages/program/hp45/hp45.h: see the README here.
+// stages/program/hp45/hp45.h: lines for the HP45 controller V4, as its hosts send them; see the README here.
 #pragma once
 
 #include <string_view>
 
 #include "stages/program/dialect.h"
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/maintenance.h"
 #include "stages/program/program_text.h"
 
 namespace lamina::program::hp45 {
-
-std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
-
-// --- lines for the HP45 controller V4, as its hosts send them; see the README here.
-
-/// Whether the controller can jet the machine's images.
-/// errors  kUsage: rows of its own, lags in ticks, more steps than its buffer holds, an encoder too coarse for its pixels,
-///         nozzles without a channel of their own, a scan speed that it cannot measure
-Status check(const Machine& machine, const HeadGrid& grid);
 
 /// Spells what the controller needs; the motion between is G-code.
 class Head {

@@ -1,12 +1,10 @@
-#include "stages/program/m578/m578.h"
-
-#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
 
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/maintenance.h"
 #include "stages/program/program_text.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program::m578 {
 namespace {
@@ -14,15 +12,6 @@ namespace {
 // Platform.h: INKJET_FIRE_MICROSECONDS and INKJET_DELAY_MICROSECONDS of each nozzle, one after the other.
 constexpr double kSecondsOfNozzle = (5 + 800) * 1e-6;
 constexpr std::uint32_t kInkjetBits = 0xFFF;
-
-/// The bits of all nozzles that are not blocked.
-std::uint32_t working_nozzles(const Machine& machine) {
-  std::uint32_t all = 0;
-  for (std::uint32_t nozzle = 0; nozzle < machine.head.nozzles; ++nozzle) {
-    if (std::ranges::find(machine.head.blocked, nozzle) == machine.head.blocked.end()) all |= 1u << nozzle;
-  }
-  return all;
-}
 
 void put_spit(const Machine& machine, ProgramBytes& out) {
   const std::uint32_t all = working_nozzles(machine);
@@ -50,9 +39,7 @@ class M578Writer final : public ProgramWriter {
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
     if (machine_.maintenance.spit_seconds > 0 || machine_.maintenance.wipe_seconds > 0) {
-      maintenance_.before_sweep(carriage_.position(carriage_.begin(sweep, vectors), sweep.first_line),
-                                carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), sweep_s(sweep, vectors),
-                                out);
+      maintenance_.before_sweep(carriage_.ends(sweep, vectors), out, sweep_s(sweep, vectors));
     }
     put(out, "; swath {} of {}\nG0 {}{} {}{} F{}\n", sweep.number, sweep.of, carriage_.scan_axis(),
         mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(), mm_text(carriage_.across(sweep.first_line)),
@@ -67,8 +54,8 @@ class M578Writer final : public ProgramWriter {
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     maintenance_.dry(out);
-    put(out, "G0 {}{} {}{} F{}\nM400\n; end of layer {}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
-        machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s), cycle.layer);
+    put_move(machine_, "G0", machine_.motion.safe_mm, machine_.motion.travel_speed_mm_s, out);
+    put(out, "M400\n; end of layer {}\n", cycle.layer);
   }
   void end(ProgramBytes& out) override { put(out, "M400\nM0\n"); }
 
@@ -112,15 +99,14 @@ Status check(const Machine& machine, const HeadGrid&) {
   int major = 0, minor = 0;
   const char* const end = machine.firmware.data() + machine.firmware.size();
   if (machine.firmware[0] < '0' || machine.firmware[0] > '9') {
-    return Error{Fault::kUsage, fmt::format("{}: machine.firmware: '{}' begins with no number; give RepRapFirmware's version "
-                                            "alone, as 2.03",
-                                            machine.name, machine.firmware)};
+    return wrong_key(machine, "machine.firmware",
+                     fmt::format("'{}' begins with no number; give RepRapFirmware's version alone, as 2.03", machine.firmware));
   }
   const auto dot = std::from_chars(machine.firmware.data(), end, major).ptr;
   if (dot != end && *dot == '.') std::from_chars(dot + 1, end, minor);
   if (major < 3 || (major == 3 && minor < 5)) return {};
-  return Error{Fault::kUsage, fmt::format("{}: machine.firmware: RepRapFirmware {} has no M578; it was removed for 3.5",
-                                          machine.name, machine.firmware)};
+  return wrong_key(machine, "machine.firmware",
+                   fmt::format("RepRapFirmware {} has no M578; it was removed for 3.5", machine.firmware));
 }
 
 }  // namespace lamina::program::m578

@@ -1,11 +1,10 @@
-#include "stages/program/nuferbj/nuferbj.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
 
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/maintenance.h"
 #include "stages/program/program_text.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program::nuferbj {
 namespace {
@@ -45,8 +44,7 @@ class NuferbjWriter final : public ProgramWriter {
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    maintenance_.before_sweep(carriage_.position(carriage_.begin(sweep, vectors), sweep.first_line),
-                              carriage_.position(carriage_.end(sweep, vectors), sweep.first_line), out);
+    maintenance_.before_sweep(carriage_.ends(sweep, vectors), out);
     put(out, "M812 S{} T{} D{}\n", sweep.number, sweep.of, sweep.backward ? 1 : 0);
     put(out, "G0 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(),
         mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
@@ -74,8 +72,8 @@ class NuferbjWriter final : public ProgramWriter {
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     maintenance_.dry(out);
-    put(out, "G0 {}{} {}{} F{}\nM813 L{}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
-        machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s), cycle.layer);
+    put_move(machine_, "G0", machine_.motion.safe_mm, machine_.motion.travel_speed_mm_s, out);
+    put(out, "M813 L{}\n", cycle.layer);
   }
 
   void end(ProgramBytes& out) override { put(out, "M814\n"); }

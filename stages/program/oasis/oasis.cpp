@@ -1,10 +1,9 @@
-#include "stages/program/oasis/oasis.h"
-
 #include <fmt/format.h>
 
 #include "stages/program/hp45/hp45.h"
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/maintenance.h"
 #include "stages/program/program_text.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program::oasis {
 namespace {
@@ -12,7 +11,7 @@ namespace {
 // SerialGRBL.py: how far pistons go down before they come up, and how far they stay below the spreader's way afterwards.
 constexpr double kHysteresisMm = 1, kClearanceMm = 0.25;
 // Where homing leaves the gantry.
-constexpr double kHomeMm[] = {5, 245};
+constexpr MachinePoint kHomeMm = {5, 245};
 
 constexpr MaintenanceWords kMaintenance{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then go on\nM0\n", "G4 P",
                                         1};
@@ -27,7 +26,7 @@ class OasisWriter final : public ProgramWriter {
     put(out, "$h\nG92 {}{} {}{}\n", motion.x_axis, mm_text(kHomeMm[0]), motion.y_axis, mm_text(kHomeMm[1]));
     put(out, "G21\nG90\nG92 {}0 {}0\n", machine_.powder.build_axis, machine_.powder.feed_axes[0]);
     put_base_zero(machine_, out);
-    go(motion.safe_mm[0], motion.safe_mm[1], out);
+    go(motion.safe_mm, out);
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override;
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
@@ -35,20 +34,17 @@ class OasisWriter final : public ProgramWriter {
   }
   void end_layer(const LayerCycle&, ProgramBytes& out) override {
     maintenance_.dry(out);
-    go(machine_.motion.safe_mm[0], machine_.motion.safe_mm[1], out);
+    go(machine_.motion.safe_mm, out);
     hp45::Head::wait(out);
     put(out, "BRL\n");
   }
   void end(ProgramBytes& out) override {
     put(out, "BCL\n");
-    go(kHomeMm[0], kHomeMm[1], out);
+    go(kHomeMm, out);
   }
 
  private:
-  void go(double x_mm, double y_mm, ProgramBytes& out) const {
-    put(out, "G1 {}{} {}{} F{}\n", machine_.motion.x_axis, mm_text(x_mm), machine_.motion.y_axis, mm_text(y_mm),
-        feed_text(machine_.motion.travel_speed_mm_s));
-  }
+  void go(MachinePoint to, ProgramBytes& out) const { put_move(machine_, "G1", to, machine_.motion.travel_speed_mm_s, out); }
   void build_to(double depth_mm, ProgramBytes& out) const {
     put(out, "G1 {}{} F{}\n", machine_.powder.build_axis, mm_text(machine_.powder.build_sign * depth_mm),
         feed_text(machine_.powder.vat_speed_mm_s));
@@ -69,7 +65,7 @@ void OasisWriter::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
   maintenance_.refill(cycle, out);
   bool again = false;
   for_each_spread(machine_, cycle, [&](std::int64_t bottom_nm, std::int64_t thickness_nm) {
-    if (again) go(machine_.motion.safe_mm[0], machine_.motion.safe_mm[1], out);  // where spreading begins
+    if (again) go(machine_.motion.safe_mm, out);  // where spreading begins
     again = true;
     spread(bottom_nm, thickness_nm, out);
   });
@@ -104,16 +100,14 @@ void OasisWriter::spread(std::int64_t bottom_nm, std::int64_t thickness_nm, Prog
 
 Status check(const Machine& machine, const HeadGrid& grid) {
   const auto& powder = machine.powder;
-  if (powder.vats != 1) {
-    return Error{Fault::kUsage, fmt::format("{}: powder.vats: Oasis has one feed piston; give 1", machine.name)};
-  }
+  if (powder.vats != 1) return wrong_key(machine, "powder.vats", "Oasis has one feed piston; give 1");
   const auto& motion = machine.motion;
   const bool x = powder.roller_axis == motion.x_axis, y = powder.roller_axis == motion.y_axis;
   if (const double waits = motion.safe_mm[x ? 0 : 1]; (x || y) && waits != powder.roller_mm[0]) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}: powder.roller_mm: the spreader on the gantry starts at {:g} mm, and the gantry "
-                             "waits at {:g} (motion.safe_mm); give the same",
-                             machine.name, powder.roller_mm[0], waits)};
+    return wrong_key(machine, "powder.roller_mm",
+                     fmt::format("the spreader on the gantry starts at {:g} mm, and the gantry waits at {:g} (motion.safe_mm); "
+                                 "give the same",
+                                 powder.roller_mm[0], waits));
   }
   return hp45::check(machine, grid);
 }

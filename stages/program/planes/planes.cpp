@@ -1,9 +1,5 @@
-#include "stages/program/planes/planes.h"
-
-#include <algorithm>
-
 #include "stages/program/binary_program.h"
-#include "stages/program/maintenance/maintenance.h"
+#include "stages/program/writers.h"
 
 namespace lamina::program::planes {
 namespace {
@@ -11,34 +7,25 @@ namespace {
 constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kStart = 0x4C04, kDone = 0x4C05, kGrey = 0x4C06;
 constexpr std::size_t kPlaneHead = 36, kGreyHead = 40;
 
-constexpr std::uint32_t kMaintenance = 0x4C10;  // and the number of the record
+/// Of records of head maintenance.
+constexpr std::array<std::uint32_t, 8> kRecords = {0x4C10, 0x4C11, 0x4C12, 0x4C13, 0x4C14, 0x4C15, 0x4C16, 0x4C17};
 
-void put_maintenance(MaintenanceRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out) {
-  put_little<std::uint32_t>(out, kMaintenance + static_cast<std::uint32_t>(kind));
-  put_little<std::uint32_t>(out, static_cast<std::uint32_t>(numbers.size()));
-  for (const std::uint32_t number : numbers) put_little<std::uint32_t>(out, number);
-}
-
-class PlanesWriter final : public ProgramWriter {
+class PlanesWriter final : public BinaryWriter {
  public:
   PlanesWriter(const Machine& machine, const HeadGrid& grid)
-      : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32), maintenance_(machine, grid, put_maintenance) {}
+      : BinaryWriter(machine, grid, kRecords), words_((grid.nozzles + 31) / 32) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     const bool grey = grid_.drop_bits > 1;
-    for (const std::uint32_t value : {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.positions,
-                                      grid_.lines, grid_.steps_per_pixel, words_}) {
-      put_little<std::uint32_t>(out, value);
-    }
-    if (grey) put_little<std::uint32_t>(out, grid_.drop_bits);
+    put_numbers(out, {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.positions, grid_.lines,
+                      grid_.steps_per_pixel, words_});
+    if (grey) put_numbers(out, {grid_.drop_bits});
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     const std::uint32_t vats = vat_bits(cycle);
-    for (const std::int64_t value : {std::int64_t{kLayer}, std::int64_t{vats == 1 ? 4 : 5}, std::int64_t{cycle.layer},
-                                     std::int64_t{cycle.layers}, cycle.bottom_nm, cycle.thickness_nm}) {
-      put_little<std::uint32_t>(out, static_cast<std::uint32_t>(value));
-    }
-    if (vats != 1) put_little<std::uint32_t>(out, vats);
+    put_numbers(out, {kLayer, vats == 1 ? 4u : 5u, cycle.layer, cycle.layers, static_cast<std::uint32_t>(cycle.bottom_nm),
+                      static_cast<std::uint32_t>(cycle.thickness_nm)});
+    if (vats != 1) put_numbers(out, {vats});
   }
 
   // Planes of one sweep, in the order of the movement; inside of a plane steps increase.
@@ -64,30 +51,16 @@ class PlanesWriter final : public ProgramWriter {
         });
   }
 
-  void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    for (const std::uint32_t value : {kEnd, 1u, cycle.layer}) put_little<std::uint32_t>(out, value);
-  }
-  void end(ProgramBytes& out) override {
-    for (const std::uint32_t value : {kDone, 0u}) put_little<std::uint32_t>(out, value);
-  }
-
-  void maintenance_of_layer(const LayerCycle& cycle, ProgramBytes& out) override { maintenance_.begin_layer(cycle, out); }
-  void maintenance_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    maintenance_.before_sweep(sweep, vectors, out);
-  }
-  void maintenance_after(ProgramBytes& out) override { maintenance_.dry(out); }
+  void end_layer(const LayerCycle& cycle, ProgramBytes& out) override { put_numbers(out, {kEnd, 1, cycle.layer}); }
+  void end(ProgramBytes& out) override { put_numbers(out, {kDone, 0}); }
 
  private:
-  const Machine& machine_;
-  const HeadGrid& grid_;
   std::uint32_t words_;  // of 32 bits a vector
-  MaintenanceRecords maintenance_;
 };
 
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
-  static_assert(std::endian::native == std::endian::little);
   return std::make_unique<PlanesWriter>(machine, grid);
 }
 

@@ -14,9 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "stages/replay/brundlefab/block.h"
-#include "stages/replay/brundlefab/ink_bar.h"
-#include "stages/replay/dialects.h"
+#include "stages/replay/brundlefab/firmware.h"
+#include "stages/replay/printing.h"
 
 namespace lamina::replay {
 namespace brundle {

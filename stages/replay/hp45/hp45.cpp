@@ -6,12 +6,11 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <vector>
 
-#include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
 #include "stages/replay/hp45/controller.h"
-#include "stages/replay/hp45/limits.h"
 
 namespace lamina::replay {
 namespace {
@@ -23,6 +22,79 @@ constexpr int kMaxRewinds = 8;      // BRES reads up to 4000 lines again; hosts 
 constexpr double kBurstsPerInch = 600;
 // Of the profile: DMAPrint.cpp gives them another one's address and primitive, so that their drops fall on its line.
 constexpr std::uint32_t kMisplaced[] = {0, 129, 263};
+
+constexpr double kMarginMm = 100;  // off the bed, besides ramps
+// PositionUpdate measures the speed every 50 counts (POSITION_STEP_COUNT); 100 ms behind the last measure it is 0
+// (POSITION_STEP_TIMEOUT), and bursts need one. It is held in whole mm/s.
+constexpr double kMinCountsPerSecond = 500;
+constexpr std::uint32_t kMaxPrimed = 25'000;  // HP45_Standalone_V4.ino, PRM: constrain()
+
+/// Bursts of PRM; none if the controller would fire others.
+std::optional<std::uint32_t> primed(std::string_view number) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::uint32_t bursts = 0;
+  for (const char c : number) {
+    const std::size_t digit = kDigits.find(c);
+    if (digit == std::string_view::npos || bursts > kMaxPrimed) return std::nullopt;
+    bursts = bursts * 64 + static_cast<std::uint32_t>(digit);
+  }
+  if (bursts > kMaxPrimed) return std::nullopt;
+  return bursts;
+}
+
+/// encoder_dpi  of the profile; 0: not stated
+/// errors       kVerification: an encoder of so many counts an inch is not the machine's
+Status check_encoder(double counts, double encoder_dpi, double step_um) {
+  if (counts == encoder_dpi) return {};
+  if (encoder_dpi <= 0) {  // 600, or what pixels need
+    if (counts <= 600 + 2 * 25'400 / step_um) return {};
+    return Error{Fault::kVerification,
+                 fmt::format("SER has {:g} counts an inch, far more than pixels of {:.1f} um need", counts, step_um)};
+  }
+  return Error{Fault::kVerification,
+               fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder_dpi)};
+}
+
+/// Whether the carriage gets to a place along the scan: the bed with ramps and clearance, where the head waits or is
+/// maintained, and the spreader's ends if the gantry has it.
+bool reaches(const Printing& printing, double counts_per_inch, double mm) {
+  const auto& profile = printing.profile();
+  const std::string& along = ScanAxes(profile).along;
+  const bool x = profile.mounting.scan_axis == ScanAxis::kX;
+  const double begin = profile.mounting.offset_mm[x ? 0 : 1],
+               offset = x ? printing.axis_positions().x_mm : printing.axis_positions().y_mm;
+  double low = std::min(begin, offset), high = std::max(begin + profile.bed.size_mm[x ? 0 : 1], offset);
+  if (profile.powder.roller_axis == along) {
+    low = std::min({low, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
+    high = std::max({high, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
+  }
+  // The run-up takes two measures of speed, of 50 counts each.
+  if (const auto& maintenance = profile.maintenance; maintenance.spits() || maintenance.wipes() || maintenance.cap_mm) {
+    const std::size_t i = x ? 0 : 1;
+    for (const auto& position : {maintenance.spit_mm, maintenance.cap_mm}) {
+      if (position) low = std::min(low, (*position)[i]), high = std::max(high, (*position)[i]);
+    }
+    if (maintenance.wipe_mm) {
+      low = std::min({low, (*maintenance.wipe_mm)[i], (*maintenance.wipe_mm)[2 + i]});
+      high = std::max({high, (*maintenance.wipe_mm)[i], (*maintenance.wipe_mm)[2 + i]});
+    }
+  }
+  const double row_mm = printing.nozzles() * profile.head.pitch_um / 1000;  // of a tilted head
+  const double clearance = kMarginMm + row_mm + profile.motion.ramp_mm + 110 * 25.4 / counts_per_inch;
+  return mm >= low - clearance && mm <= high + clearance;
+}
+
+/// errors  kVerification: the firmware does not know a sweep's speed all the way
+Status check_speed(double mm_s, double counts_per_inch) {
+  const double counts = mm_s / 25.4 * counts_per_inch;
+  if (std::abs(mm_s - std::round(mm_s)) > 1e-3) {
+    return Error{Fault::kVerification, fmt::format("sweeps at {:g} mm/s, which the controller cuts to whole mm/s", mm_s)};
+  }
+  if (counts >= kMinCountsPerSecond) return {};
+  return Error{Fault::kVerification,
+               fmt::format("sweeps at {:g} mm/s, {:.0f} counts a second: below {:.0f} the controller takes the head to rest",
+                           mm_s, counts, kMinCountsPerSecond)};
+}
 
 class Hp45Reader {
  public:
@@ -51,9 +123,13 @@ class Hp45Reader {
   bool begins_well(double from_um, double to_um);
   void move(const GcodeLine& line);
   void spread(const GcodeLine& line);
+  void pistons_came() {
+    const auto& powder = printing_.profile().powder;
+    printing_.pistons_came(axes_.last_way(powder.build_axis), axes_.last_way(powder.feed_axes[0]));
+  }
   bool ready();
-  Status check_encoder() const {
-    return hp45::check_encoder(controller_.counts_per_inch(), printing_.profile().motion.encoder_dpi, step_um_);
+  Status own_encoder() const {
+    return check_encoder(controller_.counts_per_inch(), printing_.profile().motion.encoder_dpi, step_um_);
   }
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
@@ -132,16 +208,14 @@ void Hp45Reader::command(const GcodeLine& line) {
     if (lines_ == 2) ahead_ = at_um > begin_um_ ? 1 : -1;
     take_burst();
   } else if (line.command == "SER") {
-    if (const Status encoder = check_encoder(); !encoder) reader_.fault(encoder.error().message);
+    if (const Status encoder = own_encoder(); !encoder) reader_.fault(encoder.error().message);
   } else if (line.command == "BRL") {
     if (controller_.unread() > 0) {
       return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
     }
     if (!controller_.idle()) return reader_.fault("the last line is not all off, and fires on the ways of the next layer");
     if (oasis_ && (spreading_ || !spread_)) return reader_.fault("the layer has no powder spread between M4 and M5");
-    if (oasis_)
-      printing_.pistons_came(axes_.last_way(printing_.profile().powder.build_axis),
-                             axes_.last_way(printing_.profile().powder.feed_axes[0]));
+    if (oasis_) pistons_came();
     axes_.end();
     ended_ = true;
   }
@@ -149,7 +223,7 @@ void Hp45Reader::command(const GcodeLine& line) {
 
 // So many bursts of all nozzles, wherever the head stands. SerialCommand::Update answers before they are fired.
 void Hp45Reader::prime(std::string_view number) {
-  const auto bursts = hp45::primed(number);
+  const auto bursts = primed(number);
   if (!bursts) return reader_.fault("PRM takes up to 25000 bursts, in base 64");
   const auto& profile = printing_.profile();
   printing_.spits(axes_.at(profile.motion.x_axis), axes_.at(profile.motion.y_axis), *bursts,
@@ -158,7 +232,7 @@ void Hp45Reader::prime(std::string_view number) {
 
 // Whether lines can be fired as the profile has it: where the head stands, how fine the encoder, how many bursts.
 bool Hp45Reader::ready() {
-  const Status encoder = check_encoder();
+  const Status encoder = own_encoder();
   const double density = 100 * 25'400 / (kBurstsPerInch * step_um_);
   if (const std::string_view unset = controller_.unset(); !unset.empty()) {
     reader_.fault(fmt::format("lines come before {}: the controller keeps what another print has set or left", unset));
@@ -218,7 +292,7 @@ void Hp45Reader::move(const GcodeLine& line) {
   printing_.under_way(true);
   const double to = axes_.at(scan_.along);
   if (to == from || !printing_.ok()) return;
-  if (!hp45::reaches(printing_, controller_.counts_per_inch(), to))
+  if (!reaches(printing_, controller_.counts_per_inch(), to))
     return reader_.fault(fmt::format("moves to {:g} mm, out of the machine", to));
   if (!sweeping && !controller_.idle() && ++busy_travels_ > kMaxBusyTravels) {
     return reader_.fault("travels to and fro over lines that are not done");
@@ -229,7 +303,7 @@ void Hp45Reader::move(const GcodeLine& line) {
     printing_.begin_sweep(sweep_++, !upwards);
     if (axes_.at(scan_.across) != neighbour) return reader_.fault("moves across while it fires");
     printing_.go_across(axes_.at(scan_.across));
-    const Status speed = hp45::check_speed(axes_.speed_mm_s(), controller_.counts_per_inch());
+    const Status speed = check_speed(axes_.speed_mm_s(), controller_.counts_per_inch());
     if (!speed) return reader_.fault(speed.error().message);
   }
   for (auto& shots : shots_) shots.clear();
@@ -360,8 +434,7 @@ void Hp45Reader::spread(const GcodeLine& line) {
     return reader_.fault(
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));
   } else {
-    printing_.pistons_came(axes_.last_way(printing_.profile().powder.build_axis),
-                           axes_.last_way(printing_.profile().powder.feed_axes[0]));
+    pistons_came();
   }
   spreading_ = line.command == "M4";
   if (line.has('S') && powder.roller_rpm == 0) return reader_.fault("M4 has no S: the profile tells no speed of the roller");

@@ -7,7 +7,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
 
 namespace lamina::replay {

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
 
 namespace lamina::replay {

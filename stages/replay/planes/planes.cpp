@@ -4,8 +4,6 @@
 #include <vector>
 
 #include "stages/replay/bytes.h"
-#include "stages/replay/dialects.h"
-#include "stages/replay/maintenance_records.h"
 
 namespace lamina::replay {
 namespace {

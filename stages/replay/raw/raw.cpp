@@ -1,7 +1,5 @@
 // stages/program/raw/README.md has the format.
 #include "stages/replay/bytes.h"
-#include "stages/replay/dialects.h"
-#include "stages/replay/maintenance_records.h"
 
 namespace lamina::replay {
 

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "stages/replay/bytes.h"
-#include "stages/replay/maintenance_records.h"
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {

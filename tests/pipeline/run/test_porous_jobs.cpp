@@ -9,7 +9,7 @@
 #include <polyclipping/clipper.hpp>
 
 #include "pipeline/plan/layer_cut.h"
-#include "stages/dose/edges/erode.h"
+#include "stages/dose/edges.h"
 #include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
 #include "stages/raster/raster.h"

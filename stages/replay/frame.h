@@ -1,4 +1,4 @@
-// stages/replay/frame/frame.h: what stands before the first layer of a program and behind its last.
+// stages/replay/frame.h: what precedes the first layer of a program and follows its last.
 #pragma once
 
 #include <string_view>

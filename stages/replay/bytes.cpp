@@ -1,5 +1,4 @@
-// stages/program/raw/README.md and planes/README.md have the format.
-#include "stages/replay/maintenance_records.h"
+#include "stages/replay/bytes.h"
 
 #include <fmt/format.h>
 
@@ -62,13 +61,13 @@ class Carer {
   void carry_out(std::string_view tag, std::span<const std::uint32_t> n) {
     const auto& profile = printing_.profile();
     if (tag != "GOTO") printing_.state_host(tag, tag == "FILL" || tag == "BASE" || tag == "ROLL");
-    if (tag == "GOTO") return go(mm_of(n[0]), mm_of(n[1]), 0);
+    if (tag == "GOTO") return passes_.visit(mm_of(n[0]), mm_of(n[1]), 0);
     if (tag == "FILL") return printing_.refills();
     if (tag == "BASE") return printing_.state_base(n[0], n[1] / 1e6);
     if (tag == "ROLL") return printing_.roller_turns(n[0] / 1e3);
     if (tag == "WIPE") {
       if (n[2] == 0) return reader_.fault("WIPE at no speed");
-      return go(mm_of(n[0]), mm_of(n[1]), n[2] / 1e3);
+      return passes_.visit(mm_of(n[0]), mm_of(n[1]), n[2] / 1e3);
     }
     if (tag == "SPIT") {
       passes_.stop();
@@ -83,7 +82,6 @@ class Carer {
     while (line.ends_with('\0')) line.pop_back();
     if (!printing_.takes_own(line)) reader_.fault(fmt::format("'{}' is none of the machine's own lines here", line));
   }
-  void go(double x_mm, double y_mm, double works_mm_s) { passes_.visit(x_mm, y_mm, works_mm_s); }
 
   ByteReader& reader_;
   Printing& printing_;

@@ -1,11 +1,62 @@
-#include "stages/replay/feeding.h"
+#include "stages/replay/totals.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
+#include <string>
 
 namespace lamina::replay {
+
+void Count::add(const Count& other) {
+  drops += other.drops;
+  vectors += other.vectors;
+  sweeps += other.sweeps;
+  added += other.added;
+  max_per_position = std::max(max_per_position, other.max_per_position);
+  scan_mm += other.scan_mm;
+  travel_mm += other.travel_mm;
+  microseconds += other.microseconds;
+  added_microseconds += other.added_microseconds;
+  fed_mm[0] += other.fed_mm[0];
+  fed_mm[1] += other.fed_mm[1];
+  vats |= other.vats;
+  spat += other.spat;
+  spits += other.spits;
+  wipes += other.wipes;
+  refills += other.refills;
+  moves |= other.moves;
+  build_mm = std::max(build_mm, other.build_mm);
+  farthest_along_um = std::max(farthest_along_um, other.farthest_along_um);
+  farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
+}
+
+Status check_count(const Machine& machine, const Count& reported, const Count& found) {
+  const auto wrong = [](std::string what) { return Error{Fault::kVerification, std::move(what)}; };
+  if (found.drops != reported.drops || found.spat != reported.spat) {
+    return wrong(fmt::format("{} drops and {} off the bed, the manifest says {} and {}", found.drops, found.spat,
+                             reported.drops, reported.spat));
+  }
+  if (found.sweeps != reported.sweeps)
+    return wrong(fmt::format("{} sweeps fire, the manifest says {}", found.sweeps, reported.sweeps));
+  // Further sweeps for blocked nozzles are over no place of their own.
+  const auto& head = machine.head;
+  const bool counted = head.max_drops > 1 && (head.blocked.empty() || head.blocked_rule != BlockedRule::kSecondPass);
+  if (counted && found.added != reported.added) {
+    return wrong(
+        fmt::format("{} sweeps are there for the head's frequency, the manifest says {}", found.added, reported.added));
+  }
+  if (reported.microseconds > 0 && std::abs(found.microseconds - reported.microseconds) > 1)
+    return wrong(fmt::format("takes {:.6f} s, the manifest says {:.6f}", found.seconds(), reported.seconds()));
+  // Of two times, each a whole number.
+  if (counted && reported.microseconds > 0 && std::abs(found.added_microseconds - reported.added_microseconds) > 2) {
+    return wrong(fmt::format("{:.6f} s are for sweeps that the head's frequency adds, the manifest says {:.6f}",
+                             1e-6 * static_cast<double>(found.added_microseconds),
+                             1e-6 * static_cast<double>(reported.added_microseconds)));
+  }
+  return {};
+}
 
 std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat) {
   const auto is_set = [](std::uint64_t pixels) { return pixels > 0; };

@@ -1,4 +1,4 @@
-// stages/program/line_sets.h: unions and differences of lines, and the pattern that divides a line between two swaths.
+// stages/program/lines.h: lines of an image as the head passes over them: turned, divided between swaths, as bits of drops.
 #pragma once
 
 #include <array>
@@ -7,9 +7,25 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/program.h"
+#include "stages/data/runs.h"
 #include "stages/program/fire.h"
 
 namespace lamina::program {
+
+/// Scratch for to_scan_frame; keeps its capacity.
+struct ScanScratch {
+  Runs turned;
+  Buffer<std::uint32_t> next;
+};
+
+/// Rows of the result are lines, its columns places (data/program.h). The image itself where it is so already.
+/// image  of grid.image's size; the result borrows from it or from the scratch
+/// cost   nothing, or O(rows + changes), and for a scan along y O(columns + pixels that differ from the one above)
+RunsView to_scan_frame(const HeadGrid& grid, const RunsView& image, ScanScratch& scratch);
+
+/// Columns become rows: row c of the result holds, as columns, the rows of column c.
+void transpose(const RunsView& image, Runs& result, Buffer<std::uint32_t>& next);
 
 enum class LineOperation : std::uint8_t { kUnion, kDifference };
 

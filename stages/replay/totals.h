@@ -1,4 +1,4 @@
-// stages/replay/feeding.h: the vats that must feed a layer, and the material used.
+// stages/replay/totals.h: totals of programs against the job and its record: drops and times, vats that feed, material.
 #pragma once
 
 #include <array>
@@ -12,6 +12,10 @@
 #include "stages/replay/count.h"
 
 namespace lamina::replay {
+
+/// Compares a program's numbers with what is recorded of it; a time of 0 is not recorded.
+/// errors  kVerification: the first that differs: drops, sweeps, added sweeps, times
+Status check_count(const Machine& machine, const Count& reported, const Count& found);
 
 /// One bit per vat that must feed a layer, by the machine's rule; 0 if the rule refuses. An empty layer counts as the
 /// first material.

@@ -1,10 +1,9 @@
-// stages/program/maintenance/maintenance.h: lines of G-code that keep nozzles from drying and vats from running empty.
+// stages/program/maintenance.h: maintenance of head and powder in programs: what is possible, when it is due, its lines.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <initializer_list>
-#include <span>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,8 +26,6 @@ double shot_seconds(const Machine& machine);
 /// The clock of a layer, which begins with it, so that a layer's care depends on that layer alone.
 class MaintenanceClock {
  public:
-  using MachinePoint = std::array<double, 2>;  // of the carriage, x and y in mm
-
   /// What is due, in this order; a shot follows each wipe where the profile has shots, since a wiper leaves binder and grains
   /// at the nozzles.
   struct Due {
@@ -41,9 +38,9 @@ class MaintenanceClock {
   /// Before the first sweep. at  where the head stands
   Due begin_layer(std::uint32_t layer, MachinePoint at);
   /// Before a sweep: what would be overdue at its end. The sweep is then made.
-  /// from, to  of the sweep. sweep_s  how long it takes without the way to it
-  Due before_sweep(MachinePoint from, MachinePoint to, double sweep_s);
-  Due before_sweep(MachinePoint from, MachinePoint to);
+  /// ends     of the sweep, as it is run
+  /// sweep_s  how long it takes without the way to it; default: its way at scan speed
+  Due before_sweep(const std::array<MachinePoint, 2>& ends, std::optional<double> sweep_s = {});
 
  private:
   Due serve(bool wipe, bool shot);
@@ -76,56 +73,32 @@ class MaintenanceWriter {
   /// Before the powder of a layer.
   void refill(const LayerCycle& cycle, ProgramBytes& out);
   /// Behind it: what is due every so many layers, and by the clock, which begins here.
-  void begin_layer(const LayerCycle& cycle, ProgramBytes& out);
-  /// Before the head goes to a sweep: what would be overdue at its end. from, to  of the sweep, mm of the carriage, x and y.
-  /// sweep_s  how long it takes; left out: its way at scan speed
-  void before_sweep(MaintenanceClock::MachinePoint from, MaintenanceClock::MachinePoint to, ProgramBytes& out);
-  void before_sweep(MaintenanceClock::MachinePoint from, MaintenanceClock::MachinePoint to, double sweep_s, ProgramBytes& out);
+  void begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
+    serve(clock_.begin_layer(cycle.layer, machine_.motion.safe_mm), out);
+  }
+  /// Before the head goes to a sweep: see MaintenanceClock.
+  void before_sweep(const std::array<MachinePoint, 2>& ends, ProgramBytes& out, std::optional<double> sweep_s = {}) {
+    serve(clock_.before_sweep(ends, sweep_s), out);
+  }
   /// Behind the last sweep.
   void dry(ProgramBytes& out) const;
 
  private:
   void serve(MaintenanceClock::Due due, ProgramBytes& out) const;
   void put_own(const std::vector<std::string>& lines, ProgramBytes& out) const;
-  void go(std::string_view command, double x_mm, double y_mm, double speed_mm_s, ProgramBytes& out) const;
+  void travel(MachinePoint to, ProgramBytes& out) const;
 
   const Machine& machine_;
   const MaintenanceWords& words_;
   MaintenanceClock clock_;
 };
 
-// --- care of head and powder in dialects of vectors alone, as records for their hosts.
+/// Whether a dialect can express what a profile requests besides drops and powder, and a machine do it: positions off the bed,
+/// limits in seconds that the longest sweep keeps. errors  kUsage, with the key and what to do
+Status check_maintenance(const Dialect& dialect, const Machine& machine, const HeadGrid& grid);
 
-/// What a record states; the READMEs of raw and planes have the numbers that follow each.
-enum class MaintenanceRecord : std::uint8_t { kGo, kFill, kBase, kRoller, kWipe, kShot, kDry, kOwn };
-
-/// Writes the care of one layer after the other.
-class MaintenanceRecords {
- public:
-  using Put = void (*)(MaintenanceRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out);
-
-  /// machine and grid outlive this object. spell  how the dialect spells a record
-  MaintenanceRecords(const Machine& machine, const HeadGrid& grid, Put spell)
-      : machine_(machine), carriage_(machine, grid), clock_(machine, shot_seconds(machine)), put_(spell) {}
-
-  /// Behind the record that begins a layer.
-  void begin_layer(const LayerCycle& cycle, ProgramBytes& out);
-  void before_sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out);
-  /// Behind the last sweep.
-  void dry(ProgramBytes& out) const;
-
- private:
-  void serve(MaintenanceClock::Due due, ProgramBytes& out) const;
-  void put_own(const std::vector<std::string>& lines, ProgramBytes& out) const;
-  void go(MaintenanceClock::MachinePoint to, ProgramBytes& out) const;
-  void put(MaintenanceRecord kind, std::initializer_list<std::uint32_t> numbers, ProgramBytes& out) const {
-    put_(kind, {numbers.begin(), numbers.size()}, out);
-  }
-
-  const Machine& machine_;
-  Carriage carriage_;
-  MaintenanceClock clock_;
-  Put put_;
-};
+/// Warns of what a profile has places for and never requests, and of head maintenance that does not go together: a lamp that
+/// is switched on and never off, a pause without a cap that is longer than nozzles may wait.
+void warn_of_idle_maintenance(const Machine& machine, std::vector<Warning>& warnings);
 
 }  // namespace lamina::program

@@ -1,4 +1,4 @@
-// stages/dose/edges/bleed.h: binder that spreads beyond what is jetted: the edges of a layer move before it is.
+// stages/dose/edges.h: edges of a layer on runs: erosion, dilation, holes, and binder that spreads beyond what is jetted.
 #pragma once
 
 #include <array>
@@ -10,10 +10,39 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
-#include "stages/dose/edges/erode.h"
-#include "stages/dose/edges/holes.h"
 
 namespace lamina::dose {
+
+/// The pixels around a pixel that have to be set for it to stay: an ellipse of whole pixels.
+struct Reach {
+  /// Columns on either side in the rows 0, 1, 2, ... above and below; empty if nothing is taken away.
+  std::vector<std::uint32_t> half_width;
+  bool operator==(const Reach&) const = default;
+};
+
+/// All offsets (i columns, j rows) with (i px / x)^2 + (j py / y)^2 <= 1, decided in integers; px and py are the pitches in
+/// whole picometres, x and y the half axes in whole nanometres. With an axis of 0 only offsets along the other one count.
+/// x_nm, y_nm  0 .. 10^7, or equal and up to 10^9
+Reach reach_of(const PixelGrid& grid, std::int64_t x_nm, std::int64_t y_nm);
+
+/// A pixel stays if and only if every pixel within reach of it is set; beyond the image nothing is set. So with a circle
+/// it stays if its centre is farther than the radius from the centre of the nearest pixel that is not set.
+/// cost  O(rows of the reach x changes), nothing is expanded
+void erode(const RunsView& image, const Reach& reach, Runs& result);
+
+/// A pixel is set if and only if a pixel within reach of it is: the complement of what erode() leaves of the complement,
+/// with pixels beyond the image that are not set. What would grow beyond the image is cut off.
+/// cost  O(rows of the reach x changes), nothing is expanded
+void dilate(const RunsView& image, const Reach& reach, Runs& result);
+
+/// Whether dilate() would cut anything off.
+bool grows_beyond(const RunsView& image, const Reach& reach);
+
+/// The image with its holes set: the pixels from which no way of steps along x and y over pixels that are not set leads out of
+/// the image.
+/// parent  scratch: of each gap between runs; 0 is the outside
+/// cost    O(changes + rows), nearly
+void fill_holes(const RunsView& image, Buffer<std::uint32_t>& parent, Runs& filled);
 
 /// Along x and y, in micrometres: above 0 edges move into what is set, below 0 out of it.
 using BleedUm = std::array<double, 2>;
@@ -44,7 +73,7 @@ struct ZoneBleed {
 /// Scratch for moving edges; reused by later layers.
 struct BleedWork {
   Runs moved, second, third, fourth;
-  HoleScratch holes;
+  Buffer<std::uint32_t> holes;
   std::uint64_t bytes() const;
 };
 

@@ -1,4 +1,4 @@
-#include "stages/program/maintenance/maintenance_check.h"
+#include "stages/program/maintenance.h"
 
 #include <fmt/format.h>
 
@@ -6,13 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/program/maintenance/maintenance.h"
-#include "stages/program/program_text.h"
-
 namespace lamina::program {
 namespace {
-
-using MachinePoint = std::array<double, 2>;
 
 // What dialects add to a sweep at either end, in addition to its ramps: the HP45 controller's rows and measures of speed.
 constexpr double kRunUpMm = 20;
@@ -74,9 +69,7 @@ class Checker {
   }
 
  private:
-  Error wrong(std::string_view key, const std::string& what) const {
-    return {Fault::kUsage, fmt::format("{}: {}: {}", machine_.name, key, what)};
-  }
+  Error wrong(std::string_view key, std::string_view what) const { return wrong_key(machine_, key, what); }
 
   Status check_words() const {
     const auto& powder = machine_.powder;
@@ -173,13 +166,9 @@ class Checker {
                                     "the carriage a place beside it",
                                     box.low[0], box.high[0], box.low[1], box.high[1]));
     };
-    if (maintenance_.spit_mm) {
-      if (Status status = check("maintenance.spit_mm", under_head(machine_, grid_, *maintenance_.spit_mm)); !status)
-        return status;
-    }
-    if (maintenance_.cap_mm) {
-      if (Status status = check("maintenance.cap_mm", under_head(machine_, grid_, *maintenance_.cap_mm)); !status)
-        return status;
+    for (const auto& [key, at] :
+         {std::pair("maintenance.spit_mm", maintenance_.spit_mm), {"maintenance.cap_mm", maintenance_.cap_mm}}) {
+      if (Status status = at ? check(key, under_head(machine_, grid_, *at)) : Status(); !status) return status;
     }
     if (!maintenance_.wipe_mm) return {};
     const auto& [x, y, to_x, to_y] = *maintenance_.wipe_mm;
@@ -224,6 +213,104 @@ class Checker {
 };
 
 }  // namespace
+
+double move_seconds(const Machine& machine, double way_mm, double speed_mm_s) {
+  if (speed_mm_s * 60 >= 1) speed_mm_s = std::round(speed_mm_s * 60) / 60;  // as it is spelt
+  const double a = machine.motion.acceleration_mm_s2;
+  if (a == 0) return way_mm / speed_mm_s;
+  return way_mm < speed_mm_s * speed_mm_s / a ? 2 * std::sqrt(way_mm / a) : way_mm / speed_mm_s + speed_mm_s / a;
+}
+
+double shot_seconds(const Machine& machine) { return machine.maintenance.spit_drops / machine.head.highest_frequency_hz; }
+
+double MaintenanceClock::seconds(MachinePoint from, MachinePoint to, double speed_mm_s) const {
+  return move_seconds(machine_, std::hypot(to[0] - from[0], to[1] - from[1]), speed_mm_s);
+}
+
+MaintenanceClock::Due MaintenanceClock::begin_layer(std::uint32_t layer, MachinePoint at) {
+  const auto& maintenance = machine_.maintenance;
+  const auto due = [&](std::uint32_t layers, double limit_s) { return limit_s > 0 || (layers > 0 && layer % layers == 0); };
+  at_ = at;
+  return serve(due(maintenance.wipe_layers, maintenance.wipe_seconds), due(maintenance.spit_layers, maintenance.spit_seconds));
+}
+
+MaintenanceClock::Due MaintenanceClock::before_sweep(const std::array<MachinePoint, 2>& ends, std::optional<double> takes_s) {
+  const auto& [from, to] = ends;
+  const auto& maintenance = machine_.maintenance;
+  const double sweep_s = takes_s ? *takes_s : seconds(from, to, machine_.motion.scan_speed_mm_s);
+  const double travel = machine_.motion.travel_speed_mm_s;
+  double now = seconds(at_, from, travel) + sweep_s;
+  const bool shot = maintenance.spit_seconds > 0 && since_shot_ + now > kShareOfLimit * maintenance.spit_seconds;
+  if (shot) {  // the wiper waits for the shot as well
+    now = seconds(at_, *maintenance.spit_mm, travel) + shot_s_ + seconds(*maintenance.spit_mm, from, travel) + sweep_s;
+  }
+  const bool wipe = maintenance.wipe_seconds > 0 && since_wipe_ + now > kShareOfLimit * maintenance.wipe_seconds;
+  const Due due = serve(wipe, shot);
+  const double taken = seconds(at_, from, travel) + sweep_s;
+  since_wipe_ += taken;
+  since_shot_ += taken;
+  at_ = to;
+  return due;
+}
+
+MaintenanceClock::Due MaintenanceClock::serve(bool wipe, bool shot) {
+  const auto& maintenance = machine_.maintenance;
+  shot = shot || (wipe && maintenance.spits());
+  if (wipe) {
+    at_ = {(*maintenance.wipe_mm)[2], (*maintenance.wipe_mm)[3]};
+    since_wipe_ = 0;
+  }
+  if (shot) {
+    since_wipe_ += seconds(at_, *maintenance.spit_mm, machine_.motion.travel_speed_mm_s) + shot_s_;
+    at_ = *maintenance.spit_mm;
+    since_shot_ = 0;
+  }
+  return {wipe, shot};
+}
+
+/// Beyond the bed, and waits there if the dialect has to.
+void MaintenanceWriter::travel(MachinePoint to, ProgramBytes& out) const {
+  put_move(machine_, words_.travel, to, machine_.motion.travel_speed_mm_s, out);
+  put(out, "{}", words_.wait);
+}
+
+void MaintenanceWriter::put_own(const std::vector<std::string>& lines, ProgramBytes& out) const {
+  for (const std::string& line : lines) put(out, "{}\n", line);
+}
+
+void MaintenanceWriter::refill(const LayerCycle& cycle, ProgramBytes& out) {
+  if (!cycle.refill) return;
+  const auto& cap = machine_.maintenance.cap_mm;
+  if (cap) travel(*cap, out);
+  put(out, "{}", words_.refill);
+  if (cap) travel(machine_.motion.safe_mm, out);
+}
+
+void MaintenanceWriter::serve(MaintenanceClock::Due due, ProgramBytes& out) const {
+  const auto& maintenance = machine_.maintenance;
+  if (due.wipe) {
+    const auto& [x, y, to_x, to_y] = *maintenance.wipe_mm;
+    put_move(machine_, words_.travel, {x, y}, machine_.motion.travel_speed_mm_s, out);
+    put_move(machine_, "G1", {to_x, to_y}, maintenance.wipe_speed_mm_s, out);
+    if (!maintenance.wipe_lines.empty()) put(out, "{}", words_.wait);
+    put_own(maintenance.wipe_lines, out);
+  }
+  if (due.shot) {
+    travel(*maintenance.spit_mm, out);
+    words_.spit(machine_, out);
+  } else if (due.wipe) {
+    put(out, "{}", words_.wait);
+  }
+}
+
+void MaintenanceWriter::dry(ProgramBytes& out) const {
+  if (machine_.powder.dry_s == 0) return;
+  travel(machine_.maintenance.cap_mm.value_or(machine_.motion.safe_mm), out);
+  put_own(machine_.powder.dry_on_lines, out);
+  put(out, "{}{}\n", words_.dwell,
+      plain_text(machine_.powder.dry_s / words_.dwell_unit_s, words_.dwell_unit_s < 1 ? 0 : kPlainDigits));
+  put_own(machine_.powder.dry_off_lines, out);
+}
 
 Status check_maintenance(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
   return Checker(dialect, machine, grid).check();
