@@ -16,7 +16,6 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/json_text.h"
-#include "stages/support/text/names.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -16,7 +16,6 @@
 #include "stages/segment/calibration.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/key.h"
-#include "stages/support/text/names.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stages/bead/contacts.h"
-#include "stages/pores/period.h"
+#include "stages/pores/registration.h"
 #include "stages/raster/beads.h"
 
 namespace lamina::pipeline {

@@ -12,7 +12,7 @@
 #include "pipeline/job/file.h"
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
-#include "stages/pores/coarser.h"
+#include "stages/pores/rows.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -12,7 +12,7 @@
 #include "pipeline/pores/pore_page.h"
 #include "stages/data/plot.h"
 #include "stages/formats/plot/plot.h"
-#include "stages/pores/throat.h"
+#include "stages/pores/passages.h"
 #include "stages/segment/pore_geometry.h"
 #include "stages/support/text/readable.h"
 

@@ -9,9 +9,9 @@
 #include "pipeline/pores/window_choice.h"
 #include "pipeline/report/summary.h"
 #include "stages/data/plot.h"
-#include "stages/pores/bonds.h"
+#include "stages/pores/passages.h"
+#include "stages/pores/porosity.h"
 #include "stages/pores/sizes.h"
-#include "stages/pores/tortuosity.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/pores/throat.h"
+#include "stages/pores/passages.h"
 #include "stages/stokes/canonical.h"
 #include "stages/stokes/flow.h"
 #include "stages/stokes/inertia.h"

@@ -10,7 +10,7 @@
 #include "stages/data/voxels.h"
 #include "stages/pores/porosity.h"
 #include "stages/pores/surface.h"
-#include "stages/stokes/section.h"
+#include "stages/stokes/flow.h"
 
 namespace lamina::pipeline {
 

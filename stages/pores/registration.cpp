@@ -3,17 +3,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <optional>
+#include <span>
 #include <tuple>
+#include <vector>
 
-#include "stages/pores/coarser.h"
 #include "stages/pores/rows.h"
 
 namespace lamina::pores {
 namespace {
 
-/// Columns set in row a alone, or in the stretch of b from `offset` on alone.
+/// Columns below `columns` that are set in row a alone, or from `offset` on in b alone.
 void add_differences(Row a, Row b, std::uint32_t offset, std::uint32_t columns, Match& match) {
   std::size_t j = static_cast<std::size_t>(std::ranges::upper_bound(b, offset) - b.begin()), i = 0;
   std::uint32_t at = 0;
@@ -39,19 +39,6 @@ Match match_at(const VoxelView& small, const VoxelView& large, const std::array<
 }
 
 constexpr std::uint32_t kBlock = 4;  // of the finest voxels, a side
-
-/// Adds `sign` for each set voxel of a row from `offset` on to the blocks along x.
-void add_to_blocks(Row row, std::uint32_t offset, std::uint32_t columns, std::int32_t sign, std::uint32_t side,
-                   std::span<std::int32_t> blocks) {
-  for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
-    const std::uint32_t end = std::min(std::max(row[i + 1], offset) - offset, columns);
-    for (std::uint32_t at = std::max(row[i], offset) - offset; at < end;) {
-      const std::uint32_t next = std::min(end, (at / side + 1) * side);
-      blocks[at / side] += sign * static_cast<std::int32_t>(next - at);
-      at = next;
-    }
-  }
-}
 
 /// Sum of the squares of what blocks have more in one box than in the other.
 std::uint64_t squares_at(const VoxelView& small, const VoxelView& large, const std::array<std::uint32_t, 3>& from,
@@ -127,6 +114,52 @@ Match find_shift(const VoxelView& small, const VoxelView& large, std::uint32_t r
     match = best_around(few, many, range / factor, position, reach, std::max(1u, kBlock / factor));
   }
   return {};
+}
+
+namespace {
+
+constexpr double kUniform = 0.002;  // an image that differs less at any shift is the same all along
+constexpr double kClear = 0.15;     // of what the worst shift misses, a period misses at most so much
+
+/// Share of the pixels that differ between an image and itself, shifted, where both are; of those set.
+double missed(const RunsView& image, bool columns, std::uint32_t shift, double set_share) {
+  Match match;
+  const std::uint32_t width = columns ? image.columns - shift : image.columns,
+                      rows = columns ? image.rows() : image.rows() - shift;
+  for (std::uint32_t r = 0; r < rows; ++r)
+    add_differences(image.row(r), image.row(columns ? r : r + shift), columns ? shift : 0, width, match);
+  return static_cast<double>(match.differing()) / (2 * set_share * width * rows);
+}
+
+}  // namespace
+
+std::uint32_t period(const RunsView& image, bool columns, std::uint32_t minimum, double miss) {
+  const double share = static_cast<double>(set_pixels(image)) / (static_cast<double>(image.columns) * image.rows());
+  if (!(share > 0 && share < 1)) return 0;
+  const std::uint32_t maximum = (columns ? image.columns : image.rows()) / 5 * 2;
+  minimum = std::max(minimum, 1u);
+  if (maximum < minimum) return 0;
+  std::vector<double> at(maximum + std::size_t{1} - minimum);
+  for (std::uint32_t shift = minimum; shift <= maximum; ++shift) at[shift - minimum] = missed(image, columns, shift, share);
+  const double worst = *std::ranges::max_element(at);
+  if (worst < kUniform) return minimum;
+  const double pass = std::min(miss, kClear * worst);
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (at[i] > pass) continue;
+    std::size_t best = i;
+    for (; i < at.size() && at[i] <= pass; ++i)
+      if (at[i] < at[best]) best = i;
+    // At the first shift it may only begin to differ.
+    if (best > 0) return minimum + static_cast<std::uint32_t>(best);
+  }
+  return 0;
+}
+
+double mismatch(const RunsView& one, const RunsView& other) {
+  Match match;
+  for (std::uint32_t r = 0; r < one.rows(); ++r) add_differences(one.row(r), other.row(r), 0, one.columns, match);
+  const std::uint64_t set = set_pixels(one) + set_pixels(other);
+  return set == 0 ? 0 : static_cast<double>(match.differing()) / static_cast<double>(set);
 }
 
 }  // namespace lamina::pores

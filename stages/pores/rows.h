@@ -1,9 +1,10 @@
-// stages/pores/rows.h: what single rows of runs have in common; internal to pores.
+// stages/pores/rows.h: boxes of voxels row by row: what is void, what two have in common, fewer and larger voxels.
 #pragma once
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -85,5 +86,17 @@ VoxelStack void_of(const VoxelView& solid, const VoxelView* body = nullptr);
 /// The voxels that are set in both, or in the first but not in the second.
 VoxelStack both_of(const VoxelView& one, const VoxelView& other);
 VoxelStack without(const VoxelView& one, const VoxelView& other);
+
+// --- the same box in fewer, larger voxels.
+
+/// Adds `sign` for each set voxel of a row from `offset` on to blocks of `side` voxels along x.
+void add_to_blocks(Row row, std::uint32_t offset, std::uint32_t columns, std::int32_t sign, std::uint32_t side,
+                   std::span<std::int32_t> blocks);
+
+/// Merges blocks of factor[0] x factor[1] x factor[2] voxels: one is set if more than half of its voxels are. Where it is just
+/// half of them, the block is as its first voxel is, the lowest along x, y and z, so that neither side grows.
+/// factor  at least 1 each; voxels beyond the last whole block are left out
+/// cost    O(runs + rows + voxels of the result), one thread
+VoxelStack coarser(const VoxelView& box, const std::array<std::uint32_t, 3>& factor);
 
 }  // namespace lamina::pores

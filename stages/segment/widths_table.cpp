@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "stages/support/io/file_reader.h"
-#include "stages/support/text/names.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/table.h"
 #include "stages/support/text/value.h"

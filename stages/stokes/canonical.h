@@ -7,7 +7,7 @@
 
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
-#include "stages/stokes/walls.h"
+#include "stages/stokes/cells.h"
 
 namespace lamina::stokes {
 

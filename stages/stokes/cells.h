@@ -1,6 +1,9 @@
 // stages/stokes/cells.h: the void of a box of voxels as cells of a fluid that know their neighbours.
 #pragma once
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -10,6 +13,9 @@
 #include "stages/data/voxels.h"
 
 namespace lamina::stokes {
+
+/// Where a voxel lies, in voxels of the flow.
+using CellIndex = std::array<std::uint32_t, 3>;
 
 /// Voxels that a fluid passes, numbered by blocks of 2 x 2 x 2 and blocks of these, as G. M. Morton has it (1966). A cell holds
 /// the pressure in its middle and, for each axis, the velocity through its upper face along that axis: a staggered grid.
@@ -59,6 +65,45 @@ Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_
 inline Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels) { return make_grid(solid, 1, levels); }
 
 /// The voxels in which the cells of such a grid lie, in their order. cost  O(cells log cells); 28 bytes a cell
-Buffer<std::array<std::uint32_t, 3>> cell_positions(const VoxelView& fine, std::uint32_t factor);
+Buffer<CellIndex> cell_positions(const VoxelView& fine, std::uint32_t factor);
+
+// --- loops and sums over cells that give the same digits for any number of threads; internal to stokes.
+
+inline constexpr std::uint32_t kTogether = 4096;  // cells or groups a task
+
+/// Calls work(begin, end) for pieces of [0, count), in parallel.
+template <class Work>
+void for_pieces(std::uint32_t count, const Work& work) {
+  tbb::parallel_for(std::uint32_t{0}, (count + kTogether - 1) / kTogether,
+                    [&](std::uint32_t piece) { work(piece * kTogether, std::min(count, (piece + 1) * kTogether)); });
+}
+
+/// The sum of what work(begin, end) gives for the pieces, taken in their order.
+template <class Work>
+double sum_of_pieces(std::uint32_t count, const Work& work) {
+  Buffer<double> sums((count + kTogether - 1) / kTogether);
+  for_pieces(count, [&](std::uint32_t begin, std::uint32_t end) { sums[begin / kTogether] = work(begin, end); });
+  double sum = 0;
+  for (const double piece : sums) sum += piece;
+  return sum;
+}
+
+/// Calls work(i) for each of `count` cells, in parallel.
+template <class Work>
+void for_cells(std::uint32_t count, const Work& work) {
+  for_pieces(count, [&work](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) work(i);
+  });
+}
+
+/// The sum of value(i) of `count` cells, piece by piece.
+template <class Value>
+double sum_of_cells(std::uint32_t count, const Value& value) {
+  return sum_of_pieces(count, [&value](std::uint32_t begin, std::uint32_t end) {
+    double sum = 0;
+    for (std::uint32_t i = begin; i < end; ++i) sum += value(i);
+    return sum;
+  });
+}
 
 }  // namespace lamina::stokes

@@ -8,7 +8,6 @@
 
 #include "stages/stokes/flow.h"
 #include "stages/stokes/operator.h"
-#include "stages/stokes/sums.h"
 
 namespace lamina::stokes {
 namespace {
@@ -19,26 +18,19 @@ constexpr double kOfCreeping = 0.02;  // the same of the creeping flows within, 
 
 /// Of velocities.
 double dot(std::uint32_t count, const Field& x, const Field& y) {
-  return sum_of_pieces(count, [&](std::uint32_t begin, std::uint32_t end) {
-    double sum = 0;
-    for (std::uint32_t i = begin; i < end; ++i)
-      sum += double{x[i][0]} * y[i][0] + double{x[i][1]} * y[i][1] + double{x[i][2]} * y[i][2];
-    return sum;
+  return sum_of_cells(count, [&](std::uint32_t i) {
+    return double{x[i][0]} * y[i][0] + double{x[i][1]} * y[i][1] + double{x[i][2]} * y[i][2];
   });
 }
 
 void add(std::uint32_t count, double factor, const Field& x, Field& y) {
   const auto by = static_cast<float>(factor);
-  for_pieces(count, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i) y[i] += by * x[i];
-  });
+  for_cells(count, [&](std::uint32_t i) { y[i] += by * x[i]; });
 }
 
 void scale(std::uint32_t count, double factor, Field& x) {
   const auto by = static_cast<float>(factor);
-  for_pieces(count, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i) x[i] *= by;
-  });
+  for_cells(count, [&](std::uint32_t i) { x[i] *= by; });
 }
 
 /// Least squares of a Hessenberg matrix, column by column.
@@ -112,20 +104,11 @@ class Newton {
       }
       better = flow_.change < before;
     }
-    for (int a = 0; a < 3; ++a)
-      flow_.permeability[static_cast<std::size_t>(a)] = sum_of(a) / static_cast<double>(grid_.cells.voxels());
+    flow_.permeability = mean_velocity(grid_.cells, field_);
     return flow_;
   }
 
  private:
-  double sum_of(int lane) const {
-    return sum_of_pieces(count_, [&](std::uint32_t begin, std::uint32_t end) {
-      double sum = 0;
-      for (std::uint32_t i = begin; i < end; ++i) sum += double{field_[i][lane]};
-      return sum;
-    });
-  }
-
   /// The creeping flow that force_ drives.
   Status creep(Field& result) {
     std::fill(result.begin(), result.end(), Four{});
@@ -142,12 +125,10 @@ class Newton {
 
   /// Makes the first vector what creeping flow answers to what the equations lack.
   Status inspection() {
-    for_pieces(count_, [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end; ++i) {
-        Four force{};
-        force[axis_] = stokes_.exists(i)[axis_];
-        force_[i] = force - stokes_.at(field_, i) - inertia_ * convection_.at(field_, field_, i);
-      }
+    for_cells(count_, [&](std::uint32_t i) {
+      Four force{};
+      force[axis_] = stokes_.exists(i)[axis_];
+      force_[i] = force - stokes_.at(field_, i) - inertia_ * convection_.at(field_, field_, i);
     });
     if (Status status = creep(basis_[0]); !status) return status;
     lack_ = std::sqrt(dot(count_, basis_[0], basis_[0]));
@@ -164,9 +145,8 @@ class Newton {
     std::size_t size = 0;
     for (double left = lack_; size < kMax && left > kInexact * lack_;) {
       const Field& last = basis_[size];
-      for_pieces(count_, [&](std::uint32_t begin, std::uint32_t end) {
-        for (std::uint32_t i = begin; i < end; ++i)
-          force_[i] = inertia_ * (convection_.at(field_, last, i) + convection_.at(last, field_, i));
+      for_cells(count_, [&](std::uint32_t i) {
+        force_[i] = inertia_ * (convection_.at(field_, last, i) + convection_.at(last, field_, i));
       });
       if (basis_.size() == size + 1) basis_.push_back(field_of(grid_.cells));
       if (Status status = creep(basis_[size + 1]); !status) return status;
@@ -239,9 +219,8 @@ class Foresight {
         if (other != k) product *= (force - force_[other]) / (force_[k] - force_[other]);
       share[k] = static_cast<float>(product);
     }
-    for_pieces(static_cast<std::uint32_t>(field.size()), [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end; ++i)
-        field[i] = share[0] * before_[0][i] + share[1] * before_[1][i] + share[2] * before_[2][i];
+    for_cells(static_cast<std::uint32_t>(field.size()), [&](std::uint32_t i) {
+      field[i] = share[0] * before_[0][i] + share[1] * before_[1][i] + share[2] * before_[2][i];
     });
   }
 

@@ -1,7 +1,9 @@
 // stages/stokes/operator.h: Stokes' equations on the cells of a fluid of viscosity 1; internal to stokes.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "stages/data/buffer.h"
@@ -13,7 +15,11 @@ namespace lamina::stokes {
 using Four [[gnu::vector_size(16)]] = float;
 using Field = Buffer<Four>;  // one entry a cell, and a last one that stays zero: what lies behind walls
 
-Field field_of(const Cells& cells);
+inline Field field_of(const Cells& cells) {
+  Field field(cells.size() + std::size_t{1});
+  std::fill(field.begin(), field.end(), Four{});
+  return field;
+}
 
 /// The symmetric operator (u, p) -> (-div grad u + grad p, -div u): central differences of second order; no slip at walls,
 /// which hold a velocity the more strongly the nearer they are (Cells::hold).
@@ -24,7 +30,15 @@ Field field_of(const Cells& cells);
 class Operator {
  public:
   /// cells  outlives it
-  explicit Operator(const Cells& cells);
+  explicit Operator(const Cells& cells) : cells_(cells), step_{}, around_{} {
+    float sum = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      weight_[a] = static_cast<float>(1 / (cells.edge[a] * cells.edge[a]));
+      step_[static_cast<int>(a)] = static_cast<float>(1 / cells.edge[a]);
+      sum += 2 * weight_[a];
+    }
+    around_ = Four{sum, sum, sum, 0};
+  }
 
   /// Of cell i. Lanes of faces that do not exist stay 0.
   Four at(const Field& x, std::uint32_t i) const {
@@ -100,5 +114,28 @@ class Convection {
   const Cells& cells_;
   std::array<float, 3> weight_{};
 };
+
+// --- a field's velocities.
+
+/// Along an axis in the middle of cell i: the mean of its two faces.
+inline double velocity(const Cells& cells, const Field& u, std::uint32_t i, std::size_t axis) {
+  const int a = static_cast<int>(axis);
+  return 0.5 * (double{u[i][a]} + u[cells.neighbour[i][2 * axis]][a]);
+}
+
+inline double speed(const Cells& cells, const Field& u, std::uint32_t i) {
+  double squared = 0;
+  for (std::size_t a = 0; a < 3; ++a) squared += velocity(cells, u, i, a) * velocity(cells, u, i, a);
+  return std::sqrt(squared);
+}
+
+/// Mean over the whole box along x, y, z.
+inline std::array<double, 3> mean_velocity(const Cells& cells, const Field& u) {
+  std::array<double, 3> mean{};
+  for (int a = 0; a < 3; ++a)
+    mean[static_cast<std::size_t>(a)] =
+        sum_of_cells(cells.size(), [&](std::uint32_t i) { return double{u[i][a]}; }) / static_cast<double>(cells.voxels());
+  return mean;
+}
 
 }  // namespace lamina::stokes

@@ -1,7 +1,7 @@
 // Lists of batches, and their words.
 #include "pipeline/job/lists/batch_list.h"
 #include "stages/load/load.h"
-#include "stages/support/text/shell_words.h"
+#include "stages/support/text/escape.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {

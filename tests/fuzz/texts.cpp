@@ -4,10 +4,10 @@
 
 #include "stages/heights/candidate_heights.h"
 #include "stages/infill/spacing.h"
+#include "stages/support/text/escape.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/shell_words.h"
 #include "stages/support/text/toml.h"
 #include "tests/fuzz/laws.h"
 

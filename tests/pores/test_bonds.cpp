@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "stages/pores/bonds.h"
 #include "stages/pores/porosity.h"
 #include "tests/pores/boxes.h"
 

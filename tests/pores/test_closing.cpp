@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "stages/pores/bonds.h"
 #include "stages/pores/porosity.h"
 #include "tests/pores/boxes.h"
 

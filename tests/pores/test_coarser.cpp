@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stages/pores/coarser.h"
+#include "stages/pores/rows.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina::pores {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "stages/pores/period.h"
+#include "stages/pores/registration.h"
 
 namespace lamina {
 namespace {

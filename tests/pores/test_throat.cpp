@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "stages/pores/throat.h"
+#include "stages/pores/passages.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina::pores {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "stages/pores/passages.h"
 #include "stages/pores/porosity.h"
-#include "stages/pores/tortuosity.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina::pores {

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "stages/stokes/flow.h"
-#include "stages/stokes/section.h"
 #include "tests/pores/boxes.h"
 
 namespace lamina {

@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "stages/support/text/names.h"
 #include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 #include "stages/support/text/value.h"
 
 namespace lamina::pipeline {

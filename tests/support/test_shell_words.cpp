@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stages/support/text/shell_words.h"
+#include "stages/support/text/escape.h"
 
 namespace lamina::test {
 namespace {

@@ -18,10 +18,10 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/temporary.h"
+#include "stages/support/text/escape.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/shell_words.h"
 #include "stages/support/text/terminal.h"
 
 namespace lamina::pipeline {

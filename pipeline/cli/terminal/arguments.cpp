@@ -11,7 +11,6 @@
 
 #include "pipeline/cli/terminal/slicer_aliases.h"
 #include "stages/support/text/json_text.h"
-#include "stages/support/text/names.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/terminal.h"

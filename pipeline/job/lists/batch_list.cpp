@@ -7,8 +7,8 @@
 
 #include "pipeline/job/lists/job_command.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/text/escape.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/shell_words.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -8,7 +8,6 @@
 #include <system_error>
 
 #include "stages/support/io/file_reader.h"
-#include "stages/support/text/names.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

@@ -7,7 +7,6 @@
 #include "pipeline/job/profiles/sections.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/key.h"
-#include "stages/support/text/names.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -1,15 +1,17 @@
-// stages/support/text/escape.h: escapes text for manual pages, Markdown and shells.
-//
-// Each function accepts any text and returns its escaped form; none fails.
-// cost  one pass
+// stages/support/text/escape.h: escapes text for manual pages, Markdown and shells, and splits lines as shells do.
 #pragma once
 
 #include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "stages/data/status.h"
 
 namespace lamina {
+
+// Each of these accepts any text and returns its escaped form; none fails. cost  one pass
 
 /// For a man page: backslashes, dashes, and dots and quotes at the start of a line.
 std::string roff(std::string_view text);
@@ -30,5 +32,10 @@ std::string fish_word(std::string_view text);
 
 /// Base 64 as in RFC 4648, padded, without line ends.
 std::string base64(std::span<const std::byte> bytes);
+
+/// The words of a line as a shell splits them: at blanks outside '...' and "..."; a backslash makes the next character
+/// literal (within '...' the backslash itself is literal); # at the start of a word begins a comment.
+/// Nothing is expanded. errors  kUsage: an unclosed quote
+Result<std::vector<std::string>> split_words(std::string_view line);
 
 }  // namespace lamina

@@ -1,7 +1,7 @@
 #include "stages/support/text/key.h"
 
 #include "stages/support/text/json_text.h"
-#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
 #include "stages/support/text/renamed_keys.h"
 
 namespace lamina {

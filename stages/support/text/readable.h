@@ -1,7 +1,8 @@
-// stages/support/text/readable.h: human-readable sizes, times, counts and texts from files.
+// stages/support/text/readable.h: human-readable sizes, times, counts and texts from files, and suggestions for mistyped names.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -16,5 +17,8 @@ std::string one_line(std::string_view text);
 
 /// The text with A to Z as a to z.
 std::string lower_case(std::string_view text);
+
+/// "; did you mean 'layer'?" for the known name at the least edit distance, or "" if none is near.
+std::string suggest(std::string_view mistyped, std::span<const std::string_view> known);
 
 }  // namespace lamina

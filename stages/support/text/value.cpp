@@ -1,6 +1,6 @@
 #include "stages/support/text/value.h"
 
-#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina {
 namespace {

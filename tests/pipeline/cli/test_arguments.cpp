@@ -9,7 +9,7 @@
 #include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/cli/terminal/pages.h"
 #include "pipeline/cli/terminal/slicer_aliases.h"
-#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
