@@ -113,7 +113,7 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
   Arguments arguments;
   arguments.given = words;
   if (!command.reads_itself) {
-    Result<Arguments> read = pipeline::read_arguments(spec_of(command), words);
+    Result<Arguments> read = read_arguments(spec_of(command), words);
     if (!read) return read.error();
     if (read->help) return console.print(*read->help);
     arguments = std::move(*read);

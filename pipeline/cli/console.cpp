@@ -134,7 +134,7 @@ void Console::progress(const ProgressEvent& event) {
     keep_on_signals();
   }
   if (!progress_) {
-    using Style = pipeline::Progress::Style;
+    using Style = Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);
   }
   write_all(STDERR_FILENO, counted ? progress_->report(event.done, event.total)

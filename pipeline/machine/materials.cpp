@@ -23,8 +23,7 @@ std::string names_text(const std::vector<JobMaterial>& materials) {
 Status use(const std::string& name, const std::string& part, const Machine* machine, std::vector<JobMaterial>& used) {
   if (std::ranges::find(used, name, &JobMaterial::name) != used.end()) return {};
   for (const JobMaterial& other : used) {
-    if (const std::string what = pipeline::check_case(other.name, name); !what.empty())
-      return wrong(fmt::format("{}: {}", part, what));
+    if (const std::string what = check_case(other.name, name); !what.empty()) return wrong(fmt::format("{}: {}", part, what));
   }
   JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
   if (machine != nullptr && !machine->powder.materials.empty()) {

@@ -13,7 +13,6 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
-#include "pipeline/job/lists/batch_list.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
@@ -145,7 +144,7 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
     return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", name)};
   }
   const CommandSpec spec = spec_of(*command);
-  const Result<Arguments> read = pipeline::read_arguments(spec, {words.begin() + 1, words.end()});
+  const Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return Error{Fault::kUsage, "--help is no job"};
   Job planned;
@@ -269,7 +268,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
   const BatchOptions& options = *read;
-  Result<std::vector<BatchEntry>> entries = pipeline::read_batch(arguments.operands, with, load::is_part_name);
+  Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
   const auto read_words = [sync = arguments.text("--sync")](const auto& words) { return read_call(words, sync); };
   const auto jobs =

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/scan_program.h"
+#include "pipeline/cli/other_programs.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/units.h"
 #include "stages/formats/images/image.h"
 #include "stages/support/text/json_value.h"

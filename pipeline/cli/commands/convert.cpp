@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/dose/shares.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/layer_images.h"

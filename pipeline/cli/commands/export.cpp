@@ -4,7 +4,6 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/summary.h"
@@ -21,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const KeyChoice kExportKeys = {"bed.size_mm", "placement", "load", "run.output", "part"};
+constexpr std::string_view kExportKeys = "bed.size_mm placement load run.output part";
 
 CommandSpec export_spec() {
   CommandSpec spec;

@@ -4,10 +4,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
-#include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/other_programs.h"
 #include "pipeline/job/file.h"
-#include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/heights.h"
 #include "pipeline/report/heights_plot.h"
@@ -20,8 +18,8 @@ namespace lamina::pipeline {
 namespace {
 
 // Of [[part]] what changes its shape or height.
-const KeyChoice kHeightsCommandKeys = {"layers",     "heights",         "load",       "part.unit", "part.bottom_mm",
-                                       "part.scale", "part.rotate_deg", "part.shrink"};
+constexpr std::string_view kHeightsCommandKeys =
+    "layers heights load part.unit part.bottom_mm part.scale part.rotate_deg part.shrink";
 
 enum class Form { kText, kCsv, kJson, kRp3 };
 constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"json", Form::kJson}, {"rp3", Form::kRp3}};

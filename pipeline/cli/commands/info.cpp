@@ -4,8 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/report/part_info.h"
@@ -109,7 +108,7 @@ Status check_flags(const Arguments& arguments) {
 Outcome run_info(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty()) return Error{Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"};
   // Read as lamina jet reads them.
-  const Result<Job> job = read_job_options({"part", "load"}, arguments);
+  const Result<Job> job = read_job_options("part load", arguments);
   if (!job) return job.error();
   if (Status status = check_needs(Product::kImages, arguments, *job); !status) return status;
   double density_g_cm3 = 0;

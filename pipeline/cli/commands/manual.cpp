@@ -9,7 +9,6 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "pipeline/cli/terminal/completion.h"
 #include "pipeline/cli/terminal/pages.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"
@@ -34,9 +33,9 @@ CommandSpec completion_spec() {
 
 Outcome run_completion(const Arguments& arguments, Context& context) {
   const std::string shell = arguments.operands.size() == 1 ? arguments.operands.front() : "";
-  if (shell == "bash") return context.print(pipeline::bash_completion(all_specs()));
-  if (shell == "zsh") return context.print(pipeline::zsh_completion(all_specs()));
-  if (shell == "fish") return context.print(pipeline::fish_completion(all_specs()));
+  if (shell == "bash") return context.print(bash_completion(all_specs()));
+  if (shell == "zsh") return context.print(zsh_completion(all_specs()));
+  if (shell == "fish") return context.print(fish_completion(all_specs()));
   return Error{Fault::kUsage, "name one shell: bash, zsh or fish"};
 }
 
@@ -56,15 +55,13 @@ CommandSpec manual_spec() {
   return spec;
 }
 
-std::string page_of(const CommandSpec& spec, bool markdown) {
-  return markdown ? pipeline::markdown_page(spec) : pipeline::man_page(spec);
-}
+std::string page_of(const CommandSpec& spec, bool markdown) { return markdown ? markdown_page(spec) : man_page(spec); }
 
 /// Writes all pages, or none if one would replace a user's file.
 Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
   std::vector<std::pair<std::string, std::string>> pages;  // path, text
   const std::vector<CommandSpec> specs = all_specs();
-  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), pipeline::man_page(specs));
+  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), man_page(specs));
   for (const CommandSpec& spec : specs) {
     pages.emplace_back(fmt::format("{}/{}{}{}", directory, markdown ? "" : "lamina-", spec.name, markdown ? ".md" : ".1"),
                        page_of(spec, markdown));
@@ -92,7 +89,7 @@ Outcome run_manual(const Arguments& arguments, Context& context) {
   if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
     if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
-    return context.print(pipeline::man_page(all_specs()));
+    return context.print(man_page(all_specs()));
   }
   const Command* command = find_command(arguments.operands.front());
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(arguments.operands.front())};

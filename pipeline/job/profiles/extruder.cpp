@@ -6,7 +6,6 @@
 #include <array>
 #include <vector>
 
-#include "pipeline/job/profiles/sections.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "pipeline/job/profiles/sections.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/key.h"
 #include "stages/support/text/names.h"

@@ -1,4 +1,4 @@
-#include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/other_programs.h"
 
 #include <fmt/format.h>
 
@@ -30,6 +30,18 @@ Result<std::string> plot_text(const std::string& path, const Plot& plot) {
 Status write_plot(const std::string& path, const Plot& plot) {
   const auto text = plot_text(path, plot);
   return text ? write_file(path, *text) : text.error();
+}
+
+Result<std::string> scanned(const std::string& what, const Json& request, const std::string& picture) {
+  auto text = filter("lamina-scan", what, json_line(request));
+  if (!text && text.error().message.starts_with("lamina-scan: "))
+    return Error{Fault::kUsage, "photographs are read by lamina-scan, which is not installed; install the package lamina-scan"};
+  if (!text) return text;
+  const std::size_t end = text->find('\n') + 1;
+  if (!picture.empty()) {
+    if (Status status = write_file(picture, std::string_view(*text).substr(end)); !status) return status.error();
+  }
+  return text->substr(0, end);
 }
 
 }  // namespace lamina::pipeline
