@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file_reader.h"
@@ -65,11 +66,9 @@ Status read_directory(const fs::path& directory, const std::vector<std::string>&
     if (at->is_regular_file(ignored) && (is_job_file(at->path()) || load::is_part_name(at->path().string())))
       files.push_back(at->path());
   }
-  if (error) return Error{Fault::kUsage, fmt::format("{}: {}", directory.string(), error.message())};
-  if (files.empty()) {
-    return Error{Fault::kUsage, fmt::format("{}: no part (.stl .obj .3mf, .gz of them) and no job (.toml) in it or below it",
-                                            directory.string())};
-  }
+  if (error) return usage("{}: {}", directory.string(), error.message());
+  if (files.empty())
+    return usage("{}: no part (.stl .obj .3mf, .gz of them) and no job (.toml) in it or below it", directory.string());
   std::ranges::sort(files);
   for (const fs::path& file : files) entries.push_back(entry_of_file(file, file.lexically_relative(directory), with));
   return {};
@@ -95,17 +94,15 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
   for (std::string_view line; file->next(line);) {
     const std::string source = fmt::format("{}:{}", path, file->line_number());
     Result<std::vector<std::string>> words = split_words(line);
-    if (!words) return Error{Fault::kUsage, fmt::format("{}: {}", source, words.error().message)};
+    if (!words) return usage("{}: {}", source, words.error().message);
     if (!words->empty() && words->front() == "lamina") words->erase(words->begin());
     if (words->empty()) continue;
     std::string name = name_of_words(*words);
     entries.push_back({source, std::move(name), std::move(*words)});
   }
   if (!file->status()) return file->status().error();
-  if (entries.size() == before) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600", path)};
-  }
+  if (entries.size() == before)
+    return usage("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600", path);
   return {};
 }
 
@@ -195,9 +192,7 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
   const fs::path own = fs::weakly_canonical(fs::absolute(directory, ignored), ignored);
   for (const BatchJob& job : jobs) {
     if (job.refused || job.output.empty()) continue;
-    const auto refused = [&](const std::string& why) {
-      return Error{Fault::kUsage, fmt::format("{}: {}", job.entry.source, why)};
-    };
+    const auto refused = [&](const std::string& why) { return usage("{}: {}", job.entry.source, why); };
     if (job.relative_output && below_batch(job.output, directory).empty()) {
       return refused(
           fmt::format("-o leads out of {}, to {}; an output elsewhere has to be an absolute path", directory, job.output));
@@ -220,8 +215,8 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
     const auto& [outer, first] = outputs[i - 1];
     const auto& [inner, second] = outputs[i];
     if (lies_within(inner, outer)) {
-      return Error{Fault::kUsage, fmt::format("{} and {}: both write into {}; give one of them another -o", first->entry.source,
-                                              second->entry.source, first->output)};
+      return usage("{} and {}: both write into {}; give one of them another -o", first->entry.source, second->entry.source,
+                   first->output);
     }
   }
   return {};

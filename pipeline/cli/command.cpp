@@ -12,6 +12,7 @@
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
@@ -103,9 +104,9 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
     return command.run(arguments, context);
   } catch (const std::exception& error) {
     if (is_shortage(error)) return out_of_memory();
-    return Error{Fault::kInternal, fmt::format("internal error: {}", error.what())};
+    return failure(Fault::kInternal, "internal error: {}", error.what());
   } catch (...) {
-    return Error{Fault::kInternal, "internal error"};
+    return failure(Fault::kInternal, "internal error");
   }
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
 
@@ -49,34 +50,28 @@ void add_options(std::span<const Key<Target>> keys, std::string_view choice, con
 /// Mutually exclusive options.
 Status check_together(std::string_view choice, const Arguments& arguments, const Job& job) {
   const std::string fill = arguments.text("--fill"), pattern = arguments.text("--pattern");
-  if (has(choice, {"segment", "fill"}) && !fill.empty() && !pattern.empty() && fill != pattern && fill != "segmented") {
+  if (has(choice, {"segment", "fill"}) && !fill.empty() && !pattern.empty() && fill != pattern && fill != "segmented")
     return at_option("--fill", fmt::format("{}, but --pattern {}: two patterns; give one of them", fill, pattern));
-  }
-  if (pattern == "none" && job.segment.all.on) {
+  if (pattern == "none" && job.segment.all.on)
     return at_option("--pattern", "none, but lines are segmented; leave it out, or add --fill none");
-  }
   if (job.segment.any()) return {};
   for (const JobKey& key : job_keys()) {
     if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;
-    if (has(choice, key) && arguments.has(key.flag)) {
+    if (has(choice, key) && arguments.has(key.flag))
       return at_option(key.flag, "is of segmented lines, and nothing is segmented; add --fill segmented");
-    }
   }
   return {};
 }
 
 // Errors in the parts of a job file include their place in the file.
 Status check_parts_of_file(const std::string& file, const Job& job) {
-  if (job.parts.empty()) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file)};
-  }
+  if (job.parts.empty())
+    return usage("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file);
   for (const PartRequest& part : job.parts) {
     std::error_code error;
     if (part.named_at.empty() || std::filesystem::exists(part.path, error)) continue;
-    return Error{Fault::kInput,
-                 fmt::format("{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
-                             part.named_at, part.path)};
+    return failure(Fault::kInput, "{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
+                   part.named_at, part.path);
   }
   return {};
 }
@@ -242,18 +237,16 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
     if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && named)) continue;
     return at_option(need.flag, std::string(need.unmet));
   }
-  if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off") {
-    return Error{Fault::kUsage, "--no-repair and --repair exclude each other; give one of them"};
-  }
+  if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off")
+    return usage("--no-repair and --repair exclude each other; give one of them");
   return {};
 }
 
 Status check_machine_needs(const Extruder& machine, const Arguments& arguments) {
   if (machine.format != "sml") return {};
   for (const std::string_view flag : kOfGcode) {
-    if (arguments.has(flag)) {
+    if (arguments.has(flag))
       return at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
-    }
   }
   return {};
 }

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/other_program.h"
@@ -14,9 +15,8 @@ namespace lamina::pipeline {
 Status check_plot_name(const std::string& path) {
   const std::filesystem::path name = path;
   if (path.empty()) return {};
-  if (name.extension() != ".svg" && name.extension() != ".png") {
-    return Error{Fault::kUsage, fmt::format("--plot {}: plots are SVG or PNG; end the name with .svg or .png", path)};
-  }
+  if (name.extension() != ".svg" && name.extension() != ".png")
+    return usage("--plot {}: plots are SVG or PNG; end the name with .svg or .png", path);
   return check_folder("--plot", path);
 }
 
@@ -35,7 +35,7 @@ Status write_plot(const std::string& path, const Plot& plot) {
 Result<std::string> scanned(const std::string& what, const Json& request, const std::string& picture) {
   auto text = filter("lamina-scan", what, json_line(request));
   if (!text && text.error().message.starts_with("lamina-scan: "))
-    return Error{Fault::kUsage, "photographs are read by lamina-scan, which is not installed; install the package lamina-scan"};
+    return usage("photographs are read by lamina-scan, which is not installed; install the package lamina-scan");
   if (!text) return text;
   const std::size_t end = text->find('\n') + 1;
   if (!picture.empty()) {

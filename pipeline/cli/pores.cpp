@@ -8,6 +8,7 @@
 
 #include "pipeline/cli/other_programs.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/pores/bead_rules.h"
 #include "pipeline/pores/image_stack.h"
 #include "pipeline/pores/pore_analysis.h"
@@ -55,7 +56,7 @@ Status check_window_files(const Arguments& arguments) {
     if (!arguments.has(choice.flag)) continue;
     const std::string path = arguments.text(choice.flag), reported = one_line(path);
     if (!is_stl(path) && !formats::voxels::image_kind(path))
-      return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, reported)};
+      return usage("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, reported);
     if (Status status = check_folder(choice.flag, path); !status) return status;
   }
   return {};
@@ -157,8 +158,7 @@ Result<ImageStack> open_images(const std::string& folder, const Arguments& argum
   if (!request) return request.error();
   for (const char* flag : {"--pixel", "--layer-um", "--threshold", "--dark"}) {
     if (arguments.has(flag) && has_manifest(folder))
-      return Error{Fault::kUsage, fmt::format("{} is for images without a manifest; that of {} tells it, leave it out", flag,
-                                              one_line(folder))};
+      return usage("{} is for images without a manifest; that of {} tells it, leave it out", flag, one_line(folder));
   }
   return open_stack(folder, *request);
 }
@@ -167,8 +167,8 @@ Result<std::array<bool, 3>> read_periodic(const Arguments& arguments) {
   std::array<bool, 3> periodic{};
   for (const char axis : arguments.text("--periodic")) {
     if (axis < 'x' || axis > 'z')
-      return Error{Fault::kUsage, fmt::format("--periodic: '{}' is not of the axes x, y and z, as in --periodic xy",
-                                              one_line(arguments.text("--periodic")))};
+      return usage("--periodic: '{}' is not of the axes x, y and z, as in --periodic xy",
+                   one_line(arguments.text("--periodic")));
     periodic[static_cast<std::size_t>(axis - 'x')] = true;
   }
   return periodic;
@@ -195,7 +195,7 @@ Result<WindowRequest> read_window_request(const Arguments& arguments, double vox
 Outcome compare_scan(const Arguments& arguments, Context& context, const formats::GcodeFile& file, const Pile& pile,
                      const bead::DepositionRules* rules) {
   for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--plot", "--no-flow", "--inertia", "--memory"})
-    if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} does nothing beside --scan; leave it out", flag)};
+    if (arguments.has(flag)) return usage("{} does nothing beside --scan; leave it out", flag);
   std::uint32_t range = 16;
   if (Status status = arguments.read("--range", {1, 200}, range); !status) return status;
   range = (range + 7) / 8 * 8;  // that coarse voxels hold it
@@ -289,10 +289,10 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   const Result<StackWindow> window = window_of_stack(*stack, *selection, *periodic);
   if (!window) return window.error();
   if (!arguments.has("--no-flow") && set_voxels(window->fine) == 0)
-    return Error{Fault::kInput,
-                 fmt::format("{}: nothing is solid in the window; take a larger --window, and without a manifest "
-                             "look at --threshold and --dark",
-                             one_line(folder))};
+    return failure(Fault::kInput,
+                   "{}: nothing is solid in the window; take a larger --window, and without a manifest "
+                   "look at --threshold and --dark",
+                   one_line(folder));
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = arguments.has("--no-flow") ? pores_alone(window->fine)
                                                                : analyse_pores({window->fine, window->fine, window->coarse, 1},
@@ -315,7 +315,7 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   const std::string& path = arguments.operands.front();
   if (Status status = check_window_files(arguments); !status) return status;
   if (arguments.has("--inertia") && arguments.has("--no-flow"))
-    return Error{Fault::kUsage, "--inertia does nothing beside --no-flow; leave one out"};
+    return usage("--inertia does nothing beside --no-flow; leave one out");
   FlowRequest request;
   request.inertia = arguments.has("--inertia");
   request.section = arguments.has("--plot");
@@ -336,10 +336,8 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   if (!choice) return Error{choice.error().fault, fmt::format("{}: {}", path, choice.error().message)};
   // Tortuosity and throats take that much; the memory of the flow is checked when its void is known.
   if (const std::uint64_t bytes = 16 * choice->window.voxels(); bytes > request.memory_bytes)
-    return Error{Fault::kUsage, fmt::format("{}: {} voxels take {} at least, --memory allows {}; take a larger --voxel or a "
-                                            "smaller --window",
-                                            path, readable_count(choice->window.voxels()), readable_bytes(bytes),
-                                            readable_bytes(request.memory_bytes))};
+    return usage("{}: {} voxels take {} at least, --memory allows {}; take a larger --voxel or a smaller --window", path,
+                 readable_count(choice->window.voxels()), readable_bytes(bytes), readable_bytes(request.memory_bytes));
   double left_out = 0;
   const CutWindow cut_window = [&](const Window& window) { return bead_voxels(*file, *pile, window, rules, &left_out); };
   const bool flows = !arguments.has("--no-flow");

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <vector>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/job/profiles/library.h"
 #include "stages/support/io/file.h"
@@ -23,7 +24,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kJobCommandBefore = "# A job of lamina. Run it with: lamina ", kJobCommandAfter = " --job ";
 
 Error refuse(const std::string& file, const TextPosition& at, const std::string& what) {
-  return {Fault::kUsage, fmt::format("{}{}", at.text(file), what)};
+  return usage("{}{}", at.text(file), what);
 }
 
 // --- The files that a job file names. Their relative paths begin at its folder, wherever lamina runs; profiles and presets
@@ -205,7 +206,7 @@ Status read_assigned(const TomlValue& table, std::string_view section, const std
   std::string wrong;
   const auto* key = find_key(keys, section, name, wrong);
   if (key != nullptr) wrong = key->read(table.value.front(), target, unused);
-  return wrong.empty() ? Status() : Error{Fault::kUsage, fmt::format("{}: {}", option, wrong)};
+  return wrong.empty() ? Status() : usage("{}: {}", option, wrong);
 }
 
 }  // namespace
@@ -230,7 +231,7 @@ Status read_job_text(std::string_view text, const std::string& path, Job& job) {
 
 Status set_key(Job& job, std::string_view assignment) {
   const std::string option = fmt::format("--set {}", assignment);
-  const auto wrong = [&](const std::string& what) { return Error{Fault::kUsage, fmt::format("{}: {}", option, what)}; };
+  const auto wrong = [&](const std::string& what) { return usage("{}: {}", option, what); };
   const std::size_t equals = assignment.find('=');
   const auto names = split(assignment.substr(0, equals), ".");
   if (equals == std::string_view::npos || names.size() < 2 || names.size() > 3 || (names.size() == 3 && names[0] != "part")) {
@@ -292,12 +293,8 @@ std::string canonical_job_text(const Job& job, Product product) {
 
 Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
   for (const PartRequest& part : job.parts) {
-    if (same_file(path, part.path)) {
-      return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
-    }
-    if (!is_utf8(part.path)) {
-      return Error{Fault::kUsage, fmt::format("{}: a job file cannot name it, it is not UTF-8; rename it", part.path)};
-    }
+    if (same_file(path, part.path)) return usage("--save-job {}: is a part of the job; name another file", path);
+    if (!is_utf8(part.path)) return usage("{}: a job file cannot name it, it is not UTF-8; rename it", part.path);
   }
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";

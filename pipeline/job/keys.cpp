@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/profiles/extruder.h"
 #include "pipeline/job/profiles/printer.h"
@@ -658,10 +659,8 @@ std::span<const PartKey> part_keys() { return kPartKeys; }
 
 Status set_materials(std::string_view text, Job& job) {
   const auto names = split(text, ",");
-  if (names.size() != 1 && names.size() != job.parts.size()) {
-    return Error{Fault::kUsage,
-                 fmt::format("{} names for {} parts; give one for all or one for each", names.size(), job.parts.size())};
-  }
+  if (names.size() != 1 && names.size() != job.parts.size())
+    return usage("{} names for {} parts; give one for all or one for each", names.size(), job.parts.size());
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     const auto name = names[names.size() == 1 ? 0 : p];
     if (const std::string what = check_material(name); !what.empty()) return Error{Fault::kUsage, what};

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/job/decisions.h"
+#include "pipeline/job/errors.h"
 #include "stages/bead/predicted_tables.h"
 #include "stages/geometry/bead_section.h"
 #include "stages/program/dialect.h"
@@ -47,9 +48,8 @@ Result<ExtruderProfile> extruder_of(const ProfileFiles& files) {
   count(Decision::kMachine);
   auto profile = read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
-  if (const Status status = segment::check(profile->calibration); !status) {
-    return Error{Fault::kUsage, fmt::format("{}: calibration.{}", files.back().where, status.error().message)};
-  }
+  if (const Status status = segment::check(profile->calibration); !status)
+    return usage("{}: calibration.{}", files.back().where, status.error().message);
   return profile;
 }
 
@@ -137,9 +137,8 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
   if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
   ExtruderProfile& profile = *found;
   for (const auto& [name, value] : job.extrude.machine) {
-    if (const std::string wrong = set_extruder_key(name, value, profile); !wrong.empty()) {
-      return Error{Fault::kUsage, fmt::format("extrude.machine: {}", wrong)};
-    }
+    if (const std::string wrong = set_extruder_key(name, value, profile); !wrong.empty())
+      return usage("extrude.machine: {}", wrong);
   }
   const ExtrudeRequest& r = job.extrude;
   Extruder& m = profile.machine;
@@ -187,7 +186,7 @@ void leave_to_machine(const Extruder& machine, Job& job) {
 
 namespace {
 
-Error wrong(const std::string& key, const std::string& what) { return {Fault::kUsage, fmt::format("{}: {}", key, what)}; }
+Error wrong(const std::string& key, const std::string& what) { return usage("{}: {}", key, what); }
 
 }  // namespace
 

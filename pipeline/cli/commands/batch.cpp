@@ -11,6 +11,7 @@
 #include "pipeline/batch/summary.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
 #include "stages/load/load.h"
@@ -140,18 +141,15 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
   const std::string& name = words.front();
   const Command* command = find_command(name);
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
-  if (command == &batch_command || command->reads_itself) {
-    return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", name)};
-  }
+  if (command == &batch_command || command->reads_itself)
+    return usage("'{}' cannot be a job of a batch; run it by itself", name);
   const CommandSpec spec = spec_of(*command);
   const Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
   if (!read) return read.error();
-  if (read->help) return Error{Fault::kUsage, "--help is no job"};
+  if (read->help) return usage("--help is no job");
   Job planned;
   if (read->has("--job")) {
-    if (names_stream(read->text("--job"))) {
-      return Error{Fault::kUsage, "--job: a job of a batch cannot read standard input; name a file"};
-    }
+    if (names_stream(read->text("--job"))) return usage("--job: a job of a batch cannot read standard input; name a file");
     if (Status status = read_job(read->text("--job"), planned); !status) return status.error();
   }
 
@@ -187,11 +185,9 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
 /// The settings from the options, and the default words for parts. errors  kUsage
 Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::string>& words) {
   BatchOptions options;
-  if (arguments.operands.empty()) {
-    return Error{Fault::kUsage, "no jobs; name a list, a directory of parts, or TOML job files"};
-  }
+  if (arguments.operands.empty()) return usage("no jobs; name a list, a directory of parts, or TOML job files");
   options.directory = arguments.text("-o,--output");
-  if (options.directory.empty()) return Error{Fault::kUsage, "-o DIR is missing; name the directory of the batch"};
+  if (options.directory.empty()) return usage("-o DIR is missing; name the directory of the batch");
   const auto with = split_words(arguments.has("--with") ? arguments.text("--with") : "jet");
   if (!with) return at_option("--with", with.error().message).error();
   if (with->empty()) return at_option("--with", "no command; as in --with 'jet --dpi 600'").error();
@@ -209,14 +205,11 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
   }
   if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
   options.fail_fast = arguments.has("--fail-fast");
-  if (options.fail_fast && arguments.has("--keep-going")) {
-    return Error{Fault::kUsage, "--keep-going and --fail-fast exclude each other"};
-  }
+  if (options.fail_fast && arguments.has("--keep-going")) return usage("--keep-going and --fail-fast exclude each other");
   options.resume = arguments.has("--resume");
   options.overwrite = arguments.has("--overwrite");
-  if (options.resume && options.overwrite) {
-    return Error{Fault::kUsage, "--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces"};
-  }
+  if (options.resume && options.overwrite)
+    return usage("--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces");
   return options;
 }
 

@@ -7,6 +7,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/other_programs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/calibration/chart/draw.h"
 #include "stages/formats/chart/chart.h"
@@ -206,9 +207,8 @@ Outcome say_profile(const CalibratedProfile& made, const Arguments& arguments, C
 }
 
 Outcome run_calibrate(const Arguments& arguments, Context& context) {
-  const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
   if (!arguments.operands.empty())
-    return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments.operands.front())));
+    return usage("'{}' is no option; the pieces are made here", one_line(arguments.operands.front()));
   if (!arguments.has("--machine"))
     return usage("--machine is missing; name a printer, as lamina extrude or lamina jet takes it");
   CalibrationRequest request{arguments.text("--machine"), arguments.text("-o,--output"), segment::preset_pieces(), false};

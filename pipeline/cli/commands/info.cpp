@@ -4,6 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/pores/pore_analysis.h"
@@ -88,8 +89,7 @@ Status report_images(const std::string& path, int threshold, const Arguments& ar
   }
   const Status status = arguments.has("--json") ? context.give(json) : context.print(text);
   if (!status || info->unreadable == 0) return status;
-  return Error{Fault::kInput,
-               fmt::format("{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images)};
+  return failure(Fault::kInput, "{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images);
 }
 
 /// errors  kUsage: an option that is of none of the operands
@@ -106,7 +106,7 @@ Status check_flags(const Arguments& arguments) {
 }
 
 Outcome run_info(const Arguments& arguments, Context& context) {
-  if (arguments.operands.empty()) return Error{Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"};
+  if (arguments.operands.empty()) return usage("no part to look at; name an STL, OBJ or 3MF file");
   // Read as lamina jet reads them.
   const Result<Job> job = read_job_options("part load", arguments);
   if (!job) return job.error();

@@ -10,6 +10,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/cli/terminal/pages.h"
+#include "pipeline/job/errors.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"
 
@@ -36,7 +37,7 @@ Outcome run_completion(const Arguments& arguments, Context& context) {
   if (shell == "bash") return context.print(bash_completion(all_specs()));
   if (shell == "zsh") return context.print(zsh_completion(all_specs()));
   if (shell == "fish") return context.print(fish_completion(all_specs()));
-  return Error{Fault::kUsage, "name one shell: bash, zsh or fish"};
+  return usage("name one shell: bash, zsh or fish");
 }
 
 CommandSpec manual_spec() {
@@ -72,7 +73,7 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
   }
   std::error_code error;
   std::filesystem::create_directories(directory, error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
+  if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
   for (const auto& [path, text] : pages) {
     if (Status status = write_file(path, text); !status) return status;
   }
@@ -81,14 +82,14 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
 
 Outcome run_manual(const Arguments& arguments, Context& context) {
   const bool markdown = arguments.has("--markdown");
-  if (arguments.operands.size() > 1) return Error{Fault::kUsage, "name one command, or -o DIR for the pages of all"};
+  if (arguments.operands.size() > 1) return usage("name one command, or -o DIR for the pages of all");
   if (arguments.has("-o,--output") && !arguments.operands.empty()) {
     return at_option("--output", fmt::format("is for the pages of all commands; leave out '{}', or print that page to a file",
                                              one_line(arguments.operands.front())));
   }
   if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
-    if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
+    if (markdown) return usage("--markdown: name a command, or -o DIR for all of them");
     return context.print(man_page(all_specs()));
   }
   const Command* command = find_command(arguments.operands.front());

@@ -13,6 +13,7 @@
 #include "pipeline/cli/other_programs.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/cli/pores.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/temporary_folder.h"
@@ -97,8 +98,7 @@ CommandSpec permeability_spec() {
 /// Where a gas is measured; air has its density there. errors  kUsage
 Status read_pressures(const Arguments& arguments, segment::DropsSettings& settings) {
   for (const char* flag : {"--outlet-pressure", "--flow-pressure"}) {
-    if (arguments.has(flag) && !settings.gas)
-      return Error{Fault::kUsage, fmt::format("{}: is of gases that expand; give --compressible too", flag)};
+    if (arguments.has(flag) && !settings.gas) return usage("{}: is of gases that expand; give --compressible too", flag);
   }
   if (!settings.gas) return {};
   segment::GasPressures& gas = *settings.gas;
@@ -111,13 +111,11 @@ Status read_pressures(const Arguments& arguments, segment::DropsSettings& settin
 
 /// Medium and fluid from the options. errors  kUsage
 Result<segment::DropsSettings> read_settings(const Arguments& arguments) {
-  const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
   segment::DropsSettings settings;
   if (arguments.has("--compressible")) settings.gas.emplace();
   if (arguments.has("--convention")) {
-    if (arguments.text("--convention") != "dinisio2022") {
-      return usage(fmt::format("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention"))));
-    }
+    if (arguments.text("--convention") != "dinisio2022")
+      return usage("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention")));
     settings.medium = {0.0255, 1e-3 / 60 * 28};
     settings.fluid = {1.87e-5, 998.2};
     if (settings.gas) settings.gas->outlet_pa = 102600;
@@ -184,23 +182,23 @@ constexpr std::string_view kOfToolpaths[] = {"--beads", "--machine", "--inertia"
 /// errors  kUsage: one of the options is given
 Status refuse(const Arguments& arguments, std::span<const std::string_view> flags, const char* why) {
   for (const std::string_view flag : flags)
-    if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} is for {}", flag, why)};
+    if (arguments.has(flag)) return usage("{} is for {}", flag, why);
   return {};
 }
 
 /// What can be reported about one file or folder. part  as predict_print() takes it
 Outcome analyse_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   if (arguments.operands.size() != 1)
-    return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
+    return usage("name one file of measurements or of toolpaths, a folder of images, or a job with its parts");
   const std::string& operand = arguments.operands.front();
   std::error_code ignored;
   const std::filesystem::path path = operand;
   if (!path.has_extension() && !std::filesystem::exists(path, ignored))  // a table's name has one; its reader reports the error
-    return Error{Fault::kInput, fmt::format("{}: no such file or folder", one_line(operand))};
+    return failure(Fault::kInput, "{}: no such file or folder", one_line(operand));
   const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && names_toolpaths(operand);
   Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")
                                 : refuse(arguments, kOfVoxels, "toolpaths and images, not for tables of measurements");
-  if (images && !fits) return Error{Fault::kInput, fmt::format("{}: is a folder; {}", one_line(operand), fits.error().message)};
+  if (images && !fits) return failure(Fault::kInput, "{}: is a folder; {}", one_line(operand), fits.error().message);
   if (fits && !images && !arguments.has("--scan")) fits = refuse(arguments, kOfImages, "folders of images");
   if (fits && !images) fits = refuse(arguments, std::array<std::string_view, 1>{"--periodic"}, "folders of images");
   if (fits && !beads) fits = refuse(arguments, kOfToolpaths, "toolpaths");
@@ -284,9 +282,10 @@ Result<Product> product_of(const std::string& path, const Job& job, bool by_opti
   };
   const bool moves = names({"extrude."}), images = names({"bed.dpi", "dose.", "image.format", "image.mirror"});
   if (images != moves) return images ? Product::kImages : Product::kMoves;
-  return Error{Fault::kUsage, fmt::format("{}: names no machine, and may be of filament or of powder; add --machine, as in "
-                                          "--machine anet-a8 or --machine nuferbj",
-                                          one_line(path))};
+  return usage(
+      "{}: names no machine, and may be of filament or of powder; add --machine, as in "
+      "--machine anet-a8 or --machine nuferbj",
+      one_line(path));
 }
 
 /// The box of the first part in machine coordinates, of a job that has others too.
@@ -336,15 +335,15 @@ Outcome predict_job(const Arguments& arguments, Context& context) {
   if (resolved->extruder) {
     const Extruder& machine = resolved->extruder->machine;
     if (machine.format != "gcode")
-      return Error{Fault::kUsage, fmt::format("{}: {} writes {}, and beads are read from G-code; add another --machine",
-                                              one_line(path), machine.name, machine.format)};
+      return usage("{}: {} writes {}, and beads are read from G-code; add another --machine", one_line(path), machine.name,
+                   machine.format);
     corner_mm = machine.bed.corner_mm;
   }
   keep_on_signals();
   const auto summary = run(
       std::move(*resolved), [](const ProgressEvent&) {}, context.cancel());
   if (!summary) {
-    if (summary.error().fault == Fault::kInterrupted) return Error{Fault::kInterrupted, "interrupted; nothing was written"};
+    if (summary.error().fault == Fault::kInterrupted) return failure(Fault::kInterrupted, "interrupted; nothing was written");
     return summary.error();
   }
   for (const Warning& warning : summary->warnings) context.say_text(fmt::format("warning   {}\n", one_line(warning.text)));

@@ -9,6 +9,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/pore_analysis.h"
@@ -275,13 +276,11 @@ std::string extrude_closing() {
 
 Status complete_extrude(const Arguments&, Job& job) {
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
-  if (job.output.empty() && !job.dry_run) {
-    return Error{Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"};
-  }
+  if (job.output.empty() && !job.dry_run) return usage("-o FILE is missing; name the file for the toolpaths, or use --dry-run");
   std::error_code ignored;
   if (!std::filesystem::is_directory(job.output, ignored)) return {};
-  return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
-                                          (std::filesystem::path(job.output) / "part.gcode").string())};
+  return usage("-o {}: is a directory; name a file in it, as in {}", job.output,
+               (std::filesystem::path(job.output) / "part.gcode").string());
 }
 
 /// Extension of the output file named by a batch.

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <deque>
 
+#include "pipeline/job/errors.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/names.h"
 #include "stages/support/text/number_text.h"
@@ -115,7 +116,7 @@ const OptionSpec* CommandSpec::find(std::string_view flag) const {
 
 Status at_option(std::string_view flag, const std::string& wrong) {
   if (wrong.empty()) return {};
-  return Error{Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), wrong)};
+  return usage("{}: {}", flag.substr(flag.rfind(',') + 1), wrong);
 }
 
 bool Arguments::has(std::string_view flag) const {
@@ -152,7 +153,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   const auto wrong = [&](const std::string& what) {
     const std::string line = one_line(what);
     if (line.ends_with('?')) return Error{Fault::kUsage, line};
-    return Error{Fault::kUsage, fmt::format("{}; see lamina {} --help", line, spec.name)};
+    return usage("{}; see lamina {} --help", line, spec.name);
   };
   CLI::App app("", "lamina " + spec.name);
   app.allow_extras();
