@@ -23,7 +23,7 @@ Status check_plot_name(const std::string& path) {
 Result<std::string> plot_text(const std::string& path, const Plot& plot) {
   auto text = std::filesystem::path(path).extension() == ".svg" ? Result<std::string>(formats::plot_svg(plot))
                                                                 : filter("lamina-preview", "--plot", formats::plot_json(plot));
-  if (!text) return Error{text.error().fault, fmt::format("--plot {}: {}", path, text.error().message)};
+  if (!text) return failure(text.error().fault, "--plot {}: {}", path, text.error().message);
   return text;
 }
 

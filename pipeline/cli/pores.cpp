@@ -83,8 +83,7 @@ Result<std::vector<WindowFile>> write_window_files(const Arguments& arguments, c
     WindowFile& one = written.back();
     if (is_stl(one.path)) {
       const auto counts = formats::voxels::write_surface(**file, window, choice.side, version());
-      if (!counts)
-        return Error{counts.error().fault, fmt::format("{} {}: {}", choice.flag, one_line(one.path), counts.error().message)};
+      if (!counts) return failure(counts.error().fault, "{} {}: {}", choice.flag, one_line(one.path), counts.error().message);
       one.facets = counts->facets;
     } else if (Status status =
                    formats::voxels::write_image(**file, window, choice.side, *formats::voxels::image_kind(one.path), version());
@@ -297,7 +296,7 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   const Result<PoreReport> report = arguments.has("--no-flow") ? pores_alone(window->fine)
                                                                : analyse_pores({window->fine, window->fine, window->coarse, 1},
                                                                                flow, [&](double) { return !cancel; });
-  if (!report) return Error{report.error().fault, fmt::format("{}: {}", one_line(folder), report.error().message)};
+  if (!report) return failure(report.error().fault, "{}: {}", one_line(folder), report.error().message);
   const auto files = write_window_files(
       arguments, window->fine, [&] { return draw_window(context.shown(folder), window->choice, *report, window->fine); });
   if (!files) return files.error();
@@ -333,7 +332,7 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   if (!selection) return selection.error();
   selection->part = part;
   const Result<WindowChoice> choice = choose_window(*file, *pile, *selection);
-  if (!choice) return Error{choice.error().fault, fmt::format("{}: {}", path, choice.error().message)};
+  if (!choice) return failure(choice.error().fault, "{}: {}", path, choice.error().message);
   // Tortuosity and throats take that much; the memory of the flow is checked when its void is known.
   if (const std::uint64_t bytes = 16 * choice->window.voxels(); bytes > request.memory_bytes)
     return usage("{}: {} voxels take {} at least, --memory allows {}; take a larger --voxel or a smaller --window", path,
@@ -352,7 +351,7 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report =
       flows ? analyse_pores(rasters, request, [&](double) { return !cancel; }) : pores_alone(rasters.voxels);
-  if (!report) return Error{report.error().fault, fmt::format("{}: {}", path, report.error().message)};
+  if (!report) return failure(report.error().fault, "{}: {}", path, report.error().message);
   const auto inertia = request.inertia ? inertia_of(rasters, *report, context) : Result(std::optional<Forchheimer>());
   if (!inertia) return inertia.error();
   const Result<PoreAnalysis> analysis = analyse_deposited(*file, *pile, rasters.voxels, cut_window);

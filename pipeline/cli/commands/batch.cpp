@@ -31,6 +31,7 @@ constexpr std::uint64_t kMinBatchBytes = 48ull << 20;  // the layers of one job,
 
 CommandSpec batch_spec() {
   CommandSpec spec;
+  const auto sync = std::ranges::find(job_keys(), "--sync", &JobKey::flag);
   spec.summary =
       "Runs many jobs in one queue that shares the processors and a memory budget. A job that fails does so alone; each\n"
       "result and reason is in OUT/summary.json and OUT/summary.tsv. A batch that was killed goes on with --resume.";
@@ -43,12 +44,8 @@ CommandSpec batch_spec() {
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
       {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
       {"--memory", "SIZE", "what all running jobs may hold together: 512M, 4G", "1G", "Run"},
-      {"--sync",
-       "WHEN",
-       "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off",
-       "job",
-       "Run",
-       {"layer", "job", "off"}},
+      {"--sync", "WHEN", "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off", "job", "Run",
+       sync->words()},
       {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},

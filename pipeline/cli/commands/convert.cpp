@@ -101,7 +101,7 @@ Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) 
   formats::Bytes file;
   const Status status = all.grey != nullptr ? code_grey(all, layer, file, done) : code_bits(all, layer, file, done);
   if (!status && status.error().fault == Fault::kOutput)
-    return Error{status.error().fault, fmt::format("image {}: {}", layer, status.error().message)};
+    return failure(status.error().fault, "image {}: {}", layer, status.error().message);
   if (!status) return status;
   done.bytes = file.size();
   return write_file(all.name(layer), file, {.lock = false, .follow = false, .durable = Durable::kNo});
@@ -151,10 +151,7 @@ Result<formats::LayerImagesRequest> request_of(const Arguments& arguments) {
   request.invert = arguments.has("--invert");
   request.missing_empty = arguments.has("--missing-empty");
   std::int64_t threshold = 128;
-  if (arguments.has("--threshold")) {
-    if (const std::string why = read_whole(arguments.text("--threshold"), 1, 255, threshold); !why.empty())
-      return Error{Fault::kUsage, "--threshold: " + why};
-  }
+  if (Status status = arguments.read("--threshold", {1, 255}, threshold); !status) return status.error();
   request.threshold = static_cast<int>(threshold);
   return request;
 }
@@ -192,15 +189,10 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   const auto request = request_of(arguments);
   if (!request) return request.error();
   std::array<std::int64_t, 2> given{0, 0};
-  if (arguments.has("--dpi")) {
-    if (const std::string why = read_value(arguments.text("--dpi"), {1, 25'400, "", true}, given); !why.empty())
-      return Error{Fault::kUsage, "--dpi: " + why};
-  }
   std::int64_t threads = 0;
-  if (arguments.has("--threads")) {
-    if (const std::string why = read_whole(arguments.text("--threads"), 0, 4096, threads); !why.empty())
-      return Error{Fault::kUsage, "--threads: " + why};
-  }
+  for (const Status& status :
+       {arguments.read("--dpi", {1, 25'400, "", true}, given), arguments.read("--threads", {0, 4096}, threads)})
+    if (!status) return status;
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   const auto reported = images_on_record(stack);

@@ -48,6 +48,7 @@ CommandSpec permeability_spec() {
       "rows may name their configuration and sample; without a column sample each of several drop columns is one;\n"
       "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first;\n"
       "or a job file, as in job.toml, that lamina extrude or lamina jet takes, and parts in place of its own: it is planned first";
+  const std::vector<std::string_view> beads = {"deposited", "spread", "stated"};
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
       {"--diameter", "MM", "of a round medium", "", "Medium"},
@@ -62,12 +63,9 @@ CommandSpec permeability_spec() {
        "Toolpaths and images"},
       {"--voxel", "UM", "edge of a voxel, micrometres; of images: their pixels", "10", "Toolpaths and images"},
       {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
-      {"--beads",
-       "WORD",
+      {"--beads", "WORD",
        "spread: as the printer's melt lags and spreads; deposited: no spread along lines; stated: by the file; default: spread by known printers",
-       "",
-       "Toolpaths",
-       {"deposited", "spread", "stated"}},
+       "", "Toolpaths", beads},
       {"--machine", "NAME|FILE", "printer that lays them, or of a job; default: the one that the file names", "", "Toolpaths"},
       {"--set", "KEY=VALUE", "of a job file: set any key, as in --set fill.width_mm=0.5", "", "Job"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
@@ -269,8 +267,8 @@ Result<Product> product_of(const std::string& path, const Job& job, bool by_opti
   if (!job.machine.profile.empty()) {
     const Result<bool> moves = names_extruder(job.machine.profile);
     if (!moves)
-      return Error{moves.error().fault, fmt::format("{}: {}", by_option ? "--machine" : one_line(path) + ": machine.profile",
-                                                    moves.error().message)};
+      return failure(moves.error().fault, "{}: {}", by_option ? "--machine" : one_line(path) + ": machine.profile",
+                     moves.error().message);
     return *moves ? Product::kMoves : Product::kImages;
   }
   if (const std::string command = saved_command(path); command == "extrude" || command == "jet")
