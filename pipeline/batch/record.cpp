@@ -68,10 +68,8 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   auto journal = Journal::open(path, "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
   if (!journal->empty() && !resume && !overwrite) {
-    return usage(
-        "{}: an earlier batch; go on with it by --resume, replace it with --overwrite, "
-        "or name another directory",
-        path);
+    return usage("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, or name another directory",
+                 path);
   }
   BatchRecord record(std::move(*journal));
   if (resume) {

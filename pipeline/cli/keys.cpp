@@ -96,17 +96,16 @@ bool has_core(Product, const Job& job) { return job.dose.core < 1 || job.dose.co
 bool dithers(Product, const Job& job) { return job.levels > 0 || job.dose.saturation_percent; }
 /// Filament printers deposit a wall unless something else is requested.
 bool deposits_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
-bool deposits_lines(Product, const Job& job) {
+/// Whether some heights or parts have a filling of their own.
+bool varies_filling(const Job& job) {
   const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
-  return job.fill.all.pattern != infill::Pattern::kNone || job.segment.any() || !job.fill.ranges.empty() ||
-         !std::ranges::all_of(job.parts, plain);
+  return !job.fill.ranges.empty() || !std::ranges::all_of(job.parts, plain);
+}
+bool deposits_lines(Product, const Job& job) {
+  return job.fill.all.pattern != infill::Pattern::kNone || job.segment.any() || varies_filling(job);
 }
 /// Only curves that are not closed, and lines, are cut by a rule.
-bool cuts_lines(Product, const Job& job) {
-  const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
-  return job.fill.all.pattern != infill::Pattern::kContour || !job.fill.ranges.empty() ||
-         !std::ranges::all_of(job.parts, plain);
-}
+bool cuts_lines(Product, const Job& job) { return job.fill.all.pattern != infill::Pattern::kContour || varies_filling(job); }
 bool lies_in_pairs(Product, const Job& job) { return job.segment.all.continuous > 1 || !job.segment.ranges.empty(); }
 
 bool repairs(Product, const Job& job) { return job.repair; }

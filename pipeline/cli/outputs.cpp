@@ -131,16 +131,13 @@ Status check_apart(const Arguments& arguments) {
   std::vector<fs::path> positions;
   for (const std::string_view flag : kOutputs) {
     const std::string path = arguments.text(flag);
-    std::error_code ignored;
     if (path.empty() || is_stream(path)) continue;
-    for (const char* ending : {"", ".json"}) {
-      const fs::path position = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
-      if (std::ranges::find(positions, position) == positions.end()) continue;
+    std::error_code ignored;
+    const auto position = [&](const std::string& file) { return fs::weakly_canonical(fs::absolute(file, ignored), ignored); };
+    const std::array own = {position(path), position(path + ".json")};
+    if (std::ranges::find_first_of(positions, own) != positions.end())
       return usage("{}: is named for two outputs of this call; name another file", path);
-    }
-    for (const char* ending : {"", ".json"}) {
-      positions.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
-    }
+    positions.insert(positions.end(), own.begin(), own.end());
   }
   return {};
 }
@@ -177,10 +174,7 @@ Status check_folder(std::string_view flag, const std::string& file) {
 
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {
   if (is_replaceable(path, marks)) return {};
-  return usage(
-      "{}: is there already, and is no such file of lamina; name another one, or replace it "
-      "with --overwrite",
-      path);
+  return usage("{}: is there already, and is no such file of lamina; name another one, or replace it with --overwrite", path);
 }
 
 Status check_quote(const Arguments& arguments, const std::string& directory) {

@@ -18,10 +18,8 @@ Status check_dose(const Job& job) {
   const DoseRequest& dose = job.dose;
   const auto check_signs = [](std::string_view key, const std::optional<std::array<double, 2>>& um) -> Status {
     if (!um || (*um)[0] * (*um)[1] >= 0) return {};
-    return usage(
-        "{}: an edge moves inwards along both axes, or outwards (negative) along both; give two numbers "
-        "of one sign",
-        key);
+    return usage("{}: an edge moves inwards along both axes, or outwards (negative) along both; give two numbers of one sign",
+                 key);
   };
   for (const auto& [key, um] : {std::pair{"dose.bleed_um", std::optional(dose.bleed_um)},
                                 {"dose.hole_bleed_um", dose.hole_bleed_um},

@@ -419,8 +419,7 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   for (const LayerRecord& record : read->layers) {
     if (record.layer.thickness == first.thickness) continue;
     return Error{Fault::kInput,
-                 fmt::format("{}: layer {} is {} mm thick, the first one {} mm; images as parts are layers of "
-                             "one thickness",
+                 fmt::format("{}: layer {} is {} mm thick, the first one {} mm; images as parts are layers of one thickness",
                              one_line(manifest), record.layer.index, mm(record.layer.thickness), mm(first.thickness))};
   }
   return reported;

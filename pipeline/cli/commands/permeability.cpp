@@ -281,8 +281,7 @@ Result<Product> product_of(const std::string& path, const Job& job, bool by_opti
   const bool moves = names({"extrude."}), images = names({"bed.dpi", "dose.", "image.format", "image.mirror"});
   if (images != moves) return images ? Product::kImages : Product::kMoves;
   return usage(
-      "{}: names no machine, and may be of filament or of powder; add --machine, as in "
-      "--machine anet-a8 or --machine nuferbj",
+      "{}: names no machine, and may be of filament or of powder; add --machine, as in --machine anet-a8 or --machine nuferbj",
       one_line(path));
 }
 
