@@ -235,9 +235,7 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
     std::error_code error;
     const fs::file_status status = fs::status(operand, error);
     if (operand != "-" && !fs::exists(status))
-      return Error{
-          Fault::kUsage,
-          fmt::format("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand)};
+      return usage("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand);
     if (fs::is_directory(status)) {
       if (Status read = read_directory(operand, with, entries); !read) return read.error();
     } else if (is_job_file(operand) || load::is_part_name(operand)) {

@@ -246,11 +246,10 @@ void print_warnings(const Pile& pile, const PoreReport& report, Context& context
 }
 
 Error nothing_deposited(const std::string& path, const Box& box) {
-  return {
-      Fault::kInput,
-      fmt::format("{}: no bead lies in the window of {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, the middle of the "
-                  "print; take a --window that reaches them, or a file of one part",
-                  path, mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y))};
+  return failure(Fault::kInput,
+                 "{}: no bead lies in the window of {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, the middle of the "
+                 "print; take a --window that reaches them, or a file of one part",
+                 path, mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y));
 }
 
 }  // namespace
