@@ -9,7 +9,7 @@
 #include <set>
 
 #include "pipeline/job/errors.h"
-#include "pipeline/job/file.h"
+#include "pipeline/job/job_command.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/file_target.h"

@@ -24,7 +24,7 @@ struct BatchEntry {
 };
 
 /// The jobs of all operands, in order:
-///   NAME.toml                         a job file: COMMAND --job NAME.toml, of the command in its first lines (job/file.h),
+///   NAME.toml                         a job file: COMMAND --job NAME.toml, of the command in its first lines (job_command.h),
 ///                                     else of jet
 ///   NAME.stl .obj .3mf (.gz)          a part: `with` and the file
 ///   a directory                       all of the above in it and below it, by name

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/job/errors.h"
+#include "pipeline/job/job_command.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/job/profiles/library.h"
 #include "stages/support/io/file.h"
@@ -20,8 +21,6 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::string_view kJobCommandBefore = "# A job of lamina. Run it with: lamina ", kJobCommandAfter = " --job ";
 
 Error refuse(const std::string& file, const TextPosition& at, const std::string& what) {
   return usage("{}{}", at.text(file), what);
@@ -211,14 +210,6 @@ Status read_assigned(const TomlValue& table, std::string_view section, const std
 
 }  // namespace
 
-std::string_view command_in(std::string_view line) {
-  if (!line.starts_with(kJobCommandBefore)) return {};
-  line.remove_prefix(kJobCommandBefore.size());
-  const std::string_view word = line.substr(0, line.find(' '));
-  const bool is_word = !word.empty() && std::ranges::all_of(word, [](char c) { return 'a' <= c && c <= 'z'; });
-  return is_word && line.substr(word.size()).starts_with(kJobCommandAfter) ? word : std::string_view();
-}
-
 Status read_job(const std::string& path, Job& job) {
   const auto text =
       read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes, .streams = true});
@@ -299,8 +290,7 @@ Result<File> write_job(const std::string& path, const Job& job, bool durable, st
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
   if (Status status = check_nameable(directory.string(), job.machine); !status) return status.error();
-  const std::string text =
-      fmt::format("{}{}{}FILE\n\n", kJobCommandBefore, command, kJobCommandAfter) + job_text(job, directory.string());
+  const std::string text = job_command_line(command) + "\n\n" + job_text(job, directory.string());
   auto file = File::open(path, {.durable = durable ? Durable::kAll : Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());
   if (status) status = file->flush();

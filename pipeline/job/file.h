@@ -49,7 +49,4 @@ Status save_job(const std::string& path, const Job& job, std::string_view comman
 /// The same, but the file takes its name when it is finished.
 Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command);
 
-/// The command that a line names: one word of lower-case letters, which may be no command; "" for any other line.
-std::string_view command_in(std::string_view line);
-
 }  // namespace lamina::pipeline

@@ -14,7 +14,7 @@
 #include "pipeline/cli/outputs.h"
 #include "pipeline/cli/pores.h"
 #include "pipeline/job/errors.h"
-#include "pipeline/job/file.h"
+#include "pipeline/job/job_command.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/temporary_folder.h"
 #include "pipeline/pores/pore_analysis.h"
