@@ -8,14 +8,103 @@
 #include <map>
 #include <set>
 
+#include "pipeline/job/errors.h"
+#include "pipeline/job/job_command.h"
 #include "stages/load/load.h"
+#include "stages/support/io/file_reader.h"
 #include "stages/support/io/file_target.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/shell_words.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kLongestName = 80;  // of a job that names no file, bytes
+
+bool is_job_file(const fs::path& path) { return lower_case(path.extension().string()) == ".toml"; }
+
+/// The file's name without its extensions; folders become part of it.
+std::string name_of(const fs::path& path) {
+  fs::path name = path;
+  if (lower_case(name.extension().string()) == ".gz") name.replace_extension();
+  name.replace_extension();
+  std::string text = name.lexically_normal().string();
+  std::ranges::replace(text, '/', '_');
+  return text;
+}
+
+/// The command that a saved job names in its leading comments, "jet" if none does. Reading the job reports its errors.
+std::string command_of(const fs::path& path) {
+  auto file = FileReader::open(path.string(), {.fault = Fault::kUsage, .max_bytes = kMaxTomlBytes, .longest_line = 1 << 16});
+  if (!file) return "jet";
+  for (std::string_view line; file->next(line) && (line.empty() || line.starts_with('#') || line == "\r");) {
+    if (const std::string_view command = command_in(line); !command.empty()) return std::string(command);
+  }
+  return "jet";
+}
+
+BatchEntry entry_of_file(const fs::path& path, const fs::path& below, const std::vector<std::string>& with) {
+  BatchEntry entry{path.string(), name_of(below), {}};
+  if (is_job_file(path)) {
+    entry.words = {command_of(path), "--job", path.string()};
+  } else {
+    entry.words = with;
+    // A name that begins with a dash still means a file.
+    entry.words.push_back(path.string().starts_with('-') ? "./" + path.string() : path.string());
+  }
+  return entry;
+}
+
+Status read_directory(const fs::path& directory, const std::vector<std::string>& with, std::vector<BatchEntry>& entries) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
+    std::error_code ignored;
+    if (at->is_regular_file(ignored) && (is_job_file(at->path()) || load::is_part_name(at->path().string())))
+      files.push_back(at->path());
+  }
+  if (error) return usage("{}: {}", directory.string(), error.message());
+  if (files.empty())
+    return usage("{}: no part (.stl .obj .3mf, .gz of them) and no job (.toml) in it or below it", directory.string());
+  std::ranges::sort(files);
+  for (const fs::path& file : files) entries.push_back(entry_of_file(file, file.lexically_relative(directory), with));
+  return {};
+}
+
+/// Name of a job in a list, from its first file.
+std::string name_of_words(const std::vector<std::string>& words) {
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    const fs::path path = words[i];
+    if (!words[i].starts_with('-') && (load::is_part_name(words[i]) || is_job_file(path))) return name_of(path.filename());
+  }
+  return words.front().substr(0, kLongestName);
+}
+
+Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
+  auto file = FileReader::open(path, {.fault = Fault::kUsage,
+                                      .no_text = "not a text; a list has one command line a line",
+                                      .max_bytes = kMaxListBytes,
+                                      .longest_line = 1 << 20,
+                                      .streams = true});
+  if (!file) return file.error();
+  const std::size_t before = entries.size();
+  for (std::string_view line; file->next(line);) {
+    const std::string source = fmt::format("{}:{}", path, file->line_number());
+    Result<std::vector<std::string>> words = split_words(line);
+    if (!words) return usage("{}: {}", source, words.error().message);
+    if (!words->empty() && words->front() == "lamina") words->erase(words->begin());
+    if (words->empty()) continue;
+    std::string name = name_of_words(*words);
+    entries.push_back({source, std::move(name), std::move(*words)});
+  }
+  if (!file->status()) return file->status().error();
+  if (entries.size() == before)
+    return usage("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600", path);
+  return {};
+}
 
 constexpr std::uint64_t kMebibyte = 1ull << 20;
 
@@ -103,9 +192,7 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
   const fs::path own = fs::weakly_canonical(fs::absolute(directory, ignored), ignored);
   for (const BatchJob& job : jobs) {
     if (job.refused || job.output.empty()) continue;
-    const auto refused = [&](const std::string& why) {
-      return Error{Fault::kUsage, fmt::format("{}: {}", job.entry.source, why)};
-    };
+    const auto refused = [&](const std::string& why) { return usage("{}: {}", job.entry.source, why); };
     if (job.relative_output && below_batch(job.output, directory).empty()) {
       return refused(
           fmt::format("-o leads out of {}, to {}; an output elsewhere has to be an absolute path", directory, job.output));
@@ -128,8 +215,8 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
     const auto& [outer, first] = outputs[i - 1];
     const auto& [inner, second] = outputs[i];
     if (lies_within(inner, outer)) {
-      return Error{Fault::kUsage, fmt::format("{} and {}: both write into {}; give one of them another -o", first->entry.source,
-                                              second->entry.source, first->output)};
+      return usage("{} and {}: both write into {}; give one of them another -o", first->entry.source, second->entry.source,
+                   first->output);
     }
   }
   return {};
@@ -140,6 +227,24 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
 std::string_view outcome_name(BatchOutcome outcome) {
   constexpr std::string_view kNames[] = {"done", "kept", "failed", "time limit", "stopped", "not run"};
   return kNames[static_cast<std::size_t>(outcome)];
+}
+
+Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with) {
+  std::vector<BatchEntry> entries;
+  for (const std::string& operand : operands) {
+    std::error_code error;
+    const fs::file_status status = fs::status(operand, error);
+    if (operand != "-" && !fs::exists(status))
+      return usage("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand);
+    if (fs::is_directory(status)) {
+      if (Status read = read_directory(operand, with, entries); !read) return read.error();
+    } else if (is_job_file(operand) || load::is_part_name(operand)) {
+      entries.push_back(entry_of_file(operand, fs::path(operand).filename(), with));
+    } else if (Status read = read_list(operand, entries); !read) {
+      return read.error();
+    }
+  }
+  return entries;
 }
 
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read) {

@@ -1,4 +1,4 @@
-// pipeline/batch/job.h: a job of a batch, ready to run: its outputs, inputs and memory.
+// pipeline/batch/job.h: the jobs of a batch: read from lists, directories and job files, then made ready to run.
 #pragma once
 
 #include <atomic>
@@ -6,9 +6,9 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "pipeline/job/lists/batch_list.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
 #include "stages/support/hash/hash.h"
@@ -16,7 +16,22 @@
 
 namespace lamina::pipeline {
 
-using pipeline::BatchEntry;
+/// One job as written in its source.
+struct BatchEntry {
+  std::string source;              // where: "jobs.txt:12", "parts/bracket.stl"
+  std::string name;                // default name of the output; not unique yet
+  std::vector<std::string> words;  // command and arguments: "jet", "bracket.stl", "--dpi", "600"
+};
+
+/// The jobs of all operands, in order:
+///   NAME.toml                         a job file: COMMAND --job NAME.toml, of the command in its first lines (job_command.h),
+///                                     else of jet
+///   NAME.stl .obj .3mf (.gz)          a part: `with` and the file
+///   a directory                       all of the above in it and below it, by name
+///   anything else                     a list: one command line a line, "jet bracket.stl --dpi 600 -o bracket"; the word
+///                                     lamina in front, empty lines and comments are skipped
+/// errors  kUsage: an operand that is missing, unreadable or without jobs; a line that cannot be split
+Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with);
 
 /// What a batch adds to a job's command line when the job starts.
 struct CallSettings {

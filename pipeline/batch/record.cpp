@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "pipeline/job/errors.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 
@@ -62,14 +63,13 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   namespace fs = std::filesystem;
   std::error_code error;
   fs::create_directories(directory, error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
+  if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
   const std::string path = (fs::path(directory) / "batch.jsonl").string();
   auto journal = Journal::open(path, "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
   if (!journal->empty() && !resume && !overwrite) {
-    return Error{Fault::kUsage, fmt::format("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, "
-                                            "or name another directory",
-                                            path)};
+    return usage("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, or name another directory",
+                 path);
   }
   BatchRecord record(std::move(*journal));
   if (resume) {

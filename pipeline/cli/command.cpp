@@ -12,6 +12,7 @@
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
@@ -102,9 +103,9 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
     return command.run(arguments, context);
   } catch (const std::exception& error) {
     if (is_shortage(error)) return out_of_memory();
-    return Error{Fault::kInternal, fmt::format("internal error: {}", error.what())};
+    return failure(Fault::kInternal, "internal error: {}", error.what());
   } catch (...) {
-    return Error{Fault::kInternal, "internal error"};
+    return failure(Fault::kInternal, "internal error");
   }
 }
 
@@ -112,7 +113,7 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
   Arguments arguments;
   arguments.given = words;
   if (!command.reads_itself) {
-    Result<Arguments> read = pipeline::read_arguments(spec_of(command), words);
+    Result<Arguments> read = read_arguments(spec_of(command), words);
     if (!read) return read.error();
     if (read->help) return console.print(*read->help);
     arguments = std::move(*read);

@@ -16,11 +16,6 @@
 
 namespace lamina::pipeline {
 
-using pipeline::Arguments;
-using pipeline::at_option;
-using pipeline::CommandSpec;
-using pipeline::OptionSpec;
-
 /// Receives a command's messages and results, and can cancel it. Implemented by the console and by a batch job.
 class Context {
  public:

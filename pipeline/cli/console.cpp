@@ -8,6 +8,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "pipeline/job/errors.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/json_text.h"
@@ -121,7 +122,7 @@ int Console::complain(const Error& error) {
 Status Console::print(std::string_view text) {
   const int reason = write_all(STDOUT_FILENO, text);
   if (reason == 0 || reason == EPIPE) return {};
-  return Error{Fault::kOutput, fmt::format("standard output: {}", std::strerror(reason))};
+  return failure(Fault::kOutput, "standard output: {}", std::strerror(reason));
 }
 
 Status Console::give(const Json& value) { return print(json_line(value)); }
@@ -134,7 +135,7 @@ void Console::progress(const ProgressEvent& event) {
     keep_on_signals();
   }
   if (!progress_) {
-    using Style = pipeline::Progress::Style;
+    using Style = Progress::Style;
     progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);
   }
   write_all(STDERR_FILENO, counted ? progress_->report(event.done, event.total)

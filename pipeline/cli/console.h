@@ -24,7 +24,7 @@ class Console : public Context {
   bool quiet = false;  // suppresses progress
 
  private:
-  std::optional<pipeline::Progress> progress_;
+  std::optional<Progress> progress_;
 };
 
 /// Has every signal that ends the program remove its temporary files first, and closed pipes and limits on file sizes come

@@ -6,7 +6,9 @@
 #include <filesystem>
 
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
+#include "pipeline/machine/profiles.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,10 +25,16 @@ constexpr Word<std::string_view> kHeadings[] = {{"part", "Parts"},
                                                 {"load", "Repair"},
                                                 {"run", "Run"}};
 
+bool has(std::string_view choice, const KeyName& key) {
+  const auto names = split(choice, " ");
+  const std::string whole = fmt::format("{}.{}", key.section, key.name);
+  return std::ranges::any_of(names, [&](std::string_view name) { return name == key.section || name == whole; });
+}
+
 template <class Target>
-void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, const Target& presets, CommandSpec& spec) {
+void add_options(std::span<const Key<Target>> keys, std::string_view choice, const Target& presets, CommandSpec& spec) {
   for (const Key<Target>& key : keys) {
-    if (key.flag.empty() || !choice.has(key.section, key.name)) continue;
+    if (key.flag.empty() || !has(choice, key)) continue;
     std::string preset = key.value.empty() ? std::string() : key.write(presets);
     if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
     const auto words = key.words == nullptr ? std::vector<std::string_view>() : key.words();
@@ -40,50 +48,136 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
 }
 
 /// Mutually exclusive options.
-Status check_together(const KeyChoice& choice, const Arguments& arguments, const Job& job) {
+Status check_together(std::string_view choice, const Arguments& arguments, const Job& job) {
   const std::string fill = arguments.text("--fill"), pattern = arguments.text("--pattern");
-  if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && fill != "segmented") {
+  if (has(choice, {"segment", "fill"}) && !fill.empty() && !pattern.empty() && fill != pattern && fill != "segmented")
     return at_option("--fill", fmt::format("{}, but --pattern {}: two patterns; give one of them", fill, pattern));
-  }
-  if (pattern == "none" && job.segment.all.on) {
+  if (pattern == "none" && job.segment.all.on)
     return at_option("--pattern", "none, but lines are segmented; leave it out, or add --fill none");
-  }
   if (job.segment.any()) return {};
   for (const JobKey& key : job_keys()) {
     if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;
-    if (choice.has(key.section, key.name) && arguments.has(key.flag)) {
+    if (has(choice, key) && arguments.has(key.flag))
       return at_option(key.flag, "is of segmented lines, and nothing is segmented; add --fill segmented");
-    }
   }
   return {};
 }
 
 // Errors in the parts of a job file include their place in the file.
 Status check_parts_of_file(const std::string& file, const Job& job) {
-  if (job.parts.empty()) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file)};
-  }
+  if (job.parts.empty())
+    return usage("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file);
   for (const PartRequest& part : job.parts) {
     std::error_code error;
     if (part.named_at.empty() || std::filesystem::exists(part.path, error)) continue;
-    return Error{Fault::kInput,
-                 fmt::format("{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
-                             part.named_at, part.path)};
+    return failure(Fault::kInput, "{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
+                   part.named_at, part.path);
   }
   return {};
 }
 
-}  // namespace
+// --- options without effect
 
-bool KeyChoice::has(std::string_view section, std::string_view name) const {
-  return std::ranges::any_of(names_, [&](std::string_view chosen) {
-    return chosen == section || (chosen.size() == section.size() + 1 + name.size() && chosen.starts_with(section) &&
-                                 chosen[section.size()] == '.' && chosen.ends_with(name));
-  });
+using heights::Mode;
+
+bool fits_heights(Product, const Job& job) { return job.heights.mode != Mode::kUniform; }
+bool by_angle(Product, const Job& job) { return job.heights.mode == Mode::kAngle; }
+bool by_steps(Product product, const Job& job) { return fits_heights(product, job) && !by_angle(product, job); }
+/// Optimal tables inspect all slopes in a layer.
+bool by_slopes(Product product, const Job& job) { return fits_heights(product, job) && job.heights.mode != Mode::kOptimal; }
+bool optimal(Product, const Job& job) { return job.heights.mode == Mode::kOptimal; }
+bool may_end_below(Product product, const Job& job) { return by_angle(product, job) || optimal(product, job); }
+bool scaled(Product, const Job& job) {
+  const auto nominal = [](const PartRequest& part) { return part.shrink == std::array<double, 3>{1, 1, 1}; };
+  return !std::ranges::all_of(job.parts, nominal);
+}
+bool shrinks(Product product, const Job& job) { return by_steps(product, job) && scaled(product, job); }
+bool has_core(Product, const Job& job) { return job.dose.core < 1 || job.dose.core_saturation_percent || fills(job); }
+bool dithers(Product, const Job& job) { return job.levels > 0 || job.dose.saturation_percent; }
+/// Filament printers deposit a wall unless something else is requested.
+bool deposits_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
+/// Whether some heights or parts have a filling of their own.
+bool varies_filling(const Job& job) {
+  const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
+  return !job.fill.ranges.empty() || !std::ranges::all_of(job.parts, plain);
+}
+bool deposits_lines(Product, const Job& job) {
+  return job.fill.all.pattern != infill::Pattern::kNone || job.segment.any() || varies_filling(job);
+}
+/// Only curves that are not closed, and lines, are cut by a rule.
+bool cuts_lines(Product, const Job& job) { return job.fill.all.pattern != infill::Pattern::kContour || varies_filling(job); }
+bool lies_in_pairs(Product, const Job& job) { return job.segment.all.continuous > 1 || !job.segment.ranges.empty(); }
+
+bool repairs(Product, const Job& job) { return job.repair; }
+bool leaves_open(Product, const Job& job) { return !job.repair; }
+bool arranges(Product, const Job& job) {
+  return std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.at_mm || part.copies > 1; });
+}
+bool writes_tiff(Product, const Job& job) { return job.format.starts_with("tiff"); }
+bool writes_cli(Product, const Job& job) { return job.slice.format.starts_with("cli"); }
+
+struct Need {
+  std::string_view flag;
+  bool (*met)(Product, const Job&);
+  std::string_view unmet;
+  bool (*in_study)(Product, const Job&) = nullptr;  // of layers alone; nullptr: it affects any study
+};
+constexpr std::string_view kUniform = "is of layers that fit the part, and these are uniform; add --heights and --thickness",
+                           kSteps = "is of --heights cusp, stepwise and optimal; add one of them",
+                           kSlopes = "is of --heights angle, cusp and stepwise; add one of them",
+                           kAngle = "is of --heights angle; add it", kOptimal = "is of --heights optimal; add it",
+                           kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
+                           kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
+                           kBeads = "is of beads, and none are asked for; add --fill, --pattern or --walls",
+                           kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
+constexpr Need kNeeds[] = {
+    {"--cusp", by_steps, kSteps},
+    {"--cusp-of", shrinks, kShrinks, scaled},
+    {"--adapt-angle", by_angle, kAngle, by_angle},
+    {"--peaks", by_angle, kAngle, by_angle},
+    {"--cover-top", may_end_below, kCovered, may_end_below},
+    {"--peak-angle", fits_heights, kUniform},
+    {"--facets", by_slopes, kSlopes, by_slopes},
+    {"--facet-area", fits_heights, kUniform},
+    {"--no-flats", optimal, kOptimal, optimal},
+    {"--flat-area", fits_heights, kUniform},
+    {"--flat-tolerance", fits_heights, kUniform},
+    {"--time-model", optimal, kOptimal, optimal},
+    {"--shell", has_core, "is the depth that is not thinned, and nothing is; add --core, --core-saturation or --fill"},
+    {"--no-dither", dithers, "is of drops that are not whole, and none are asked for; add --levels or --saturation"},
+    {"--bead-ends", deposits_beads, kBeads},
+    {"--bead", deposits_beads, kBeads},
+    {"--bead-gap", deposits_lines, kLines},
+    {"--line-distance", deposits_lines, kLines},
+    {"--gap-formula", deposits_lines, kLines},
+    {"--angle", deposits_lines, kLines},
+    {"--angle-step", deposits_lines, kLines},
+    {"--stagger", deposits_lines, kLines},
+    {"--print-speed", deposits_lines, "is of lines that fill, and no pattern is asked for; add --fill, or give --wall-speed"},
+    {"--segment-rule", cuts_lines, "is of lines; closed curves are cut by their length under every rule, leave it out"},
+    {"--spacing-cc", lies_in_pairs,
+     "is between continuous lines, and one lies alone between segmented ones; add --continuous 2"},
+    {"--bridge", leaves_open, "is of open meshes, and repair closes them; add --no-repair"},
+    {"--title", writes_tiff, "is of TIFF, other images have no place for it; leave it out, or add --format tiff-g4"},
+    {"--weld", repairs, "is of repair, which is off; leave out one of the two"},
+    {"--gap", arranges, "is between parts that are arranged, and --at places this one; leave out one of the two"},
+    {"--empty-first-layer", writes_cli, "is of CLI files; add --format cli or cli-binary"},
+};
+
+/// Options of what a printer that reads SML decides by itself: its files carry no heat, fans and speeds.
+constexpr std::string_view kOfGcode[] = {"--nozzle-temperature", "--bed-temperature", "--retraction", "--fan",
+                                         "--relative-extrusion", "--print-speed",     "--wall-speed", "--first-layer-speed",
+                                         "--travel-speed"};
+
+/// Whether a key has an effect on this product; images are filled by beads.
+bool decides_in(Product product, const JobKey& key, const Job& job) {
+  if (key.decides == 0 || (key.decides & bit(product)) != 0) return true;
+  return product == Product::kImages && fills(job) && (key.section == "fill" || key.section == "segment");
 }
 
-void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
+}  // namespace
+
+void add_key_options(std::string_view choice, CommandSpec& spec) {
   spec.options.insert(
       spec.options.end(),
       {{"--job", "FILE", "a TOML job; options override what it says", "", "Job"},
@@ -93,7 +187,7 @@ void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
   add_options<PartRequest>(part_keys(), choice, PartRequest(), spec);
 }
 
-Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments) {
+Result<Job> read_job_options(std::string_view choice, const Arguments& arguments) {
   Job job;
   if (arguments.has("--job")) {
     if (Status status = read_job(arguments.text("--job"), job); !status) return status.error();
@@ -109,13 +203,13 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
     if (Status status = set_key(job, assignment); !status) return status.error();
   }
   for (const JobKey& key : job_keys()) {
-    if (key.flag.empty() || !choice.has(key.section, key.name) || !arguments.has(key.flag)) continue;
+    if (key.flag.empty() || !has(choice, key) || !arguments.has(key.flag)) continue;
     const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
     if (Status status = at_option(key.flag, key.read(text, job)); !status) return status.error();
     job.named.push_back(fmt::format("{}.{}", key.section, key.name));
   }
   for (const PartKey& key : part_keys()) {
-    if (key.flag.empty() || !choice.has(key.section, key.name) || !arguments.has(key.flag)) continue;
+    if (key.flag.empty() || !has(choice, key) || !arguments.has(key.flag)) continue;
     if (key.flag == "--at" && job.parts.size() > 1) {
       return at_option(key.flag, fmt::format("is for a single part, here are {}; set at_mm of each [[part]] in a job file",
                                              job.parts.size()))
@@ -131,6 +225,50 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
   }
   if (Status status = check_outputs(arguments, job); !status) return status.error();
   return job;
+}
+
+Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study) {
+  // A job that selects the pattern "none" has no lines by intention.
+  const bool named = arguments.has("--pattern") || arguments.has("--fill");
+  for (const Need& need : kNeeds) {
+    const bool beads = need.met == deposits_lines || need.met == deposits_beads;
+    const auto met = study ? need.in_study : need.met;
+    if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && named)) continue;
+    return at_option(need.flag, std::string(need.unmet));
+  }
+  if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off")
+    return usage("--no-repair and --repair exclude each other; give one of them");
+  return {};
+}
+
+Status check_machine_needs(const Extruder& machine, const Arguments& arguments) {
+  if (machine.format != "sml") return {};
+  for (const std::string_view flag : kOfGcode) {
+    if (arguments.has(flag))
+      return at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
+  }
+  return {};
+}
+
+std::vector<std::string> notes_on_needs(Product product, const Arguments& arguments, const Job& job) {
+  std::vector<std::string> notes;
+  if (arguments.has("--layer") && !job.heights.thickness_mm.empty()) {
+    notes.emplace_back("--layer does nothing here, layers are as thick as --thickness says; leave it out");
+  }
+  const bool hollow = product == Product::kImages && fills(job) && !deposits_lines(product, job);
+  if (hollow && !is_named(job, "fill.pattern") && !is_named(job, "segment.fill")) {
+    notes.emplace_back(
+        "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant");
+  }
+  for (const std::string& assignment : arguments.all("--set")) {
+    const auto key = std::ranges::find_if(job_keys(), [&](const JobKey& k) {
+      return assignment.starts_with(fmt::format("{}.{}=", k.section, k.name)) && !decides_in(product, k, job);
+    });
+    if (key != job_keys().end()) {
+      notes.push_back(fmt::format("--set {}: {}.{} decides nothing here; leave it out", assignment, key->section, key->name));
+    }
+  }
+  return notes;
 }
 
 }  // namespace lamina::pipeline

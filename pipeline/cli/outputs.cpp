@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/manifest/layer_files.h"
 #include "pipeline/report/cost_report.h"
 #include "stages/formats/voxels/image.h"
@@ -130,16 +131,13 @@ Status check_apart(const Arguments& arguments) {
   std::vector<fs::path> positions;
   for (const std::string_view flag : kOutputs) {
     const std::string path = arguments.text(flag);
-    std::error_code ignored;
     if (path.empty() || is_stream(path)) continue;
-    for (const char* ending : {"", ".json"}) {
-      const fs::path position = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
-      if (std::ranges::find(positions, position) == positions.end()) continue;
-      return Error{Fault::kUsage, fmt::format("{}: is named for two outputs of this call; name another file", path)};
-    }
-    for (const char* ending : {"", ".json"}) {
-      positions.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
-    }
+    std::error_code ignored;
+    const auto position = [&](const std::string& file) { return fs::weakly_canonical(fs::absolute(file, ignored), ignored); };
+    const std::array own = {position(path), position(path + ".json")};
+    if (std::ranges::find_first_of(positions, own) != positions.end())
+      return usage("{}: is named for two outputs of this call; name another file", path);
+    positions.insert(positions.end(), own.begin(), own.end());
   }
   return {};
 }
@@ -159,13 +157,9 @@ Status check_outputs(std::span<const InputFile> inputs, std::span<const std::str
     const auto file = file_id(input.path), folder = folder_id(input.path);
     const auto found = std::ranges::find_if(taken, [&](const Taken& one) { return (one.folder ? folder : file) == one.id; });
     if (found == taken.end()) continue;
-    if (!found->folder) {
-      return Error{Fault::kUsage,
-                   fmt::format("{}: is read by this call as {}; name another output", *found->output, input.role)};
-    }
-    return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}, and lies among the layers of the output {}; "
-                                            "name another output",
-                                            input.path, input.role, *found->output)};
+    if (!found->folder) return usage("{}: is read by this call as {}; name another output", *found->output, input.role);
+    return usage("{}: is read by this call as {}, and lies among the layers of the output {}; name another output", input.path,
+                 input.role, *found->output);
   }
   return {};
 }
@@ -174,28 +168,24 @@ Status check_folder(std::string_view flag, const std::string& file) {
   const fs::path folder = fs::path(file).parent_path();
   std::error_code ignored;
   if (folder.empty() || fs::is_directory(folder, ignored)) return {};
-  return Error{Fault::kOutput, fmt::format("{} {}: there is no folder {}; make it or choose another place", flag,
-                                           one_line(file), one_line(folder.string()))};
+  return failure(Fault::kOutput, "{} {}: there is no folder {}; make it or choose another place", flag, one_line(file),
+                 one_line(folder.string()));
 }
 
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {
   if (is_replaceable(path, marks)) return {};
-  return Error{Fault::kUsage,
-               fmt::format("{}: is there already, and is no such file of lamina; name another one, or replace it "
-                           "with --overwrite",
-                           path)};
+  return usage("{}: is there already, and is no such file of lamina; name another one, or replace it with --overwrite", path);
 }
 
 Status check_quote(const Arguments& arguments, const std::string& directory) {
   const std::string path = arguments.text("--quote");
   if (path.empty() || directory.empty() || !lies_in_job(path, directory)) return {};
-  return Error{Fault::kUsage, fmt::format("--quote {}: is among the files of the job in {}; name another file", one_line(path),
-                                          one_line(directory))};
+  return usage("--quote {}: is among the files of the job in {}; name another file", one_line(path), one_line(directory));
 }
 
 Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows) {
   if (!arguments.has("--quote")) return {};
-  if (rows.empty()) return Error{Fault::kInput, "--quote: the job has no machine, or layers whose time was not recorded"};
+  if (rows.empty()) return failure(Fault::kInput, "--quote: the job has no machine, or layers whose time was not recorded");
   return write_file(arguments.text("--quote"), cost::csv_text(rows));
 }
 
@@ -215,14 +205,13 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
     if ((!own.command.empty() && own.command != command) || !arguments.has(own.flag)) continue;
     const std::string path = arguments.text(own.flag);
     if (!own.stream && is_stream(path)) {
-      return Error{Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", path,
-                                               path == "-" ? "standard output" : "a device or a pipe")};
+      return failure(Fault::kOutput, "{}: is {}, not a file; name another one", path,
+                     path == "-" ? "standard output" : "a device or a pipe");
     }
     const Status status = check_own_file(path, own.marks);
     if (status) continue;
     if (const std::string directory = directory_read(path, arguments); !directory.empty())
-      return Error{Fault::kUsage,
-                   fmt::format("{}: belongs to {}, which this call reads; name another output", path, directory)};
+      return usage("{}: belongs to {}, which this call reads; name another output", path, directory);
     if (!arguments.has("--overwrite")) return status;
   }
   return {};

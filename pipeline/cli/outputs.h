@@ -12,8 +12,6 @@
 
 namespace lamina::pipeline {
 
-using pipeline::Arguments;
-
 /// An input file of a call, with its role: "the job file".
 struct InputFile {
   std::string path, role;

@@ -4,16 +4,18 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <tuple>
+#include <system_error>
 #include <vector>
 
+#include "pipeline/job/errors.h"
+#include "pipeline/job/job_command.h"
 #include "pipeline/job/keys.h"
-#include "pipeline/job/lists/job_command.h"
-#include "pipeline/job/lists/named_files.h"
+#include "pipeline/job/profiles/library.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/file_target.h"
 #include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -21,8 +23,109 @@ namespace {
 namespace fs = std::filesystem;
 
 Error refuse(const std::string& file, const TextPosition& at, const std::string& what) {
-  return {Fault::kUsage, fmt::format("{}{}", at.text(file), what)};
+  return usage("{}{}", at.text(file), what);
 }
+
+// --- The files that a job file names. Their relative paths begin at its folder, wherever lamina runs; profiles and presets
+// that are no paths are names, which stay.
+
+std::string path_from(const fs::path& folder, const std::string& path) {
+  return path.empty() || fs::path(path).is_absolute() ? path : (folder / path).lexically_normal().string();
+}
+
+/// A path that has lost its slash would be a name.
+std::string as_path(std::string path) { return is_profile_path(path) ? path : "./" + path; }
+
+std::string profile_from(const fs::path& folder, const std::string& name) {
+  return folder.empty() || !is_profile_path(name) ? name : as_path(path_from(folder, name));
+}
+
+void replace_path(TomlValue* table, std::string_view name, const fs::path& folder) {
+  TomlValue* const path = table != nullptr && table->is_table() ? table->find(name) : nullptr;
+  if (path != nullptr && path->is_text()) path->text = path_from(folder, path->text);
+}
+
+std::string divided(const std::string& name) {
+  return fmt::format("{}: a comma divides presets; rename the file or its folder", one_line(name));
+}
+
+/// Makes the path of a profile one from the working directory; one that is not there is noted as missing.
+void replace_profile(TomlValue& value, std::string_view key, const fs::path& folder, const std::string& file, Job& job) {
+  if (!value.is_text()) return;
+  const std::string said = value.text;
+  value.text = profile_from(folder, said);
+  std::error_code ignored;
+  if (names_stream(file) || !is_profile_path(value.text) || fs::exists(value.text, ignored)) return;
+  const bool here = fs::path(said).is_relative() && fs::exists(said, ignored);
+  job.missing.emplace_back(value.text,
+                           fmt::format("{}machine.{}: {}: no such machine profile; correct it (a relative path begins "
+                                       "beside the job file{})",
+                                       value.position.text(file), key, one_line(value.text),
+                                       here ? ", not where lamina runs, where " + one_line(said) + " is" : ""));
+}
+
+/// Of a list, or of a text with commas. errors  kUsage: the folder's name has a comma
+Status replace_presets(TomlValue& presets, const fs::path& folder, const std::string& file, Job& job) {
+  const auto text = flat_text(presets);
+  std::vector<std::string> names;
+  if (!text || !read_presets(*text, names).empty()) return {};  // the reader of the key reports the error
+  TomlValue list{TomlValue::Kind::kList, {}, {}, {}, presets.position};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const TextPosition position = names.size() == presets.value.size() ? presets.value[i].position : presets.position;
+    TomlValue& preset = list.value.emplace_back(TomlValue{TomlValue::Kind::kText, std::move(names[i]), {}, {}, position});
+    replace_profile(preset, "presets", folder, file, job);
+    if (preset.text.find(',') == std::string::npos) continue;
+    return refuse(file, position, "machine.presets: " + divided(preset.text));
+  }
+  presets = std::move(list);
+  return {};
+}
+
+/// Makes part.path, run.output, machine.profile and machine.presets of a job's tree paths from the working directory.
+/// file  the job file, for its folder and for messages; of a stream paths stay as they are
+/// errors  kUsage: a comma in the path of a preset, which divides them
+Status replace_paths(TomlValue& tree, const std::string& file, Job& job) {
+  const fs::path folder = names_stream(file) ? fs::path() : fs::path(file).parent_path();
+  if (TomlValue* const parts = tree.find("part"); parts != nullptr && parts->is_list()) {
+    for (TomlValue& part : parts->value) replace_path(&part, "path", folder);
+  }
+  replace_path(tree.find("run"), "output", folder);
+  TomlValue* const machine = tree.find("machine");
+  if (machine == nullptr || !machine->is_table()) return {};
+  if (TomlValue* const profile = machine->find("profile")) replace_profile(*profile, "profile", folder, file, job);
+  TomlValue* const presets = machine->find("presets");
+  return presets == nullptr ? Status() : replace_presets(*presets, folder, file, job);
+}
+
+/// The way back: a path as a file in `folder` names it, relative if it is below, else absolute. Unchanged for "".
+std::string path_in(const std::string& folder, const std::string& path) {
+  if (folder.empty() || path.empty()) return path;
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  const fs::path near = whole.lexically_relative(fs::absolute(folder).lexically_normal());
+  return near.empty() || *near.begin() == ".." ? whole.string() : near.string();
+}
+
+std::string profile_in(const std::string& folder, const std::string& name) {
+  return folder.empty() || !is_profile_path(name) ? name : as_path(path_in(folder, name));
+}
+
+/// A profile by its file's name alone, as manifests have it.
+std::string profile_name(const std::string& name) {
+  const std::string file = fs::path(name).filename().string();
+  return is_profile_path(name) && !file.empty() ? file : name;
+}
+
+/// Whether a job file in `folder` can name them. errors  kUsage: a path that is not UTF-8, a preset's with a comma
+Status check_nameable(const std::string& folder, const MachineRequest& machine) {
+  for (std::size_t i = 0; i <= machine.presets.size(); ++i) {
+    const std::string name = profile_in(folder, i == 0 ? machine.profile : machine.presets[i - 1]);
+    if (!is_utf8(name)) return Error{Fault::kUsage, name + ": a job file cannot name it, it is not UTF-8; rename it"};
+    if (i > 0 && name.find(',') != std::string::npos) return Error{Fault::kUsage, divided(name)};
+  }
+  return {};
+}
+
+// --- its text
 
 Status read_parts(const TomlValue& list, const std::string& file, Job& job) {
   if (!list.is_list() || list.value.empty() || !std::ranges::all_of(list.value, &TomlValue::is_table)) {
@@ -52,7 +155,7 @@ bool has_section(std::string_view section) {
 
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
-  if (Status status = pipeline::replace_paths(*tree, file, job.missing); !status) return status;
+  if (Status status = replace_paths(*tree, file, job); !status) return status;
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
     if (section == "part") {
@@ -102,7 +205,7 @@ Status read_assigned(const TomlValue& table, std::string_view section, const std
   std::string wrong;
   const auto* key = find_key(keys, section, name, wrong);
   if (key != nullptr) wrong = key->read(table.value.front(), target, unused);
-  return wrong.empty() ? Status() : Error{Fault::kUsage, fmt::format("{}: {}", option, wrong)};
+  return wrong.empty() ? Status() : usage("{}: {}", option, wrong);
 }
 
 }  // namespace
@@ -119,7 +222,7 @@ Status read_job_text(std::string_view text, const std::string& path, Job& job) {
 
 Status set_key(Job& job, std::string_view assignment) {
   const std::string option = fmt::format("--set {}", assignment);
-  const auto wrong = [&](const std::string& what) { return Error{Fault::kUsage, fmt::format("{}: {}", option, what)}; };
+  const auto wrong = [&](const std::string& what) { return usage("{}: {}", option, what); };
   const std::size_t equals = assignment.find('=');
   const auto names = split(assignment.substr(0, equals), ".");
   if (equals == std::string_view::npos || names.size() < 2 || names.size() > 3 || (names.size() == 3 && names[0] != "part")) {
@@ -155,9 +258,9 @@ Status set_key(Job& job, std::string_view assignment) {
 
 std::string job_text(const Job& job, const std::string& directory) {
   Job named = job;
-  named.output = pipeline::path_in(directory, named.output);
-  change_profiles(named.machine, [&](const std::string& name) { return pipeline::profile_in(directory, name); });
-  for (PartRequest& part : named.parts) part.path = pipeline::path_in(directory, part.path);
+  named.output = path_in(directory, named.output);
+  change_profiles(named.machine, [&](const std::string& name) { return profile_in(directory, name); });
+  for (PartRequest& part : named.parts) part.path = path_in(directory, part.path);
   std::string text = sections_text(job_keys(), named, [](const JobKey&, const std::string& value) { return !value.empty(); });
   for (const PartRequest& part : named.parts) text += part_text(part);
   return text;
@@ -167,7 +270,7 @@ std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
-  change_profiles(whole.machine, pipeline::profile_name);
+  change_profiles(whole.machine, profile_name);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
@@ -181,18 +284,13 @@ std::string canonical_job_text(const Job& job, Product product) {
 
 Result<File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
   for (const PartRequest& part : job.parts) {
-    if (same_file(path, part.path)) {
-      return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
-    }
-    if (!is_utf8(part.path)) {
-      return Error{Fault::kUsage, fmt::format("{}: a job file cannot name it, it is not UTF-8; rename it", part.path)};
-    }
+    if (same_file(path, part.path)) return usage("--save-job {}: is a part of the job; name another file", path);
+    if (!is_utf8(part.path)) return usage("{}: a job file cannot name it, it is not UTF-8; rename it", part.path);
   }
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
-  const auto& [profile, presets] = std::tie(job.machine.profile, job.machine.presets);
-  if (Status status = pipeline::check_nameable(directory.string(), profile, presets); !status) return status.error();
-  const std::string text = pipeline::job_command_line(command) + "\n\n" + job_text(job, directory.string());
+  if (Status status = check_nameable(directory.string(), job.machine); !status) return status.error();
+  const std::string text = job_command_line(command) + "\n\n" + job_text(job, directory.string());
   auto file = File::open(path, {.durable = durable ? Durable::kAll : Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());
   if (status) status = file->flush();

@@ -1,5 +1,3 @@
-#include "pipeline/job/fill.h"
-
 #include "pipeline/job/keys.h"
 #include "stages/support/text/ranges.h"
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
@@ -17,10 +18,8 @@ Status check_dose(const Job& job) {
   const DoseRequest& dose = job.dose;
   const auto check_signs = [](std::string_view key, const std::optional<std::array<double, 2>>& um) -> Status {
     if (!um || (*um)[0] * (*um)[1] >= 0) return {};
-    return Error{Fault::kUsage,
-                 fmt::format("{}: an edge moves inwards along both axes, or outwards (negative) along both; give two numbers "
-                             "of one sign",
-                             key)};
+    return usage("{}: an edge moves inwards along both axes, or outwards (negative) along both; give two numbers of one sign",
+                 key);
   };
   for (const auto& [key, um] : {std::pair{"dose.bleed_um", std::optional(dose.bleed_um)},
                                 {"dose.hole_bleed_um", dose.hole_bleed_um},
@@ -31,11 +30,11 @@ Status check_dose(const Job& job) {
     if (Status status = check_signs("part.bleed_um", part.bleed_um); !status) return status;
     if (Status status = check_signs("part.hole_bleed_um", part.hole_bleed_um); !status) return status;
     if (part.core_saturation_percent && !part.saturation_percent)
-      return Error{Fault::kUsage, "part.core_saturation_percent: changes a part.saturation_percent that is missing; add it"};
+      return usage("part.core_saturation_percent: changes a part.saturation_percent that is missing; add it");
     if (part.core_saturation_percent && dose.shell_mm == 0)
-      return Error{Fault::kUsage, "part.core_saturation_percent: is of what lies inside of a shell; add --shell"};
+      return usage("part.core_saturation_percent: is of what lies inside of a shell; add --shell");
     if (part.saturation_percent && !dose.saturation_percent)
-      return Error{Fault::kUsage, "part.saturation_percent: changes a saturation that is not asked for; add --saturation"};
+      return usage("part.saturation_percent: changes a saturation that is not asked for; add --saturation");
   }
   return {};
 }
@@ -54,42 +53,33 @@ std::vector<std::array<double, 2>> bleeds_of(const Job& job) {
 }
 
 Status check_job(const Job& job) {
-  if (job.parts.empty()) return Error{Fault::kUsage, "no part to plan; name one or more STL, OBJ or 3MF files"};
+  if (job.parts.empty()) return usage("no part to plan; name one or more STL, OBJ or 3MF files");
   for (const JobKey& key : job_keys()) {
-    if (const std::string wrong = key.check(job); !wrong.empty()) {
-      return Error{Fault::kUsage, fmt::format("{}.{}: {}", key.section, key.name, wrong)};
-    }
+    if (const std::string wrong = key.check(job); !wrong.empty()) return usage("{}.{}: {}", key.section, key.name, wrong);
   }
   for (const PartRequest& part : job.parts) {
     for (const PartKey& key : part_keys()) {
-      if (const std::string wrong = key.check(part); !wrong.empty()) {
-        return Error{Fault::kUsage, fmt::format("{}: {}.{}: {}", part.path, key.section, key.name, wrong)};
-      }
+      if (const std::string wrong = key.check(part); !wrong.empty())
+        return usage("{}: {}.{}: {}", part.path, key.section, key.name, wrong);
     }
   }
   if (const auto options = heights_options(job); !options) return options.error();
   if (const auto isa = usable_isa(job.isa); !isa) return isa.error();
   const DoseRequest& dose = job.dose;
   if (!dose.saturation_percent && (dose.core_saturation_percent || !dose.saturation_ranges.empty())) {
-    return Error{Fault::kUsage, fmt::format("dose.{}: changes a saturation that is not asked for; add --saturation",
-                                            dose.core_saturation_percent ? "core_saturation_percent" : "saturation_range")};
+    return usage("dose.{}: changes a saturation that is not asked for; add --saturation",
+                 dose.core_saturation_percent ? "core_saturation_percent" : "saturation_range");
   }
-  if (dose.core_saturation_percent && dose.shell_mm == 0) {
-    return Error{Fault::kUsage, "dose.core_saturation_percent: is of what lies inside of a shell; add --shell"};
-  }
+  if (dose.core_saturation_percent && dose.shell_mm == 0)
+    return usage("dose.core_saturation_percent: is of what lies inside of a shell; add --shell");
   if (Status status = check_dose(job); !status) return status;
-  if (dose.saturation_percent && dose.core < 1) {
-    return Error{Fault::kUsage, "dose.core: a share of the pixels and --saturation exclude each other; use --core-saturation"};
-  }
-  if (job.layers && job.shard) {
-    return Error{Fault::kUsage, "--layers and --shard exclude each other; a shard is a share of all layers"};
-  }
-  if (job.resume && job.overwrite) {
-    return Error{Fault::kUsage, "--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces"};
-  }
-  if (job.output.empty() && !job.dry_run) {
-    return Error{Fault::kUsage, "-o DIR is missing; name the directory for the layers, or use --dry-run"};
-  }
+  if (dose.saturation_percent && dose.core < 1)
+    return usage("dose.core: a share of the pixels and --saturation exclude each other; use --core-saturation");
+  if (job.layers && job.shard) return usage("--layers and --shard exclude each other; a shard is a share of all layers");
+  if (job.resume && job.overwrite)
+    return usage("--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces");
+  if (job.output.empty() && !job.dry_run)
+    return usage("-o DIR is missing; name the directory for the layers, or use --dry-run");
   return {};
 }
 
@@ -122,8 +112,8 @@ Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t l
   }
   if (!job.layers) return std::array<std::uint32_t, 2>{0, layer_count};
   if ((*job.layers)[0] >= layer_count) {
-    return Error{Fault::kUsage, fmt::format("--layers {}:: the job has {} layers, 0 to {}; begin below that", (*job.layers)[0],
-                                            layer_count, layer_count - 1)};
+    return usage("--layers {}:: the job has {} layers, 0 to {}; begin below that", (*job.layers)[0], layer_count,
+                 layer_count - 1);
   }
   return std::array<std::uint32_t, 2>{(*job.layers)[0], std::min((*job.layers)[1], layer_count)};
 }

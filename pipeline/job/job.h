@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/job/fill.h"
-#include "pipeline/job/part.h"
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
+#include "stages/data/saturation.h"
 #include "stages/data/status.h"
 #include "stages/heights/settings.h"
+#include "stages/infill/settings.h"
 #include "stages/segment/settings.h"
 #include "stages/support/text/changes.h"
 
@@ -47,6 +47,17 @@ struct SliceRequest {
   std::optional<double> tolerance_um;  // simplification: greatest displacement of contours; absent: tolerance_um_of()
   double bridge_mm = 0.1;              // longest gap in an open mesh that a straight segment closes
   double offset_mm = 0;                // offset of the contours, positive outwards
+};
+
+/// The keys of one filling.
+using FillSettings = infill::FillSettings;
+using FillChanges = Changes<FillSettings>;
+using FillRange = Range<FillSettings>;
+
+/// Section [fill].
+struct FillRequest {
+  FillSettings all;
+  std::vector<FillRange> ranges;  // none overlaps another
 };
 
 /// The keys of one segmentation.
@@ -98,6 +109,45 @@ struct DoseRequest {
   std::vector<SaturationRange> saturation_ranges;
   bool dithered = true;                                   // drops that are not whole; else they are rounded
   raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of filling beads, also where thick changes to thin
+};
+
+/// A different material between two heights, in mm above the bottom of a part. Where ranges overlap, the last one counts.
+struct MaterialRange {
+  double from_mm = 0, to_mm = 0;
+  std::string material;
+};
+
+/// The properties of images used as a part (docs/images-as-parts.md) that their files do not state.
+struct PartImages {
+  std::optional<std::array<std::int64_t, 2>> dpi;  // absent: by the tags of the files
+  std::optional<double> layer_mm;                  // absent: by the manifest next to them, or the job's
+  std::uint32_t threshold = 128;                   // grey below it is dark, 1 .. 255
+  bool invert = false;                             // bright pixels are jetted
+  bool missing_empty = false;                      // numbers that are missing are empty layers
+  bool crop = false;                               // what sticks out of the bed is cut off
+  bool resample = false;                           // another dpi than the job's is brought to it
+  bool operator==(const PartImages&) const = default;
+};
+
+/// One [[part]] of a job.
+struct PartRequest {
+  std::string path;
+  std::string named_at = {};  // position in the job file, "job.toml:12:8"; empty without one
+  std::string unit = "mm";    // mm, cm, m, um, inch, foot: for STL and OBJ, which store no unit
+  std::uint32_t copies = 1;
+  std::optional<std::array<double, 2>> at_mm = {};  // corner of the part's box on the bed; arranged if absent
+  std::optional<double> bottom_mm = {};             // height of the part's lowest point above the bed; absent: of images as
+                                                    // their manifest has it, else 0
+  std::array<double, 3> scale{1, 1, 1};
+  std::array<double, 3> rotate_deg{0, 0, 0};
+  std::array<double, 3> shrink{1, 1, 1};            // compensation factors per axis of the bed, applied last
+  FillChanges fill = {};                            // changes to the job's filling
+  std::string material = {};                        // name of its powder; set for all parts or for none
+  std::vector<MaterialRange> material_ranges = {};  // other materials between heights above its bottom
+  PartImages images = {};                           // of a part that is images
+  // --- instead of the job's
+  std::optional<std::array<double, 2>> bleed_um = {}, hole_bleed_um = {};
+  std::optional<Saturation> saturation_percent = {}, core_saturation_percent = {};  // at all heights; by its own corner
 };
 
 /// First the fields that decide the bytes of the output, then the others.
@@ -160,6 +210,25 @@ Result<heights::Options> heights_options(const Job& job);
 
 /// The job's slice.tolerance_um; if absent 10 for toolpaths, whose planners plan ahead over a few dozen moves, else 0.
 double tolerance_um_of(const Job& job, Product product);
+
+/// Sets the changed keys. A changed distance between lines replaces every earlier setting of that distance.
+void apply(const FillChanges& changes, FillSettings& settings);
+
+/// Sets the distances between lines in `changes`.
+void set_distances(const std::vector<double>& distance_mm, FillChanges& changes);
+
+/// Whether these settings produce walls or a filling in any layer.
+bool fills(const FillSettings& settings);
+
+/// The keys for the distance between lines whose values differ from their defaults; at most one of distance_mm,
+/// gap_formula, gap_by_height and gap_mm is valid.
+std::vector<std::string_view> distance_keys(const FillSettings& settings);
+/// The same for changes: every key that is set, to any value.
+std::vector<std::string_view> distance_keys(const FillChanges& changes);
+
+/// Sets the materials of the parts: "steel" for all, or "steel,bronze" one per part in order.
+/// errors  kUsage: wrong number of names, or an invalid name
+Status set_materials(std::string_view names, Job& job);
 
 /// Every bleed that a job or a part of it states.
 std::vector<std::array<double, 2>> bleeds_of(const Job& job);

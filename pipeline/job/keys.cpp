@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <optional>
 #include <vector>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/profiles/extruder.h"
 #include "pipeline/job/profiles/printer.h"
@@ -16,10 +20,24 @@
 #include "stages/heights/heights.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/ranges.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 
 namespace {
+
+/// The names of a section's keys on which the bytes of the same products depend.
+struct SectionKeys {
+  std::string_view section;
+  unsigned decides;
+  constexpr KeyName operator()(std::string_view name, std::string_view flag, std::string_view value, std::string_view meaning,
+                               std::string_view switch_text = {}) const {
+    return {section, name, flag, value, meaning, decides, switch_text};
+  }
+};
+constexpr SectionKeys heights_key{"heights", decides::all}, image_key{"image", decides::images},
+    printer_key{"machine", decides::images}, dose_key{"dose", decides::images},
+    slice_key{"slice", decides::contours | decides::moves}, part_key{"part", decides::all}, images_key{"part", decides::images};
 
 // --- [bed], [layers], [placement]
 
@@ -73,7 +91,6 @@ std::string read_thickness_text(std::string_view text, std::string& thickness_mm
   thickness_mm = text;
   return {};
 }
-std::string same_text(const std::string& text) { return text; }
 
 std::string read_time_model(std::string_view text, std::array<double, 2>& model) {
   std::vector<double> read;
@@ -90,64 +107,55 @@ constexpr auto kHeights = &Job::heights;
 constexpr Limits kLength{kMinMm, kMaxMm, " mm"}, kArea{0, 1e9, " mm2"};
 
 const JobKey kHeightsKeys[] = {
-    word<kModes, kHeights, &Request::mode>(
-        {"heights", "mode", "--heights", "MODE",
-         "how layers are decided: uniform, angle, cusp, stepwise, optimal; see docs/heights.md", decides::all}),
+    word<kModes, kHeights, &Request::mode>(heights_key(
+        "mode", "--heights", "MODE", "how layers are decided: uniform, angle, cusp, stepwise, optimal; see docs/heights.md")),
     custom<Job, read_thickness_text, same_text, kHeights, &Request::thickness_mm>(
-        {"heights", "thickness_mm", "--thickness", "SET|RANGE",
-         "thicknesses in mm: a set as 0.178,0.254, or a range as 0.05..0.3:0.01 (step 0.001 if left out); --layer if absent",
-         decides::all},
+        heights_key(
+            "thickness_mm", "--thickness", "SET|RANGE",
+            "thicknesses in mm: a set as 0.178,0.254, or a range as 0.05..0.3:0.01 (step 0.001 if left out); --layer if absent"),
         Form::kString),
     field<kHeights, &Request::cusp_mm>(
-        {"heights", "cusp_mm", "--cusp", "MM", "highest step on a slope, for cusp, stepwise and optimal", decides::all},
-        kLength),
+        heights_key("cusp_mm", "--cusp", "MM", "highest step on a slope, for cusp, stepwise and optimal"), kLength),
     word<kCuspsOf, kHeights, &Request::cusp_of>(
-        {"heights", "cusp_of", "--cusp-of", "printed|nominal",
-         "with --shrink: the steps that are printed, or those of the part once it has shrunk", decides::all}),
+        heights_key("cusp_of", "--cusp-of", "printed|nominal",
+                    "with --shrink: the steps that are printed, or those of the part once it has shrunk")),
     field<kHeights, &Request::adapt_angle_deg>(
-        {"heights", "adapt_angle_deg", "--adapt-angle", "DEG",
-         "angle: slopes at least this flat, before --shrink, get thinner layers; 0 is a wall, 90 a horizontal face",
-         decides::all},
+        heights_key("adapt_angle_deg", "--adapt-angle", "DEG",
+                    "angle: slopes at least this flat, before --shrink, get thinner layers; 0 is a wall, 90 a horizontal face"),
         {0, 90, " degrees"}),
-    field<kHeights, &Request::peak_angle_deg>({"heights", "peak_angle_deg", "--peak-angle", "DEG",
-                                               "facets at least this flat, and level, are horizontal faces", decides::all},
-                                              {45, 90, " degrees"}),
+    field<kHeights, &Request::peak_angle_deg>(
+        heights_key("peak_angle_deg", "--peak-angle", "DEG", "facets at least this flat, and level, are horizontal faces"),
+        {45, 90, " degrees"}),
     field<kHeights, &Request::normal_tolerance>(
-        {"heights", "normal_tolerance", "", "", "of the vertical component of a facet's normal, in all comparisons of angles",
-         decides::all},
+        heights_key("normal_tolerance", "", "", "of the vertical component of a facet's normal, in all comparisons of angles"),
         {0, 0.1}),
-    word<kFacets, kHeights, &Request::facets>(
-        {"heights", "facets", "--facets", "range|plane",
-         "what a layer looks at: facets within it, or only those that its bounding plane cuts, as in the documents",
-         decides::all}),
+    word<kFacets, kHeights, &Request::facets>(heights_key(
+        "facets", "--facets", "range|plane",
+        "what a layer looks at: facets within it, or only those that its bounding plane cuts, as in the documents")),
     field<kHeights, &Request::min_facet_mm2>(
-        {"heights", "facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing", decides::all}, kArea),
+        heights_key("facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing"), kArea),
     word<kPeaks, kHeights, &Request::peaks>(
-        {"heights", "peaks", "--peaks", "flats|facets",
-         "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all}),
-    field<kHeights, &Request::cover_top>({"heights", "cover_top", "--cover-top", "",
-                                          "angle and optimal: the last layer ends at the top or above it", decides::all,
-                                          "true"}),
-    field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",
-                                      "optimal: do not aim at horizontal faces and tops, only keep the step", decides::all,
-                                      "false"}),
+        heights_key("peaks", "--peaks", "flats|facets",
+                    "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)")),
+    field<kHeights, &Request::cover_top>(
+        heights_key("cover_top", "--cover-top", "", "angle and optimal: the last layer ends at the top or above it", "true")),
+    field<kHeights, &Request::flats>(heights_key(
+        "flats", "--no-flats", "", "optimal: do not aim at horizontal faces and tops, only keep the step", "false")),
     field<kHeights, &Request::min_flat_mm2>(
-        {"heights", "flat_mm2", "--flat-area", "MM2", "horizontal faces smaller than this are not aimed at", decides::all},
-        kArea),
+        heights_key("flat_mm2", "--flat-area", "MM2", "horizontal faces smaller than this are not aimed at"), kArea),
     field<kHeights, &Request::flat_tolerance_um>(
-        {"heights", "flat_tolerance_um", "--flat-tolerance", "UM",
-         "horizontal faces that near are one, and a layer that ends that near hits it, in micrometres", decides::all},
+        heights_key("flat_tolerance_um", "--flat-tolerance", "UM",
+                    "horizontal faces that near are one, and a layer that ends that near hits it, in micrometres"),
         {0, 1000, " um"}),
     custom<Job, read_time_model, write_time_model, kHeights, &Request::time_model>(
-        {"heights", "time_model", "--time-model", "S[,S]",
-         "optimal: the least time instead of the fewest layers; seconds a layer, and a mm2 of its section", decides::all},
+        heights_key("time_model", "--time-model", "S[,S]",
+                    "optimal: the least time instead of the fewest layers; seconds a layer, and a mm2 of its section"),
         Form::kList),
-    word<kContainments, kHeights, &Request::containment>({"heights", "containment", "--containment", "across|inside|outside",
-                                                          "whether steps lie across the true surface, inside or outside of it",
-                                                          decides::all}),
-    field<kHeights, &Request::per_part>({"heights", "per_part", "--per-part", "",
-                                         "each part gets its own layers within common slabs (material extrusion)", decides::all,
-                                         "true"}),
+    word<kContainments, kHeights, &Request::containment>(
+        heights_key("containment", "--containment", "across|inside|outside",
+                    "whether steps lie across the true surface, inside or outside of it")),
+    field<kHeights, &Request::per_part>(heights_key(
+        "per_part", "--per-part", "", "each part gets its own layers within common slabs (material extrusion)", "true")),
 };
 
 // --- [image]
@@ -170,16 +178,16 @@ std::string check_image_format(std::string_view text) {
 std::string check_title(std::string_view) { return {}; }
 
 const JobKey kImageKeys[] = {
-    text<check_image_format, &Job::format>({"image", "format", "--format", "FORMAT", "of the layer files", decides::images})
+    text<check_image_format, &Job::format>(image_key("format", "--format", "FORMAT", "of the layer files"))
         .with_words(image_formats),
     word<kFillRules, &Job::fill_rule>(
         {"image", "fill", "--fill-rule", "RULE",
          "what is solid where shells overlap: nonzero (any), positive (drops shells turned inside out), evenodd",
          decides::all}),
-    word<kMirrors, &Job::mirror>({"image", "mirror", "--mirror", "x|y|xy|none",
-                                  "turn the image over: x swaps left and right, y back and front", decides::images}),
-    text<check_title, &Job::title>({"image", "title", "--title", "NAME",
-                                    "of the job: TIFF layers then tell it, the layer and z in their tags", decides::images}),
+    word<kMirrors, &Job::mirror>(
+        image_key("mirror", "--mirror", "x|y|xy|none", "turn the image over: x swaps left and right, y back and front")),
+    text<check_title, &Job::title>(
+        image_key("title", "--title", "NAME", "of the job: TIFF layers then tell it, the layer and z in their tags")),
 };
 
 // --- [machine], [dose]
@@ -226,11 +234,11 @@ using raster::BeadEnds;
 
 std::string read_rule(std::string_view text, std::optional<VatRule>& rule) {
   VatRule read{};
-  std::string wrong = pipeline::read_vat_rule(text, read);
+  std::string wrong = read_vat_rule(text, read);
   if (wrong.empty()) rule = read;
   return wrong;
 }
-std::string rule_text(const std::optional<VatRule>& rule) { return rule ? pipeline::vat_rule_text(*rule) : std::string(); }
+std::string rule_text(const std::optional<VatRule>& rule) { return rule ? vat_rule_text(*rule) : std::string(); }
 
 constexpr Word<std::uint32_t> kLevels[] = {{"off", 0}, {"2", 2}, {"4", 4}, {"16", 16}};
 
@@ -241,68 +249,59 @@ const JobKey kMachineKeys[] = {
         {"machine", "profile", "--machine", "NAME|FILE",
          "write the print program of this machine, and take bed and dpi from it; lamina machines lists them",
          decides::images | decides::moves}),
-    custom<Job, pipeline::read_presets, pipeline::presets_text, &Job::machine, &MachineRequest::presets>(
-        {"machine", "presets", "--preset", "NAME|FILE,...",
-         "powder, binder and process that change the machine's profile, in their order; lamina machines lists them",
-         decides::images},
+    custom<Job, read_presets, presets_text, &Job::machine, &MachineRequest::presets>(
+        printer_key("presets", "--preset", "NAME|FILE,...",
+                    "powder, binder and process that change the machine's profile, in their order; lamina machines lists them"),
         Form::kStrings),
     field<&Job::machine, &MachineRequest::scan_speed_mm_s>(
-        {"machine", "scan_speed_mm_s", "--scan-speed", "MM/S", "of the head over the bed, instead of the machine's",
-         decides::images},
+        printer_key("scan_speed_mm_s", "--scan-speed", "MM/S", "of the head over the bed, instead of the machine's"),
         {1e-3, 1e6, " mm/s"}),
     field<&Job::machine, &MachineRequest::blocked>(
-        {"machine", "blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's",
-         decides::images},
+        printer_key("blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's"),
         {0, 65'534}),
     custom<Job, read_rule, rule_text, &Job::machine, &MachineRequest::vat_rule>(
-        {"machine", "vat_rule", "--vat-rule", "RULE",
-         "vat that feeds a layer of two powders, instead of the machine's; refuse: there must be none", decides::images},
+        printer_key("vat_rule", "--vat-rule", "RULE",
+                    "vat that feeds a layer of two powders, instead of the machine's; refuse: there must be none"),
         Form::kString)
-        .with_words(pipeline::vat_rule_words),
+        .with_words(vat_rule_words),
 };
 
 const JobKey kDoseKeys[] = {
     field<&Job::dose, &DoseRequest::bleed_um>(
-        {"dose", "bleed_um", "--bleed", "UM|XxY",
-         "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it",
-         decides::images},
+        dose_key("bleed_um", "--bleed", "UM|XxY",
+                 "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it"),
         kBleedUm),
-    field<&Job::dose, &DoseRequest::hole_bleed_um>({"dose", "hole_bleed_um", "--hole-bleed", "UM|XxY",
-                                                    "the same at the edges of holes, if it differs there", decides::images},
-                                                   kBleedUm),
+    field<&Job::dose, &DoseRequest::hole_bleed_um>(
+        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "the same at the edges of holes, if it differs there"), kBleedUm),
     field<&Job::dose, &DoseRequest::first_bleed_um>(
-        {"dose", "first_bleed_um", "--first-bleed", "UM|XxY", "the same at all edges of the first layers, if it differs there",
-         decides::images},
+        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "the same at all edges of the first layers, if it differs there"),
         kBleedUm),
-    field<&Job::dose, &DoseRequest::first_layers>(
-        {"dose", "first_layers", "--first-layers", "N", "that --first-bleed is of", decides::images}, {1, 1'000'000})
+    field<&Job::dose, &DoseRequest::first_layers>(dose_key("first_layers", "--first-layers", "N", "that --first-bleed is of"),
+                                                  {1, 1'000'000})
         .shown_if([](const Job& job) { return job.dose.first_layers != DoseRequest().first_layers; }),
     field<&Job::dose, &DoseRequest::shell_mm>(
-        {"dose", "shell_mm", "--shell", "MM",
-         "depth below the edge of a layer that gets all its binder (with --core or --fill)", decides::images},
+        dose_key("shell_mm", "--shell", "MM",
+                 "depth below the edge of a layer that gets all its binder (with --core or --fill)"),
         {0, 1000, " mm"}),
     field<&Job::dose, &DoseRequest::core>(
-        {"dose", "core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1", decides::images},
-        {0, 1}),
+        dose_key("core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1"), {0, 1}),
     structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(
-        {"dose", "saturation_percent", "--saturation", "PERCENT|FORMULA",
-         "of the voids of the powder that binder fills, by as many drops a pixel as it takes; of x, y, z in mm",
-         decides::images}),
+        dose_key("saturation_percent", "--saturation", "PERCENT|FORMULA",
+                 "of the voids of the powder that binder fills, by as many drops a pixel as it takes; of x, y, z in mm")),
     structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::core_saturation_percent>(
-        {"dose", "core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
-         "the same inside of the shell (with --saturation and --shell)", decides::images}),
+        dose_key("core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
+                 "the same inside of the shell (with --saturation and --shell)")),
     structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
-        {"dose", "saturation_range", "", "[{...}]", "other saturations between two heights above the bed", decides::images}),
-    word<kLevels, &Job::levels>({"dose", "levels", "--levels", "2|4|16|off",
-                                 "of drops by how full a voxel is, exactly, instead of by its centre alone", decides::images})
+        dose_key("saturation_range", "", "[{...}]", "other saturations between two heights above the bed")),
+    word<kLevels, &Job::levels>(dose_key("levels", "--levels", "2|4|16|off",
+                                         "of drops by how full a voxel is, exactly, instead of by its centre alone"))
         .with_form(Form::kBare)
         .shown_if([](const Job& job) { return job.levels > 0; }),
-    field<&Job::dose, &DoseRequest::dithered>({"dose", "dithered", "--no-dither", "",
-                                               "round drops to whole ones (with --levels or --saturation)", decides::images,
-                                               "false"}),
+    field<&Job::dose, &DoseRequest::dithered>(
+        dose_key("dithered", "--no-dither", "", "round drops to whole ones (with --levels or --saturation)", "false")),
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
-        {"dose", "bead_ends", "--bead-ends", "round|square",
-         "of the beads that fill a part, and of their thick and thin stretches", decides::images})
+        dose_key("bead_ends", "--bead-ends", "round|square",
+                 "of the beads that fill a part, and of their thick and thin stretches"))
         .shown_if([](const Job& job) { return job.dose.bead_ends != BeadEnds::kRound; }),
 };
 
@@ -318,8 +317,6 @@ std::string check_slice_format(std::string_view text) {
   return formats::find_slice_format(text) != nullptr ? "" : not_one_of(text, slice_format_words());
 }
 
-constexpr unsigned kContour = decides::contours | decides::moves;
-
 const JobKey kSliceKeys[] = {
     text<check_slice_format, &Job::slice, &SliceRequest::format>(
         {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none",
@@ -332,30 +329,27 @@ const JobKey kSliceKeys[] = {
         {"slice", "empty_first_layer", "--empty-first-layer", "",
          "CLI: begin with an empty layer at the bottom, from which readers infer the thickness", decides::contours, "true"}),
     field<&Job::slice, &SliceRequest::tolerance_um>(
-        {"slice", "tolerance_um", "--tolerance", "UM", "points are left out if the contour moves by no more, in micrometres",
-         kContour},
+        slice_key("tolerance_um", "--tolerance", "UM", "points are left out if the contour moves by no more, in micrometres"),
         {0, 1e6, " um"}),
     field<&Job::slice, &SliceRequest::bridge_mm>(
-        {"slice", "bridge_mm", "--bridge", "MM", "longest gap of an open mesh (--no-repair) that is closed, in mm", kContour},
+        slice_key("bridge_mm", "--bridge", "MM", "longest gap of an open mesh (--no-repair) that is closed, in mm"),
         {0, 1000, " mm"}),
     field<&Job::slice, &SliceRequest::offset_mm>(
-        {"slice", "offset_mm", "--offset", "MM", "contours are moved outwards by this, inwards if negative", kContour},
+        slice_key("offset_mm", "--offset", "MM", "contours are moved outwards by this, inwards if negative"),
         {-1000, 1000, " mm"}),
 };
 
 // --- [extrude]
 
-std::string read_machine_changes(const TomlValue& tree, pipeline::ProfileChanges& changes, TextPosition& at) {
-  return tree.is_text() ? pipeline::read_changes(tree.text, changes) : pipeline::read_changes(tree, changes, at);
+std::string read_machine_changes(const TomlValue& tree, ProfileChanges& changes, TextPosition& at) {
+  return tree.is_text() ? read_changes(tree.text, changes) : read_changes(tree, changes, at);
 }
 
 JobKey machine_key() {
-  JobKey key = structure<read_machine_changes, pipeline::changes_text, &Job::extrude, &ExtrudeRequest::machine>(
+  JobKey key = structure<read_machine_changes, changes_text, &Job::extrude, &ExtrudeRequest::machine>(
       {"extrude", "machine", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in fan.from_layer=2",
        decides::moves});
-  key.read_text = [](const JobKey&, std::string_view text, Job& job) {
-    return pipeline::read_changes(text, job.extrude.machine);
-  };
+  key.read_text = [](const JobKey&, std::string_view text, Job& job) { return read_changes(text, job.extrude.machine); };
   return key;
 }
 
@@ -505,6 +499,102 @@ const JobKey kRunKeys[] = {
         Form::kString),
 };
 
+// --- [[part]]
+
+constexpr double kMaxFactor = 1e6, kMinScale = 1e-6, kMinShrink = 0.1;
+constexpr std::string_view kUnits[] = {"mm", "cm", "m", "um", "inch", "foot"};
+
+std::string check_unit(std::string_view text) {
+  return std::ranges::find(kUnits, text) == std::end(kUnits) ? not_one_of(text, kUnits) : std::string();
+}
+
+// Factors of 0 flatten a part; of shrink, negative ones make no sense.
+// clang below 18 takes no double as a template's argument.
+template <const double& Low, bool Negative>
+std::string read_factors(std::string_view text, std::array<double, 3>& factors) {
+  std::array<double, 3> read{};
+  if (auto wrong = read_value(text, {Negative ? -kMaxFactor : Low, kMaxFactor, "", true}, read); !wrong.empty()) return wrong;
+  for (const double factor : read) {
+    if (std::abs(factor) >= Low) continue;
+    return fmt::format("{} is out of range; give factors of at least {}", number_text(factor), Low);
+  }
+  factors = read;
+  return {};
+}
+std::string write_factors(const std::array<double, 3>& factors) { return value_text(factors); }
+
+/// What no mesh is called: images, whose manifest may say where they begin.
+bool may_be_images(const PartRequest& part) {
+  constexpr std::string_view kMeshes[] = {".stl", ".obj", ".3mf", ".gz"};
+  return !part.path.empty() &&
+         std::ranges::find(kMeshes, lower_case(std::filesystem::path(part.path).extension().string())) == std::end(kMeshes);
+}
+
+PartKey bottom_key() {
+  PartKey key = field<&PartRequest::bottom_mm>(
+      part_key("bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed, in mm"), {0, kMaxMm, " mm"});
+  key.write_text = [](const PartKey&, const PartRequest& part) { return value_text(part.bottom_mm.value_or(0)); };
+  return key.shown_if([](const PartRequest& part) { return part.bottom_mm || !may_be_images(part); });
+}
+
+const PartKey kPartKeys[] = {
+    text<check_path, &PartRequest::path>(part_key(
+        "path", "", "FILE", "STL, OBJ or 3MF file, or a folder of layer images; in a job file, relative to that file")),
+    text<check_unit, &PartRequest::unit>(
+        part_key("unit", "--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot"))
+        .with_words([] { return std::vector<std::string_view>(std::begin(kUnits), std::end(kUnits)); }),
+    field<&PartRequest::copies>(part_key("copies", "--copies", "N", "of each part, 1 to 1000000"), {1, 1'000'000}),
+    field<&PartRequest::at_mm>(
+        part_key("at_mm", "--at", "X,Y", "where the part's box starts, in mm from the bed's front left; else arranged"),
+        {0, kMaxMm, " mm"}),
+    bottom_key(),
+    custom<PartRequest, read_factors<kMinScale, true>, write_factors, &PartRequest::scale>(
+        part_key("scale", "--scale", "S|X,Y,Z", "factors per axis of the file; a negative one mirrors"), Form::kList),
+    field<&PartRequest::rotate_deg>(
+        part_key("rotate_deg", "--rotate", "X,Y,Z", "degrees about x, then y, then z, after scaling"),
+        {-36000, 36000, " degrees"}),
+    custom<PartRequest, read_factors<kMinShrink, false>, write_factors, &PartRequest::shrink>(
+        part_key("shrink", "--shrink", "S|X,Y,Z", "factors per axis of the bed that make up for shrinkage, applied last"),
+        Form::kList),
+    structure<read_fill_changes, fill_changes_text, &PartRequest::fill>(
+        part_key("fill", "", "{...}", "keys of the job's filling that differ for this part")),
+    text<check_material, &PartRequest::material>(
+        part_key("material", "", "NAME", "powder of the part, for machines with two vats")),
+    structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
+        part_key("material_range", "", "[{...}]", "other powders between two heights above the part's bottom")),
+    field<&PartRequest::images, &PartImages::dpi>(
+        images_key("dpi", "", "DPI|XxY", "of a part that is images, if their files do not tell it"), {1, 25'400, "", true}),
+    field<&PartRequest::images, &PartImages::layer_mm>(
+        images_key("layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's"),
+        {0.001, kMaxMm, " mm"}),
+    field<&PartRequest::images, &PartImages::threshold>(
+        images_key("threshold", "", "N", "grey below it is jetted, 1 to 255; of images"), {1, 255})
+        .shown_if([](const PartRequest& part) { return part.images.threshold != PartImages().threshold; }),
+    field<&PartRequest::images, &PartImages::invert>(
+        images_key("invert", "", "", "bright pixels are jetted, not dark ones; of images"))
+        .shown_if([](const PartRequest& part) { return part.images.invert; }),
+    field<&PartRequest::images, &PartImages::missing_empty>(
+        images_key("missing_empty", "", "", "numbers that are missing among images are empty layers"))
+        .shown_if([](const PartRequest& part) { return part.images.missing_empty; }),
+    field<&PartRequest::images, &PartImages::crop>(
+        images_key("crop", "", "", "what of images sticks out of the bed is cut off"))
+        .shown_if([](const PartRequest& part) { return part.images.crop; }),
+    field<&PartRequest::images, &PartImages::resample>(
+        images_key("resample", "", "", "images of another dpi than the job's are brought to it"))
+        .shown_if([](const PartRequest& part) { return part.images.resample; }),
+    field<&PartRequest::bleed_um>(
+        images_key("bleed_um", "", "UM|XxY", "of this part, instead of dose.bleed_um and dose.hole_bleed_um"), kBleedUm),
+    field<&PartRequest::hole_bleed_um>(images_key("hole_bleed_um", "", "UM|XxY", "of this part's holes, if it differs there"),
+                                       kBleedUm),
+    structure<read_saturation, saturation_text, &PartRequest::saturation_percent>(images_key(
+        "saturation_percent", "", "PERCENT|FORMULA",
+        "of this part at all heights, instead of dose.saturation_percent and its ranges; of x, y, z from its corner")),
+    structure<read_saturation, saturation_text, &PartRequest::core_saturation_percent>(
+        images_key("core_saturation_percent", "", "PERCENT|FORMULA", "the same inside of its shell; absent: as in it")),
+};
+
+constexpr Key<MaterialRange> kMaterialKeys[] = {text<check_material, &MaterialRange::material>({"material_range", "material"})};
+
 }  // namespace
 
 std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, TextPosition&) {
@@ -545,6 +635,43 @@ std::span<const JobKey> job_keys() {
     return all;
   }();
   return keys;
+}
+
+std::span<const PartKey> part_keys() { return kPartKeys; }
+
+Status set_materials(std::string_view text, Job& job) {
+  const auto names = split(text, ",");
+  if (names.size() != 1 && names.size() != job.parts.size())
+    return usage("{} names for {} parts; give one for all or one for each", names.size(), job.parts.size());
+  for (std::size_t p = 0; p < job.parts.size(); ++p) {
+    const auto name = names[names.size() == 1 ? 0 : p];
+    if (const std::string what = check_material(name); !what.empty()) return Error{Fault::kUsage, what};
+    job.parts[p].material = name;
+  }
+  return {};
+}
+
+std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, TextPosition& at) {
+  if (auto wrong = check_tables(list, "from_mm, to_mm and material"); !wrong.empty()) return wrong;
+  std::vector<MaterialRange> read;
+  for (TomlValue table : list.value) {
+    MaterialRange& range = read.emplace_back();
+    at = table.position;
+    if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
+    if (auto wrong = read_table<MaterialRange>(table, "material_range", kMaterialKeys, range, at); !wrong.empty()) return wrong;
+    if (range.material.empty()) return fmt::format("{}: material is missing", range_name(range.from_mm, range.to_mm));
+  }
+  ranges = std::move(read);
+  return {};
+}
+
+std::string material_ranges_text(const std::vector<MaterialRange>& ranges) {
+  std::string text;
+  for (const auto& [from, to, material] : ranges) {
+    text += fmt::format("{}{{ from_mm = {}, to_mm = {}, material = {} }}", text.empty() ? "" : ", ", number_text(from),
+                        number_text(to), toml_string(material));
+  }
+  return text.empty() ? text : fmt::format("[{}]", text);
 }
 
 std::vector<KeyFacts> key_facts() {

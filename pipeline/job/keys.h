@@ -40,6 +40,9 @@ inline constexpr Limits kBleedUm{-10'000, 10'000, " um", true};
 /// Reads a number of per cent or a formula of x, y and z. returns "" or an error message; at  its place
 std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, TextPosition& at);
 std::string saturation_text(const std::optional<Saturation>& percent);
+/// Reads an array of tables { from_mm, to_mm, material }. returns "" or an error message; at  its place
+std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, TextPosition& at);
+std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 /// Reads a rule for shells that overlap.
 std::string read_fill_rule(std::string_view text, FillRule& rule);
 

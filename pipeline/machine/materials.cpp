@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/profiles/printer.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/value.h"
@@ -23,8 +24,7 @@ std::string names_text(const std::vector<JobMaterial>& materials) {
 Status use(const std::string& name, const std::string& part, const Machine* machine, std::vector<JobMaterial>& used) {
   if (std::ranges::find(used, name, &JobMaterial::name) != used.end()) return {};
   for (const JobMaterial& other : used) {
-    if (const std::string what = pipeline::check_case(other.name, name); !what.empty())
-      return wrong(fmt::format("{}: {}", part, what));
+    if (const std::string what = check_case(other.name, name); !what.empty()) return wrong(fmt::format("{}: {}", part, what));
   }
   JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
   if (machine != nullptr && !machine->powder.materials.empty()) {
@@ -108,10 +108,10 @@ Result<std::vector<std::uint32_t>> vats_of_layer(const Machine& machine, const M
   for (const std::uint32_t m : present) {
     held += fmt::format("{}{} pixels of {}", held.empty() ? "" : " and ", readable_count(pixels[m]), materials.used[m].name);
   }
-  return Error{Fault::kUsage,
-               fmt::format("{}, but {} feeds a layer from one vat; move the parts to other heights or into jobs of "
-                           "their own, or print it with --vat-rule majority, first, second or both",
-                           held, machine.name)};
+  return usage(
+      "{}, but {} feeds a layer from one vat; move the parts to other heights or into jobs of "
+      "their own, or print it with --vat-rule majority, first, second or both",
+      held, machine.name);
 }
 
 std::uint64_t unfed_pixels(const JobMaterial& material, std::span<const std::uint32_t> feeds, std::uint64_t pixels) {

@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <vector>
 
 #include "pipeline/job/decisions.h"
-#include "pipeline/job/lists/named_files.h"
+#include "pipeline/job/errors.h"
 #include "stages/bead/predicted_tables.h"
 #include "stages/geometry/bead_section.h"
 #include "stages/program/dialect.h"
@@ -23,47 +21,53 @@ namespace {
 
 /// The files of a profile, shipped or the user's. unknown(suggestion, names)  makes the error for an unknown name
 template <class Unknown>
-Result<pipeline::ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
-                                    const Unknown& unknown) {
-  const pipeline::Library library = profile_library();
+Result<ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped, const Unknown& unknown) {
+  const Library library = profile_library();
   std::vector<std::string_view> names = names_of(shipped);
-  if (!pipeline::is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
+  if (!is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
       !library.is_own(name_or_file)) {
     const std::vector<std::string> own = library.own_names();
     names.insert(names.end(), own.begin(), own.end());
     return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
   }
-  pipeline::ProfileFiles files;
+  ProfileFiles files;
   const Status status = library.add(name_or_file, files);
-  return status ? Result<pipeline::ProfileFiles>(std::move(files)) : status.error();
+  return status ? Result<ProfileFiles>(std::move(files)) : status.error();
 }
 
 bool is_one_of(std::span<const ShippedProfile> shipped, std::string_view name) {
   return std::ranges::find(shipped, name, &ShippedProfile::name) != shipped.end();
 }
 
-Result<ExtruderProfile> extruder_of(const pipeline::ProfileFiles& files) {
+Result<ExtruderProfile> extruder_of(const ProfileFiles& files) {
   if (have_section(files, "head") && !have_section(files, "material"))
     return Error{Fault::kUsage, files.back().where + ": is the profile of a powder printer; lamina jet takes it"};
   count(Decision::kMachine);
-  auto profile = pipeline::read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
+  auto profile = read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
-  if (const Status status = segment::check(profile->calibration); !status) {
-    return Error{Fault::kUsage, fmt::format("{}: calibration.{}", files.back().where, status.error().message)};
-  }
+  if (const Status status = segment::check(profile->calibration); !status)
+    return usage("{}: calibration.{}", files.back().where, status.error().message);
   return profile;
+}
+
+/// errors  kUsage: one of the profiles is not there, says the job file that names it
+Status check_there(const Job& job, const std::vector<std::string>& presets) {
+  for (const auto& [path, what] : job.missing) {
+    if (path == job.machine.profile || std::ranges::find(presets, path) != presets.end()) return Error{Fault::kUsage, what};
+  }
+  return {};
 }
 
 }  // namespace
 
-pipeline::Library profile_library() {
+Library profile_library() {
   std::vector<ShippedProfile> all;
   for (const auto shipped : {shipped_machines(), shipped_presets(), shipped_extruders()})
     all.insert(all.end(), shipped.begin(), shipped.end());
-  return {std::move(all), pipeline::profile_folder()};
+  return {std::move(all), profile_folder()};
 }
 
-Result<Machine> read_machine(const pipeline::ProfileFiles& files) {
+Result<Machine> read_machine(const ProfileFiles& files) {
   if (have_section(files, "material") && !have_section(files, "head")) {
     const auto other = extruder_of(files);
     return Error{Fault::kUsage, other ? files.back().where + ": is the profile of an extrusion printer; lamina extrude takes it"
@@ -72,12 +76,12 @@ Result<Machine> read_machine(const pipeline::ProfileFiles& files) {
   count(Decision::kMachine);
   std::vector<std::string_view> dialects;
   for (const auto& dialect : program::dialects()) dialects.push_back(dialect.id);
-  return pipeline::read_machine(files, dialects);
+  return read_machine(files, dialects);
 }
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
   auto keys = read_toml(text, where);
-  return keys ? read_machine(pipeline::ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
+  return keys ? read_machine(ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
 }
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
@@ -85,7 +89,7 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
   return keys ? extruder_of({{std::move(*keys), where, {}}}) : keys.error();
 }
 
-Result<pipeline::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
+Result<ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
   auto files = find(name_or_file, shipped_machines(), [&](const std::string& near, const std::string& names) {
     if (is_one_of(shipped_extruders(), name_or_file))
       return fmt::format("'{}' is an extrusion printer, of lamina extrude; name a profile or one of {}", name_or_file, names);
@@ -125,14 +129,13 @@ Result<bool> names_extruder(const std::string& name_or_file) {
 }
 
 Result<ExtruderProfile> resolve_extruder(const Job& job) {
-  if (Status status = pipeline::check_there(job.missing, job.machine.profile, {}); !status) return status.error();
+  if (Status status = check_there(job, {}); !status) return status.error();
   auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
   if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
   ExtruderProfile& profile = *found;
   for (const auto& [name, value] : job.extrude.machine) {
-    if (const std::string wrong = pipeline::set_extruder_key(name, value, profile); !wrong.empty()) {
-      return Error{Fault::kUsage, fmt::format("extrude.machine: {}", wrong)};
-    }
+    if (const std::string wrong = set_extruder_key(name, value, profile); !wrong.empty())
+      return usage("extrude.machine: {}", wrong);
   }
   const ExtrudeRequest& r = job.extrude;
   Extruder& m = profile.machine;
@@ -180,7 +183,7 @@ void leave_to_machine(const Extruder& machine, Job& job) {
 
 namespace {
 
-Error wrong(const std::string& key, const std::string& what) { return {Fault::kUsage, fmt::format("{}: {}", key, what)}; }
+Error wrong(const std::string& key, const std::string& what) { return usage("{}: {}", key, what); }
 
 }  // namespace
 
@@ -209,8 +212,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
     printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
     return printer;
   }
-  const Status there = pipeline::check_there(job.missing, request.profile, request.presets);
-  if (!there) return there.error();
+  if (const Status status = check_there(job, request.presets); !status) return status.error();
   Result<Machine> found = find_machine(request.profile, request.presets);
   if (!found) return found.error();
   Machine& machine = *found;

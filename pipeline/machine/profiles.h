@@ -21,27 +21,25 @@
 
 namespace lamina::pipeline {
 
-using pipeline::names_of;
-using pipeline::ShippedProfile;
 std::span<const ShippedProfile> shipped_machines();   // powder printers, pipeline/machine/shipped/printers/*.toml
 std::span<const ShippedProfile> shipped_presets();    // powder, binder and process for them, presets/*.toml there
 std::span<const ShippedProfile> shipped_extruders();  // pipeline/machine/shipped/extruders/*.toml
 
 /// All of them, and the user's own.
-pipeline::Library profile_library();
+Library profile_library();
 
 /// Reads a profile that inherits nothing. `where` names it in messages.
 /// errors  kUsage: place, key, reason; an unknown dialect
 Result<Machine> read_machine(std::string_view text, const std::string& where);
-Result<Machine> read_machine(const pipeline::ProfileFiles& files);
+Result<Machine> read_machine(const ProfileFiles& files);
 
 /// The same for an extrusion printer; the default calibration is the published one of the Anet A8.
 /// errors  kUsage: place, key, reason; those of segment::check
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where);
 
 /// The files of a powder printer's profile by name or file, and those of presets, which change it in their order.
-/// errors  kUsage, with the known names; of pipeline::Library
-Result<pipeline::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets = {});
+/// errors  kUsage, with the known names; of Library
+Result<ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets = {});
 
 /// The profile with that name, or in that file (a text with a slash or ending in .toml).
 /// errors  kUsage, with the known names

@@ -11,8 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/manifest/manifest_head.h"
-#include "pipeline/manifest/manifest_line.h"
+#include "pipeline/manifest/manifest_text.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
@@ -21,6 +20,8 @@
 
 namespace lamina {
 
+namespace fs = std::filesystem;
+
 Hash128 ManifestHead::id() const {
   const std::string text = lasting_text(*this);
   return hash_bytes(std::as_bytes(std::span(text)));
@@ -28,7 +29,7 @@ Hash128 ManifestHead::id() const {
 
 std::string title_of(const std::vector<PartSummary>& parts) {
   if (parts.empty()) return {};
-  const std::string name = std::filesystem::path(parts.front().path).filename().string();
+  const std::string name = fs::path(parts.front().path).filename().string();
   return parts.size() == 1 ? name : name + " and " + std::to_string(parts.size() - 1) + " more";
 }
 
@@ -97,7 +98,7 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
 
 bool has_record(const std::string& path) {
   std::error_code error;
-  return std::filesystem::exists(path, error) || has_manifest_head(part_of(path));
+  return fs::exists(path, error) || has_manifest_head(part_of(path));
 }
 
 Status check_begun_manifest(const std::string& part) {
@@ -382,6 +383,53 @@ std::optional<Product> product_of_manifest(const std::string& path) {
   const auto head = read_manifest_head(path);
   if (!head) return std::nullopt;
   return head->product;
+}
+
+Result<ImagesOnRecord> images_on_record(const std::string& path) {
+  ImagesOnRecord reported{path, 0, 0, {}, 0};
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return reported;
+  std::string manifest = path + "/manifest.json";
+  if (product_of_manifest(manifest) == Product::kImages) {
+    reported.path = path + "/layers";
+  } else {
+    manifest = (fs::path(path).lexically_normal() / "../manifest.json").string();
+    if (!fs::equivalent(path, fs::path(path) / "../layers", ignored) || product_of_manifest(manifest) != Product::kImages)
+      return reported;
+  }
+  const auto read = read_manifest(manifest);
+  if (!read || read->layers.empty()) return reported;
+  if (read->head.grey_drops()) {
+    return Error{Fault::kInput,
+                 fmt::format("{}: its images are drops of a pixel as grey, which are no shares of a part; plan its "
+                             "parts again, or copy the images into a folder of their own",
+                             one_line(manifest))};
+  }
+  if (read->head.named_images() > 0) {
+    return Error{Fault::kInput,
+                 fmt::format("{}: has several images a layer, of drops or materials; plan its parts again, or name a "
+                             "folder with one image a layer",
+                             one_line(manifest))};
+  }
+  const Layer first = read->layers.front().layer;
+  reported.bottom = first.bottom;
+  reported.thickness = first.thickness;
+  reported.mirror = read->head.mirror;
+  reported.levels = read->head.full_level() > 0 ? read->head.levels : 0;
+  for (const LayerRecord& record : read->layers) {
+    if (record.layer.thickness == first.thickness) continue;
+    return Error{Fault::kInput,
+                 fmt::format("{}: layer {} is {} mm thick, the first one {} mm; images as parts are layers of one thickness",
+                             one_line(manifest), record.layer.index, mm(record.layer.thickness), mm(first.thickness))};
+  }
+  return reported;
+}
+
+bool are_grey_drops(const std::string& image) {
+  const std::string manifest = (fs::path(image).parent_path() / "../manifest.json").string();
+  if (product_of_manifest(manifest) != Product::kImages) return false;
+  const auto read = read_manifest(manifest);
+  return read && read->head.grey_drops();
 }
 
 }  // namespace lamina

@@ -137,6 +137,21 @@ Status check_begun_manifest(const std::string& part);
 /// The product of a manifest, from its first lines; nothing if the file is absent or not a manifest of this version.
 std::optional<Product> product_of_manifest(const std::string& path);
 
+/// The record of layer images by the manifest next to them.
+struct ImagesOnRecord {
+  std::string path;              // of the images
+  Nm bottom = 0, thickness = 0;  // of the first layer, of all; 0: nothing is on record
+  std::string mirror;            // of the job that wrote them
+  std::uint32_t levels = 0;      // of shares of voxels, that they carry; 0: they are of 1 bit
+};
+
+/// path  a job's directory, its layers/, or anything else, of which nothing is on record
+/// errors  kInput: several images a layer, or layers of several thicknesses
+Result<ImagesOnRecord> images_on_record(const std::string& path);
+
+/// Whether an image is a layer of a job whose manifest says that its grey is drops of a pixel. False where none says so.
+bool are_grey_drops(const std::string& image);
+
 /// Appends layers in order; thread-compatible (the flow records one layer at a time).
 class ManifestWriter {
  public:

@@ -54,7 +54,18 @@ struct PathFacts {
   std::vector<RangePores> by_range;
 
   /// Sums the fields. Summed in layer order, the result is deterministic.
-  void add(const PathFacts& other);
+  void add(const PathFacts& other) {
+    contours += other.contours;
+    points += other.points;
+    paths += other.paths;
+    merged += other.merged > 0 ? 1 : 0;
+    open += other.open;
+    area_mm2 += other.area_mm2;
+    bead_mm += other.bead_mm;
+    stored_points += other.stored_points;
+    totals.add(other.totals);
+    deposited.add(other.deposited);
+  }
 };
 
 struct LayerRecord {
@@ -83,8 +94,18 @@ struct LayerRecord {
   const ImageRecord& image_of(std::size_t material, std::size_t materials) const {
     return images[material * (images.size() / materials)];
   }
-  std::vector<std::uint64_t> pixels_of_materials(std::size_t materials) const;
-  std::uint64_t drops_of(std::size_t material, std::size_t materials) const;
+  std::vector<std::uint64_t> pixels_of_materials(std::size_t materials) const {
+    std::vector<std::uint64_t> pixels(materials);
+    for (std::size_t m = 0; m < materials; ++m) pixels[m] = image_of(m, materials).set_pixels;
+    return pixels;
+  }
+  std::uint64_t drops_of(std::size_t material, std::size_t materials) const {
+    const std::size_t each = images.size() / materials;
+    std::uint64_t sum = 0;
+    for (std::size_t i = material * each; i < (material + 1) * each; ++i)
+      sum += images[i].drops > 0 ? images[i].drops : images[i].set_pixels;
+    return sum;
+  }
 
   std::shared_ptr<const PathFacts> paths;  // null for images
 

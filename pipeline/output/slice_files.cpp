@@ -10,7 +10,7 @@
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/file.h"
-#include "pipeline/manifest/kept.h"
+#include "pipeline/manifest/layered_file.h"
 #include "pipeline/output/directory.h"
 #include "stages/formats/slice_format.h"
 #include "stages/support/io/file.h"

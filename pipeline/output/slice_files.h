@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/manifest/kept.h"
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"

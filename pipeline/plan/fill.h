@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "pipeline/job/fill.h"
+#include "pipeline/job/job.h"
 #include "stages/data/status.h"
 #include "stages/infill/parameters.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/job/fill.h"
 #include "pipeline/job/job.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"

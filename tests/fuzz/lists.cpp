@@ -1,5 +1,5 @@
 // Lists of batches, and their words.
-#include "pipeline/job/lists/batch_list.h"
+#include "pipeline/batch/job.h"
 #include "stages/load/load.h"
 #include "stages/support/text/escape.h"
 #include "tests/fuzz/laws.h"
@@ -9,7 +9,7 @@ namespace {
 
 bool read_list(std::string_view text) {
   static MemoryFile file("jobs.txt");
-  const auto entries = pipeline::read_batch({file.hold(text)}, {"jet"}, load::is_part_name);
+  const auto entries = pipeline::read_batch({file.hold(text)}, {"jet"});
   if (!entries) return check_error(entries.error()), false;
   law(!entries->empty(), "a batch without jobs");
   for (const pipeline::BatchEntry& entry : *entries) {
@@ -33,8 +33,7 @@ std::vector<std::string> list_seeds() {
       "# parts\njet bracket.stl --dpi 600 -o bracket\nlamina extrude 'a part.stl' -o \"out \\\"1\\\".gcode\"\n\nslice x.3mf\r\n"};
 }
 
-const Registered kList(
-    {"batch_list", read_list, list_seeds, "pipeline/job/lists/batch_list stages/support/text", ".txt", {}, 1024});
+const Registered kList({"batch_list", read_list, list_seeds, "pipeline/batch/job stages/support/text", ".txt", {}, 1024});
 
 }  // namespace
 }  // namespace lamina::fuzz

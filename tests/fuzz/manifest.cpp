@@ -1,8 +1,7 @@
 // Manifests: finished ones, and what an interrupted run left.
 #include "pipeline/manifest/manifest.h"
 
-#include "pipeline/manifest/manifest_head.h"
-#include "pipeline/manifest/manifest_line.h"
+#include "pipeline/manifest/manifest_text.h"
 #include "stages/program/dialect.h"
 #include "tests/fuzz/laws.h"
 

@@ -11,9 +11,9 @@
 #include "pipeline/batch/summary.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
-#include "pipeline/job/lists/batch_list.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
@@ -31,6 +31,7 @@ constexpr std::uint64_t kMinBatchBytes = 48ull << 20;  // the layers of one job,
 
 CommandSpec batch_spec() {
   CommandSpec spec;
+  const auto sync = std::ranges::find(job_keys(), "--sync", &JobKey::flag);
   spec.summary =
       "Runs many jobs in one queue that shares the processors and a memory budget. A job that fails does so alone; each\n"
       "result and reason is in OUT/summary.json and OUT/summary.tsv. A batch that was killed goes on with --resume.";
@@ -43,12 +44,8 @@ CommandSpec batch_spec() {
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
       {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
       {"--memory", "SIZE", "what all running jobs may hold together: 512M, 4G", "1G", "Run"},
-      {"--sync",
-       "WHEN",
-       "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off",
-       "job",
-       "Run",
-       {"layer", "job", "off"}},
+      {"--sync", "WHEN", "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off", "job", "Run",
+       sync->words()},
       {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
@@ -141,18 +138,15 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
   const std::string& name = words.front();
   const Command* command = find_command(name);
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
-  if (command == &batch_command || command->reads_itself) {
-    return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", name)};
-  }
+  if (command == &batch_command || command->reads_itself)
+    return usage("'{}' cannot be a job of a batch; run it by itself", name);
   const CommandSpec spec = spec_of(*command);
-  const Result<Arguments> read = pipeline::read_arguments(spec, {words.begin() + 1, words.end()});
+  const Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
   if (!read) return read.error();
-  if (read->help) return Error{Fault::kUsage, "--help is no job"};
+  if (read->help) return usage("--help is no job");
   Job planned;
   if (read->has("--job")) {
-    if (names_stream(read->text("--job"))) {
-      return Error{Fault::kUsage, "--job: a job of a batch cannot read standard input; name a file"};
-    }
+    if (names_stream(read->text("--job"))) return usage("--job: a job of a batch cannot read standard input; name a file");
     if (Status status = read_job(read->text("--job"), planned); !status) return status.error();
   }
 
@@ -188,11 +182,9 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
 /// The settings from the options, and the default words for parts. errors  kUsage
 Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::string>& words) {
   BatchOptions options;
-  if (arguments.operands.empty()) {
-    return Error{Fault::kUsage, "no jobs; name a list, a directory of parts, or TOML job files"};
-  }
+  if (arguments.operands.empty()) return usage("no jobs; name a list, a directory of parts, or TOML job files");
   options.directory = arguments.text("-o,--output");
-  if (options.directory.empty()) return Error{Fault::kUsage, "-o DIR is missing; name the directory of the batch"};
+  if (options.directory.empty()) return usage("-o DIR is missing; name the directory of the batch");
   const auto with = split_words(arguments.has("--with") ? arguments.text("--with") : "jet");
   if (!with) return at_option("--with", with.error().message).error();
   if (with->empty()) return at_option("--with", "no command; as in --with 'jet --dpi 600'").error();
@@ -210,14 +202,11 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
   }
   if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
   options.fail_fast = arguments.has("--fail-fast");
-  if (options.fail_fast && arguments.has("--keep-going")) {
-    return Error{Fault::kUsage, "--keep-going and --fail-fast exclude each other"};
-  }
+  if (options.fail_fast && arguments.has("--keep-going")) return usage("--keep-going and --fail-fast exclude each other");
   options.resume = arguments.has("--resume");
   options.overwrite = arguments.has("--overwrite");
-  if (options.resume && options.overwrite) {
-    return Error{Fault::kUsage, "--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces"};
-  }
+  if (options.resume && options.overwrite)
+    return usage("--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces");
   return options;
 }
 
@@ -269,7 +258,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
   const BatchOptions& options = *read;
-  Result<std::vector<BatchEntry>> entries = pipeline::read_batch(arguments.operands, with, load::is_part_name);
+  Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
   const auto read_words = [sync = arguments.text("--sync")](const auto& words) { return read_call(words, sync); };
   const auto jobs =

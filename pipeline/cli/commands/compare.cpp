@@ -2,9 +2,10 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/scan_program.h"
+#include "pipeline/cli/other_programs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/units.h"
 #include "stages/formats/images/image.h"
 #include "stages/support/text/json_value.h"
@@ -28,7 +29,7 @@ CommandSpec compare_spec() {
 }
 
 Outcome run_compare(const Arguments& arguments, Context& context) {
-  if (arguments.operands.size() != 2) return Error{Fault::kUsage, "name the image of a layer, and a photograph of it"};
+  if (arguments.operands.size() != 2) return usage("name the image of a layer, and a photograph of it");
   double photo_um = 100;
   if (Status status = arguments.read("--pixel", {1, 2000, " um"}, photo_um); !status) return status;
   const auto machine = arguments.has("--machine") ? find_machine(arguments.text("--machine")) : Machine();
@@ -36,7 +37,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   const auto layer = formats::dark_pixels(arguments.operands[0], are_grey_drops(arguments.operands[0]) ? 255 : 128);
   if (!layer) return layer.error();
   if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
-    return Error{Fault::kInput, fmt::format("{}: tells no resolution; give an image that lamina wrote", arguments.operands[0])};
+    return failure(Fault::kInput, "{}: tells no resolution; give an image that lamina wrote", arguments.operands[0]);
   const auto reported = scanned("compare",
                                 {{"photo", arguments.operands[1]},
                                  {"photo_um", photo_um},

@@ -7,7 +7,8 @@
 #include <optional>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/job/errors.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/dose/shares.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/layer_images.h"
@@ -100,7 +101,7 @@ Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) 
   formats::Bytes file;
   const Status status = all.grey != nullptr ? code_grey(all, layer, file, done) : code_bits(all, layer, file, done);
   if (!status && status.error().fault == Fault::kOutput)
-    return Error{status.error().fault, fmt::format("image {}: {}", layer, status.error().message)};
+    return failure(status.error().fault, "image {}: {}", layer, status.error().message);
   if (!status) return status;
   done.bytes = file.size();
   return write_file(all.name(layer), file, {.lock = false, .follow = false, .durable = Durable::kNo});
@@ -111,16 +112,15 @@ Status check_output(const Conversion& all, const std::string& stack) {
   std::error_code error;
   const fs::path in = fs::weakly_canonical(stack, error), out = fs::weakly_canonical(all.output, error);
   if (out == in || (fs::is_regular_file(in, error) && in.parent_path() == out))
-    return Error{Fault::kUsage, fmt::format("-o {}: is where the images are; name another directory", all.output)};
+    return usage("-o {}: is where the images are; name another directory", all.output);
   if (fs::exists(all.output, error) && !fs::is_directory(all.output, error))
-    return Error{Fault::kOutput, fmt::format("-o {}: is a file, not a directory; name another one", all.output)};
+    return failure(Fault::kOutput, "-o {}: is a file, not a directory; name another one", all.output);
   for (std::uint32_t l = 0; !all.overwrite && l < all.images.layers(); ++l) {
     if (fs::exists(fs::symlink_status(all.name(l), error)))
-      return Error{Fault::kUsage,
-                   fmt::format("{}: is there already; replace it with --overwrite, or name another directory", all.name(l))};
+      return usage("{}: is there already; replace it with --overwrite, or name another directory", all.name(l));
   }
   fs::create_directories(all.output, error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", all.output, error.message())};
+  if (error) return failure(Fault::kOutput, "{}: {}", all.output, error.message());
   return {};
 }
 
@@ -142,7 +142,7 @@ Status convert_all(const Conversion& all, const std::atomic<bool>& cancel, Conve
     if (!status && (!wrong || layer < wrong->first)) wrong.emplace(layer, status.error());
   });
   if (wrong) return wrong->second;
-  if (cancel) return Error{Fault::kInterrupted, "interrupted; images that are written stay, --overwrite writes them again"};
+  if (cancel) return failure(Fault::kInterrupted, "interrupted; images that are written stay, --overwrite writes them again");
   return {};
 }
 
@@ -151,10 +151,7 @@ Result<formats::LayerImagesRequest> request_of(const Arguments& arguments) {
   request.invert = arguments.has("--invert");
   request.missing_empty = arguments.has("--missing-empty");
   std::int64_t threshold = 128;
-  if (arguments.has("--threshold")) {
-    if (const std::string why = read_whole(arguments.text("--threshold"), 1, 255, threshold); !why.empty())
-      return Error{Fault::kUsage, "--threshold: " + why};
-  }
+  if (Status status = arguments.read("--threshold", {1, 255}, threshold); !status) return status.error();
   request.threshold = static_cast<int>(threshold);
   return request;
 }
@@ -164,7 +161,7 @@ Status choose_format(const Arguments& arguments, const std::string& id, Conversi
   all.bits = formats::find_image_format(id);
   all.grey = formats::find_level_format(id);
   if (all.grey == nullptr && (all.bits == nullptr || all.bits->extension.empty()))
-    return Error{Fault::kUsage, fmt::format("--format {}: is none of the image formats; `lamina jet --help` lists them", id)};
+    return usage("--format {}: is none of the image formats; `lamina jet --help` lists them", id);
   const bool nibbles = id == "tiff-4";
   all.full = nibbles ? 15 : 255;
   if (all.grey == nullptr && arguments.has("--levels"))
@@ -181,27 +178,21 @@ Status choose_format(const Arguments& arguments, const std::string& id, Conversi
 }
 
 Outcome run_convert(const Arguments& arguments, Context& context) {
-  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one stack: a folder of images, or a file"};
+  if (arguments.operands.size() != 1) return usage("name one stack: a folder of images, or a file");
   const std::string& stack = arguments.operands.front();
   const std::string output = arguments.text("-o,--output"), mirror = arguments.text("--mirror");
-  if (output.empty()) return Error{Fault::kUsage, "-o DIR is missing; name a directory for the images"};
+  if (output.empty()) return usage("-o DIR is missing; name a directory for the images");
   const std::string id = arguments.has("--format") ? arguments.text("--format") : "tiff-g4";
   Conversion all{{}, nullptr, nullptr, 0, {}, output, mirror, 0, arguments.has("--overwrite")};
   if (Status status = choose_format(arguments, id, all); !status) return status;
-  if (!mirror.empty() && mirror != "x" && mirror != "y" && mirror != "xy")
-    return Error{Fault::kUsage, fmt::format("--mirror {}: give x, y or xy", mirror)};
+  if (!mirror.empty() && mirror != "x" && mirror != "y" && mirror != "xy") return usage("--mirror {}: give x, y or xy", mirror);
   const auto request = request_of(arguments);
   if (!request) return request.error();
   std::array<std::int64_t, 2> given{0, 0};
-  if (arguments.has("--dpi")) {
-    if (const std::string why = read_value(arguments.text("--dpi"), {1, 25'400, "", true}, given); !why.empty())
-      return Error{Fault::kUsage, "--dpi: " + why};
-  }
   std::int64_t threads = 0;
-  if (arguments.has("--threads")) {
-    if (const std::string why = read_whole(arguments.text("--threads"), 0, 4096, threads); !why.empty())
-      return Error{Fault::kUsage, "--threads: " + why};
-  }
+  for (const Status& status :
+       {arguments.read("--dpi", {1, 25'400, "", true}, given), arguments.read("--threads", {0, 4096}, threads)})
+    if (!status) return status;
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   const auto reported = images_on_record(stack);
@@ -211,8 +202,7 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   std::array<double, 2>& dpi = all.dpi;
   dpi = {images->dpi_x(), images->dpi_y()};
   if (given[0] > 0) dpi = {static_cast<double>(given[0]), static_cast<double>(given[1])};
-  if (!(dpi[0] > 0) || !(dpi[1] > 0))
-    return Error{Fault::kInput, fmt::format("{}: its files tell no resolution; give --dpi", stack)};
+  if (!(dpi[0] > 0) || !(dpi[1] > 0)) return failure(Fault::kInput, "{}: its files tell no resolution; give --dpi", stack);
   for (double& one : dpi) {
     if (std::abs(one - std::round(one)) < 0.02) one = std::round(one);  // of whole pixels a metre
   }

@@ -6,6 +6,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/design_page.h"
 #include "stages/segment/permeability.h"  // the unit
@@ -107,16 +108,15 @@ Result<TargetEnds> read_target(const Arguments& arguments) {
     if (!status) return status.error();
   }
   const int targets = arguments.has("--porosity") + arguments.has("--permeability") + arguments.has("--pore");
-  if (targets == 0) return Error{Fault::kUsage, "nothing is wished for; give --porosity, --permeability or --pore"};
-  if (targets == 3)
-    return Error{Fault::kUsage, "--porosity, --permeability and --pore are more than a filling can follow; leave one out"};
+  if (targets == 0) return usage("nothing is wished for; give --porosity, --permeability or --pore");
+  if (targets == 3) return usage("--porosity, --permeability and --pore are more than a filling can follow; leave one out");
   return target;
 }
 
 /// The regions of a gradient. errors  kUsage
 Result<std::vector<segment::TargetStep>> read_steps(const Arguments& arguments, const TargetEnds& target) {
   if (arguments.has("--tops") && (arguments.has("--height") || arguments.has("--steps")))
-    return Error{Fault::kUsage, "--tops says all regions, --height and --steps make equal ones; give one of the two"};
+    return usage("--tops says all regions, --height and --steps make equal ones; give one of the two");
   const auto profile = designable_extruder(arguments.text("--machine"));
   if (!profile) return profile.error();
   const double layer_mm = profile->calibration.height_mm;
@@ -134,7 +134,7 @@ Result<std::vector<segment::TargetStep>> read_steps(const Arguments& arguments, 
         return at_option("--tops", wrong).error();
     }
   } else if (!arguments.has("--height")) {
-    return Error{Fault::kUsage, "a gradient needs the part's height; give --height MM, or --tops MM,MM,... of its regions"};
+    return usage("a gradient needs the part's height; give --height MM, or --tops MM,MM,... of its regions");
   }
   const bool equal = tops_mm.empty();
   auto tops = equal ? segment::equal_tops(height, steps, layer_mm) : segment::whole_tops(tops_mm, layer_mm);
@@ -168,12 +168,11 @@ Outcome give_found(const Found& found, const std::string& missed, const Argument
     if (const Status status = context.give(as_json(found, written ? output : "")); !status) return status;
   }
   if (enough) return {};
-  return Error{Fault::kVerification, fmt::format("not reachable: {}; write it with --nearest", missed)};
+  return failure(Fault::kVerification, "not reachable: {}; write it with --nearest", missed);
 }
 
 Outcome run_design(const Arguments& arguments, Context& context) {
-  if (!arguments.has("--machine"))
-    return Error{Fault::kUsage, "--machine is missing; name an extrusion printer, as lamina extrude takes it"};
+  if (!arguments.has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
   const auto target = read_target(arguments);
   if (!target) return target.error();
   auto request = read_request(arguments);

@@ -4,7 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/summary.h"
@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const KeyChoice kExportKeys = {"bed.size_mm", "placement", "load", "run.output", "part"};
+constexpr std::string_view kExportKeys = "bed.size_mm placement load run.output part";
 
 CommandSpec export_spec() {
   CommandSpec spec;
@@ -51,11 +51,11 @@ CommandSpec export_spec() {
 enum class MeshFormat { kStl, k3mf };
 
 Result<MeshFormat> format_of(const std::string& output) {
-  if (output.empty()) return Error{Fault::kUsage, "-o FILE is missing; name a .stl or .3mf file, or - for STL on stdout"};
+  if (output.empty()) return usage("-o FILE is missing; name a .stl or .3mf file, or - for STL on stdout");
   const std::string ending = lower_case(fs::path(output).extension().string());
   if (ending == ".3mf") return MeshFormat::k3mf;
   if (ending == ".stl" || ending.empty() || is_stream(output)) return MeshFormat::kStl;
-  return Error{Fault::kUsage, fmt::format("-o {}: end the name with .stl or .3mf", output)};
+  return usage("-o {}: end the name with .stl or .3mf", output);
 }
 
 /// The bed on which a product of the job would stand.
@@ -133,16 +133,15 @@ Json json_of(const Scene& scene, const Exported& exported, const std::string& ou
 Outcome run_export(const Arguments& arguments, Context& context) {
   const Result<Job> job = read_job_options(kExportKeys, arguments);
   if (!job) return job.error();
-  if (job->parts.empty()) return Error{Fault::kUsage, "no part to write; name one or more STL, OBJ or 3MF files"};
+  if (job->parts.empty()) return usage("no part to write; name one or more STL, OBJ or 3MF files");
   const std::string& output = job->output;
   const Result<MeshFormat> format = format_of(output);
   if (!format) return format.error();
   if (Status status = *format == MeshFormat::k3mf ? formats::check_3mf_date() : Status(); !status) return status;
   if (Status status = check_needs(Product::kContours, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  if (is_file(output) && !arguments.has("--overwrite")) {
-    return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another file", output)};
-  }
+  if (is_file(output) && !arguments.has("--overwrite"))
+    return usage("{}: is there already; replace it with --overwrite, or name another file", output);
   const Result<Bed> bed = bed_of(*job);
   if (!bed) return bed.error();
   const Result<Scene> scene = load_scene(*job, *bed);

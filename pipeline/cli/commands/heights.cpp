@@ -4,10 +4,9 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
-#include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/other_programs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
-#include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/heights.h"
 #include "pipeline/report/heights_plot.h"
@@ -20,8 +19,8 @@ namespace lamina::pipeline {
 namespace {
 
 // Of [[part]] what changes its shape or height.
-const KeyChoice kHeightsCommandKeys = {"layers",     "heights",         "load",       "part.unit", "part.bottom_mm",
-                                       "part.scale", "part.rotate_deg", "part.shrink"};
+constexpr std::string_view kHeightsCommandKeys =
+    "layers heights load part.unit part.bottom_mm part.scale part.rotate_deg part.shrink";
 
 enum class Form { kText, kCsv, kJson, kRp3 };
 constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"json", Form::kJson}, {"rp3", Form::kRp3}};
@@ -64,7 +63,7 @@ Result<HeightsJob> job_of(const Arguments& arguments) {
   Result<Job> read = read_job_options(kHeightsCommandKeys, arguments);
   if (!read) return read.error();
   const Job requested = *read;
-  if (read->parts.empty()) return Error{Fault::kUsage, "no part to look at; name one or more STL, OBJ or 3MF files"};
+  if (read->parts.empty()) return usage("no part to look at; name one or more STL, OBJ or 3MF files");
   // Heights do not depend on the parts' positions or on the size of the bed.
   if (read->bed_mm || read->machine.profile.empty()) read->bed_mm = kLargestBed.size_mm;
   read->dry_run = true;
@@ -84,11 +83,10 @@ Result<HeightsJob> job_of(const Arguments& arguments) {
 Status check_one_table(const Job& job, const Arguments& arguments) {
   const bool many = arguments.all("--measure").size() > 1;
   if (!arguments.has("--compare") && !job.heights.per_part && !many) return {};
-  return Error{Fault::kUsage,
-               fmt::format("--format rp3: holds one table, and {} makes several; leave it out or choose text, csv or json",
-                           arguments.has("--compare") ? "--compare"
-                           : job.heights.per_part     ? "--per-part"
-                                                      : "more than one --measure")};
+  return usage("--format rp3: holds one table, and {} makes several; leave it out or choose text, csv or json",
+               arguments.has("--compare") ? "--compare"
+               : job.heights.per_part     ? "--per-part"
+                                          : "more than one --measure");
 }
 
 std::string rp3_text(const Job& job, const heights::Study& study) {

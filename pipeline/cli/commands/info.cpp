@@ -4,8 +4,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
-#include "pipeline/manifest/images_on_record.h"
+#include "pipeline/job/errors.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/report/part_info.h"
@@ -29,21 +29,12 @@ CommandSpec info_spec() {
   spec.operand_meaning =
       "STL, OBJ or 3MF file, also gzipped STL and OBJ, toolpaths, as in part.gcode, or layer images, a folder or a file; as many "
       "as you like";
-  spec.options = {{"--unit",
-                   "UNIT",
-                   "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot",
-                   "mm",
-                   "",
-                   {"mm", "cm", "m", "um", "inch", "foot"}},
+  const std::vector<std::string_view> units = {"mm", "cm", "m", "um", "inch", "foot"}, modes = {"auto", "winding", "off"};
+  spec.options = {{"--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", "mm", "", units},
                   {"--scale", "S|X,Y,Z", "factors per axis of the file", "1", ""},
                   {"--rotate", "X,Y,Z", "degrees about x, then y, then z", "0,0,0", ""},
                   {"--drop-bad", "", "drop facets with coordinates that are no numbers", "", ""},
-                  {"--repair",
-                   "MODE",
-                   "how open meshes are closed: auto, winding (approximate) or off",
-                   "auto",
-                   "",
-                   {"auto", "winding", "off"}},
+                  {"--repair", "MODE", "how open meshes are closed: auto, winding (approximate) or off", "auto", "", modes},
                   {"--weld", "UM", "repair joins open edges this far apart, in micrometres; 5 grows by itself", "5", ""},
                   {"--threshold", "N", "of images: grey below it counts as set, 1 to 255", "128", ""},
                   {"--density", "G/CM3", "of the filament of toolpaths, where the file tells none", "", ""},
@@ -89,8 +80,7 @@ Status report_images(const std::string& path, int threshold, const Arguments& ar
   }
   const Status status = arguments.has("--json") ? context.give(json) : context.print(text);
   if (!status || info->unreadable == 0) return status;
-  return Error{Fault::kInput,
-               fmt::format("{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images)};
+  return failure(Fault::kInput, "{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images);
 }
 
 /// errors  kUsage: an option that is of none of the operands
@@ -107,9 +97,9 @@ Status check_flags(const Arguments& arguments) {
 }
 
 Outcome run_info(const Arguments& arguments, Context& context) {
-  if (arguments.operands.empty()) return Error{Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"};
+  if (arguments.operands.empty()) return usage("no part to look at; name an STL, OBJ or 3MF file");
   // Read as lamina jet reads them.
-  const Result<Job> job = read_job_options({"part", "load"}, arguments);
+  const Result<Job> job = read_job_options("part load", arguments);
   if (!job) return job.error();
   if (Status status = check_needs(Product::kImages, arguments, *job); !status) return status;
   double density_g_cm3 = 0;
@@ -118,26 +108,23 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--threshold", {1, 255}, threshold); !status) return status;
   if (Status status = check_flags(arguments); !status) return status;
   int code = 0;
+  const bool json = arguments.has("--json");
   for (const PartRequest& part : job->parts) {
+    Status status;
     if (names_toolpaths(part.path)) {
-      if (Status status = report_print(part.path, density_g_cm3, arguments, context); !status)
-        code = std::max(code, context.complain(status.error()));
-      continue;
+      status = report_print(part.path, density_g_cm3, arguments, context);
+    } else if (formats::names_images(part.path)) {
+      status = report_images(part.path, static_cast<int>(threshold), arguments, context);
+    } else {
+      const auto page =
+          (json ? describe_part_json : describe_part_text)(part.path, load_options(*job, part), slice::surplus_areas);
+      if (page) {
+        if (status = json ? context.give(parse_json(*page)) : context.print(*page); !status) return status.error();
+        continue;
+      }
+      status = page.error();
     }
-    if (formats::names_images(part.path)) {
-      if (Status status = report_images(part.path, static_cast<int>(threshold), arguments, context); !status)
-        code = std::max(code, context.complain(status.error()));
-      continue;
-    }
-    const load::LoadOptions options = load_options(*job, part);
-    const Result<std::string> page =
-        (arguments.has("--json") ? describe_part_json : describe_part_text)(part.path, options, slice::surplus_areas);
-    if (!page) {
-      code = std::max(code, context.complain(page.error()));
-      continue;
-    }
-    const Status status = arguments.has("--json") ? context.give(parse_json(*page)) : context.print(*page);
-    if (!status) return status.error();
+    if (!status) code = std::max(code, context.complain(status.error()));
   }
   return code;
 }

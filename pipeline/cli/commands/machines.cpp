@@ -144,9 +144,9 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
   if (!powder) {
     const auto extrusion = find_extruder(name);
     if (!extrusion) return powder.error();
-    return whole ? pipeline::extruder_text(*extrusion) : explain(*extrusion);
+    return whole ? extruder_text(*extrusion) : explain(*extrusion);
   }
-  if (whole) return pipeline::sourced_text(pipeline::machine_text(*powder), *files);
+  if (whole) return sourced_text(machine_text(*powder), *files);
   const auto resolved = resolve_profile(*powder);
   if (!resolved) return resolved.error();
   const auto full = time_full_layer(*resolved);
@@ -166,7 +166,7 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
   }
   std::string text;
   std::vector<std::string> presets;
-  if (Status status = arguments.read("--preset", pipeline::read_presets, presets); !status) return status;
+  if (Status status = arguments.read("--preset", read_presets, presets); !status) return status;
   if (arguments.has("--dialects")) {
     for (const program::Dialect& dialect : program::dialects())
       text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
@@ -191,7 +191,7 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     }
     text += "\n--preset:\n";
     for (const ShippedProfile& shipped : shipped_presets()) text += fmt::format("{}\n", shipped.name);
-    const pipeline::Library library = profile_library();
+    const Library library = profile_library();
     if (!library.own_names().empty()) text += fmt::format("\nin {}:\n", one_line(library.folder()));
     for (const std::string& name : library.own_names()) text += one_line(name) + "\n";
     text += "\nlamina extrude:\n";

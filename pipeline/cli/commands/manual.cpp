@@ -9,8 +9,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "pipeline/cli/terminal/completion.h"
 #include "pipeline/cli/terminal/pages.h"
+#include "pipeline/job/errors.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/readable.h"
 
@@ -34,10 +34,10 @@ CommandSpec completion_spec() {
 
 Outcome run_completion(const Arguments& arguments, Context& context) {
   const std::string shell = arguments.operands.size() == 1 ? arguments.operands.front() : "";
-  if (shell == "bash") return context.print(pipeline::bash_completion(all_specs()));
-  if (shell == "zsh") return context.print(pipeline::zsh_completion(all_specs()));
-  if (shell == "fish") return context.print(pipeline::fish_completion(all_specs()));
-  return Error{Fault::kUsage, "name one shell: bash, zsh or fish"};
+  if (shell == "bash") return context.print(bash_completion(all_specs()));
+  if (shell == "zsh") return context.print(zsh_completion(all_specs()));
+  if (shell == "fish") return context.print(fish_completion(all_specs()));
+  return usage("name one shell: bash, zsh or fish");
 }
 
 CommandSpec manual_spec() {
@@ -56,15 +56,13 @@ CommandSpec manual_spec() {
   return spec;
 }
 
-std::string page_of(const CommandSpec& spec, bool markdown) {
-  return markdown ? pipeline::markdown_page(spec) : pipeline::man_page(spec);
-}
+std::string page_of(const CommandSpec& spec, bool markdown) { return markdown ? markdown_page(spec) : man_page(spec); }
 
 /// Writes all pages, or none if one would replace a user's file.
 Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
   std::vector<std::pair<std::string, std::string>> pages;  // path, text
   const std::vector<CommandSpec> specs = all_specs();
-  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), pipeline::man_page(specs));
+  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), man_page(specs));
   for (const CommandSpec& spec : specs) {
     pages.emplace_back(fmt::format("{}/{}{}{}", directory, markdown ? "" : "lamina-", spec.name, markdown ? ".md" : ".1"),
                        page_of(spec, markdown));
@@ -75,7 +73,7 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
   }
   std::error_code error;
   std::filesystem::create_directories(directory, error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
+  if (error) return failure(Fault::kOutput, "{}: {}", directory, error.message());
   for (const auto& [path, text] : pages) {
     if (Status status = write_file(path, text); !status) return status;
   }
@@ -84,15 +82,15 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
 
 Outcome run_manual(const Arguments& arguments, Context& context) {
   const bool markdown = arguments.has("--markdown");
-  if (arguments.operands.size() > 1) return Error{Fault::kUsage, "name one command, or -o DIR for the pages of all"};
+  if (arguments.operands.size() > 1) return usage("name one command, or -o DIR for the pages of all");
   if (arguments.has("-o,--output") && !arguments.operands.empty()) {
     return at_option("--output", fmt::format("is for the pages of all commands; leave out '{}', or print that page to a file",
                                              one_line(arguments.operands.front())));
   }
   if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
-    if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
-    return context.print(pipeline::man_page(all_specs()));
+    if (markdown) return usage("--markdown: name a command, or -o DIR for all of them");
+    return context.print(man_page(all_specs()));
   }
   const Command* command = find_command(arguments.operands.front());
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(arguments.operands.front())};

@@ -2,6 +2,7 @@
 
 #include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/report/summary.h"
 #include "stages/support/text/json_value.h"
@@ -30,9 +31,9 @@ CommandSpec merge_spec() {
 }
 
 Outcome run_merge(const Arguments& arguments, Context& context) {
-  if (arguments.operands.empty()) return Error{Fault::kUsage, "no directory to merge; name those of the shards"};
+  if (arguments.operands.empty()) return usage("no directory to merge; name those of the shards");
   const std::string output = arguments.text("-o,--output");
-  if (output.empty()) return Error{Fault::kUsage, "-o OUT is missing; name the directory of the whole job"};
+  if (output.empty()) return usage("-o OUT is missing; name the directory of the whole job");
   const Result<MergeReport> report =
       merge({arguments.operands, output, arguments.has("--strict"), arguments.has("--allow-empty")});
   if (!report) return report.error();

@@ -1,17 +1,25 @@
 // lamina permeability: k1 and k2 of measured pressure drops, and k1 predicted from written toolpaths.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <numbers>
 
 #include "pipeline/calibrate/drops_page.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/plot_file.h"
-#include "pipeline/cli/pore_job.h"
-#include "pipeline/cli/pore_print.h"
-#include "pipeline/cli/pore_stack.h"
-#include "pipeline/cli/window_files.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/cli/keys.h"
+#include "pipeline/cli/other_programs.h"
+#include "pipeline/cli/outputs.h"
+#include "pipeline/cli/pores.h"
+#include "pipeline/job/errors.h"
+#include "pipeline/job/job_command.h"
+#include "pipeline/machine/profiles.h"
+#include "pipeline/output/temporary_folder.h"
 #include "pipeline/pores/pore_analysis.h"
+#include "pipeline/run/run_resolved.h"
+#include "stages/support/io/file_reader.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
@@ -40,6 +48,7 @@ CommandSpec permeability_spec() {
       "rows may name their configuration and sample; without a column sample each of several drop columns is one;\n"
       "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first;\n"
       "or a job file, as in job.toml, that lamina extrude or lamina jet takes, and parts in place of its own: it is planned first";
+  const std::vector<std::string_view> beads = {"deposited", "spread", "stated"};
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
       {"--diameter", "MM", "of a round medium", "", "Medium"},
@@ -54,12 +63,9 @@ CommandSpec permeability_spec() {
        "Toolpaths and images"},
       {"--voxel", "UM", "edge of a voxel, micrometres; of images: their pixels", "10", "Toolpaths and images"},
       {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
-      {"--beads",
-       "WORD",
+      {"--beads", "WORD",
        "spread: as the printer's melt lags and spreads; deposited: no spread along lines; stated: by the file; default: spread by known printers",
-       "",
-       "Toolpaths",
-       {"deposited", "spread", "stated"}},
+       "", "Toolpaths", beads},
       {"--machine", "NAME|FILE", "printer that lays them, or of a job; default: the one that the file names", "", "Toolpaths"},
       {"--set", "KEY=VALUE", "of a job file: set any key, as in --set fill.width_mm=0.5", "", "Job"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
@@ -90,8 +96,7 @@ CommandSpec permeability_spec() {
 /// Where a gas is measured; air has its density there. errors  kUsage
 Status read_pressures(const Arguments& arguments, segment::DropsSettings& settings) {
   for (const char* flag : {"--outlet-pressure", "--flow-pressure"}) {
-    if (arguments.has(flag) && !settings.gas)
-      return Error{Fault::kUsage, fmt::format("{}: is of gases that expand; give --compressible too", flag)};
+    if (arguments.has(flag) && !settings.gas) return usage("{}: is of gases that expand; give --compressible too", flag);
   }
   if (!settings.gas) return {};
   segment::GasPressures& gas = *settings.gas;
@@ -104,13 +109,11 @@ Status read_pressures(const Arguments& arguments, segment::DropsSettings& settin
 
 /// Medium and fluid from the options. errors  kUsage
 Result<segment::DropsSettings> read_settings(const Arguments& arguments) {
-  const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
   segment::DropsSettings settings;
   if (arguments.has("--compressible")) settings.gas.emplace();
   if (arguments.has("--convention")) {
-    if (arguments.text("--convention") != "dinisio2022") {
-      return usage(fmt::format("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention"))));
-    }
+    if (arguments.text("--convention") != "dinisio2022")
+      return usage("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention")));
     settings.medium = {0.0255, 1e-3 / 60 * 28};
     settings.fluid = {1.87e-5, 998.2};
     if (settings.gas) settings.gas->outlet_pa = 102600;
@@ -177,23 +180,23 @@ constexpr std::string_view kOfToolpaths[] = {"--beads", "--machine", "--inertia"
 /// errors  kUsage: one of the options is given
 Status refuse(const Arguments& arguments, std::span<const std::string_view> flags, const char* why) {
   for (const std::string_view flag : flags)
-    if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} is for {}", flag, why)};
+    if (arguments.has(flag)) return usage("{} is for {}", flag, why);
   return {};
 }
 
 /// What can be reported about one file or folder. part  as predict_print() takes it
 Outcome analyse_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   if (arguments.operands.size() != 1)
-    return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
+    return usage("name one file of measurements or of toolpaths, a folder of images, or a job with its parts");
   const std::string& operand = arguments.operands.front();
   std::error_code ignored;
   const std::filesystem::path path = operand;
   if (!path.has_extension() && !std::filesystem::exists(path, ignored))  // a table's name has one; its reader reports the error
-    return Error{Fault::kInput, fmt::format("{}: no such file or folder", one_line(operand))};
+    return failure(Fault::kInput, "{}: no such file or folder", one_line(operand));
   const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && names_toolpaths(operand);
   Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")
                                 : refuse(arguments, kOfVoxels, "toolpaths and images, not for tables of measurements");
-  if (images && !fits) return Error{Fault::kInput, fmt::format("{}: is a folder; {}", one_line(operand), fits.error().message)};
+  if (images && !fits) return failure(Fault::kInput, "{}: is a folder; {}", one_line(operand), fits.error().message);
   if (fits && !images && !arguments.has("--scan")) fits = refuse(arguments, kOfImages, "folders of images");
   if (fits && !images) fits = refuse(arguments, std::array<std::string_view, 1>{"--periodic"}, "folders of images");
   if (fits && !beads) fits = refuse(arguments, kOfToolpaths, "toolpaths");
@@ -204,9 +207,164 @@ Outcome analyse_file(const Arguments& arguments, Context& context, const std::op
                  : fit_table(arguments, context);
 }
 
+// --- of a job file
+
+/// Reports the job next to the results of its files, which have no name outside of the call.
+class JobContext : public Context {
+ public:
+  /// made  the file or folder that the job became; shown  its name for people
+  JobContext(Context& outer, std::string made, std::string shown, std::string line, Json job)
+      : outer_(outer), made_(std::move(made)), shown_(std::move(shown)), line_(std::move(line)), job_(std::move(job)) {}
+  void say_text(std::string_view text) override { outer_.say_text(shown(std::string(text))); }
+  /// Messages name files by their paths.
+  std::string shown(const std::string& text) override {
+    std::string renamed = text;
+    for (std::size_t at = renamed.find(made_); at != std::string::npos; at = renamed.find(made_, at + shown_.size()))
+      renamed.replace(at, made_.size(), shown_);
+    return renamed;
+  }
+  int complain(const Error& error) override { return outer_.complain(error); }
+  Status print(std::string_view text) override { return outer_.print(std::exchange(line_, {}) + std::string(text)); }
+  Status give(const Json& value) override {
+    Json reported = value;
+    reported["job"] = job_;
+    return outer_.give(reported);
+  }
+  void progress(const ProgressEvent& event) override { outer_.progress(event); }
+  const std::atomic<bool>& cancel() override { return outer_.cancel(); }
+
+ private:
+  Context& outer_;
+  std::string made_, shown_, line_;
+  Json job_;
+};
+
+/// The job as lamina jet and lamina extrude read it.
+Result<Job> read_job_of(const Arguments& arguments) {
+  Arguments of_job;
+  of_job.operands.assign(arguments.operands.begin() + 1, arguments.operands.end());
+  of_job.options.emplace_back("--job", arguments.operands.front());
+  for (const auto& [flag, text] : arguments.options)
+    if (flag == "--set" || flag == "--machine" || is_output_option(flag)) of_job.options.emplace_back(flag, text);
+  Result<Job> job = read_job_options("machine.profile", of_job);
+  if (!job) return job;
+  job->leave_to_machine = true;
+  job->quiet = true;
+  job->overwrite = job->resume = job->dry_run = false;
+  job->shard.reset();
+  job->format = Job().format;
+  return job;
+}
+
+/// The command that a saved job names in its first line; "" for others.
+std::string saved_command(const std::string& path) {
+  const auto text = read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .max_bytes = kMaxTomlBytes});
+  return text ? std::string(command_in(std::string_view(*text).substr(0, text->find('\n')))) : "";
+}
+
+/// errors  kUsage: no such machine, or nothing names it
+Result<Product> product_of(const std::string& path, const Job& job, bool by_option) {
+  if (!job.machine.profile.empty()) {
+    const Result<bool> moves = names_extruder(job.machine.profile);
+    if (!moves)
+      return failure(moves.error().fault, "{}: {}", by_option ? "--machine" : one_line(path) + ": machine.profile",
+                     moves.error().message);
+    return *moves ? Product::kMoves : Product::kImages;
+  }
+  if (const std::string command = saved_command(path); command == "extrude" || command == "jet")
+    return command == "jet" ? Product::kImages : Product::kMoves;
+  const auto names = [&](std::initializer_list<std::string_view> sections) {
+    return std::ranges::any_of(job.named, [&](std::string_view key) {
+      return std::ranges::any_of(sections, [&](std::string_view section) { return key.starts_with(section); });
+    });
+  };
+  const bool moves = names({"extrude."}), images = names({"bed.dpi", "dose.", "image.format", "image.mirror"});
+  if (images != moves) return images ? Product::kImages : Product::kMoves;
+  return usage(
+      "{}: names no machine, and may be of filament or of powder; add --machine, as in --machine anet-a8 or --machine nuferbj",
+      one_line(path));
+}
+
+/// The box of the first part in machine coordinates, of a job that has others too.
+std::optional<Box> first_part(const Summary& summary, const std::array<double, 2>& corner_mm) {
+  const bool alone = summary.parts.size() == 1 && summary.parts.front().copies == 1;
+  if (alone || summary.parts.empty() || summary.parts.front().bounds.empty()) return std::nullopt;
+  Box box = summary.parts.front().bounds;
+  const auto x = static_cast<Nm>(std::llround(corner_mm[0] * 1e6)), y = static_cast<Nm>(std::llround(corner_mm[1] * 1e6));
+  box.lo.x += x, box.hi.x += x, box.lo.y += y, box.hi.y += y;
+  return box;
+}
+
+/// The arguments of a call on the files.
+Arguments arguments_on(const std::string& files, const Job& job, Product product, const Arguments& arguments) {
+  Arguments inner = arguments;
+  inner.operands = {files};
+  std::erase_if(inner.options, [](const auto& option) { return option.first == "--set" || option.first == "--machine"; });
+  // Toolpaths name no printer that a file describes.
+  if (product == Product::kMoves && !job.machine.profile.empty() && arguments.text("--beads") != "stated")
+    inner.options.emplace_back("--machine", job.machine.profile);
+  return inner;
+}
+
+/// Plans the job of the first operand as lamina extrude or lamina jet does, with parts of the other operands in place of its
+/// own, --set and --machine, and predicts what was written: G-code or bitmaps in a temporary folder, in the place of the job.
+/// The machine decides which of the two; a job without one its first line as lamina saves it, or keys that one of the two
+/// reads alone.
+/// errors  those of reading, checking and running a job, and of predict, with the job's name; kUsage: it is unknown which
+/// of the
+///         two, toolpaths of another format than G-code
+Outcome predict_job(const Arguments& arguments, Context& context) {
+  const std::string& path = arguments.operands.front();
+  Result<Job> job = read_job_of(arguments);
+  if (!job) return job.error();
+  const Result<Product> product = product_of(path, *job, arguments.has("--machine"));
+  if (!product) return product.error();
+  const bool moves = *product == Product::kMoves;
+  if (moves && job->segment.all.on && job->fill.all.pattern == infill::Pattern::kNone)
+    job->fill.all.pattern = infill::Pattern::kRaster;
+  const TemporaryFolder folder("permeability");
+  if (const Status status = folder.status(); !status) return status;
+  job->output = folder.file(moves ? "part.gcode" : "job");
+  if (Status status = check_job(*job); !status) return status;
+  Result<Resolved> resolved = resolve(*job, *product);
+  if (!resolved) return resolved.error();
+  std::array<double, 2> corner_mm{};
+  if (resolved->extruder) {
+    const Extruder& machine = resolved->extruder->machine;
+    if (machine.format != "gcode")
+      return usage("{}: {} writes {}, and beads are read from G-code; add another --machine", one_line(path), machine.name,
+                   machine.format);
+    corner_mm = machine.bed.corner_mm;
+  }
+  keep_on_signals();
+  const auto summary = run(
+      std::move(*resolved), [](const ProgressEvent&) {}, context.cancel());
+  if (!summary) {
+    if (summary.error().fault == Fault::kInterrupted) return failure(Fault::kInterrupted, "interrupted; nothing was written");
+    return summary.error();
+  }
+  for (const Warning& warning : summary->warnings) context.say_text(fmt::format("warning   {}\n", one_line(warning.text)));
+  Json parts = Json::array();
+  for (const PartSummary& part : summary->parts) parts.push_back(part.path);
+  const std::string machine = summary->machine.empty() ? "" : ", " + one_line(summary->machine);
+  JobContext reported(context, job->output, one_line(path),
+                      fmt::format("job       {}: planned as lamina {} does, {} layers {}{}\n", one_line(path),
+                                  command_name(*product), summary->layers_planned, summary->layer_text, machine),
+                      {{"path", path},
+                       {"command", command_name(*product)},
+                       {"machine", summary->machine},
+                       {"layers", summary->layers_planned},
+                       {"parts", parts},
+                       {"warnings", warnings_json(summary->warnings)}});
+  Outcome outcome = analyse_file(arguments_on(job->output, *job, *product, arguments), reported,
+                                 moves ? first_part(*summary, corner_mm) : std::nullopt);
+  if (outcome.error) outcome.error->message = reported.shown(outcome.error->message);
+  return outcome;
+}
+
 Outcome run_permeability(const Arguments& arguments, Context& context) {
-  if (!arguments.operands.empty() && names_job(arguments.operands.front()))
-    return predict_job(arguments, context, analyse_file);
+  if (!arguments.operands.empty() && lower_case(arguments.operands.front()).ends_with(".toml"))
+    return predict_job(arguments, context);
   if (const Status fits = refuse(arguments, std::array<std::string_view, 1>{"--set"}, "job files, as in job.toml"); !fits)
     return fits;
   return analyse_file(arguments, context, std::nullopt);

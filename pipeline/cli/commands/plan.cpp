@@ -8,10 +8,9 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/needs.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
-#include "pipeline/job/job.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/run/run_resolved.h"
@@ -27,7 +26,7 @@ constexpr std::string_view kNames[] = {"jet", "slice", "extrude"};  // by produc
 /// The differences between the commands.
 struct PlanCommand {
   Product product;
-  KeyChoice keys;                         // of the job, as options
+  std::string_view keys;                  // of the job, as options
   std::string_view summary;               // what it does, for the help
   std::span<const OptionSpec> own;        // switches of the row, among --resume, --overwrite and --dry-run
   std::span<const OptionSpec> overrides;  // help texts that replace those of keys: value, meaning, preset if not ""
@@ -143,11 +142,10 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
 
 // --- lamina jet
 
-// clang-format off
-const KeyChoice kJetKeys = {"bed", "layers", "heights", "placement", "image", "machine", "dose", "fill", "segment.fill", "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
-                            "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
-                            "segment.thin_width_mm", "load", "run", "part"};
-// clang-format on
+constexpr std::string_view kJetKeys =
+    "bed layers heights placement image machine dose fill segment.fill segment.rule segment.thick_mm segment.thin_mm "
+    "segment.continuous_lines segment.spacing_sc_mm segment.spacing_cc_mm segment.gap_mm segment.shift_mm "
+    "segment.thick_width_mm segment.thin_width_mm load run part";
 
 const OptionSpec kJetSwitches[] = {
     {"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two", "",
@@ -199,9 +197,9 @@ PlanCommand jet_row() {
 
 // --- lamina slice
 
-const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "placement",    "image.fill", "load",
-                              "run.output",      "run.threads", "run.memory", "run.sync",     "run.layers", "run.strict",
-                              "run.allow_empty", "slice",       "fill",       "segment.fill", "part"};
+constexpr std::string_view kSliceKeys =
+    "bed.size_mm layers heights placement image.fill load run.output run.threads run.memory run.sync run.layers "
+    "run.strict run.allow_empty slice fill segment.fill part";
 
 const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
@@ -243,24 +241,9 @@ PlanCommand slice_row() {
 
 // --- lamina extrude
 
-const KeyChoice kExtrudeKeys = {"layers",
-                                "heights",
-                                "placement",
-                                "machine.profile",
-                                "fill",
-                                "image.fill",
-                                "segment",
-                                "extrude",
-                                "load",
-                                "slice.tolerance_um",
-                                "run.output",
-                                "run.threads",
-                                "run.memory",
-                                "run.sync",
-                                "run.layers",
-                                "run.strict",
-                                "run.allow_empty",
-                                "part"};
+constexpr std::string_view kExtrudeKeys =
+    "layers heights placement machine.profile fill image.fill segment extrude load slice.tolerance_um run.output "
+    "run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
 
 const OptionSpec kExtrudeSwitches[] = {
     {"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
@@ -293,13 +276,11 @@ std::string extrude_closing() {
 
 Status complete_extrude(const Arguments&, Job& job) {
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
-  if (job.output.empty() && !job.dry_run) {
-    return Error{Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"};
-  }
+  if (job.output.empty() && !job.dry_run) return usage("-o FILE is missing; name the file for the toolpaths, or use --dry-run");
   std::error_code ignored;
   if (!std::filesystem::is_directory(job.output, ignored)) return {};
-  return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
-                                          (std::filesystem::path(job.output) / "part.gcode").string())};
+  return usage("-o {}: is a directory; name a file in it, as in {}", job.output,
+               (std::filesystem::path(job.output) / "part.gcode").string());
 }
 
 /// Extension of the output file named by a batch.

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/show/report.h"
 #include "stages/support/io/file.h"
@@ -42,22 +43,18 @@ bool is_page_name(const std::string& path) {
 
 Outcome run_report(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1)
-    return Error{Fault::kUsage, "name one finished directory of lamina jet, or one G-code file of lamina extrude"};
+    return usage("name one finished directory of lamina jet, or one G-code file of lamina extrude");
   const std::string output = arguments.text("-o,--output");
-  if (output.empty()) return Error{Fault::kUsage, "-o HTML is missing; name the page"};
-  if (!is_page_name(output)) {
-    return Error{Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)};
-  }
+  if (output.empty()) return usage("-o HTML is missing; name the page");
+  if (!is_page_name(output)) return usage("-o {}: the page is HTML; give it a name that ends in .html", output);
   ReportOptions options;
   if (Status status = arguments.read("--max-bytes", read_bytes, options.size_limit); !status) return status;
   options.parts = arguments.all("--parts");
   std::error_code ignored;
-  if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored)) {
+  if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored))
     return at_option("--parts", "is of jobs of images; a page of toolpaths has no views of the parts, leave it out");
-  }
   for (const std::string& parts : options.parts) {
-    if (!std::filesystem::exists(parts, ignored))
-      return Error{Fault::kInput, fmt::format("--parts: {}: no such file or folder", parts)};
+    if (!std::filesystem::exists(parts, ignored)) return failure(Fault::kInput, "--parts: {}: no such file or folder", parts);
   }
   AnalysisPage deposited = analysis_page(arguments.operands.front());
   options.deposited = std::move(deposited.text);

@@ -5,6 +5,7 @@
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
+#include "pipeline/job/errors.h"
 #include "pipeline/report/replay_text.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/support/text/json_text.h"
@@ -55,8 +56,7 @@ Json report_json(const VerifyReport& report) {
 }
 
 Outcome run_verify(const Arguments& arguments, Context& context) {
-  if (arguments.operands.empty())
-    return Error{Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"};
+  if (arguments.operands.empty()) return usage("no directory to verify; name one that lamina jet or lamina slice wrote");
   if (arguments.has("--quote") && arguments.operands.size() > 1)
     return at_option("--quote", "is of one directory; verify them one by one");
   if (arguments.has("--quote") && arguments.has("--quick"))

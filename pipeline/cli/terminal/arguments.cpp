@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <deque>
 
-#include "pipeline/cli/terminal/slicer_aliases.h"
+#include "pipeline/job/errors.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
@@ -59,6 +59,51 @@ std::string meaning_of(const OptionSpec& option) {
   return option.preset.empty() ? option.meaning : fmt::format("{} (default{}{})", option.meaning, kNoBreak, option.preset);
 }
 
+/// An option of lamina, the options of other slicers that it is called there, and what differs.
+struct SlicerAlias {
+  std::string_view ours, theirs, differs = {};
+};
+// Of two rows of a word, the first whose option the command has counts. Without an option of ours, lamina has nothing of it.
+constexpr SlicerAlias kSlicerAliases[] = {
+    {"--layer", "--layer-height"},
+    {"--line-distance", "--fill-density --infill-density --infill-sparse-density",
+     "it is the width of a bead over the density, as 2 for 0.4 mm and 20 %"},
+    {"--line-distance", "--infill-line-distance"},
+    {"--pattern", "--fill-pattern --infill-pattern --infill"},
+    {"--angle", "--fill-angle --infill-angle --infill-angles"},
+    {"--walls", "--perimeters --wall-line-count --wall-loops"},
+    {"--bead", "--extrusion-width --line-width"},
+    {"--flow", "--extrusion-multiplier --material-flow"},
+    {"--dpi", "--resolution", "pixels per inch"},
+    {"--tolerance", "--resolution --meshfix-maximum-deviation --gcode-resolution", "micrometres"},
+    {"--bridge", "--slice-closing-radius"},
+    {"--nozzle-temperature", "--temperature --material-print-temperature"},
+    {"--bed-temperature", "--material-bed-temperature"},
+    {"--wall-speed", "--perimeter-speed --speed-wall"},
+    {"--print-speed", "--infill-speed --speed-print"},
+    {"--travel-speed", "--speed-travel"},
+    {"--first-layer-speed", "--speed-layer-0"},
+    {"--retraction", "--retract-length --retraction-amount"},
+    {"--fan", "--cool-fan-speed --max-fan-speed"},
+    {"--relative-extrusion", "--use-relative-e-distances"},
+    {"--bed", "--bed-shape", "width and depth, as 250x210"},
+    {"--at", "--center", "the corner of the part's box, not its middle"},
+    {"--at", "--align-xy"},
+    {"--copies", "--duplicate"},
+    {"--rotate", "--rotate-x", "angles about x, y and z, as 90,0,0"},
+    {"--rotate", "--rotate-y", "angles about x, y and z, as 0,90,0"},
+    {"--rotate", "--rotate-z", "angles about x, y and z, as 0,0,90"},
+    {"--skirt", "--skirts --skirt-line-count"},
+    {"--job", "--load"},
+    {"--save-job", "--save"},
+    {"--machine", "--printer --printer-profile"},
+    {"--output", "--output-dir"},
+    {"--quiet", "--loglevel"},
+    {"", "--support --supports --support-material --support-enable", "lamina makes no supports"},
+    {"", "--brim --brim-width --brim-line-count", "lamina lays no brim"},
+    {"", "--raft --raft-layers", "lamina lays no raft"},
+};
+
 }  // namespace
 
 const OptionSpec* CommandSpec::find(std::string_view flag) const {
@@ -70,7 +115,7 @@ const OptionSpec* CommandSpec::find(std::string_view flag) const {
 
 Status at_option(std::string_view flag, const std::string& wrong) {
   if (wrong.empty()) return {};
-  return Error{Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), wrong)};
+  return usage("{}: {}", flag.substr(flag.rfind(',') + 1), wrong);
 }
 
 bool Arguments::has(std::string_view flag) const {
@@ -90,11 +135,24 @@ std::string Arguments::text(std::string_view flag) const {
   return values.empty() ? std::string() : values.back();
 }
 
+std::string slicer_alias(std::string_view flag, const CommandSpec& spec) {
+  std::string word(flag);
+  std::ranges::replace(word, '_', '-');
+  for (const SlicerAlias& row : kSlicerAliases) {
+    if (const auto words = split(row.theirs, " "); std::ranges::find(words, word) == words.end()) continue;
+    if (row.ours.empty()) return fmt::format("; {}", row.differs);
+    if (spec.find(row.ours) == nullptr) continue;
+    return row.differs.empty() ? fmt::format("; did you mean '{}'?", row.ours)
+                               : fmt::format("; did you mean '{}' ({})?", row.ours, row.differs);
+  }
+  return {};
+}
+
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments) {
   const auto wrong = [&](const std::string& what) {
     const std::string line = one_line(what);
     if (line.ends_with('?')) return Error{Fault::kUsage, line};
-    return Error{Fault::kUsage, fmt::format("{}; see lamina {} --help", line, spec.name)};
+    return usage("{}; see lamina {} --help", line, spec.name);
   };
   CLI::App app("", "lamina " + spec.name);
   app.allow_extras();

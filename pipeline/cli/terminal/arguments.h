@@ -71,4 +71,9 @@ std::string help_text(const CommandSpec& spec, int columns);
 /// errors  kUsage: unknown option (with the nearest name), missing value
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
 
+/// "; did you mean '--layer'?" for an option of PrusaSlicer, Slic3r or CuraEngine whose counterpart the command has, with
+/// what differs; "; lamina makes no supports" for what lamina does not make; else "". Sources: PrusaSlicer
+/// src/libslic3r/PrintConfig.cpp, Cura fdmprinter.def.json.
+std::string slicer_alias(std::string_view flag, const CommandSpec& spec);
+
 }  // namespace lamina::pipeline

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "pipeline/job/profiles/sections.h"
+#include "pipeline/job/errors.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
@@ -199,9 +199,8 @@ constexpr Key<Profile> kKeys[] = {
 }  // namespace
 
 Result<ExtruderProfile> read_extruder(const ProfileFiles& files, ExtruderProfile profile) {
-  if (have_section(files, "head") || have_section(files, "powder")) {
-    return Error{Fault::kUsage, fmt::format("{}: is the profile of a powder printer; lamina jet takes it", files.back().where)};
-  }
+  if (have_section(files, "head") || have_section(files, "powder"))
+    return usage("{}: is the profile of a powder printer; lamina jet takes it", files.back().where);
   if (Status status = read_sections<Profile>(files, kKeys, profile, profile.machine.name); !status) return status.error();
   return profile;
 }

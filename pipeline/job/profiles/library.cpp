@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "pipeline/job/errors.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
@@ -130,15 +131,14 @@ Result<Library::Found> Library::find(const std::string& name, const std::string&
     path = (fs::path(folder_) / (name + ".toml")).string();
     if (shipped != shipped_.end()) {
       if (!is_own(name)) return Found{std::string(shipped->text), name + ".toml", name, {}};
-      return Error{Fault::kUsage,
-                   fmt::format("'{}' is part of lamina, and {} has that name as well; rename the file", one_line(name), path)};
+      return usage("'{}' is part of lamina, and {} has that name as well; rename the file", one_line(name), path);
     }
     if (!is_own(name)) {
       const std::vector<std::string> own = own_names();
       std::vector<std::string_view> names = names_of(shipped_);
       names.insert(names.end(), own.begin(), own.end());
-      return Error{Fault::kUsage, fmt::format("no profile '{}'{}; name a file that ends in .toml, or one of {}", one_line(name),
-                                              suggest(name, names), fmt::join(names, ", "))};
+      return usage("no profile '{}'{}; name a file that ends in .toml, or one of {}", one_line(name), suggest(name, names),
+                   fmt::join(names, ", "));
     }
   } else if (folder.empty()) {
     rules.streams = true;

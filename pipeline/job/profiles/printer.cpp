@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/job/profiles/sections.h"
+#include "pipeline/job/errors.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/key.h"
 #include "stages/support/text/readable.h"
@@ -257,7 +257,7 @@ Result<Machine> read_machine(const ProfileFiles& files, std::span<const std::str
     const TomlValue* named = section == nullptr ? nullptr : section->find("dialect");
     if (named != nullptr) at = named->position.text(file.where);
   }
-  return Error{Fault::kUsage, fmt::format("{}machine.dialect: {}", at, not_one_of(machine.dialect, dialects))};
+  return usage("{}machine.dialect: {}", at, not_one_of(machine.dialect, dialects));
 }
 
 std::string machine_text(const Machine& machine) {

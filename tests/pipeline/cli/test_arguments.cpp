@@ -8,7 +8,6 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/cli/terminal/pages.h"
-#include "pipeline/cli/terminal/slicer_aliases.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -9,7 +9,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/layer_files.h"
 #include "pipeline/manifest/manifest.h"
-#include "pipeline/manifest/manifest_line.h"
+#include "pipeline/manifest/manifest_text.h"
 #include "stages/program/dialect.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/text/version.h"

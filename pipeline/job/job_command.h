@@ -1,4 +1,4 @@
-// pipeline/job/lists/job_command.h: the comment at the top of a saved job that names the command which runs it.
+// pipeline/job/job_command.h: the comment at the top of a saved job that names the command which runs it.
 #pragma once
 
 #include <algorithm>

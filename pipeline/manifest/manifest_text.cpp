@@ -1,4 +1,4 @@
-#include "pipeline/manifest/manifest_head.h"
+#include "pipeline/manifest/manifest_text.h"
 
 #include <fmt/format.h>
 
