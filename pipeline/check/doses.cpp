@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "pipeline/job/file.h"
-#include "pipeline/job/job.h"
 #include "stages/heights/on_record.h"
 
 namespace lamina::pipeline {

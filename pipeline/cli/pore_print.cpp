@@ -6,11 +6,10 @@
 
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
-#include "pipeline/pores/bead_rules.h"
+#include "pipeline/pores/bead_voxels.h"
 #include "pipeline/pores/pore_analysis.h"
-#include "pipeline/pores/pore_drawing.h"
 #include "pipeline/pores/pore_page.h"
-#include "pipeline/pores/predict_inertia.h"
+#include "pipeline/pores/predict_flow.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 

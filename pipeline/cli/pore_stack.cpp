@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/window_files.h"
-#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/image_stack.h"
 #include "pipeline/pores/pore_page.h"
-#include "pipeline/pores/scan_compare.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

@@ -9,7 +9,6 @@
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
-#include "stages/view/bead_shapes.h"
 
 namespace lamina::pipeline {
 namespace {

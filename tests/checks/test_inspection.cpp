@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/report/inspection_json.h"
+#include "pipeline/report/image_text.h"
 #include "stages/checks/inspect.h"
 #include "tests/checks/volume.h"
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "pipeline/calibrate/chart_job.h"
-#include "pipeline/calibrate/chart_reading.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
