@@ -15,6 +15,8 @@
 namespace lamina::pipeline {
 namespace {
 
+constexpr std::uint32_t kFluidAtEnds = 4 * kFiner;  // fine voxels before each end of an axis that does not repeat
+
 /// The box with fluid before both ends of an axis, which repeats then.
 VoxelStack with_fluid_at_ends(const VoxelView& box, int axis) {
   VoxelStack longer(box.nx, box.ny, box.edge, box.periodic);
@@ -36,8 +38,6 @@ VoxelStack with_fluid_at_ends(const VoxelView& box, int axis) {
   }
   return longer;
 }
-
-constexpr std::uint32_t kFluidAtEnds = 4 * kFiner;  // fine voxels before each end of an axis that does not repeat
 
 /// Where the cells of a turned box lie in the box as it is.
 stokes::CellPositions positions_in_box(const stokes::Canonical& canonical, std::uint32_t finer,
