@@ -92,11 +92,11 @@ set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/text/version.cp
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|scan_main|calibrate/scan_answer|show/sheet|show/swath)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|scan_main|calibrate/scan_answer|show/sheet)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
                "pipeline/machine/*.cpp" "pipeline/pores/*.cpp" "pipeline/show/*.cpp")
-list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet|show/swath)\\.cpp$")
+list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
 target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nlohmann_json)
@@ -136,12 +136,10 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
 lamina_sources(picture_sources "stages/view/picture/*.cpp")
-add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/sheet.cpp pipeline/show/swath.cpp
-               ${picture_sources})
+add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/sheet.cpp ${picture_sources})
 if(LAMINA_UNITY STREQUAL "all")
   list(FILTER picture_sources EXCLUDE REGEX "/(plan_view|swath_view)\\.cpp$")  # colours of their own
-  lamina_unity(lamina-preview ${PROJECT_SOURCE_DIR}/pipeline/show/sheet.cpp
-               ${PROJECT_SOURCE_DIR}/pipeline/show/swath.cpp ${picture_sources})
+  lamina_unity(lamina-preview ${PROJECT_SOURCE_DIR}/pipeline/show/sheet.cpp ${picture_sources})
 endif()
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 

@@ -13,8 +13,8 @@
 #include "stages/load/load.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/file_target.h"
+#include "stages/support/text/escape.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/shell_words.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {

@@ -5,17 +5,37 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/calibrate/pieces_text.h"
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
 #include "stages/formats/stl/mesh_stl.h"
 #include "stages/segment/widths_table.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
+#include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
+
+/// What to do with the pieces, step by step, as Markdown. extension  of the pieces' toolpaths
+std::string steps_text(const std::vector<segment::TestPiece>& pieces, const segment::PieceRequest& request,
+                       std::string_view extension) {
+  std::string text = fmt::format(
+      "# Calibrating segmented lines\n\n1. Parameters: beads of {} mm, layers of {} mm, the speeds and temperatures of the machine's profile; keep them for all "
+      "pieces.\n",
+      number_text(request.width_mm), number_text(request.height_mm));
+  char step = '1';
+  for (const segment::TestPiece& piece : pieces) {
+    if (piece.name[0] == '6' && step < '5') {
+      text +=
+          "5. Spacing: fill in widths.csv, then `lamina calibrate --measured widths.csv --machine MACHINE -o machine.toml`; plan the pieces of steps 6 and 7 "
+          "again with `lamina extrude --job FILE --machine machine.toml`.\n";
+    }
+    text += fmt::format("{}. `{}{}`: {}\n", piece.name[0], piece.name, extension, piece.task);
+    step = piece.name[0];
+  }
+  return text;
+}
 
 namespace fs = std::filesystem;
 
@@ -123,6 +143,20 @@ Status check_absent(const std::vector<segment::TestPiece>& pieces, const fs::pat
 }
 
 }  // namespace
+
+std::string widths_text(const segment::PieceRequest& request) {
+  std::string text =
+      "# Widths in mm; leave cells empty where nothing was measured, add rows for further thick speeds or repeated measurements.\n"
+      "test,percent,thick_speed_percent,region,wall_mm,thick_mm,thin_mm,continuous_mm,stable_mm\n"
+      "flow,,,,,,,,\n";
+  for (const double percent : request.thin_speeds) text += fmt::format("speed,{},,,,,,,\n", number_text(percent));
+  for (const double percent : request.thin_extrusions) text += fmt::format("extrusion,{},,,,,,,\n", number_text(percent));
+  for (const double percent : request.extrusions) {
+    for (const char* region : {"initial", "central", "final"})
+      text += fmt::format("repeated,{},100,{},,,,,\n", number_text(percent), region);
+  }
+  return text;
+}
 
 Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, const std::atomic<bool>& cancel) {
   const auto profile = machine_of(request);

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/machine/profiles.h"
@@ -11,6 +12,9 @@
 #include "stages/segment/pieces.h"
 
 namespace lamina::pipeline {
+
+/// The empty widths.csv (stages/segment/widths_table.h): one row per line of the pieces.
+std::string widths_text(const segment::PieceRequest& request);
 
 struct CalibrationRequest {
   std::string machine;           // as --machine takes it

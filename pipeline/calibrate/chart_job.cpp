@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <functional>
-#include <vector>
+#include <optional>
+#include <set>
 
-#include "pipeline/machine/profiles.h"
 #include "pipeline/run/run.h"
 #include "stages/calibration/chart/layout.h"
+#include "stages/calibration/chart/rows.h"
 #include "stages/formats/chart/chart.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
@@ -52,6 +56,156 @@ Status write_images(const HeadGrid& grid, std::uint32_t count, const std::functi
 std::string drops_text(const calibration::DropLayers& wanted) {
   return json_line(
       {{"kind", "lamina drops 1"}, {"drops", wanted.drops}, {"drops_a_layer", wanted.a_layer}, {"layers", wanted.layers}});
+}
+
+using calibration::Located;
+
+std::string list_of(const std::vector<std::uint32_t>& nozzles) {
+  return nozzles.empty() ? "none" : fmt::format("{}", fmt::join(nozzles, ", "));
+}
+
+constexpr double kReportedPixels = 0.1, kErrors = 4;  // as of single nozzles
+
+/// Nozzles that were read along the scan or across it, and those that are too uncertain to report.
+std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* detected, const char* error) {
+  std::vector<std::optional<Located>> read(nozzles.size());
+  for (std::size_t n = 0; n < nozzles.size(); ++n) {
+    if (nozzles[n].is_null() || nozzles[n].at(detected).is_null()) continue;
+    read[n] = Located{nozzles[n].at(detected).get<double>(), nozzles[n].at(error).get<double>()};
+  }
+  return read;
+}
+
+/// A nozzle of a later row that lands too far along the scan stands less far behind than the profile says.
+std::string correct_rows(const std::vector<std::optional<Located>>& along, const Chart& chart, Machine& machine) {
+  std::vector<double>& rows = machine.head.row_offset_um;
+  if (rows.size() < 2) return "";
+  const auto detected = calibration::rows_of(along, static_cast<std::uint32_t>(rows.size()));
+  const double pixel_um = 1e-3 * (chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm);
+  std::string line;
+  std::size_t unreadable = 0;
+  for (std::size_t r = 1; r < rows.size(); ++r) {
+    line += line.empty() ? "rows      against the first one, changed by " : ", ";
+    if (!detected[r] || kErrors * detected[r]->error_um > kReportedPixels * pixel_um) {
+      line += "unreadable";
+      ++unreadable;
+      continue;
+    }
+    const double late = std::round(10 * detected[r]->um) / 10;
+    rows[r] -= late;
+    line += fmt::format("{:+g} um (within {:.1f})", 0 - late, detected[r]->within_um);
+  }
+  const char* why = "the photograph does not show them within a tenth of a pixel";
+  if (unreadable + 1 == rows.size()) return fmt::format("rows      not told: {}", why);
+  return unreadable == 0 ? line : fmt::format("{}: {}", line, why);
+}
+
+/// How far nozzles lie off, of all that were read.
+std::string positions_line(const std::vector<std::optional<Located>>& along,
+                           const std::vector<std::optional<Located>>& across) {
+  const auto maximum = [](const std::vector<std::optional<Located>>& nozzles) {
+    double um = 0;
+    for (const auto& one : nozzles) um = std::max(um, one ? std::abs(one->um) : 0);
+    return um;
+  };
+  const auto read = std::ranges::count_if(along, [](const auto& one) { return one.has_value(); });
+  return fmt::format("nozzles   {} read, within {:.0f} um along the scan and {:.0f} across it of the head's line", read,
+                     maximum(along), maximum(across));
+}
+
+/// A length, or that it cannot be determined.
+std::string reported(const Json& json, const char* key) {
+  return json.at(key).is_null() ? "unreadable" : fmt::format("{:+.0f} um", json.at(key).get<double>());
+}
+std::string reported_within(const Json& json, const char* key, const char* within) {
+  if (json.at(key).is_null()) return "unreadable";
+  return fmt::format("{:+.1f} um (within {:.1f})", json.at(key).get<double>(), json.at(within).get<double>());
+}
+
+std::vector<std::string> swath_lines(const Json& swaths) {
+  std::vector<std::string> lines;
+  for (std::size_t s = 0; s < swaths.size(); ++s) {
+    const Json& swath = swaths[s];
+    if (swath.is_null()) {
+      lines.push_back(fmt::format("swath {}   was not printed", s));
+    } else if (s > 0) {
+      lines.push_back(fmt::format("swath {}   {} across, {} along the scan against the first one", s,
+                                  reported_within(swath, "across_um", "across_within_um"),
+                                  reported_within(swath, "along_um", "along_within_um")));
+    }
+  }
+  return lines;
+}
+
+/// Joints whose verniers and blocks show something else than the swaths' dashes: one of the two was read wrong.
+std::vector<std::string> joint_lines(const Json& stitches) {
+  std::vector<std::string> lines;
+  for (const Json& joint : stitches) {
+    if (joint.at("agrees").get<bool>()) continue;
+    const auto swath = joint.at("swath").get<std::uint32_t>();
+    lines.push_back(fmt::format(
+        "joint {}   shows {} across, {} along the scan from swath {} to {}, which its dashes do not: look at it in the photograph",
+        swath, reported(joint, "across_um"), reported(joint, "along_um"), swath - 1, swath));
+  }
+  return lines;
+}
+
+/// Offsets that four standard errors do not hold within a tenth of a pixel.
+std::string unreadable_line(const Json& nozzles) {
+  std::size_t detected = 0, unreadable = 0;
+  for (const Json& nozzle : nozzles) {
+    if (nozzle.is_null()) continue;
+    for (const char* key : {"along_um", "across_um"}) {
+      ++detected;
+      unreadable += nozzle.at(key).is_null();
+    }
+  }
+  if (unreadable == 0) return "";
+  return fmt::format("untold    {} of {} offsets of nozzles: the photograph does not show them within a tenth of a pixel",
+                     unreadable, detected);
+}
+
+std::vector<std::string> take(const Json& json, const Chart& chart, Machine& machine) {
+  const auto blocked_nozzles = json.at("blocked").get<std::vector<std::uint32_t>>();
+  const auto weak = json.at("weak").get<std::vector<std::uint32_t>>(),
+             unreadable = json.at("unreadable").get<std::vector<std::uint32_t>>();
+  const Json& nozzles = json.at("nozzles");
+  // Nozzles that were not on the chart, or of which nothing was detected, stay blocked.
+  std::set<std::uint32_t> blocked(blocked_nozzles.begin(), blocked_nozzles.end());
+  for (const std::uint32_t n : machine.head.blocked) {
+    if (n < nozzles.size() && nozzles[n].is_null()) blocked.insert(n);
+  }
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's place",
+                              json.at("pixels_a_mm").get<double>(), json.at("scatter_um").get<double>()));
+  const auto read_along = read_nozzles(nozzles, "along_detected_um", "along_error_um"),
+             read_across = read_nozzles(nozzles, "across_detected_um", "across_error_um");
+  lines.push_back(positions_line(read_along, read_across));
+  machine.head.blocked.assign(blocked.begin(), blocked.end());
+  lines.push_back("blocked   " + list_of(machine.head.blocked));
+  if (!weak.empty()) lines.push_back(fmt::format("weak      {}: seen by times, not taken for blocked", list_of(weak)));
+  if (!unreadable.empty()) lines.push_back("unknown   " + list_of(unreadable) + ": nothing of theirs can be seen");
+  if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
+  for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
+  for (std::string& line : joint_lines(json.at("stitches"))) lines.push_back(std::move(line));
+  if (auto unreadable_offsets = unreadable_line(nozzles); !unreadable_offsets.empty())
+    lines.push_back(std::move(unreadable_offsets));
+  if (const Json* gain = json.find("dot_gain_um")) {
+    const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
+    const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;
+    const std::array<double, 2> um{std::round(along_x ? along : across), std::round(along_x ? across : along)};
+    lines.push_back(
+        fmt::format("gain      edges stand out by {:g} um along x, {:g} um along y: take it off with --bleed {:g}x{:g}", um[0],
+                    um[1], std::max(um[0], 0.0), std::max(um[1], 0.0)));
+    machine.head.dot_gain_um = um;
+  }
+  for (const Json& wedge : json.at("wedges")) {
+    const double percent = wedge.at("pixels_percent").get<double>(), saturation = saturation_of(percent, chart, machine);
+    lines.push_back(fmt::format("wedge     {:g} % of the pixels{}: {:.0f} % of full ink", percent,
+                                saturation > 0 ? fmt::format(", {:.1f} % saturation", saturation) : "",
+                                wedge.at("detected_percent").get<double>()));
+  }
+  return lines;
 }
 
 }  // namespace
@@ -113,6 +267,21 @@ Result<std::string> measured_profile(const Machine& machine) {
     return Error{Fault::kInput, "what was measured gives no valid profile: " + (again ? why : why.substr(why.find(": ") + 2))};
   }
   return toml;
+}
+
+Result<std::vector<std::string>> take_over(std::string_view reading, const Chart& chart, Machine& machine) {
+  try {
+    return take(parse_json(reading), chart, machine);
+  } catch (const std::exception& error) {
+    return Error{Fault::kInternal, std::string("lamina-scan told what is no reading: ") + error.what()};
+  }
+}
+
+double saturation_of(double pixels_percent, const Chart& chart, const Machine& machine) {
+  const double stays = 1 - machine.powder.evaporates_percent / 100, drop_um3 = machine.head.drop_pl * 1000 * stays;
+  const double voids_um3 =
+      chart.pixel_x_nm * 1e-3 * chart.pixel_y_nm * 1e-3 * chart.layer_mm * 1e3 * (1 - machine.powder.packing);
+  return voids_um3 > 0 ? pixels_percent * drop_um3 / voids_um3 : 0;
 }
 
 }  // namespace lamina::pipeline

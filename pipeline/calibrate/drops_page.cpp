@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "stages/support/text/json_value.h"
-
 namespace lamina::pipeline {
 namespace {
 

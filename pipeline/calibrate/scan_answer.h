@@ -7,7 +7,7 @@
 
 namespace lamina::pipeline {
 
-/// What chart_reading.h takes over: lengths in um, as the keys say; null where the photograph does not show them.
+/// What chart_job.h takes over: lengths in um, as the keys say; null where the photograph does not show them.
 Json reading_json(const calibration::ChartReading& reading);
 /// Lengths in mm from the upper left corner of the layer's image.
 Json comparison_json(const calibration::Comparison& comparison);

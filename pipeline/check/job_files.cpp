@@ -7,11 +7,9 @@
 #include <utility>
 
 #include "pipeline/machine/profiles.h"
-#include "pipeline/output/print_program.h"
 #include "pipeline/report/machine_text.h"
 #include "stages/data/levels.h"
 #include "stages/program/head_grid.h"
-#include "stages/raster/materials.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {

@@ -10,7 +10,7 @@
 
 #include "pipeline/job/errors.h"
 #include "pipeline/manifest/layer_files.h"
-#include "pipeline/report/cost_report.h"
+#include "pipeline/report/job_cost.h"
 #include "stages/formats/voxels/image.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_target.h"

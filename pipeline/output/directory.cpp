@@ -12,10 +12,8 @@
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/file.h"
-#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/print_program.h"
 #include "stages/support/hash/hash.h"
-#include "stages/support/io/temporary.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {

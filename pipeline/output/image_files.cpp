@@ -9,7 +9,6 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/compare.h"
-#include "pipeline/output/directory.h"
 #include "stages/program/dialect.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/version.h"

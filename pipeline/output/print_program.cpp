@@ -4,9 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/machine/profiles.h"
 #include "stages/program/binary_program.h"
-#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 

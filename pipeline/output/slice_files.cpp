@@ -3,19 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <optional>
 #include <system_error>
-#include <vector>
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/output/directory.h"
-#include "stages/formats/slice_format.h"
-#include "stages/support/io/file.h"
 #include "stages/support/io/file_target.h"
-#include "stages/support/io/temporary.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {

@@ -11,7 +11,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/job/profiles/extruder.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/plan/heights.h"
+#include "pipeline/plan/layers.h"
 #include "stages/formats/rp3/rp3.h"
 #include "stages/heights/evaluate.h"
 #include "stages/support/io/file.h"

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string_view>
 
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"

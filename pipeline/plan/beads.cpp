@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/plan/layer_cut.h"
 #include "stages/raster/porous.h"
 #include "stages/segment/expand.h"
 #include "stages/segment/predict.h"

@@ -7,13 +7,7 @@
 #include <future>
 #include <set>
 
-#include "pipeline/job/job.h"
-#include "pipeline/machine/profiles.h"
-#include "pipeline/plan/fill.h"
-#include "pipeline/plan/heights.h"
-#include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/layers.h"
-#include "pipeline/plan/part_images.h"
 #include "pipeline/plan/scene.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/formats/extrusion_format.h"

@@ -1,14 +1,15 @@
-// pipeline/plan/scene.h: the parts of a job, loaded and placed on the bed.
+// pipeline/plan/scene.h: the parts of a job, loaded and placed on the bed: meshes and layer images.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "pipeline/job/job.h"
 #include "pipeline/machine/profiles.h"
+#include "stages/arrange/placement.h"
 #include "stages/data/machine.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
@@ -62,5 +63,25 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false, co
 /// Checks that all parts lie on the bed and below the build height.
 /// errors  kUsage with the part and its first point outside
 Status check_reach(const Machine& machine, const Scene& scene);
+
+/// The opened images of a part, with the data of a lamina manifest next to them and of the job's keys.
+struct OpenImages {
+  std::shared_ptr<const formats::LayerImages> images;
+  std::array<std::int64_t, 2> dots{};  // an inch, or the bed's where they are the same
+  Nm bottom = 0, thickness = 0;
+  std::int64_t width = 0, depth = 0;  // nm on the bed
+  std::vector<Note> notes;
+};
+
+/// errors  kInput, kUsage: what the files, the manifest and the keys together leave open
+Result<OpenImages> open_images(const Job& job, const PartRequest& part, const PixelGrid* grid);
+
+/// The nearest whole pixel; a note reports it if it differs from the request.
+PlacedImages placed_images(const OpenImages& open, const PartRequest& part, const PixelGrid& grid, std::int64_t x_nm,
+                           std::int64_t y_nm, std::vector<Note>& notes);
+
+/// The layers of a job of images alone are theirs; with meshes they are the job's. Sets job.layer_mm.
+/// errors  kUsage: --layer or --heights or a filling that do not fit images
+Status fit_layers(const Scene& scene, bool beads, Job& job);
 
 }  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// pipeline/plan/segment.h: the segmentation of lines at each height, from section [segment] of a job.
+// pipeline/plan/segment.h: the segmentation of lines at each height, from section [segment] of a job, and its cut of a layer.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,13 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/plan/sections.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
+#include "stages/infill/parameters.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/expand.h"
+#include "stages/segment/layer_cut.h"
 #include "stages/segment/predict.h"
 
 namespace lamina::pipeline {
@@ -40,5 +43,13 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
 
 /// Warnings before any toolpath is deposited: `no-bead`, `pores`, `calibration`. fills  walls or lines are requested
 void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profile, bool fills, std::vector<Warning>& warnings);
+
+/// The cut of a part's lines in a layer.
+/// errors  of infill::first_position
+Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
+                                    const Box& part);
+
+/// Checks that thin stretches fit into the parts. errors  kUsage: longer than any possible line
+Status check_thin_intervals(const SegmentPlan& segments, const Sections& plan);
 
 }  // namespace lamina::pipeline

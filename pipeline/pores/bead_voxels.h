@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "stages/bead/deposition.h"
@@ -12,6 +13,17 @@
 #include "stages/formats/gcode/read_gcode.h"
 
 namespace lamina::pipeline {
+
+struct BeadRules {
+  std::optional<bead::DepositionRules> rules;  // none: beads are as wide as the file states
+  std::string reported;                        // for people: where widths come from
+};
+
+/// beads    "spread": by the bead model (docs/bead.md); "deposited": the same, without spread along their lines; "stated" by
+///          the file; or "": spread where the printer is known
+/// machine  as --machine takes it; "": the one that the file names, if a profile of that name is shipped
+/// errors   kUsage: an unknown printer or word; "deposited" or "spread" without a printer
+Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& beads, const std::string& machine);
 
 /// A box of a print, cut into voxels.
 struct Window {

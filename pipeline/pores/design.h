@@ -1,5 +1,5 @@
 // pipeline/pores/design.h: the job of segmented lines whose pores are as requested, the same everywhere or changing with
-// height.
+// height; as a job file, as text and as JSON.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
 #include "stages/segment/design/gradient.h"
+#include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
 
@@ -77,7 +78,22 @@ struct GradientJob {
 Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
                                     const std::function<bool(double)>& advance);
 
-/// "3 to 5.7 mm", as a summary names the pores of a range.
-std::string heights_text(double from_mm, double to_mm);
+/// What a forward run says: "porosity 24.13 %, k1 101.9 +- 3.3 D along z, pores 0.071 x 1.61 mm"
+std::string predicted_lines(const ForwardRun& forward);
+
+/// Lines that end with LF.
+std::string as_text(const DesignedJob& found);
+/// output  the job file; "" if none was written
+Json as_json(const DesignedJob& found, const std::string& output);
+
+/// The same, step by step from the bottom up.
+std::string as_text(const GradientJob& found);
+Json as_json(const GradientJob& found, const std::string& output);
+
+/// The nearest values to the targets, as options: "--porosity 26.14".
+std::string nearest_text(const segment::PoreTarget& target, const DesignedJob& found);
+
+/// Which steps miss their target, and what is nearest to the first of them; one line.
+std::string missed_text(const GradientJob& found);
 
 }  // namespace lamina::pipeline

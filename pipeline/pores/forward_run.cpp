@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "pipeline/output/temporary_folder.h"
-#include "pipeline/pores/bead_rules.h"
 #include "pipeline/pores/bead_voxels.h"
 #include "pipeline/pores/window_choice.h"
 #include "pipeline/run/run.h"

@@ -35,7 +35,7 @@ struct ForwardRegion {
 };
 
 /// Plans a block of that height with the job through to toolpaths in a temporary folder, and analyses one period in the layer
-/// of each region, of beads as the machine deposits them (bead_rules.h).
+/// of each region, of beads as the machine deposits them (bead_voxels.h).
 /// job      of extrusion, without parts and output; all layers at one angle of 90 degrees
 /// machine  as --machine takes it
 /// advance  receives the progress, 0 .. 1; false stops

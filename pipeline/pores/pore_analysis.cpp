@@ -7,10 +7,8 @@
 #include <exception>
 #include <filesystem>
 
-#include "pipeline/pores/bead_rules.h"
-#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/bead_voxels.h"
 #include "pipeline/pores/pore_page.h"
-#include "stages/data/plot.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/pores/passages.h"
 #include "stages/segment/pore_geometry.h"

@@ -1,11 +1,12 @@
-// pipeline/pores/pore_page.h: what there is to say of the pores of a window, for people and for programs.
+// pipeline/pores/pore_page.h: a window of pores and the flow through it, as text, JSON and plot.
 #pragma once
 
 #include <string>
 
+#include "pipeline/pores/bead_voxels.h"
 #include "pipeline/pores/predict_flow.h"
-#include "pipeline/pores/predict_inertia.h"
 #include "pipeline/pores/window_choice.h"
+#include "stages/data/plot.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
@@ -19,5 +20,14 @@ Json as_json(const WindowChoice& choice, const PoreReport& report);
 /// k2 along z, and what it was fitted on.
 std::string as_text(const Forchheimer& inertia);
 Json as_json(const Forchheimer& inertia);
+
+/// Sections through the fastest place of the report's section; without one, through the widest pore of the middle slice.
+/// source  the file or folder that they are of; its last name is printed
+/// voxels  of the window: those of rasters.fine where there was a flow
+/// file    whose layers are distinguished, with its pile; none: images
+/// errors  of GcodeFile::layer()
+/// cost    of draw_pores() and void_through()
+Result<Plot> draw_window(const std::string& source, const WindowChoice& choice, const PoreReport& report,
+                         const VoxelView& voxels, const formats::GcodeFile* file = nullptr, const Pile* pile = nullptr);
 
 }  // namespace lamina::pipeline

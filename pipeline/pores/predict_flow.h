@@ -1,4 +1,4 @@
-// pipeline/pores/predict_flow.h: the pores of a window of voxels and what a fluid sees of them.
+// pipeline/pores/predict_flow.h: the pores of a window of voxels, Darcy's k1 and Forchheimer's k2.
 #pragma once
 
 #include <array>
@@ -10,6 +10,7 @@
 #include "stages/data/voxels.h"
 #include "stages/pores/porosity.h"
 #include "stages/pores/surface.h"
+#include "stages/segment/permeability.h"
 #include "stages/stokes/flow.h"
 
 namespace lamina::pipeline {
@@ -59,9 +60,22 @@ struct FlowRequest {
 Result<PoreReport> analyse_pores(const PoreRasters& rasters, const FlowRequest& request,
                                  const std::function<bool(double)>& advance);
 
-/// The box with fluid before both ends of an axis, which repeats then.
-VoxelStack with_fluid_at_ends(const VoxelView& box, int axis);
-
 inline constexpr std::uint32_t kFlowLevels = 8;  // of the solver
+
+/// dp / L = (mu / k1) v + (rho / k2) v^2, fitted to computed flows as to measured ones: all points, none weighted.
+struct Forchheimer {
+  segment::Permeability fit;  // errors are of the fit, and of voxels twice as large where these say more
+  std::vector<segment::FlowPoint> points;
+  double reynolds_per_velocity = 0;  // of pores, s/m: void velocity x 4 void / surface x density / viscosity
+  double weak_reynolds = 0;          // up to which the excess goes with the cube of the velocity
+  bool settled = true;               // else the last point found no steady flow and is left out
+};
+
+/// Six flows along z, in equal steps up to a pore Reynolds number.
+/// report  of the window, with its flow along z
+/// errors  kInput: nothing to fit, as in straight pores; kInterrupted
+/// cost    some hundred creeping flows through the window
+Result<Forchheimer> analyse_inertia(const PoreRasters& rasters, const PoreReport& report,
+                                    const std::function<bool(double)>& advance);
 
 }  // namespace lamina::pipeline

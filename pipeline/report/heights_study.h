@@ -1,10 +1,13 @@
-// pipeline/report/heights_study.h: layer tables and their effect on the surface, as text, CSV and JSON.
+// pipeline/report/heights_study.h: layer tables and their effect on the surface, as text, CSV, JSON and plot.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "stages/data/mesh.h"
+#include "stages/data/plot.h"
 #include "stages/heights/evaluate.h"
 
 namespace lamina::pipeline {
@@ -35,5 +38,11 @@ std::string study_csv(const StudiedParts& parts, const std::vector<heights::Stud
 std::string study_json(const StudiedParts& parts, const std::vector<heights::Study>& studies);
 /// One line per study.
 std::string comparison_page(const std::vector<heights::Study>& studies);
+
+/// title  of the parts
+/// errors  none
+/// cost  O(triangles * rows they span + layers)
+Plot draw_study(const std::string& title, std::span<const Mesh> meshes, std::span<const Instance> instances,
+                const heights::Study& study);
 
 }  // namespace lamina::pipeline

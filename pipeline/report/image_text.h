@@ -1,4 +1,4 @@
-// pipeline/report/image_text.h: figures of a powder job, as text and as JSON: powders, binder, voxels, layers.
+// pipeline/report/image_text.h: figures of a powder job, as text and as JSON: powders, binder, voxels, layers, inspection.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "stages/checks/inspect.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/shares.h"
@@ -37,5 +38,8 @@ std::string ranges_text(std::span<const checks::LayerRange> ranges);
 
 /// "pauses before layers 812, 1630 and 4 more for vats to be filled"; empty without refills.
 std::string refills_text(const std::vector<std::uint32_t>& refills);
+
+/// min_mm  least width of what is not thin
+Json json_of(const checks::Findings& findings, double min_mm);
 
 }  // namespace lamina::pipeline

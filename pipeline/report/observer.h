@@ -1,7 +1,7 @@
 // pipeline/report/observer.h: what counts, warns and reports while layers are made. Makers only make them.
 //
-// A new figure of the summary is a new observer in the list of its product (image_observers.h, contour_observers.h,
-// move_observers.h). One observer counts one thing.
+// A new figure of the summary is a new observer in the list of its product (image_observers.h,
+// path_observers.h). One observer counts one thing.
 #pragma once
 
 #include <memory>

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::replay {

@@ -4,7 +4,6 @@
 
 #include "pipeline/report/timing.h"
 #include "stages/support/text/json_text.h"
-#include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -1,16 +1,216 @@
 #include "pipeline/run/image_maker.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <numeric>
 #include <optional>
+#include <vector>
 
+#include "pipeline/manifest/inspection_file.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/report/image_observers.h"
-#include "pipeline/run/inspector.h"
+#include "pipeline/report/image_text.h"
+#include "pipeline/report/job_cost.h"
 #include "pipeline/run/layer_imager.h"
-#include "pipeline/run/part_counter.h"
 #include "pipeline/run/powders.h"
+#include "stages/checks/inspect.h"
+#include "stages/cost/part_pixels.h"
+#include "stages/slice/bodies.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
+
+/// Two pixels, or a drop as it flies, whichever is wider.
+double narrowest_mm(const ImagePlan& images) {
+  const double pixel = 25.4 / std::min(images.grid.x.dpi(), images.grid.y.dpi());
+  const double drop_mm3 = images.machine ? images.machine->machine.head.drop_pl * 1e-6 : 0;
+  return std::max(2 * pixel, std::cbrt(6 * drop_mm3 / std::numbers::pi));
+}
+
+class Inspector : public ImageObserver {
+ public:
+  /// Idle unless the job requests it. The plan must outlive this object.
+  explicit Inspector(const Plan& plan);
+  bool on() const { return inspection_.has_value(); }
+
+  /// Those of layers in flight, from any thread, are its const functions. Of an idle one there is none.
+  const checks::Inspection& inspection() const { return *inspection_; }
+  /// In layer order.
+  void record(const Layer& layer, const checks::LayerInspection& layer_inspection) {
+    inspection_->add(layer, layer_inspection);
+  }
+  /// In addition to the inspection of layers.
+  std::uint64_t bytes() const { return on() ? inspection_->bytes() : 0; }
+
+  // --- observer
+  /// The image of a layer of an earlier run is not available: bodies cannot be followed.
+  void layer(const LayerRecord&, const ImageNotes* made) override {
+    if (made != nullptr) return;
+    kept_ = true;
+    if (on()) inspection_->leave();
+  }
+  void warn(const Summary& summary, std::vector<Warning>& warnings) override;
+  void report(Summary& summary) const override;
+
+  // --- DIR/inspection.json, for reports: of whole jobs that were inspected from the first layer to the last
+  /// Before the first layer. errors  kUsage: a file of somebody else has that name
+  Status check_file() const;
+  /// After warn(). Without findings of this run the file stays if it is of the same job, and is removed if it is of another.
+  Status write(const ManifestHead& head) const;
+
+ private:
+  bool whole() const;
+
+  const Plan& plan_;
+  std::optional<checks::Inspection> inspection_;
+  std::vector<Warning> reports_;
+  double min_mm_ = 0;
+  bool kept_ = false;
+};
+
+/// Counts nothing unless costs of parts are reported one by one (reported_parts). Usable from many threads at once.
+class PartCounter {
+ public:
+  /// The plan has a machine and must outlive this object.
+  explicit PartCounter(const Plan& plan);
+
+  /// Of a job with parts that are images, before these are added to its meshes: the pixels that each mesh sets.
+  void weigh(const Layer& layer, const ImageWork& work, ImageNotes& notes) const;
+  /// Counts the pixels of each part in a layer, and its drops where a saturation decides them. Next to images they are
+  /// divided in proportion to what each part sets by itself: exact where no pixel is of two parts.
+  void count(const ImageWork& work, const ImageNotes& notes, LayerRecord& record) const;
+
+ private:
+  void share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const;
+
+  const Plan& plan_;
+  std::optional<cost::PartPixels> windows_;
+  bool saturates_ = false, several_ = false;  // drops are decided; pixels get more than one
+  std::uint8_t full_ = 0;                     // level of a full voxel; 0: pixels are set or not
+};
+
+Inspector::Inspector(const Plan& plan) : plan_(plan) {
+  if (!plan.job.inspect) return;
+  std::vector<checks::Solid> placed_parts;
+  for (std::size_t i = 0; i < plan.scene->instances.size(); ++i) {
+    placed_parts.push_back({box_of(*plan.scene, plan.scene->instances[i]), plan.scene->part_of_instance[i]});
+  }
+  for (const PlacedImages& images : plan.scene->images) {
+    placed_parts.push_back({plan.scene->parts[images.part].bounds, images.part});
+    Box& box = placed_parts.back().box;
+    const PixelGrid& grid = plan.images->grid;
+    const auto nm = [](std::int64_t pixel, const PixelAxis& axis) { return static_cast<Nm>(pixel * axis.span / axis.dots); };
+    const std::int64_t back = std::int64_t{grid.rows()} - images.position.first_row;
+    box.lo = {nm(images.position.column.front(), grid.x), nm(back - std::ssize(images.position.row), grid.y), images.bottom};
+    box.hi = {nm(images.position.column.back(), grid.x), nm(back, grid.y),
+              static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
+  }
+  min_mm_ = plan.job.min_wall_mm.value_or(narrowest_mm(*plan.images));
+  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), plan.job.memory_bytes / 2);
+}
+
+void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
+  if (!on()) return;
+  if (kept_) {
+    warnings.push_back({"not-inspected",
+                        "layers of an earlier run were kept: what hangs together was not looked at; run the job "
+                        "anew, or as a dry run, with --inspect"});
+    return;
+  }
+  std::vector<std::string> names;
+  for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
+  checks::report(inspection_->finish(), names, min_mm_, reports_);
+  warnings.insert(warnings.end(), reports_.begin(), reports_.end());
+}
+
+void Inspector::report(Summary& summary) const {
+  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_);
+}
+
+Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
+
+Status Inspector::write(const ManifestHead& head) const {
+  if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
+  return write_inspection(plan_.job.output, head,
+                          {{"inspection", json_of(inspection_->findings(), min_mm_)}, {"warnings", warnings_json(reports_)}});
+}
+
+bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }
+
+PartCounter::PartCounter(const Plan& plan) : plan_(plan) {
+  const std::size_t parts = reported_parts(plan);
+  if (parts < 2) return;
+  saturates_ = plan.images->dose.saturates();
+  several_ = plan.images->dose.max_drops() > 1;
+  full_ = plan.images->dose.full();
+  const std::vector<checks::Solid> solids = solids_from_above(*plan.scene);
+  std::vector<Box> boxes;
+  for (const checks::Solid& solid : solids) {
+    Box box = full_ > 0 ? cost::box_of_voxels(solid.box, plan.images->grid) : solid.box;
+    const auto [by_x, by_y] = plan.images->dose.zones().grows_nm(plan.images->dose.zones().of_part(solid.part));
+    box.lo.x -= static_cast<Nm>(by_x), box.hi.x += static_cast<Nm>(by_x);
+    box.lo.y -= static_cast<Nm>(by_y), box.hi.y += static_cast<Nm>(by_y);
+    boxes.push_back(box);
+  }
+  const std::vector<std::uint32_t> group = slice::group_from_above(boxes);  // anew, for boxes have grown
+  std::vector<cost::Body> bodies;
+  for (std::size_t i = 0; i < solids.size(); ++i) bodies.push_back({boxes[i], solids[i].part, group[i]});
+  const Mirror mirror = plan.job.mirror;
+  // Pixels set by images belong to no window: with images, windows are of the meshes alone, before anything is mirrored.
+  const bool mirrored = mirror != Mirror::kNone && plan.scene->images.empty();
+  windows_.emplace(bodies, parts, plan.images->grid, mirrored && mirror != Mirror::kY, mirrored && mirror != Mirror::kX);
+}
+
+void PartCounter::weigh(const Layer& layer, const ImageWork& work, ImageNotes& notes) const {
+  if (!windows_) return;
+  notes.part_pixels = full_ > 0 ? windows_->sum(layer, work.drops.shares) : windows_->count(layer, work.runs);
+}
+
+void PartCounter::count(const ImageWork& work, const ImageNotes& notes, LayerRecord& record) const {
+  if (!windows_) return;
+  if (!plan_.scene->images.empty()) return share_out(work, notes.part_pixels, record);
+  const dose::DropWork& drops = work.drops;
+  if (full_ > 0) {
+    const Levels& voxels = saturates_ ? drops.zones : drops.shares;
+    record.part_pixels = windows_->share(record.layer, voxels, full_, record.dosed_pixels);
+  } else {
+    record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, work.runs);
+  }
+  if (saturates_) {
+    record.part_drops = several_ ? windows_->sum(record.layer, drops.levels) : windows_->count(record.layer, work.runs);
+  }
+}
+
+void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const {
+  const auto shared = [](std::uint64_t all, const std::vector<std::uint64_t>& by) {
+    const auto whole = cost::shares(static_cast<std::int64_t>(all), by);
+    return std::vector<std::uint64_t>(whole.begin(), whole.end());
+  };
+  record.part_pixels = shared(record.filled_pixels(), weights);
+  const DoseZones& zones = plan_.images->dose.zones();
+  if (!saturates_ || !zones.several()) return;  // drops are as pixels
+  record.part_drops.assign(weights.size(), 0);
+  std::vector<std::uint64_t> drops(zones.count(), 0);  // those of shared voxels count for all of theirs
+  for (std::uint32_t zone = 0; full_ == 0 && zone < zones.count(); ++zone)
+    drops[zone] = sum_of_levels(work.drops.levels, work.zones.image[zone]);
+  for (std::size_t i = 0; full_ > 0 && i < work.drops.deposited.size(); ++i) {
+    Runs voxels;
+    threshold_levels(work.drops.deposited[i].shares, 1, voxels);
+    drops[work.drops.deposited[i].zone] += sum_of_levels(work.drops.levels, voxels);
+  }
+  drops = shared(record.drops, drops);
+  for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
+    std::vector<std::uint64_t> within(weights.size(), 0);
+    for (std::uint32_t part = 0; part < weights.size(); ++part) {
+      if (zones.of_part(part) == zone) within[part] = weights[part];
+    }
+    if (drops[zone] == 0) continue;
+    const std::vector<std::uint64_t> own = shared(drops[zone], within);
+    for (std::size_t part = 0; part < own.size(); ++part) record.part_drops[part] += own[part];
+  }
+}
 
 class ImageMaker : public Maker {
  public:

@@ -4,8 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/plan/heights.h"
-#include "stages/checks/solid_checks.h"
+#include "pipeline/plan/layers.h"
 #include "stages/load/planned.h"
 #include "stages/slice/bodies.h"
 #include "stages/slice/slice.h"

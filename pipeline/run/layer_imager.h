@@ -2,11 +2,9 @@
 #pragma once
 
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "pipeline/output/image_files.h"
-#include "pipeline/plan/heights.h"
+#include "pipeline/plan/layers.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/image_observers.h"
 #include "stages/checks/thin.h"

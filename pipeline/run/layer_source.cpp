@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "pipeline/plan/heights.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/run/layer_imager.h"
 #include "stages/load/load.h"

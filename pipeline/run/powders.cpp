@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <atomic>
 
-#include "pipeline/plan/heights.h"
+#include "pipeline/plan/layers.h"
 #include "pipeline/report/image_text.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/program/vats.h"

@@ -1,6 +1,5 @@
 #include "pipeline/run/run.h"
 
-#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -9,19 +8,16 @@
 #include <span>
 
 #include "pipeline/flow/layers.h"
-#include "pipeline/job/job.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/slice_files.h"
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/report/heights_study.h"
 #include "pipeline/report/image_observers.h"
-#include "pipeline/report/move_observers.h"
+#include "pipeline/report/path_observers.h"
 #include "pipeline/report/timing.h"
-#include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/job_checks.h"
-#include "pipeline/run/move_maker.h"
-#include "pipeline/run/run_resolved.h"
+#include "pipeline/run/path_makers.h"
 #include "stages/checks/layer_warnings.h"
 
 namespace lamina::pipeline {

@@ -13,6 +13,8 @@
 
 namespace lamina::pipeline {
 
+struct Resolved;  // pipeline/plan/plan.h
+
 /// Runs a job and writes job.output. A dry run ends before the first layer with the summary's estimates;
 /// with a printer it makes the layers, reports their time, and writes nothing.
 /// job     checked (check_job)
@@ -22,5 +24,7 @@ namespace lamina::pipeline {
 ///         is kBoth and a pixel differs, or a strict job has warnings; kInput: a whole job comes out empty; the lowest failing
 ///         layer decides
 Result<Summary> run(const Job& job, Product product, const ProgressCallback& progress, const std::atomic<bool>& cancel);
+/// The same of a job whose machine is found already. errors  those of run() but of resolve
+Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const std::atomic<bool>& cancel);
 
 }  // namespace lamina::pipeline

@@ -11,9 +11,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/report/job_cost.h"
-#include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_head.h"
-#include "pipeline/show/report_locations.h"
 #include "pipeline/show/report_source.h"
 #include "pipeline/show/report_warnings.h"
 #include "stages/geometry/coverage.h"

@@ -62,4 +62,9 @@ std::string page_title(const ManifestHead& head);
 std::string head_json(const Manifest& manifest, const ReportManifest& file, const PixelGrid& grid, const ReportLayers& detected,
                       view::report::HeldLayers& held, const std::vector<ShownView>& views);
 
+/// Adds the warnings and places of the job's inspection.json to the findings; nothing without a file of this job.
+/// directory  of the manifest. mirrored  whether columns and rows of the images are, on which places are then shown
+void add_inspection(const std::string& directory, const ManifestHead& head, bool mirrored_x, bool mirrored_y,
+                    ReportLayers& detected);
+
 }  // namespace lamina::pipeline

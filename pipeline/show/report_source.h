@@ -1,16 +1,21 @@
-// pipeline/show/report_source.h: the input of a report on a finished job: its manifest and the runs of its layers.
+// pipeline/show/report_source.h: the input of a report on a finished job: its manifest, the runs of its layers, and its parts.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/scene.h"
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/view/cast.h"
 
 namespace lamina::pipeline {
 
@@ -33,5 +38,14 @@ struct ReportSource {
 /// errors  kVerification: no manifest, an unfinished job, a job of contours, a job without images, a changed G-code file;
 ///         of the readers
 Result<ReportSource> report_source(const std::string& path);
+
+/// The job's parts where they stand.
+///
+/// A manifest names parts without their folders. Each is searched in `folders` (entries may also be files) and accepted if
+/// its triangles match the recorded fingerprint. errors  kInput: a missing or changed part, with its name; of load_scene
+Result<Scene> find_parts(const ManifestHead& head, const Job& job, const std::vector<std::string>& folders);
+
+/// Parts from above, from the front and from the right, `most` pixels along the longest side of all.
+Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t maximum);
 
 }  // namespace lamina::pipeline

@@ -1,20 +1,41 @@
 // pipeline/show/report_warnings.h: the warnings of a finished job, from its files.
 #pragma once
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"
+#include "pipeline/plan/plan.h"
 #include "pipeline/plan/scene.h"
-#include "pipeline/show/report_bleed.h"
+#include "pipeline/run/layer_imager.h"
 #include "stages/checks/solid_checks.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
+
+class ReportBleed {
+ public:
+  /// Null where no bleed goes inwards, or beads fill the parts. machine  null without one. scene  the parts, which are copied
+  static std::unique_ptr<ReportBleed> make(const Manifest& manifest, const Job& job, const Machine* machine,
+                                           const Scene& scene);
+
+  /// Makes a layer as it was before the bleed, and moves its edges; from many threads at once.
+  void inspect(const Layer& layer);
+  void report(std::vector<Warning>& warnings) const;
+
+ private:
+  ReportBleed() = default;
+
+  Plan plan_;
+  std::vector<Layer> layers_;
+  std::vector<checks::VanishedPieces> vanished_;  // by layer
+  tbb::enumerable_thread_specific<ImageWork> work_;
+};
 
 class ReportWarnings {
  public:

@@ -3,18 +3,23 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <numeric>
 
+#include "pipeline/check/job_files.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/show/series.h"
-#include "pipeline/show/swath.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/svg/svg.h"
+#include "stages/formats/svg/svg_writer.h"
+#include "stages/geometry/combine.h"
+#include "stages/replay/jetting.h"
 #include "stages/support/text/readable.h"
-#include "stages/view/picture/canvas.h"  // have_font
+#include "stages/view/picture/canvas.h"
 #include "stages/view/picture/contact_sheet.h"
 #include "stages/view/picture/plan_view.h"
+#include "stages/view/picture/swath_view.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -101,6 +106,45 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
   auto picture = view::picture::plan_view(*shapes, request.width.value_or(kSheetWidth));
   if (!picture) return picture.error();
   return Preview{std::move(*picture), said};
+}
+
+/// Replays the layer's program up to the step and draws the drops jetted so far, `width` pixels wide. errors  kUsage: no
+/// such layer, swath or step; kVerification: missing or changed files; kInternal
+Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifest& manifest, const replay::StepChoice& choice,
+                                     std::uint32_t width) {
+  const ManifestHead& head = manifest.head;
+  if (head.machine.empty()) {
+    return Error{Fault::kUsage, fmt::format("{}: the job has no print program; plan it with --machine", directory)};
+  }
+  const auto record =
+      std::ranges::find_if(manifest.layers, [&](const LayerRecord& one) { return one.layer.index == choice.layer; });
+  if (record == manifest.layers.end()) {
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", choice.layer,
+                                            manifest.layers.front().layer.index, manifest.layers.back().layer.index)};
+  }
+  const auto machine = machine_of_job(directory, head);
+  if (!machine) return machine.error();
+  const auto image = picture_of_layer(directory, head, *record);
+  if (!image) return image.error();
+  replay::StepChoice step = choice;
+  step.planes = std::max(1u, head.max_drops);
+  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), step, head.grid);
+  if (!jetting) return jetting.error();
+  view::picture::SwathView view;
+  view.grid = head.grid;
+  view.width = width;
+  const Levels requested = times_set(*image);
+  view.image = requested;
+  view.fired = jetting->printed;
+  view.maximum = head.max_of_pixel();
+  view.bands = jetting->bands;
+  view.nozzles = jetting->nozzles;
+  view.title = fmt::format("{}, layer {}, swath {} ({} of {} that fire), step {}", head.machine, choice.layer, jetting->swath,
+                           jetting->position, jetting->sweeps, jetting->step);
+  view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", jetting->fired, jetting->drops,
+                             jetting->firing, jetting->nozzles.size());
+  if (view.maximum > 1) view.caption += fmt::format("; darkest {} drops", view.maximum);
+  return view::picture::swath_picture(view);
 }
 
 /// Draws a layer at a step of its program.

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/report/inspection_json.h"
+#include "pipeline/report/image_text.h"
 #include "stages/checks/inspect.h"
 #include "tests/checks/volume.h"
 
@@ -104,7 +104,8 @@ TEST_F(BoundedInspection, StopsWhereItDoesRegardlessOfTheScratchOfLayers) {
   const std::uint64_t maximum = *std::ranges::max_element(held_);
   for (const std::uint64_t may : {maximum / 16, maximum / 4, maximum / 2, maximum}) {
     const std::string one = json_text(pipeline::json_of(inspect(may), 0.3));
-    for (const std::size_t slots : {2, 3, 5, 12}) EXPECT_EQ(json_text(pipeline::json_of(inspect(may, kLayers, slots), 0.3)), one) << may;
+    for (const std::size_t slots : {2, 3, 5, 12})
+      EXPECT_EQ(json_text(pipeline::json_of(inspect(may, kLayers, slots), 0.3)), one) << may;
   }
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/report/cost_report.h"
+#include "pipeline/report/job_cost.h"
 #include "stages/cost/cost.h"
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"

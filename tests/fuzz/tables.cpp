@@ -1,7 +1,7 @@
 // Tables that people write: tops of layers, measured widths, flows and pressure drops.
 #include <cmath>
 
-#include "pipeline/calibrate/pieces_text.h"
+#include "pipeline/calibrate/calibrate.h"
 #include "stages/heights/evaluate.h"
 #include "stages/segment/flows.h"
 #include "stages/segment/measured.h"

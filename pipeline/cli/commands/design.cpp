@@ -8,7 +8,7 @@
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/pores/design_page.h"
+#include "pipeline/pores/design.h"
 #include "stages/segment/permeability.h"  // the unit
 #include "stages/support/io/file.h"
 #include "stages/support/text/json_value.h"

@@ -8,8 +8,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/manifest.h"  // title_of
-#include "pipeline/plan/heights.h"
-#include "pipeline/report/heights_plot.h"
+#include "pipeline/plan/layers.h"
 #include "pipeline/report/heights_study.h"
 #include "stages/formats/rp3/rp3.h"
 #include "stages/support/io/file.h"

@@ -18,7 +18,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/temporary_folder.h"
 #include "pipeline/pores/pore_analysis.h"
-#include "pipeline/run/run_resolved.h"
+#include "pipeline/run/run.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"

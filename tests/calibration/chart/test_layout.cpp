@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/calibrate/chart_reading.h"
+#include "pipeline/calibrate/chart_job.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/data/runs.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/calibrate/chart_reading.h"
+#include "pipeline/calibrate/chart_job.h"
 #include "pipeline/calibrate/scan_answer.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/calibration/scan/photo.h"

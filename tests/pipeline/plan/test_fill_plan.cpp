@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/plan/fill.h"
+#include "pipeline/plan/sections.h"
 #include "stages/support/text/toml.h"
 
 namespace lamina::test {

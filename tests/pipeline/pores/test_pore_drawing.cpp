@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/pore_page.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/support/io/other_program.h"
 #include "tests/commands/program.h"

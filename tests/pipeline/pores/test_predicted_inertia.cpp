@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pipeline/pores/pore_page.h"
-#include "pipeline/pores/predict_inertia.h"
+#include "pipeline/pores/predict_flow.h"
 #include "stages/stokes/flow.h"
 #include "stages/support/text/json_value.h"
 #include "tests/pores/boxes.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <polyclipping/clipper.hpp>
 
-#include "pipeline/plan/layer_cut.h"
+#include "pipeline/plan/segment.h"
 #include "stages/dose/edges.h"
 #include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"

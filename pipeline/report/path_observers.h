@@ -1,10 +1,14 @@
-// pipeline/report/move_observers.h: what an extrusion job counts, layer by layer, for its summary.
+// pipeline/report/path_observers.h: what jobs of contours and of moves count, layer by layer, for their summaries.
 #pragma once
 
 #include "pipeline/plan/plan.h"
 #include "pipeline/report/observer.h"
+#include "stages/slice/slice.h"
 
 namespace lamina::pipeline {
+
+/// In the order of their lines. The plan must outlive them.
+void observe_contours(const Plan& plan, Observers<slice::SectionReport>& observers);
 
 /// Whether layers can have several segmented ranges of heights: parts stand at different heights, or layers continue above
 /// the top of one.

@@ -1,4 +1,4 @@
-// pipeline/run/contour_maker.h: makes the layers of a sliced job: contours and their filling.
+// pipeline/run/path_makers.h: makes the layers of sliced and of extrusion jobs: contours, and walls and fillings as moves.
 #pragma once
 
 #include <memory>
@@ -10,5 +10,6 @@
 namespace lamina::pipeline {
 
 std::unique_ptr<Maker> make_contour_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits);
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, JobChecks& checks, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline
