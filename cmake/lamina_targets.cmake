@@ -95,7 +95,9 @@ lamina_sources(pipeline_sources "pipeline/*.cpp")
 list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|scan_main|calibrate/scan_answer|show/sheet)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
-               "pipeline/machine/*.cpp" "pipeline/pores/*.cpp" "pipeline/show/*.cpp")
+               "pipeline/machine/*.cpp" "pipeline/manifest/*.cpp" "pipeline/plan/plan.cpp" "pipeline/plan/progress.cpp"
+               "pipeline/plan/scene.cpp" "pipeline/plan/solids.cpp" "pipeline/pores/*.cpp" "pipeline/report/*.cpp"
+               "pipeline/show/*.cpp")
 list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
@@ -115,7 +117,6 @@ add_library(lamina_pipeline STATIC ${pipeline_sources} $<TARGET_OBJECTS:lamina_o
 add_library(lamina::pipeline ALIAS lamina_pipeline)
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages PRIVATE nlohmann_json::nlohmann_json)
 if(LAMINA_UNITY STREQUAL "all")
-  list(FILTER pipeline_sources EXCLUDE REGEX "/plan/(plan|segment)\\.cpp$")
   lamina_unity(lamina_pipeline ${pipeline_sources})
 endif()
 

@@ -113,7 +113,7 @@ if(LAMINA_SANITIZE STREQUAL "thread")
                         PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH nlohmann_json::nlohmann_json TIFF::TIFF GTest::gtest_main
                         ${CMAKE_DL_LIBS})
   target_compile_definitions(test_threads PRIVATE $<TARGET_PROPERTY:lamina_test_support,INTERFACE_COMPILE_DEFINITIONS>)
-  list(FILTER thread_sources EXCLUDE REGEX "/(cli/commands/plan|job/profiles/printer|plan/plan|plan/segment)\\.cpp$")  # names of their own
+  list(FILTER thread_sources EXCLUDE REGEX "/(cli/commands/plan|job/profiles/printer)\\.cpp$")  # names of their own
   lamina_unity(test_threads ${thread_sources})
 endif()
 

@@ -7,6 +7,7 @@
 #include <future>
 #include <set>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/scene.h"
 #include "stages/checks/layer_warnings.h"
@@ -22,8 +23,6 @@
 
 namespace lamina::pipeline {
 namespace {
-
-Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
 
 /// Builds a plan step by step.
 class Planner {
@@ -187,10 +186,10 @@ class Planner {
     if (options->mode != heights::Mode::kUniform || count * bytes_of_layer <= static_cast<double>(job().memory_bytes))
       return {};
     return usage(
-        fmt::format("{:.0f} layers of {} mm take {} for their table alone, --memory is {}; give thicker layers or more "
-                    "memory",
-                    std::ceil(count), number_text(mm(options->set.minimum())),
-                    readable_bytes(static_cast<std::uint64_t>(count * bytes_of_layer)), readable_bytes(job().memory_bytes)));
+        "{:.0f} layers of {} mm take {} for their table alone, --memory is {}; give thicker layers or more "
+        "memory",
+        std::ceil(count), number_text(mm(options->set.minimum())),
+        readable_bytes(static_cast<std::uint64_t>(count * bytes_of_layer)), readable_bytes(job().memory_bytes));
   }
 
   Status check_machine() {
@@ -206,8 +205,8 @@ class Planner {
     if (!moves()) return {};
     const Extruder& machine = plan_.moves->profile.machine;
     if (mm(plan_.scene->height) > machine.bed.build_height_mm) {
-      return usage(fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
-                               mm(plan_.scene->height), machine.name, machine.bed.build_height_mm));
+      return usage("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them", mm(plan_.scene->height),
+                   machine.name, machine.bed.build_height_mm);
     }
     const auto format = formats::make_extrusion_format(machine);
     for (std::uint32_t i = plan_.range[0]; i < plan_.range[1]; ++i) {
@@ -242,15 +241,15 @@ class Planner {
     constexpr std::uint32_t kMaxZones = 100;
     if (zones.count() > kMaxZones) {
       return usage(
-          fmt::format("part.bleed_um, part.saturation_percent: the parts have {} different doses, at most {} are "
-                      "planned together; plan them as several jobs",
-                      zones.count(), kMaxZones));
+          "part.bleed_um, part.saturation_percent: the parts have {} different doses, at most {} are "
+          "planned together; plan them as several jobs",
+          zones.count(), kMaxZones);
     }
     if (zones.several() && job().fill_rule == FillRule::kEvenOdd && (materials_.several() || job().levels > 0)) {
       return usage(
-          fmt::format("--fill-rule: evenodd looks at all parts together, and parts have doses of their own and {}; "
-                      "choose nonzero",
-                      job().levels > 0 ? "shares of voxels" : "several materials"));
+          "--fill-rule: evenodd looks at all parts together, and parts have doses of their own and {}; "
+          "choose nonzero",
+          job().levels > 0 ? "shares of voxels" : "several materials");
     }
     if (!zones.bleeds().grows()) return {};
     if (materials_.several())
@@ -263,8 +262,8 @@ class Planner {
       const std::int64_t beyond =
           std::max({by_x - box.lo.x, box.hi.x + by_x - grid.x.length, by_y - box.lo.y, box.hi.y + by_y - grid.y.length});
       if (beyond <= 0) continue;
-      return usage(fmt::format("dose.bleed_um: edges of {} grow {:.3f} mm beyond the bed; move it away from its edge",
-                               one_line(plan_.scene->parts[part].path), mm(beyond)));
+      return usage("dose.bleed_um: edges of {} grow {:.3f} mm beyond the bed; move it away from its edge",
+                   one_line(plan_.scene->parts[part].path), mm(beyond));
     }
     return {};
   }
@@ -329,22 +328,22 @@ Result<Resolved> resolve(const Job& job, Product product) {
     if (!printer) return printer.error();
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
-    if (!formats::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
+    if (!formats::extension_of(job.format)) return usage("unknown format '{}'", job.format);
     const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
     if (formats::find_level_format(job.format) != nullptr && !dosed) {
       return usage(
-          fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
-                      "--levels 2, 4 or 16, or --machine and --saturation",
-                      job.format));
+          "--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
+          "--levels 2, 4 or 16, or --machine and --saturation",
+          job.format);
     }
     return resolved;
   }
-  if (job.shard) return usage(fmt::format("run.shard: {}", kNoShards));
+  if (job.shard) return usage("run.shard: {}", kNoShards);
   if (product == Product::kContours) {
     const auto* format = formats::find_slice_format(job.slice.format);
-    if (format == nullptr) return usage(fmt::format("unknown format '{}'", job.slice.format));
+    if (format == nullptr) return usage("unknown format '{}'", job.slice.format);
     if (!format->paths && fills(job)) {
-      return usage(fmt::format("--format {}: holds contours only; leave out the filling, or choose svg", format->id));
+      return usage("--format {}: holds contours only; leave out the filling, or choose svg", format->id);
     }
     if (job.slice.format == "3mf" && job.slice.file_a_layer) {
       return usage("--file-a-layer: a 3MF package holds all slices; choose svg or cli, or leave it out");

@@ -8,6 +8,7 @@
 #include <map>
 #include <tuple>
 
+#include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/manifest/manifest.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
@@ -216,8 +217,6 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t kSampledImages = 5;  // into a stack, for how crowded its images are
 
-Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
-
 /// An output never replaces an input.
 Status check_apart(const Job& job, const std::string& path) {
   std::error_code ignored;
@@ -225,7 +224,7 @@ Status check_apart(const Job& job, const std::string& path) {
   const fs::path in = fs::weakly_canonical(path, ignored), out = fs::weakly_canonical(job.output, ignored);
   const bool inside = std::ranges::mismatch(out, in).in1 == out.end();
   if (!inside) return {};
-  return usage(fmt::format("{}: lies in the directory that is written; name another one with -o", one_line(path)));
+  return usage("{}: lies in the directory that is written; name another one with -o", one_line(path));
 }
 
 /// Dots an inch of the images by key or tags. errors  kInput, kUsage
@@ -241,13 +240,13 @@ Result<std::array<std::int64_t, 2>> dots_of(const PartRequest& part, const forma
     if (std::abs(dpi[a] - axes[a]->dpi()) <= 0.02) {
       dots[a] = axes[a]->dots;
     } else if (!part.images.resample) {
-      return usage(fmt::format("{}: {:g} x {:g} dpi, the job has {:g} x {:g}; give the same --dpi, or part.resample = true",
-                               one_line(part.path), dpi[0], dpi[1], grid.x.dpi(), grid.y.dpi()));
+      return usage("{}: {:g} x {:g} dpi, the job has {:g} x {:g}; give the same --dpi, or part.resample = true",
+                   one_line(part.path), dpi[0], dpi[1], grid.x.dpi(), grid.y.dpi());
     } else if (axes[a]->span != kNmPerInch || dpi[a] < 1 || dpi[a] > 25'400) {
       return usage(
-          fmt::format("{}: {:g} dpi cannot be resampled to the job's {:g} x {:g}, which are not whole; plan the images at "
-                      "the machine's",
-                      one_line(part.path), dpi[a], grid.x.dpi(), grid.y.dpi()));
+          "{}: {:g} dpi cannot be resampled to the job's {:g} x {:g}, which are not whole; plan the images at "
+          "the machine's",
+          one_line(part.path), dpi[a], grid.x.dpi(), grid.y.dpi());
     } else {
       dots[a] = std::llround(dpi[a]);
     }
@@ -260,8 +259,7 @@ Status check_no_transform(const PartRequest& part) {
   if (part.scale == plain.scale && part.rotate_deg == plain.rotate_deg && part.shrink == plain.shrink &&
       part.unit == plain.unit)
     return {};
-  return usage(fmt::format("{}: images are neither scaled nor turned; leave out scale, rotate_deg, shrink and unit",
-                           one_line(part.path)));
+  return usage("{}: images are neither scaled nor turned; leave out scale, rotate_deg, shrink and unit", one_line(part.path));
 }
 
 /// nm that pixels of the image take on the bed. As many as a bed of this length has are as long as the bed.
@@ -379,17 +377,16 @@ Status check_reach(const Machine& machine, const Scene& scene) {
 }
 
 Result<OpenImages> open_images(const Job& job, const PartRequest& part, const PixelGrid* grid) {
-  if (grid == nullptr)
-    return usage(fmt::format("{}: is layer images; lamina jet and lamina convert take them", one_line(part.path)));
+  if (grid == nullptr) return usage("{}: is layer images; lamina jet and lamina convert take them", one_line(part.path));
   if (Status status = check_no_transform(part); !status) return status.error();
   if (Status status = check_apart(job, part.path); !status) return status.error();
   const auto reported = images_on_record(part.path);
   if (!reported) return reported.error();
   if (job.levels > 0 && part.images.threshold != PartImages().threshold)
     return usage(
-        fmt::format("{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
-                    "one of them",
-                    one_line(part.path)));
+        "{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
+        "one of them",
+        one_line(part.path));
   auto images = formats::LayerImages::open(
       reported->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty, kSampledImages});
   if (!images) return images.error();
@@ -406,11 +403,11 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
     open.thickness = static_cast<Nm>(nm_of(job.layer_mm));
   }
   if (open.thickness <= 0)
-    return usage(fmt::format("{}: no manifest of lamina tells how thick its layers are; give --layer, or part.layer_mm",
-                             one_line(part.path)));
+    return usage("{}: no manifest of lamina tells how thick its layers are; give --layer, or part.layer_mm",
+                 one_line(part.path));
   if (open.bottom + std::int64_t{open.thickness} * images->layers() > kNmReach)
-    return usage(fmt::format("{}: {} layers of {} mm reach beyond {} mm; give thinner ones", one_line(part.path),
-                             images->layers(), mm(open.thickness), mm(kNmReach)));
+    return usage("{}: {} layers of {} mm reach beyond {} mm; give thinner ones", one_line(part.path), images->layers(),
+                 mm(open.thickness), mm(kNmReach));
   open.width = length_of(images->columns(), open.dots[0], grid->x);
   open.depth = length_of(images->rows(), open.dots[1], grid->y);
   open.notes.push_back(
@@ -461,24 +458,24 @@ PlacedImages placed_images(const OpenImages& open, const PartRequest& part, cons
 Status fit_layers(const Scene& scene, bool beads, Job& job) {
   if (scene.images.empty()) return {};
   const std::string first = one_line(scene.parts[scene.images.front().part].path);
-  if (beads) return usage(first + ": is images; walls, fillings and segments are of meshes, leave them out");
+  if (beads) return usage("{}: is images; walls, fillings and segments are of meshes, leave them out", first);
   if (job.heights.mode != heights::Mode::kUniform || job.heights.per_part || !job.heights.thickness_mm.empty())
-    return usage(first + ": images have layers of one thickness; leave out --heights and --thickness");
+    return usage("{}: images have layers of one thickness; leave out --heights and --thickness", first);
   if (!scene.instances.empty()) return {};
   const Nm thickness = scene.images.front().thickness;
   for (const PlacedImages& images : scene.images) {
     const std::string& path = scene.parts[images.part].path;
     if (images.thickness != thickness)
-      return usage(fmt::format("{}: layers of {} mm, those of {} are {} mm; images share one thickness", one_line(path),
-                               mm(images.thickness), first, mm(thickness)));
+      return usage("{}: layers of {} mm, those of {} are {} mm; images share one thickness", one_line(path),
+                   mm(images.thickness), first, mm(thickness));
     if (images.bottom % thickness != 0)
-      return usage(fmt::format("{}: begins {} mm above the bed, which are no whole layers of {} mm; give another --bottom",
-                               one_line(path), mm(images.bottom), mm(thickness)));
+      return usage("{}: begins {} mm above the bed, which are no whole layers of {} mm; give another --bottom", one_line(path),
+                   mm(images.bottom), mm(thickness));
   }
   const bool named = std::ranges::find(job.named, "layers.thickness_mm") != job.named.end();
   if (named && nm_of(job.layer_mm) != thickness)
-    return usage(fmt::format("{}: layers of {} mm, the job asks for {} mm; leave out --layer", first, mm(thickness),
-                             number_text(job.layer_mm)));
+    return usage("{}: layers of {} mm, the job asks for {} mm; leave out --layer", first, mm(thickness),
+                 number_text(job.layer_mm));
   job.layer_mm = mm(thickness);
   return {};
 }
