@@ -2,24 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
+#include <concepts>
 
 #include "stages/formats/image_format.h"
 #include "stages/formats/png/png_format.h"
 #include "stages/formats/svg/svg_writer.h"
 #include "stages/support/text/escape.h"
 #include "stages/support/text/json_text.h"
-
-namespace lamina {
-
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Box, left, top, width, height, colour)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Image, left, top, columns, colours, pixels)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Line, points, colour)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Dot, x, y, radius, colour)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Text, x, baseline, size, anchor, colour, line)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot, width, height, boxes, images, lines, dots, texts)
-
-}  // namespace lamina
+#include "stages/support/text/json_value.h"
 
 namespace lamina::formats {
 namespace {
@@ -79,6 +69,66 @@ void put(SvgWriter& svg, const Plot::Text& text) {
   svg.text(text.line, "text");
 }
 
+// --- as JSON, for lamina-preview.
+
+template <class T, class Shape>
+concept Is = std::same_as<std::remove_const_t<T>, Shape>;
+
+void each_field(Is<Plot::Box> auto& box, auto visit) {
+  visit("left", box.left), visit("top", box.top), visit("width", box.width), visit("height", box.height);
+  visit("colour", box.colour);
+}
+void each_field(Is<Plot::Image> auto& image, auto visit) {
+  visit("left", image.left), visit("top", image.top), visit("columns", image.columns);
+  visit("colours", image.colours), visit("pixels", image.pixels);
+}
+void each_field(Is<Plot::Line> auto& line, auto visit) { visit("points", line.points), visit("colour", line.colour); }
+void each_field(Is<Plot::Dot> auto& dot, auto visit) {
+  visit("x", dot.x), visit("y", dot.y), visit("radius", dot.radius), visit("colour", dot.colour);
+}
+void each_field(Is<Plot::Text> auto& text, auto visit) {
+  visit("x", text.x), visit("baseline", text.baseline), visit("size", text.size), visit("anchor", text.anchor);
+  visit("colour", text.colour), visit("line", text.line);
+}
+void each_field(Is<Plot> auto& plot, auto visit) {
+  visit("width", plot.width), visit("height", plot.height), visit("boxes", plot.boxes), visit("images", plot.images);
+  visit("lines", plot.lines), visit("dots", plot.dots), visit("texts", plot.texts);
+}
+
+template <class Shape>
+Json json_of(const Shape& shape) {
+  Json json = Json::object();
+  each_field(shape, [&json](std::string_view name, const auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::same_as<Value, Plot::Anchor>) {
+      json[name] = static_cast<int>(value);
+    } else if constexpr (std::convertible_to<const Value&, Json>) {
+      json[name] = value;
+    } else {
+      Json& list = json[name] = Json::array();
+      for (const auto& element : value) list.push_back(json_of(element));
+    }
+  });
+  return json;
+}
+
+/// errors  throws JsonError
+template <class Shape>
+void read(const Json& json, Shape& shape) {
+  each_field(shape, [&json](std::string_view name, auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::same_as<Value, Plot::Anchor>) {
+      value = static_cast<Plot::Anchor>(json.at(name).get<int>());
+    } else if constexpr (std::same_as<Value, decltype(Plot::Line::points)>) {
+      for (const Json& point : json.at(name)) value.push_back({point.at(0).get<double>(), point.at(1).get<double>()});
+    } else if constexpr (std::convertible_to<const Value&, Json>) {
+      json.at(name).get_to(value);
+    } else {
+      for (const Json& element : json.at(name)) read(element, value.emplace_back());
+    }
+  });
+}
+
 }  // namespace
 
 std::string plot_svg(const Plot& plot) {
@@ -102,15 +152,15 @@ std::string plot_svg(const Plot& plot) {
   return {out.begin(), out.end()};
 }
 
-std::string plot_json(const Plot& plot) {
-  return nlohmann::json(plot).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
+std::string plot_json(const Plot& plot) { return json_text(json_of(plot)); }
 
 Result<Plot> read_plot(std::string_view json) {
   if (!json_nests_within(json)) return Error{Fault::kUsage, "is no plot: it nests too deep"};
   try {
-    return nlohmann::json::parse(json).get<Plot>();
-  } catch (const nlohmann::json::exception& error) {
+    Plot plot;
+    read(parse_json(json), plot);
+    return plot;
+  } catch (const JsonError& error) {
     return Error{Fault::kUsage, std::string("is no plot: ") + error.what()};
   }
 }
