@@ -93,12 +93,12 @@ set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/text/version.cp
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
 list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|scan_main|calibrate/scan_answer|show/sheet)\\.cpp$")
-# What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
+# What runs once a job, or little once a layer, is compiled to be compiled fast; what does the work of layers or facets, and
+# what decodes programs, is optimised.
 lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
                "pipeline/machine/*.cpp" "pipeline/manifest/*.cpp" "pipeline/plan/plan.cpp" "pipeline/plan/progress.cpp"
-               "pipeline/plan/scene.cpp" "pipeline/plan/solids.cpp" "pipeline/pores/*.cpp" "pipeline/report/*.cpp"
-               "pipeline/show/*.cpp")
-list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet)\\.cpp$")
+               "pipeline/plan/solids.cpp" "pipeline/pores/*.cpp" "pipeline/report/*.cpp" "pipeline/show/*.cpp")
+list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet|report/part_info|report/heights_study)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
 target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nlohmann_json)

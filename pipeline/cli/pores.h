@@ -9,7 +9,7 @@
 
 namespace lamina::pipeline {
 
-/// For the help: --solid FILE, --void FILE and --no-flow, a window of voxels taken elsewhere.
+/// For the help: --solid FILE, --void FILE and --no-flow, a window of voxels taken elsewhere. --plot serves measurements too.
 std::vector<OptionSpec> window_file_options();
 /// For the help: --pixel, --layer-um, --threshold, --dark, --periodic, --scan, --range.
 std::vector<OptionSpec> stack_options();

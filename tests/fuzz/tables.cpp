@@ -94,7 +94,7 @@ std::vector<std::string> flow_seeds() {
 }
 
 const Registered kHeights(
-    {"table_heights", read_heights, height_seeds, "stages/heights/study stages/support/text", "", {}, 512});
+    {"table_heights", read_heights, height_seeds, "stages/heights/evaluate stages/support/text", "", {}, 512});
 const Registered kWidths({"table_widths", read_widths, width_seeds,
                           "stages/segment/widths_table stages/segment/measured stages/support/text", ".csv", "tables.dict",
                           1024});

@@ -92,7 +92,7 @@ std::vector<std::string> tree_seeds() {
 }
 
 const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/spacing", "", "formula.dict", 256});
-const Registered kTexts({"texts", read_texts, text_seeds, "stages/support/text stages/heights/thickness_set", "", {}, 256});
+const Registered kTexts({"texts", read_texts, text_seeds, "stages/support/text stages/heights/candidate_heights", "", {}, 256});
 const Registered kTree({"toml", read_tree, tree_seeds, "stages/support/text/toml", ".toml", "toml.dict", 2048});
 
 }  // namespace

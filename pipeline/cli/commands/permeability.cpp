@@ -310,9 +310,8 @@ Arguments arguments_on(const std::string& files, const Job& job, Product product
 /// own, --set and --machine, and predicts what was written: G-code or bitmaps in a temporary folder, in the place of the job.
 /// The machine decides which of the two; a job without one its first line as lamina saves it, or keys that one of the two
 /// reads alone.
-/// errors  those of reading, checking and running a job, and of predict, with the job's name; kUsage: it is unknown which
-/// of the
-///         two, toolpaths of another format than G-code
+/// errors  those of reading, checking and running a job, and of analyse_file, with the job's name; kUsage: it is unknown which of
+///         the two, toolpaths of another format than G-code
 Outcome predict_job(const Arguments& arguments, Context& context) {
   const std::string& path = arguments.operands.front();
   Result<Job> job = read_job_of(arguments);
