@@ -39,7 +39,7 @@ void add_to_blocks(Row row, std::uint32_t offset, std::uint32_t columns, std::in
 VoxelStack coarser(const VoxelView& box, const std::array<std::uint32_t, 3>& factor) {
   VoxelStack out(box.nx / factor[0], box.ny / factor[1], box.edge, box.periodic);
   for (std::size_t a = 0; a < 3; ++a) out.edge[a] *= static_cast<Nm>(factor[a]);
-  const auto block = static_cast<std::int32_t>(factor[0] * factor[1] * factor[2]);
+  const auto block = static_cast<std::int64_t>(factor[0] * factor[1] * factor[2]);
   Buffer<std::int32_t> count(out.nx);
   Runs slice;
   slice.columns = out.nx;
@@ -56,7 +56,8 @@ VoxelStack coarser(const VoxelView& box, const std::array<std::uint32_t, 3>& fac
       bool before = false;
       for (std::uint32_t x = 0; x < out.nx; ++x) {
         while (passed < first.size() && first[passed] <= x * factor[0]) ++passed;
-        const bool set = 2 * count[x] == block ? passed % 2 == 1 : 2 * count[x] > block;
+        const std::int64_t twice = 2 * std::int64_t{count[x]};
+        const bool set = twice == block ? passed % 2 == 1 : twice > block;
         if (set != before) slice.change.push_back(x);
         before = set;
       }

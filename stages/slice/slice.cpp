@@ -169,6 +169,9 @@ Result<double> surplus_area(std::span<const SharedMesh> shared, std::span<const 
   for (const auto& [triangles, source, offsets] : shared) {
     scratch.closed.clear();
     find_loops(triangles, source, planes, plane, scratch, scratch.closed);
+    // Once for all copies, and never by less than doubling: append_moved() reserves what one copy needs.
+    const std::size_t needed = all.point.size() + offsets.size() * scratch.closed.point.size();
+    if (needed > all.point.capacity()) all.point.reserve(std::max(needed, 2 * all.point.capacity()));
     for (const Point2 by : offsets) append_moved(scratch.closed, by, all);
   }
   const __int128 wound = doubled_area(all);

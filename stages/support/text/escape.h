@@ -11,7 +11,7 @@
 
 namespace lamina {
 
-// Each of these accepts any text and returns its escaped form; none fails. cost  one pass
+// Each of the escapes accepts any text and returns its escaped form; none fails. cost  one pass
 
 /// For a man page: backslashes, dashes, and dots and quotes at the start of a line.
 std::string roff(std::string_view text);
@@ -32,6 +32,8 @@ std::string fish_word(std::string_view text);
 
 /// Base 64 as in RFC 4648, padded, without line ends.
 std::string base64(std::span<const std::byte> bytes);
+
+// --- words of a line.
 
 /// The words of a line as a shell splits them: at blanks outside '...' and "..."; a backslash makes the next character
 /// literal (within '...' the backslash itself is literal); # at the start of a word begins a comment.
