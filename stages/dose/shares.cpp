@@ -67,7 +67,8 @@ void append_run(std::uint32_t row_begin, std::uint32_t begin, std::uint32_t end,
   if (image.change.size() > row_begin && image.change.back() == begin) {
     image.change.back() = end;
   } else {
-    image.change.insert(image.change.end(), {begin, end});
+    image.change.push_back(begin);
+    image.change.push_back(end);
   }
 }
 

@@ -38,7 +38,7 @@ inline void put_move(const Machine& machine, std::string_view command, MachinePo
       feed_text(mm_s));
 }
 
-/// The bits of all nozzles that are not blocked, of a head of at most 32.
+/// The bits of all nozzles that are not blocked, of a head of at most 31.
 inline std::uint32_t working_nozzles(const Machine& machine) {
   std::uint32_t all = (std::uint32_t{1} << machine.head.nozzles) - 1;
   for (const std::uint32_t nozzle : machine.head.blocked) all &= ~(1u << nozzle);

@@ -25,7 +25,7 @@ Buffer<std::byte> pack_runs(const RunsView& runs);
 /// Any bytes as one zlib stream.
 Buffer<std::byte> deflate_bytes(std::span<const std::byte> bytes);
 
-/// Codes of layers (run_code.h), added in order and limited to the page's size: beyond the limit, every second one is
+/// Codes of layers (pack_runs), added in order and limited to the page's size: beyond the limit, every second one is
 /// dropped.
 class HeldLayers {
  public:
