@@ -49,6 +49,9 @@ class Queue : public std::enable_shared_from_this<Queue> {
   Result<BatchSummary> run(const BatchWatcher& watcher, const std::atomic<bool>& interrupt) {
     const auto start = Clock::now();
     const std::size_t threads = std::min<std::size_t>(std::max(options_.jobs, 1u), jobs_.size());
+    // Once while there is one thread: with another allocator (jemalloc, a sanitizer's) the first call initialises glibc's own,
+    // which takes no lock for it.
+    ::malloc_trim(0);
     for (std::size_t i = 0; i < threads; ++i) start_worker();
     std::unique_lock lock(mutex_);
     while (true) {
