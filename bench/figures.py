@@ -235,6 +235,10 @@ def lines(root, cases):
         yield ""
         yield from table(["job", "layers", "compared", "pixels that differ, all", "in the worst layer", "pixels a layer"], rows)
     yield from mslicer_text(root, results)
+    yield "## Rays"
+    yield ""
+    yield "Why a layer has few rays, with the times of more: [rays.md](rays.md)."
+    yield ""
     yield "## Where the time goes"
     yield ""
     yield ("Wall time of the process; then milliseconds from the last run's summary: load, index and layers follow each "
