@@ -5,7 +5,7 @@ if(NOT LAMINA_FUZZ)
   return()
 endif()
 
-foreach(library lamina_stages lamina_once_a_job lamina_pipeline)
+foreach(library ${lamina_libraries})
   target_compile_options(${library} PRIVATE -fsanitize=fuzzer-no-link)
 endforeach()
 
@@ -15,6 +15,7 @@ add_executable(fuzz_readers ${fuzz_sources})
 target_link_libraries(fuzz_readers PRIVATE lamina::pipeline PNG::PNG ZLIB::ZLIB TIFF::TIFF PkgConfig::LIBZIP PkgConfig::XXHASH
                       nlohmann_json::nlohmann_json)
 target_link_options(fuzz_readers PRIVATE -fsanitize=fuzzer)
+lamina_libraries_first(fuzz_readers)
 if(LAMINA_UNITY STREQUAL "all")
   lamina_unity(fuzz_readers ${fuzz_sources})
 endif()

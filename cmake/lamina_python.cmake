@@ -4,7 +4,7 @@
 # A module must be loadable at any address; hidden symbols keep calls within it direct. The libraries are compiled like this with and
 # without the module, so that its packages can be installed later without compiling them again.
 if(NOT LAMINA_SANITIZE)
-  set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
+  set_target_properties(${lamina_libraries} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
 endif()
 
 set(Python_FIND_STRATEGY LOCATION)

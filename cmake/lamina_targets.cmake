@@ -52,22 +52,39 @@ function(lamina_unity target)
   target_compile_options(${target} PRIVATE -Wno-subobject-linkage)  # g++ takes what a file keeps to itself for a header's
 endfunction()
 
+# Links a program with the libraries before its own objects. Of an inline function that several objects contain the linker keeps the
+# first: this way the one that the stages optimise, not that of a test at -O0 or of what runs once a job at -O1.
+function(lamina_libraries_first target)
+  target_link_options(${target} BEFORE PRIVATE -Wl,--whole-archive $<TARGET_FILE:lamina_stages> $<TARGET_FILE:lamina_pipeline>
+                                               -Wl,--no-whole-archive)
+endfunction()
+
 include(GNUInstallDirs)
 
 # --- stages: what is done
 lamina_sources(stage_sources "stages/*.cpp")
 list(FILTER stage_sources EXCLUDE REGEX "/stages/(view/picture|calibration/scan)/")
+# What runs once a job or once a file is compiled to be compiled fast.
+set(stages_once_a_job ${stage_sources})
+list(FILTER stages_once_a_job INCLUDE REGEX "/stages/(calibration/chart/|formats/(chart|plot)/|formats/image_format|formats/images/stack_info|\
+load/(planned|source|threemf/(archive|extensions|placement|roles))|program/(bed|dialect|maintenance|vats)|support/(io|late)/|\
+support/text/(escape|json_|readable|toml|value)|view/)")
+list(REMOVE_ITEM stage_sources ${stages_once_a_job})
+add_library(lamina_stages_once_a_job OBJECT ${stages_once_a_job})
 
-add_library(lamina_stages STATIC ${stage_sources})
+add_library(lamina_stages STATIC ${stage_sources} $<TARGET_OBJECTS:lamina_stages_once_a_job>)
 add_library(lamina::stages ALIAS lamina_stages)
 if(LAMINA_UNITY STREQUAL "all")
   lamina_unity(lamina_stages ${stage_sources})
+  lamina_unity(lamina_stages_once_a_job ${stages_once_a_job})
 endif()
-target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
-                                                $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
-target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt
-                      PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::GMPXX
-                              PkgConfig::XXHASH nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
+foreach(library lamina_stages lamina_stages_once_a_job)
+  target_include_directories(${library} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                                               $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
+  target_link_libraries(${library} PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt
+                        PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::GMPXX
+                                PkgConfig::XXHASH nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
+endforeach()
 
 # Embree, libtiff and libzip are loaded when a job first needs them (stages/support/late/late.h), by the names that linking
 # would have written down.
@@ -86,7 +103,9 @@ foreach(name embree tiff zip)
   list(APPEND lamina_late_files ${lamina_${name}_file})
 endforeach()
 set(lamina_late_headers $<TARGET_PROPERTY:embree,INTERFACE_INCLUDE_DIRECTORIES> ${TIFF_INCLUDE_DIRS} ${LIBZIP_INCLUDE_DIRS})
-target_include_directories(lamina_stages SYSTEM PRIVATE ${lamina_late_headers})
+foreach(library lamina_stages lamina_stages_once_a_job)
+  target_include_directories(${library} SYSTEM PRIVATE ${lamina_late_headers})
+endforeach()
 set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/text/version.cpp PROPERTIES
                             COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)
 
@@ -102,11 +121,13 @@ list(FILTER once_a_job EXCLUDE REGEX "/(calibrate/scan_answer|show/sheet|report/
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
 target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nlohmann_json)
-target_compile_options(lamina_once_a_job PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
-if(LAMINA_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # The same checks as calls instead of in place: slower to run, compiled in two thirds of the time.
-  target_compile_options(lamina_once_a_job PRIVATE --param=asan-instrumentation-with-call-threshold=0)
-endif()
+foreach(library lamina_stages_once_a_job lamina_once_a_job)
+  target_compile_options(${library} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
+  if(LAMINA_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # The same checks as calls instead of in place: slower to run, compiled in two thirds of the time.
+    target_compile_options(${library} PRIVATE --param=asan-instrumentation-with-call-threshold=0)
+  endif()
+endforeach()
 if(LAMINA_UNITY)
   set(merged ${once_a_job})
   list(FILTER merged EXCLUDE REGEX "/(cli/commands/plan|job/profiles/printer)\\.cpp$")
@@ -121,18 +142,24 @@ if(LAMINA_UNITY STREQUAL "all")
 endif()
 
 # ccache keeps nothing that was made from precompiled headers, and does better without them.
+set(lamina_libraries lamina_stages lamina_stages_once_a_job lamina_once_a_job lamina_pipeline)
 if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
-  target_precompile_headers(lamina_stages PRIVATE cmake/precompiled.h)
-  target_precompile_headers(lamina_once_a_job REUSE_FROM lamina_stages)
-  target_precompile_headers(lamina_pipeline REUSE_FROM lamina_stages)
-  foreach(library lamina_stages lamina_once_a_job lamina_pipeline)
+  # A library of nothing else: g++ 12 takes headers parsed at -O3 for sources at -O1, but not the other way round.
+  file(TOUCH ${PROJECT_BINARY_DIR}/precompiled.cpp)
+  add_library(lamina_precompiled OBJECT ${PROJECT_BINARY_DIR}/precompiled.cpp)
+  target_link_libraries(lamina_precompiled PRIVATE TBB::tbb Eigen3::Eigen fmt::fmt)
+  target_precompile_headers(lamina_precompiled PRIVATE cmake/precompiled.h)
+  foreach(library ${lamina_libraries})
+    target_precompile_headers(${library} REUSE_FROM lamina_precompiled)
     # g++ 12 forgets that precompiled headers are the system's, and has these wrong for std::string.
     target_compile_options(${library} PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
   endforeach()
+  list(APPEND lamina_libraries lamina_precompiled)
 endif()
 
 add_executable(lamina pipeline/main.cpp)
 target_link_libraries(lamina PRIVATE lamina::pipeline)
+lamina_libraries_first(lamina)
 
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.

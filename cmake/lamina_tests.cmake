@@ -58,6 +58,7 @@ foreach(folder run ${folders})
   add_executable(test_${folder} ${test_sources})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
                         PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
+  lamina_libraries_first(test_${folder})
   if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
     target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
   endif()

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cstring>
 #include <random>
-#include <tuple>
 
 #include "stages/geometry/isa.h"
 #include "stages/raster/cut_clusters.h"
@@ -120,8 +119,12 @@ Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, cons
   return segments;
 }
 
-/// Crossings as (row, column, enters), sorted.
-using Crossings = std::vector<std::tuple<std::uint32_t, std::uint32_t, bool>>;
+/// Crossings, sorted: of each the row, the column and whether it enters, from the highest bits to the lowest.
+using Crossings = std::vector<std::uint64_t>;
+
+std::uint64_t crossing_at(std::int64_t row, std::int64_t column, bool enters) {
+  return static_cast<std::uint64_t>(row) << 32 | static_cast<std::uint64_t>(column) << 1 | (enters ? 1 : 0);
+}
 
 /// Facet by facet and row by row, in integers alone.
 Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
@@ -141,10 +144,10 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClu
     for (std::int64_t row = std::max<std::int64_t>(first, rows[0]); row < std::min<std::int64_t>(last, rows[1]); ++row) {
       const std::int64_t column =
           raster::exact_column(sampling.x, t, sampling.row_centre[static_cast<std::size_t>(row)], plane);
-      all.emplace_back(row, column, t.nx < 0);
+      all.push_back(crossing_at(row, column, t.nx < 0));
     }
   }
-  std::ranges::sort(all);
+  std::sort(all.begin(), all.end());
   return all;
 }
 
@@ -165,9 +168,9 @@ Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, 
   Crossings all;
   for (std::uint32_t row = 0, i = 0; row < count; ++row) {
     EXPECT_EQ(position[row], i + in_row[row]) << "row " << row;
-    for (; i < position[row]; ++i) all.emplace_back(row + rows[0], crossing[i] >> 1, (crossing[i] & 1) != 0);
+    for (; i < position[row]; ++i) all.push_back(crossing_at(row + rows[0], crossing[i] >> 1, (crossing[i] & 1) != 0));
   }
-  std::ranges::sort(all);
+  std::sort(all.begin(), all.end());
   return all;
 }
 
