@@ -6,7 +6,8 @@ if(NOT LAMINA_FUZZ)
 endif()
 
 foreach(library ${lamina_libraries})
-  target_compile_options(${library} PRIVATE -fsanitize=fuzzer-no-link)
+  target_compile_options(${library} PRIVATE -fsanitize=fuzzer-no-link
+                         -fsanitize-coverage-ignorelist=${PROJECT_SOURCE_DIR}/cmake/without_coverage.txt)
 endforeach()
 
 lamina_sources(fuzz_sources "tests/fuzz/*.cpp")
