@@ -50,7 +50,7 @@ CommandSpec design_spec() {
       "Examples:\n"
       "  lamina design --porosity 24 --permeability 100 --machine anet-a8 -o pores.toml\n"
       "  lamina design --pore 0.12x0.9 --machine anet-a8 --voxel 20 -o pores.toml\n"
-      "  lamina design --permeability 60:150 --height 25.4 --steps 3 --voxel 15 --machine anet-a8 -o pores.toml\n"
+      "  lamina design --permeability 60:150 --height 25.4 --steps 3 --voxel 20 --machine anet-a8 -o pores.toml\n"
       "  lamina extrude part.stl --job pores.toml -o part.gcode";
   return spec;
 }
