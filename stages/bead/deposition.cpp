@@ -1,10 +1,14 @@
 #include "stages/bead/deposition.h"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <numbers>
 
-#include "stages/bead/line.h"
 #include "stages/bead/section.h"
 #include "stages/bead/spread.h"
 
@@ -16,8 +20,9 @@ constexpr double kWidest = 3;                        // mm
 constexpr double kMaxPrimed = 4;                     // times the flow of a line: what is primed beyond that is a purge
 constexpr double kMinSpeed = 0.01, kMaxSpeed = 1e4;  // mm/s: a file may say anything
 
-double length_of(const DepositedBead& bead) {
-  return std::hypot((mm(bead.to.x) - mm(bead.from.x)), (mm(bead.to.y) - mm(bead.from.y)));
+template <class Straight>
+double length_of(const Straight& bead) {
+  return std::hypot(mm(bead.to.x) - mm(bead.from.x), mm(bead.to.y) - mm(bead.from.y));
 }
 
 /// The beads of one line and how far along it each begins.
@@ -151,6 +156,262 @@ void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> fee
     flow = line.deposit(beads.subspan(i, end - i), feeds.subspan(i, end - i), flow, out);
     i = end;
   }
+}
+
+// Contacts of pieces.
+
+namespace {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+constexpr double kAlike = 0.9;                               // cosine of the angle between beads that lie side by side
+constexpr double kLevels = 0.05;                             // of a bead: what a free side takes at once does not heap up
+constexpr double kOwnLine = 0.2;                             // of a width: what is nearer lies on the same line
+constexpr double kCorners = 4 * (1 - std::numbers::pi / 4);  // area of the cusps of two round sides / their radius squared
+constexpr std::size_t kMaxSquares = std::size_t{1} << 22;
+
+/// A piece's middle, mm, and its direction.
+struct PieceFrame {
+  double x, y, along_x, along_y, half_mm;
+  double forward(const PieceFrame& to) const { return (to.x - x) * along_x + (to.y - y) * along_y; }
+  double leftward(const PieceFrame& to) const { return (to.y - y) * along_x - (to.x - x) * along_y; }
+};
+
+PieceFrame frame_of(const DepositedPiece& piece) {
+  const double x = mm(piece.to.x) - mm(piece.from.x), y = mm(piece.to.y) - mm(piece.from.y), length = std::hypot(x, y);
+  const double scale = length > 0 ? 1 / length : 0;
+  return {(mm(piece.from.x) + mm(piece.to.x)) / 2, (mm(piece.from.y) + mm(piece.to.y)) / 2, x * scale, y * scale, length / 2};
+}
+
+/// Frames by squares of the bed as wide as the widest bead.
+class Squares {
+ public:
+  Squares(std::span<const PieceFrame> frames, double widest_mm) {
+    double right = -HUGE_VAL, top = -HUGE_VAL;
+    for (const PieceFrame& frame : frames) {
+      left_ = std::min(left_, frame.x), right = std::max(right, frame.x);
+      bottom_ = std::min(bottom_, frame.y), top = std::max(top, frame.y);
+    }
+    edge_ = std::max(widest_mm, 0.05);
+    while ((right - left_) / edge_ * ((top - bottom_) / edge_) > static_cast<double>(kMaxSquares)) edge_ *= 2;
+    columns_ = column(right) + 1;
+    rows_ = row(top) + 1;
+    begin_.assign(columns_ * rows_ + 1, 0);
+    for (const PieceFrame& frame : frames) ++begin_[square(frame) + 1];
+    for (std::size_t s = 1; s < begin_.size(); ++s) begin_[s] += begin_[s - 1];
+    Buffer<std::uint32_t> next(begin_.begin(), begin_.end());
+    held_.resize(frames.size());
+    for (std::uint32_t i = 0; i < frames.size(); ++i) held_[next[square(frames[i])]++] = i;
+  }
+
+  /// Calls see(index) of all frames that may lie within a bead's width of one.
+  template <class See>
+  void around(const PieceFrame& frame, const See& see) const {
+    const std::size_t c = column(frame.x), r = row(frame.y);
+    for (std::size_t y = r > 0 ? r - 1 : 0; y < std::min(r + 2, rows_); ++y) {
+      for (std::size_t x = c > 0 ? c - 1 : 0; x < std::min(c + 2, columns_); ++x) {
+        const std::size_t s = x + y * columns_;
+        for (std::uint32_t k = begin_[s]; k < begin_[s + 1]; ++k) see(held_[k]);
+      }
+    }
+  }
+
+ private:
+  std::size_t column(double x) const { return static_cast<std::size_t>((x - left_) / edge_); }
+  std::size_t row(double y) const { return static_cast<std::size_t>((y - bottom_) / edge_); }
+  std::size_t square(const PieceFrame& frame) const { return column(frame.x) + row(frame.y) * columns_; }
+
+  double left_ = HUGE_VAL, bottom_ = HUGE_VAL, edge_ = 1;
+  std::size_t columns_ = 0, rows_ = 0;
+  Buffer<std::uint32_t> begin_, held_;
+};
+
+/// A neighbour that a piece touches, and the area of the cusps between them; below 0: both do not fit.
+struct Contact {
+  std::uint32_t piece = kNone;
+  double distance_mm = 0, clearance_mm2 = 0;
+};
+using Contacts = std::array<Contact, 2>;  // at the left, at the right
+
+class ContactFinder {
+ public:
+  ContactFinder(std::span<const DepositedPiece> pieces, double height_mm)
+      : pieces_(pieces), frames_(pieces.size()), contacts_(pieces.size()), height_(height_mm) {
+    for_all([&](std::size_t i) { frames_[i] = frame_of(pieces_[i]); });
+  }
+
+  double run(Buffer<PieceSides>& sides, Buffer<PieceClearance>& clearances) {
+    double widest = 0;
+    for (const DepositedPiece& piece : pieces_) widest = std::max(widest, piece.width_mm);
+    const Squares squares(frames_, widest);
+    for_all([&](std::size_t i) { contacts_[i] = touched(squares, static_cast<std::uint32_t>(i)); });
+    for_all([&](std::size_t i) { clearances[i] = shape(i, sides[i]); });
+    double sum = 0;
+    for (const PieceClearance& clearance : clearances) sum += clearance.over;
+    return sum;
+  }
+
+ private:
+  template <class Do>
+  void for_all(const Do& what) const {
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), what);
+  }
+
+  /// The nearest piece at each side that a bead reaches, of those that it passes.
+  Contacts touched(const Squares& squares, std::uint32_t i) const {
+    const PieceFrame& here = frames_[i];
+    Contacts found;
+    std::array<double, 2> offset{};
+    squares.around(here, [&](std::uint32_t j) {
+      const PieceFrame& other = frames_[j];
+      if (std::abs(here.along_x * other.along_x + here.along_y * other.along_y) < kAlike) return;
+      const double forward = std::abs(here.forward(other)), leftward = here.leftward(other), distance = std::abs(leftward);
+      const double widths = (pieces_[i].width_mm + pieces_[j].width_mm) / 2;
+      if (distance >= widths || distance <= kOwnLine * widths || forward > here.half_mm + other.half_mm) return;
+      Contact& best = found[leftward > 0 ? 0 : 1];
+      double& best_offset = offset[leftward > 0 ? 0 : 1];
+      // Pieces of one line differ in rounding alone: the one straight across is the neighbour.
+      const bool same_line = best.piece != kNone && std::abs(distance - best.distance_mm) < 0.1 * widths;
+      const bool nearer = same_line ? forward < best_offset || (forward == best_offset && j < best.piece)
+                                    : best.piece == kNone || distance < best.distance_mm;
+      if (!nearer) return;
+      best = {j, distance, height_ * distance - (pieces_[i].area_mm2 + pieces_[j].area_mm2) / 2};
+      best_offset = forward;
+    });
+    return found;
+  }
+
+  /// Half of what has no room at one side of a piece, and goes to its other one.
+  double pushed(std::size_t piece, std::size_t from_side) const {
+    return std::max(-contacts_[piece][from_side].clearance_mm2, 0.0) / 2;
+  }
+
+  PieceClearance shape(std::size_t i, PieceSides& out) const {
+    PieceClearance found;
+    for (std::size_t s = 0; s < 2; ++s) {
+      const Contact& contact = contacts_[i][s];
+      PieceSide& side = s == 0 ? out.left : out.right;
+      const double more = pushed(i, 1 - s);
+      if (contact.piece == kNone) {
+        side = {pieces_[i].width_mm / 2 + more / height_, -1};
+        found.clearance += kLevels * pieces_[i].area_mm2 * 2 * frames_[i].half_mm;
+        continue;
+      }
+      const DepositedPiece& neighbour = pieces_[contact.piece];
+      const bool faces_left = frames_[contact.piece].leftward(frames_[i]) > 0;
+      const double taken = more + pushed(contact.piece, faces_left ? 1 : 0), clearance = contact.clearance_mm2 - taken;
+      const double share = pieces_[i].width_mm / (pieces_[i].width_mm + neighbour.width_mm);
+      side = {contact.distance_mm * share, std::min(std::sqrt(std::max(clearance, 0.0) / kCorners), height_ / 2)};
+      // What a contact has no room for goes to the other sides; half of what has none there is this piece's.
+      found.over += (contact.clearance_mm2 >= 0 ? std::max(-clearance, 0.0) : taken) * frames_[i].half_mm;
+      found.clearance += std::max(clearance, 0.0) * frames_[i].half_mm;
+    }
+    return found;
+  }
+
+  std::span<const DepositedPiece> pieces_;
+  Buffer<PieceFrame> frames_;
+  Buffer<Contacts> contacts_;
+  double height_;
+};
+
+}  // namespace
+
+double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
+                     Buffer<PieceClearance>* clearances) {
+  Buffer<PieceClearance> own;
+  Buffer<PieceClearance>& into = clearances != nullptr ? *clearances : own;
+  sides.resize(pieces.size());
+  into.resize(pieces.size());
+  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides, into);
+}
+
+double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm) {
+  const double above = std::abs(above_mm);
+  if (side.corner_mm >= 0) {
+    const double into = above - (height_mm / 2 - side.corner_mm);
+    if (into <= 0) return side.reach_mm;
+    return into >= side.corner_mm ? -1
+                                  : side.reach_mm - side.corner_mm + std::sqrt(side.corner_mm * side.corner_mm - into * into);
+  }
+  // A bead that does not fill its layer is a circle, or an ellipse as high as its area makes it.
+  const bool thread = piece.width_mm < height_mm;
+  const double height = thread ? std::min(height_mm, piece.area_mm2 / (std::numbers::pi / 4 * piece.width_mm)) : height_mm;
+  if (above >= height / 2) return -1;
+  if (thread) return side.reach_mm * std::sqrt(1 - 4 * above * above / (height * height));
+  return side.reach_mm - height / 2 + std::sqrt(height * height / 4 - above * above);
+}
+
+namespace {
+
+constexpr int kRounds = 8;           // each makes room for what the one before has moved
+constexpr double kNothing = 1e-9;    // mm3
+constexpr double kNoProgress = 0.9;  // of what was over before
+
+/// One line: what is over flows to both sides.
+class LineFlow {
+ public:
+  LineFlow(std::span<DepositedPiece> pieces, std::span<PieceClearance> clearances, double height_mm)
+      : pieces_(pieces), clearances_(clearances), height_(height_mm), gained_(pieces.size(), 0.0) {}
+
+  void run() {
+    double over = 0;
+    for (PieceClearance& clearance : clearances_) {
+      over += clearance.over;
+      if (clearance.over > 0) clearance.clearance = 0;
+    }
+    if (over <= kNothing) return;
+    const double passed = pass(0, true, 0.5);
+    const double back = pass(passed, false, 0.5);
+    const double rest = pass(back, true, 0);
+    const double moved = 1 - rest / over;
+    for (std::size_t i = 0; i < pieces_.size(); ++i) change(pieces_[i], gained_[i] - moved * clearances_[i].over);
+  }
+
+ private:
+  /// From one end to the other with `carried`, taking `share` of what is over. returns  what is left at the other end
+  double pass(double carried, bool forwards, double share) {
+    for (std::size_t n = 0; n < pieces_.size(); ++n) {
+      const std::size_t i = forwards ? n : pieces_.size() - 1 - n;
+      carried += share * clearances_[i].over;
+      const double taken = std::min(carried, clearances_[i].clearance);
+      gained_[i] += taken;
+      clearances_[i].clearance -= taken;
+      carried -= taken;
+    }
+    return carried;
+  }
+
+  void change(DepositedPiece& piece, double volume_mm3) const {
+    const double length = length_of(piece);
+    if (volume_mm3 == 0 || !(length > 0)) return;
+    const double area = std::max(piece.area_mm2 + volume_mm3 / length, 0.0);
+    piece.width_mm = std::max(piece.width_mm + width_of(area, false, height_) - width_of(piece.area_mm2, false, height_), 0.0);
+    piece.area_mm2 = area;
+  }
+
+  std::span<DepositedPiece> pieces_;
+  std::span<PieceClearance> clearances_;
+  double height_;
+  Buffer<double> gained_;
+};
+
+}  // namespace
+
+double flow_along(std::span<DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides) {
+  Buffer<PieceClearance> clearances;
+  double over = find_contacts(pieces, height_mm, sides, &clearances);
+  for (int round = 0; round < kRounds && over > kNothing; ++round) {
+    for (std::size_t begin = 0; begin < pieces.size();) {
+      std::size_t end = begin + 1;
+      while (end < pieces.size() && pieces[end - 1].to == pieces[end].from) ++end;
+      LineFlow(pieces.subspan(begin, end - begin), std::span(clearances).subspan(begin, end - begin), height_mm).run();
+      begin = end;
+    }
+    const double before = over;
+    over = find_contacts(pieces, height_mm, sides, &clearances);
+    if (over > kNoProgress * before) break;
+  }
+  return over;
 }
 
 }  // namespace lamina::bead

@@ -1,9 +1,7 @@
 // stages/bead/line.cpp: stretches -> phases of constant acceleration -> pieces.
 #include "stages/bead/line.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
 #include "stages/bead/section.h"

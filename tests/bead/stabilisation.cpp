@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/bead/lag.h"
 #include "stages/bead/section.h"
 #include "stages/data/buffer.h"
 

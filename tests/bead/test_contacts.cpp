@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/bead/contacts.h"
+#include "stages/bead/deposition.h"
 #include "stages/bead/section.h"
 #include "tests/bead/neighbours.h"
 

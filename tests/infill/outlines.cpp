@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include "stages/load/load.h"
 #include "stages/slice/slice.h"
