@@ -143,25 +143,6 @@ double DepositedLine::deposit(std::span<const DepositedBead> beads, std::span<co
   return joint.flow_mm3_s;
 }
 
-}  // namespace
-
-void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, const DepositionRules& rules,
-             Buffer<DepositedPiece>& out) {
-  out.clear();
-  DepositedLine line(rules);
-  double flow = -1;
-  for (std::size_t i = 0; i < beads.size();) {
-    std::size_t end = i + 1;
-    while (end < beads.size() && feeds[end].joined) ++end;
-    flow = line.deposit(beads.subspan(i, end - i), feeds.subspan(i, end - i), flow, out);
-    i = end;
-  }
-}
-
-// Contacts of pieces.
-
-namespace {
-
 constexpr std::uint32_t kNone = UINT32_MAX;
 constexpr double kAlike = 0.9;                               // cosine of the angle between beads that lie side by side
 constexpr double kLevels = 0.05;                             // of a bead: what a free side takes at once does not heap up
@@ -314,35 +295,6 @@ class ContactFinder {
   double height_;
 };
 
-}  // namespace
-
-double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
-                     Buffer<PieceClearance>* clearances) {
-  Buffer<PieceClearance> own;
-  Buffer<PieceClearance>& into = clearances != nullptr ? *clearances : own;
-  sides.resize(pieces.size());
-  into.resize(pieces.size());
-  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides, into);
-}
-
-double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm) {
-  const double above = std::abs(above_mm);
-  if (side.corner_mm >= 0) {
-    const double into = above - (height_mm / 2 - side.corner_mm);
-    if (into <= 0) return side.reach_mm;
-    return into >= side.corner_mm ? -1
-                                  : side.reach_mm - side.corner_mm + std::sqrt(side.corner_mm * side.corner_mm - into * into);
-  }
-  // A bead that does not fill its layer is a circle, or an ellipse as high as its area makes it.
-  const bool thread = piece.width_mm < height_mm;
-  const double height = thread ? std::min(height_mm, piece.area_mm2 / (std::numbers::pi / 4 * piece.width_mm)) : height_mm;
-  if (above >= height / 2) return -1;
-  if (thread) return side.reach_mm * std::sqrt(1 - 4 * above * above / (height * height));
-  return side.reach_mm - height / 2 + std::sqrt(height * height / 4 - above * above);
-}
-
-namespace {
-
 constexpr int kRounds = 8;           // each makes room for what the one before has moved
 constexpr double kNothing = 1e-9;    // mm3
 constexpr double kNoProgress = 0.9;  // of what was over before
@@ -396,6 +348,46 @@ class LineFlow {
 };
 
 }  // namespace
+
+void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> feeds, const DepositionRules& rules,
+             Buffer<DepositedPiece>& out) {
+  out.clear();
+  DepositedLine line(rules);
+  double flow = -1;
+  for (std::size_t i = 0; i < beads.size();) {
+    std::size_t end = i + 1;
+    while (end < beads.size() && feeds[end].joined) ++end;
+    flow = line.deposit(beads.subspan(i, end - i), feeds.subspan(i, end - i), flow, out);
+    i = end;
+  }
+}
+
+// Contacts of pieces.
+
+double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
+                     Buffer<PieceClearance>* clearances) {
+  Buffer<PieceClearance> own;
+  Buffer<PieceClearance>& into = clearances != nullptr ? *clearances : own;
+  sides.resize(pieces.size());
+  into.resize(pieces.size());
+  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides, into);
+}
+
+double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm) {
+  const double above = std::abs(above_mm);
+  if (side.corner_mm >= 0) {
+    const double into = above - (height_mm / 2 - side.corner_mm);
+    if (into <= 0) return side.reach_mm;
+    return into >= side.corner_mm ? -1
+                                  : side.reach_mm - side.corner_mm + std::sqrt(side.corner_mm * side.corner_mm - into * into);
+  }
+  // A bead that does not fill its layer is a circle, or an ellipse as high as its area makes it.
+  const bool thread = piece.width_mm < height_mm;
+  const double height = thread ? std::min(height_mm, piece.area_mm2 / (std::numbers::pi / 4 * piece.width_mm)) : height_mm;
+  if (above >= height / 2) return -1;
+  if (thread) return side.reach_mm * std::sqrt(1 - 4 * above * above / (height * height));
+  return side.reach_mm - height / 2 + std::sqrt(height * height / 4 - above * above);
+}
 
 double flow_along(std::span<DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides) {
   Buffer<PieceClearance> clearances;

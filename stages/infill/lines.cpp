@@ -180,71 +180,6 @@ class Scan {
   Buffer<LineInterval> intervals_;
 };
 
-}  // namespace
-
-std::uint64_t count_crossings(const ContoursView& region, const LinePositions& positions) {
-  const auto line_at = [&](std::int64_t v) {
-    return std::lower_bound(positions.at.begin(), positions.at.end(), v) - positions.at.begin();
-  };
-  std::uint64_t total = 0;
-  for (std::uint32_t c = 0; c < region.size(); ++c) {
-    std::int64_t before = line_at(region[c].back().y);
-    for (const Point2 p : region[c]) {
-      const std::int64_t at = line_at(p.y);
-      total += static_cast<std::uint64_t>(std::abs(at - before));
-      before = at;
-    }
-  }
-  return total;
-}
-
-void append_raster(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions,
-                   const Frame& frame, Toolpaths& out) {
-  if (region.size() == 0 || positions.at.empty()) return;
-  std::int64_t longest_link = parameters.longest_link;
-  if (longest_link < 0) {
-    std::int64_t widest = 0;
-    for (std::size_t i = 1; i < positions.at.size(); ++i) widest = std::max(widest, positions.at[i] - positions.at[i - 1]);
-    longest_link = 3 * widest;
-  }
-  Scan scan(region, positions);
-  Buffer<Point2> way;
-  for (std::uint32_t first = 0; first < scan.lines(); ++first) {
-    for (std::uint32_t start = scan.begin_of(first); start < scan.end_of(first); ++start) {
-      if (scan.interval(start).deposited) continue;
-      std::uint32_t line = first, current = start;
-      const std::size_t points_before = out.point.size();
-      for (;;) {
-        LineInterval& interval = scan.interval(current);
-        interval.deposited = true;
-        if (std::int64_t{interval.end} - interval.begin < parameters.shortest_line) break;
-        const std::int32_t number = positions.first_number + static_cast<std::int32_t>(line);
-        const bool forwards = (number % 2 == 0) != frame.reversed();
-        const auto v = static_cast<Nm>(positions.at[line]);
-        const Point2 from{forwards ? interval.begin : interval.end, v}, to{forwards ? interval.end : interval.begin, v};
-        out.add(frame.from(from), PathKind::kRaster, parameters.width, number);
-        const std::uint32_t found =
-            scan.walk(line, forwards ? interval.end_edge : interval.begin_edge, forwards, to, longest_link, way);
-        const bool links = found != kNone && !scan.interval(found).deposited &&
-                           std::int64_t{scan.interval(found).end} - scan.interval(found).begin >= parameters.shortest_line;
-        if (!links) {
-          out.add(frame.from(to), PathKind::kRaster, parameters.width, number);
-          break;
-        }
-        out.add(frame.from(to), PathKind::kLink, parameters.width);
-        for (const Point2 p : way) out.add(frame.from(p), PathKind::kLink, parameters.width);
-        current = found;
-        ++line;
-      }
-      if (out.point.size() > points_before) out.close();
-    }
-  }
-}
-
-// Waves.
-
-namespace {
-
 constexpr std::int64_t kMaxPeriods = 1'000'000;  // of a wave
 constexpr int kCosineSteps = 48;                 // a period; off by less than 0.4 % of the wave's height
 
@@ -321,6 +256,67 @@ void append_pieces(const Contours& pieces, const FillParameters& parameters, con
 }
 
 }  // namespace
+
+std::uint64_t count_crossings(const ContoursView& region, const LinePositions& positions) {
+  const auto line_at = [&](std::int64_t v) {
+    return std::lower_bound(positions.at.begin(), positions.at.end(), v) - positions.at.begin();
+  };
+  std::uint64_t total = 0;
+  for (std::uint32_t c = 0; c < region.size(); ++c) {
+    std::int64_t before = line_at(region[c].back().y);
+    for (const Point2 p : region[c]) {
+      const std::int64_t at = line_at(p.y);
+      total += static_cast<std::uint64_t>(std::abs(at - before));
+      before = at;
+    }
+  }
+  return total;
+}
+
+void append_raster(const ContoursView& region, const FillParameters& parameters, const LinePositions& positions,
+                   const Frame& frame, Toolpaths& out) {
+  if (region.size() == 0 || positions.at.empty()) return;
+  std::int64_t longest_link = parameters.longest_link;
+  if (longest_link < 0) {
+    std::int64_t widest = 0;
+    for (std::size_t i = 1; i < positions.at.size(); ++i) widest = std::max(widest, positions.at[i] - positions.at[i - 1]);
+    longest_link = 3 * widest;
+  }
+  Scan scan(region, positions);
+  Buffer<Point2> way;
+  for (std::uint32_t first = 0; first < scan.lines(); ++first) {
+    for (std::uint32_t start = scan.begin_of(first); start < scan.end_of(first); ++start) {
+      if (scan.interval(start).deposited) continue;
+      std::uint32_t line = first, current = start;
+      const std::size_t points_before = out.point.size();
+      for (;;) {
+        LineInterval& interval = scan.interval(current);
+        interval.deposited = true;
+        if (std::int64_t{interval.end} - interval.begin < parameters.shortest_line) break;
+        const std::int32_t number = positions.first_number + static_cast<std::int32_t>(line);
+        const bool forwards = (number % 2 == 0) != frame.reversed();
+        const auto v = static_cast<Nm>(positions.at[line]);
+        const Point2 from{forwards ? interval.begin : interval.end, v}, to{forwards ? interval.end : interval.begin, v};
+        out.add(frame.from(from), PathKind::kRaster, parameters.width, number);
+        const std::uint32_t found =
+            scan.walk(line, forwards ? interval.end_edge : interval.begin_edge, forwards, to, longest_link, way);
+        const bool links = found != kNone && !scan.interval(found).deposited &&
+                           std::int64_t{scan.interval(found).end} - scan.interval(found).begin >= parameters.shortest_line;
+        if (!links) {
+          out.add(frame.from(to), PathKind::kRaster, parameters.width, number);
+          break;
+        }
+        out.add(frame.from(to), PathKind::kLink, parameters.width);
+        for (const Point2 p : way) out.add(frame.from(p), PathKind::kLink, parameters.width);
+        current = found;
+        ++line;
+      }
+      if (out.point.size() > points_before) out.close();
+    }
+  }
+}
+
+// Waves.
 
 Nm wave_height(const FillParameters& parameters) {
   return static_cast<Nm>(std::llround(side_length(parameters) * std::numbers::sqrt3 / 2));

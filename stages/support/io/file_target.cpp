@@ -41,6 +41,8 @@ Error not_a_file(const std::string& path, std::string_view what, bool named = tr
   return {Fault::kOutput, fmt::format("{}: is {}, not a file; {}", path, what, named ? "name another one" : "remove it")};
 }
 
+constexpr std::size_t kMarkedHead = 4096;  // bytes of a file in which its mark stands
+
 }  // namespace
 
 Error write_failure(const std::string& path, int code) {
@@ -102,12 +104,6 @@ Result<int> open_stream(const std::string& path, const FileTarget& target, bool 
   if (file < 0) return write_failure(path, errno);
   return file;
 }
-
-namespace {
-
-constexpr std::size_t kMarkedHead = 4096;  // bytes of a file in which its mark stands
-
-}  // namespace
 
 std::optional<FileId> file_id(const std::string& path) {
   struct stat status {};

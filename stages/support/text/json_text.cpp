@@ -24,6 +24,27 @@ std::size_t character_bytes(std::string_view text) {
   return overlong || surrogate || beyond ? 0 : length;
 }
 
+/// Where a string that begins at `at` ends, one behind its quotes. An unclosed string of one line ends with the line,
+/// where the parser stops too.
+std::size_t end_of_string(std::string_view text, std::size_t at) {
+  const char quote = text[at];
+  const bool escapes = quote == '"';
+  const std::string_view three = escapes ? R"(""")" : "'''";
+  const bool several_lines = text.substr(at, 3) == three;
+  for (at += several_lines ? 3 : 1; at < text.size(); ++at) {
+    if (escapes && text[at] == '\\') {
+      ++at;
+    } else if (!several_lines && (text[at] == quote || text[at] == '\n')) {
+      return at + (text[at] == quote ? 1 : 0);
+    } else if (several_lines && text.substr(at, 3) == three) {
+      at += 3;
+      for (int more = 0; more < 2 && at < text.size() && text[at] == quote; ++more) ++at;  // quotes at the string's end
+      return at;
+    }
+  }
+  return text.size();
+}
+
 }  // namespace
 
 std::string json_string(std::string_view text) {
@@ -56,31 +77,6 @@ bool is_utf8(std::string_view text) {
   }
   return true;
 }
-
-namespace {
-
-/// Where a string that begins at `at` ends, one behind its quotes. An unclosed string of one line ends with the line,
-/// where the parser stops too.
-std::size_t end_of_string(std::string_view text, std::size_t at) {
-  const char quote = text[at];
-  const bool escapes = quote == '"';
-  const std::string_view three = escapes ? R"(""")" : "'''";
-  const bool several_lines = text.substr(at, 3) == three;
-  for (at += several_lines ? 3 : 1; at < text.size(); ++at) {
-    if (escapes && text[at] == '\\') {
-      ++at;
-    } else if (!several_lines && (text[at] == quote || text[at] == '\n')) {
-      return at + (text[at] == quote ? 1 : 0);
-    } else if (several_lines && text.substr(at, 3) == three) {
-      at += 3;
-      for (int more = 0; more < 2 && at < text.size() && text[at] == quote; ++more) ++at;  // quotes at the string's end
-      return at;
-    }
-  }
-  return text.size();
-}
-
-}  // namespace
 
 BeyondBound toml_beyond_bounds(std::string_view text) {
   std::uint32_t depth = 0, dots = 0, values = 0, line = 1;
