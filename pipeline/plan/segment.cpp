@@ -10,7 +10,6 @@
 #include "stages/infill/layout.h"
 #include "stages/segment/resolve.h"
 #include "stages/support/text/number_text.h"
-#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -120,4 +120,19 @@ std::string read_shard(std::string_view text, std::array<std::uint32_t, 2>& shar
   return {};
 }
 
+char separator_of(std::string_view header) {
+  return header.find('\t') != std::string_view::npos ? '\t' : header.find(';') != std::string_view::npos ? ';' : ',';
+}
+
+std::vector<std::string> cells_of(std::string_view line, char separator) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  std::vector<std::string> cells;
+  for (std::string_view cell : split(line, std::string_view(&separator, 1))) {
+    while (!cell.empty() && (cell.front() == ' ' || cell.front() == '"')) cell.remove_prefix(1);
+    while (!cell.empty() && (cell.back() == ' ' || cell.back() == '"')) cell.remove_suffix(1);
+    cells.emplace_back(cell);
+  }
+  return cells;
+}
+
 }  // namespace lamina

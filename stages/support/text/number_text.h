@@ -39,4 +39,12 @@ std::string_view trimmed(std::string_view text);
 /// The shortest text that reads back as the same number; never -0.
 std::string number_text(double value);
 
+// --- lines of user-edited tables, separated by commas, semicolons or tabs.
+
+/// The column separator of a table, detected from its first line.
+char separator_of(std::string_view header);
+
+/// The cells of a line without surrounding blanks and quotes.
+std::vector<std::string> cells_of(std::string_view line, char separator);
+
 }  // namespace lamina
