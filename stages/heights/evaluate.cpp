@@ -6,7 +6,6 @@
 #include <chrono>
 #include <utility>
 
-#include "stages/heights/steepest.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
 

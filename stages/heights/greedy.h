@@ -9,7 +9,6 @@
 #include "stages/data/buffer.h"
 #include "stages/heights/candidate_heights.h"
 #include "stages/heights/heights.h"
-#include "stages/heights/steepest.h"
 
 namespace lamina::heights {
 
