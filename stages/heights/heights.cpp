@@ -150,8 +150,8 @@ class HeightSearch {
   Buffer<CandidateRow> rows_;
 };
 
-/// The best of all layer tables: of all stacks of the set's thicknesses in which no slope gets a step above options.cusp, except
-/// in layers of the minimum thickness, the one with
+/// The best of all layer tables: of all stacks of the set's thicknesses in which no slope gets a step above options.cusp,
+/// except in layers of the minimum thickness, the one with
 ///   1. the minimum distance from the flat that is missed most,
 ///   2. the minimum sum of the distances of all flats that are missed,
 ///   3. the fewest layers, or the minimum time,
