@@ -130,10 +130,7 @@ const Json* Json::begin() const {
   return list == nullptr ? nullptr : list->data();
 }
 
-const Json* Json::end() const {
-  const List* list = std::get_if<List>(&value_);
-  return list == nullptr ? nullptr : list->data() + list->size();
-}
+const Json* Json::end() const { return begin() == nullptr ? nullptr : begin() + size(); }
 
 Json& Json::emplace_back() {
   if (is_null()) value_ = List();
