@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <numbers>
 
-#include "stages/bead/section.h"
 #include "stages/bead/spread.h"
 
 namespace lamina::bead {
@@ -359,12 +358,10 @@ void deposit(std::span<const DepositedBead> beads, std::span<const BeadFeed> fee
 // Contacts of pieces.
 
 double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
-                     Buffer<PieceClearance>* clearances) {
-  Buffer<PieceClearance> own;
-  Buffer<PieceClearance>& into = clearances != nullptr ? *clearances : own;
+                     Buffer<PieceClearance>& clearances) {
   sides.resize(pieces.size());
-  into.resize(pieces.size());
-  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides, into);
+  clearances.resize(pieces.size());
+  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides, clearances);
 }
 
 double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm) {
@@ -385,7 +382,7 @@ double reach_at(const DepositedPiece& piece, const PieceSide& side, double heigh
 
 double flow_along(std::span<DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides) {
   Buffer<PieceClearance> clearances;
-  double over = find_contacts(pieces, height_mm, sides, &clearances);
+  double over = find_contacts(pieces, height_mm, sides, clearances);
   for (int round = 0; round < kRounds && over > kNothing; ++round) {
     for (std::size_t begin = 0; begin < pieces.size();) {
       std::size_t end = begin + 1;
@@ -394,7 +391,7 @@ double flow_along(std::span<DepositedPiece> pieces, double height_mm, Buffer<Pie
       begin = end;
     }
     const double before = over;
-    over = find_contacts(pieces, height_mm, sides, &clearances);
+    over = find_contacts(pieces, height_mm, sides, clearances);
     if (over > kNoProgress * before) break;
   }
   return over;

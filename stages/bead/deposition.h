@@ -63,12 +63,11 @@ struct PieceClearance {
 };
 
 /// height_mm  of the layer
-/// sides      one for each piece
-/// clearances  one for each piece; null: not reported
+/// sides, clearances  one for each piece
 /// returns    mm3 that did not fit and are left out
 /// cost       O(pieces x pieces within the widest bead's width of one), parallel; 100 bytes a piece. Same for any threads
 double find_contacts(std::span<const DepositedPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
-                     Buffer<PieceClearance>* clearances = nullptr);
+                     Buffer<PieceClearance>& clearances);
 
 /// How far a side reaches at a height over or below the middle of the layer, mm; below 0: not at all.
 double reach_at(const DepositedPiece& piece, const PieceSide& side, double height_mm, double above_mm);

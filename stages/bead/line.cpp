@@ -4,10 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "stages/bead/section.h"
-
 namespace lamina::bead {
-
 namespace {
 
 /// The highest speed at one end of a way if it is `speed` at the other.

@@ -2,7 +2,7 @@
 //
 // What it assumes: extrusion follows motion (what is fed is the commanded cross-section x the speed of the head), the head
 // accelerates evenly, the melt lags (FlowPhase), and volume is conserved: cross-section = flow / speed. The width is
-// that of the cross-section (section.h). That material spreads along the line as well is left to spread.h. Three numbers of a
+// that of the cross-section. That material spreads along the line as well is left to spread.h. Three numbers of a
 // machine and the volume it is fed enter; no table of widths is used.
 #pragma once
 
@@ -11,9 +11,11 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <span>
 
 #include "stages/data/buffer.h"
+#include "stages/geometry/bead_section.h"
 
 namespace lamina::bead {
 
@@ -37,8 +39,37 @@ struct LineSegment {
 struct Joint {
   double speed_mm_s = 0;  // of the head
   double flow_mm3_s = 0;  // that leaves the nozzle
-  bool pressed = true;    // the bead stays between nozzle and layer (section.h)
+  bool pressed = true;    // the bead stays between nozzle and layer
 };
+
+// --- the width of a bead of given cross-section.
+//
+// Three forms, none with a constant of its own:
+// - A bead that fills its layer is a stadium: a rectangle with half circles at both sides (the `Flow` of PrusaSlicer and
+//   Slic3r).
+// - A bead that filled its layer and is starved by the lag, though it is fed enough, stays between nozzle and layer below: it
+//   keeps its height and is an ellipse. Examples are the thin segments of Di Nisio 2022, Table 11.
+// - A thread that is fed too little to fill its layer detaches and stays round, as it left the nozzle, until the layer is
+//   filled again. Examples are those of Table 12.
+// The rule that separates the last two was derived from Tables 11 and 12, in both of which a bead has half of its area
+// and is 0.21 mm wide in one, 0.27 mm in the other. Tables 13 to 16 were not used for it.
+
+/// mm2: the circle as high as the layer.
+inline double full_circle(double height_mm) { return std::numbers::pi / 4 * height_mm * height_mm; }
+
+/// What is fed is enough to fill the layer: a bead that is starved all the same stays between nozzle and layer.
+inline bool may_stay_pressed(double fed_mm2, double height_mm) { return fed_mm2 >= full_circle(height_mm); }
+
+/// Whether a bead lies between nozzle and layer. before  whether it did so just before
+inline bool stays_pressed(double area_mm2, double fed_mm2, bool before, double height_mm) {
+  return area_mm2 >= full_circle(height_mm) || (before && may_stay_pressed(fed_mm2, height_mm));
+}
+
+/// mm. pressed  it stays between nozzle and layer; says nothing where the layer is filled
+inline double width_of(double area_mm2, bool pressed, double height_mm) {
+  const bool ellipse = pressed && area_mm2 < full_circle(height_mm);
+  return bead_width(std::max(area_mm2, 0.0), height_mm, ellipse ? BeadShape::kEllipse : BeadShape::kStadium);
+}
 
 // --- the flow out of a nozzle that follows its feed late, in closed form.
 //

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "stages/bead/section.h"
 #include "stages/bead/spread.h"
 
 namespace lamina::bead {

@@ -408,7 +408,7 @@ class Solver {
     steps[end] = 0;
     for (std::uint32_t candidate = end; candidate-- > 0;) {
       if (cost[candidate] == unreached<Cost>() || is_last<Cost>(candidate)) continue;
-      const std::size_t flat = first_flat_above_if<Cost>(candidate);
+      const std::size_t flat = sizeof(Cost) > 8 ? first_flat_above(candidate_heights_[candidate]) : 0;
       for_each_layer(candidate, [&](std::uint32_t i, std::uint32_t up) {
         if (up > end || steps[up] == kFar || cost[candidate] + weight<Cost>(candidate, flat, up) != cost[up]) return;
         const double value = steps[up] + set_.values[i] * (below[up] - below[candidate]);
@@ -418,10 +418,6 @@ class Solver {
       });
     }
     return via;
-  }
-  template <class Cost>
-  std::size_t first_flat_above_if(std::uint32_t candidate) const {
-    return sizeof(Cost) > 8 ? first_flat_above(candidate_heights_[candidate]) : 0;
   }
 
   LayerReason reason(std::int64_t bottom, std::uint32_t i) const {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/bead/section.h"
+#include "stages/bead/line.h"
 #include "stages/data/buffer.h"
 
 namespace lamina::bead {
