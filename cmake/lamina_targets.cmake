@@ -89,6 +89,7 @@ endforeach()
 # Embree, libtiff and libzip are loaded when a job first needs them (stages/support/late/late.h), by the names that linking
 # would have written down.
 set(lamina_late_files)
+set(lamina_late_names)
 foreach(name embree tiff zip)
   string(REPLACE "embree" "embree3" library ${name})
   find_library(lamina_${name}_file ${library} REQUIRED)
@@ -98,10 +99,11 @@ foreach(name embree tiff zip)
     message(FATAL_ERROR "${lamina_${name}_file} is no shared library; lamina loads it when a job first needs it")
   endif()
   string(TOUPPER ${name} upper)
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/late/${name}.cpp PROPERTIES
-                              COMPILE_DEFINITIONS LAMINA_${upper}_FILE="${CMAKE_MATCH_1}" SKIP_PRECOMPILE_HEADERS ON)
+  list(APPEND lamina_late_names LAMINA_${upper}_FILE="${CMAKE_MATCH_1}")
   list(APPEND lamina_late_files ${lamina_${name}_file})
 endforeach()
+set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/support/late/late.cpp PROPERTIES
+                            COMPILE_DEFINITIONS "${lamina_late_names}" SKIP_PRECOMPILE_HEADERS ON)
 set(lamina_late_headers $<TARGET_PROPERTY:embree,INTERFACE_INCLUDE_DIRECTORIES> ${TIFF_INCLUDE_DIRS} ${LIBZIP_INCLUDE_DIRS})
 foreach(library lamina_stages lamina_stages_once_a_job)
   target_include_directories(${library} SYSTEM PRIVATE ${lamina_late_headers})

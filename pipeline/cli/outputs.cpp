@@ -13,7 +13,6 @@
 #include "pipeline/report/job_cost.h"
 #include "stages/formats/voxels/image.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

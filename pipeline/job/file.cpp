@@ -13,7 +13,6 @@
 #include "pipeline/job/profiles/library.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
 

@@ -1,5 +1,4 @@
 #include "pipeline/job/keys.h"
-#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 

@@ -11,7 +11,7 @@
 
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
-#include "stages/data/saturation.h"
+#include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/heights/settings.h"
 #include "stages/infill/settings.h"

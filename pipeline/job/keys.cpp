@@ -19,7 +19,6 @@
 #include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
 #include "stages/support/text/number_text.h"
-#include "stages/support/text/ranges.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -8,7 +8,6 @@
 
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 

@@ -15,7 +15,6 @@
 
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/io/temporary.h"
 
 namespace lamina {

@@ -12,7 +12,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "stages/checks/layer_warnings.h"
-#include "stages/support/io/file_target.h"
+#include "stages/support/io/file.h"
 #include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {

@@ -9,7 +9,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/output/directory.h"
-#include "stages/support/io/file_target.h"
+#include "stages/support/io/file.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {

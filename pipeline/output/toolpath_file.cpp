@@ -15,7 +15,6 @@
 #include "stages/formats/rp3/rp3.h"
 #include "stages/heights/evaluate.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/version.h"

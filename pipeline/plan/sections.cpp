@@ -12,7 +12,6 @@
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
 #include "stages/slice/bodies.h"
-#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -7,10 +7,9 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/infill/spacing.h"
+#include "stages/infill/layout.h"
 #include "stages/segment/resolve.h"
 #include "stages/support/text/number_text.h"
-#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

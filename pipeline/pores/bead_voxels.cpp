@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "pipeline/machine/profiles.h"
-#include "stages/bead/contacts.h"
 #include "stages/pores/registration.h"
 #include "stages/raster/beads.h"
 #include "stages/support/text/readable.h"

@@ -47,7 +47,7 @@ struct Pile {
 Result<Pile> pile_of(const formats::GcodeFile& file);
 
 /// Cuts the voxels whose centres lie in a bead.
-/// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h, contacts.h); heights are those of
+/// rules   by which beads come to lie as what is fed makes them (stages/bead/deposition.h); heights are those of
 /// the pile.
 ///         None: a bead is a stadium, as high as its layer and as wide as the file states, with round ends; one narrower
 ///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/bead/lag.h"
 #include "stages/data/units.h"
 
 namespace lamina::bead {

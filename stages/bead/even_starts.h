@@ -1,6 +1,6 @@
 // stages/bead/even_starts.h: lines begin with the flow they keep, regardless of the previous line.
 //
-// The melt lags (stages/bead/lag.h): after a faster line a line begins too thick, after a slower one too thin, until the
+// The melt lags (stages/bead/line.h): after a faster line a line begins too thick, after a slower one too thin, until the
 // transient has decayed after some tenths of a millimetre. The first 0.2 mm of a line, or as much as keeps the feed between a
 // twentieth and three times its own, are fed more or less such that the flow at their end is that of the line. Nothing is fed
 // or retracted for it while the head stands still. Within a line nothing is changed: segmented lines depend on the lag.

@@ -1,22 +1,53 @@
 // stages/bead/line.cpp: stretches -> phases of constant acceleration -> pieces.
 #include "stages/bead/line.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
-#include "stages/bead/section.h"
-
 namespace lamina::bead {
-
-// Speeds at the joints of a line.
-
 namespace {
 
 /// The highest speed at one end of a way if it is `speed` at the other.
 double within_reach(double speed, double length, double acceleration) {
   return std::isinf(acceleration) ? acceleration : std::sqrt(speed * speed + 2 * acceleration * length);
+}
+
+constexpr double kMinPiece = 1e-4;  // mm
+
+/// The one to three phases of a stretch, in order.
+struct Phases {
+  std::array<FlowPhase, 3> phase;
+  std::uint32_t count = 0;
+
+  void add(double length, double area, double from, double to, double tau) {
+    if (length <= 0) return;
+    phase[count++] = {length, area, from, (to * to - from * from) / (2 * length), tau, 0};
+  }
+};
+
+Phases phases_of(const Planned& planned, const BeadMachine& machine) {
+  const auto& [length, area, speed] = planned.segment;
+  const double tau = machine.tau_s, acceleration = machine.acceleration_mm_s2;
+  const double from = planned.begin_mm_s, to = planned.end_mm_s;
+  Phases phases;
+  if (std::isinf(acceleration)) {
+    phases.add(length, area, speed, speed, tau);
+    return phases;
+  }
+  const double peak = planned.peak(acceleration);
+  const double up = std::max((peak * peak - from * from) / (2 * acceleration), 0.0);
+  const double down = std::max((peak * peak - to * to) / (2 * acceleration), 0.0);
+  const double rest = length - up - down;
+  if (up + down > length * (1 + 1e-9)) {  // joined faster than the head can brake
+    phases.add(length, area, from, to, tau);
+    return phases;
+  }
+  const double even = rest > length * 1e-12 ? rest : 0;
+  const double share = (length - even) / std::max(up + down, 1e-300);
+  phases.add(up * share, area, from, peak, tau);
+  phases.add(even, area, peak, peak, tau);
+  phases.add(down * share, area, peak, to, tau);
+  return phases;
 }
 
 }  // namespace
@@ -77,48 +108,6 @@ double cyclic_speed(std::span<const LineSegment> period, double acceleration_mm_
   }
   return std::min({first, speed, period.front().speed_mm_s});
 }
-
-namespace {
-
-constexpr double kMinPiece = 1e-4;  // mm
-
-/// The one to three phases of a stretch, in order.
-struct Phases {
-  std::array<FlowPhase, 3> phase;
-  std::uint32_t count = 0;
-
-  void add(double length, double area, double from, double to, double tau) {
-    if (length <= 0) return;
-    phase[count++] = {length, area, from, (to * to - from * from) / (2 * length), tau, 0};
-  }
-};
-
-Phases phases_of(const Planned& planned, const BeadMachine& machine) {
-  const auto& [length, area, speed] = planned.segment;
-  const double tau = machine.tau_s, acceleration = machine.acceleration_mm_s2;
-  const double from = planned.begin_mm_s, to = planned.end_mm_s;
-  Phases phases;
-  if (std::isinf(acceleration)) {
-    phases.add(length, area, speed, speed, tau);
-    return phases;
-  }
-  const double peak = planned.peak(acceleration);
-  const double up = std::max((peak * peak - from * from) / (2 * acceleration), 0.0);
-  const double down = std::max((peak * peak - to * to) / (2 * acceleration), 0.0);
-  const double rest = length - up - down;
-  if (up + down > length * (1 + 1e-9)) {  // joined faster than the head can brake
-    phases.add(length, area, from, to, tau);
-    return phases;
-  }
-  const double even = rest > length * 1e-12 ? rest : 0;
-  const double share = (length - even) / std::max(up + down, 1e-300);
-  phases.add(up * share, area, from, peak, tau);
-  phases.add(even, area, peak, peak, tau);
-  phases.add(down * share, area, peak, to, tau);
-  return phases;
-}
-
-}  // namespace
 
 BeadLine::BeadLine(const BeadMachine& machine, double height_mm, double tolerance_mm)
     : machine_(machine), height_(height_mm), tolerance_(tolerance_mm), plan_(machine.acceleration_mm_s2) {}

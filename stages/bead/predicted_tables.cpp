@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "stages/bead/section.h"
 #include "stages/bead/spread.h"
 
 namespace lamina::bead {
@@ -44,35 +43,6 @@ LongInterval deposit_long(const BeadMachine& machine, double height_mm, double s
   return found;
 }
 
-}  // namespace
-
-Calibration predicted_tables(const BeadMachine& machine, double width_mm, double height_mm, double speed_mm_s) {
-  Calibration tables;
-  tables.source = "predicted from what 100 % lays, the lag of the melt and the acceleration (stages/bead)";
-  tables.width_mm = width_mm;
-  tables.height_mm = height_mm;
-  tables.speed_mm_s = speed_mm_s;
-  for (int percent = 125; percent <= 400; percent += 25) {
-    const LongInterval deposited = deposit_long(machine, height_mm, speed_mm_s, machine.area_mm2, speed_mm_s * percent / 100);
-    tables.by_speed.push_back({static_cast<double>(percent), deposited.minimum, deposited.stable_mm, deposited.largest});
-  }
-  for (int percent = 90; percent >= 10; percent -= 10) {
-    const LongInterval deposited = deposit_long(machine, height_mm, speed_mm_s, machine.area_mm2 * percent / 100, speed_mm_s);
-    tables.by_extrusion.push_back({static_cast<double>(percent), deposited.minimum});
-  }
-  const double even = width_of(machine.area_mm2, true, height_mm);
-  for (const auto& [extrusion, thick_speed] : {std::pair{75.0, 100.0}, {100.0, 75.0}, {125.0, 50.0}}) {
-    const Pattern pattern{1.5, 1.5, extrusion, speed_mm_s * thick_speed / 100, speed_mm_s * 2};
-    const PatternWidths deposited = steady_widths(machine, height_mm, pattern, true);
-    tables.repeated.push_back({extrusion, 200, thick_speed, deposited.thick.middle, deposited.thin.middle, even});
-  }
-  return tables;
-}
-
-// One period of a pattern in its steady state, and its widths.
-
-namespace {
-
 constexpr double kReach = 1.5;  // mm: half of the widest bead that spreads
 
 std::array<LineSegment, 2> period_of(const BeadMachine& machine, const Pattern& pattern) {
@@ -106,6 +76,31 @@ class Gather {
 };
 
 }  // namespace
+
+Calibration predicted_tables(const BeadMachine& machine, double width_mm, double height_mm, double speed_mm_s) {
+  Calibration tables;
+  tables.source = "predicted from what 100 % lays, the lag of the melt and the acceleration (stages/bead)";
+  tables.width_mm = width_mm;
+  tables.height_mm = height_mm;
+  tables.speed_mm_s = speed_mm_s;
+  for (int percent = 125; percent <= 400; percent += 25) {
+    const LongInterval deposited = deposit_long(machine, height_mm, speed_mm_s, machine.area_mm2, speed_mm_s * percent / 100);
+    tables.by_speed.push_back({static_cast<double>(percent), deposited.minimum, deposited.stable_mm, deposited.largest});
+  }
+  for (int percent = 90; percent >= 10; percent -= 10) {
+    const LongInterval deposited = deposit_long(machine, height_mm, speed_mm_s, machine.area_mm2 * percent / 100, speed_mm_s);
+    tables.by_extrusion.push_back({static_cast<double>(percent), deposited.minimum});
+  }
+  const double even = width_of(machine.area_mm2, true, height_mm);
+  for (const auto& [extrusion, thick_speed] : {std::pair{75.0, 100.0}, {100.0, 75.0}, {125.0, 50.0}}) {
+    const Pattern pattern{1.5, 1.5, extrusion, speed_mm_s * thick_speed / 100, speed_mm_s * 2};
+    const PatternWidths deposited = steady_widths(machine, height_mm, pattern, true);
+    tables.repeated.push_back({extrusion, 200, thick_speed, deposited.thick.middle, deposited.thin.middle, even});
+  }
+  return tables;
+}
+
+// One period of a pattern in its steady state, and its widths.
 
 PatternSums steady_profile(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread,
                            const TakeProfile& take) {

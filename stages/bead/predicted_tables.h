@@ -5,7 +5,6 @@
 #pragma once
 
 #include "stages/bead/line.h"
-#include "stages/bead/machine.h"
 #include "stages/data/extruder.h"
 
 namespace lamina::bead {

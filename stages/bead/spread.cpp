@@ -7,8 +7,6 @@
 #include <cstddef>
 #include <numbers>
 
-#include "stages/bead/section.h"
-
 namespace lamina::bead {
 namespace {
 

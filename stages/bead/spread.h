@@ -29,7 +29,7 @@ struct SpreadCell {
   double begin_mm, end_mm;
   double volume_mm3;
   double area_mm2;  // volume / length
-  double width_mm;  // between those of a pressed bead and a round thread by the shares of either (section.h)
+  double width_mm;  // between those of a pressed bead and a round thread by the shares of either (line.h)
 };
 
 using TakeCell = std::function<void(const SpreadCell&)>;

@@ -34,7 +34,7 @@ struct Extruder {
     std::optional<BeadShape> bead_area;
     double flow = 1;        // found by measuring walls
     double feed_ratio = 1;  // the machine's error: filament that is fed / filament commanded by E
-    double lag_s = 0;       // with which the melt follows its feed (stages/bead/lag.h); 0: at once, or unknown
+    double lag_s = 0;       // with which the melt follows its feed (stages/bead/line.h); 0: at once, or unknown
     double nozzle_degc = 200, bed_degc = 60;
     double first_nozzle_degc = 200, first_bed_degc = 60;  // while the first layer is extruded
 

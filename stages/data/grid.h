@@ -1,4 +1,4 @@
-// stages/data/grid.h: the pixel centres of a bed, as integers.
+// stages/data/grid.h: the pixel centres of a bed, as integers, and where a print head passes and stands over them.
 #pragma once
 
 #include <cstdint>
@@ -41,6 +41,18 @@ struct PixelGrid {
   PixelAxis x, y;
   std::uint32_t columns() const { return x.count; }
   std::uint32_t rows() const { return y.count; }
+};
+
+/// What a sweep of the head passes over: pixels [left, right) x [top, bottom) of the image.
+struct SwathBand {
+  double left, right, top, bottom;
+  bool present;  // the one under inspection
+};
+
+/// A nozzle at a step.
+struct NozzlePosition {
+  double column, row;  // of its centre, in pixels
+  bool fires;
 };
 
 }  // namespace lamina

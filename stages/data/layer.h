@@ -1,9 +1,10 @@
-// stages/data/layer.h: one layer of the job, and the plane that stands for it.
+// stages/data/layer.h: one layer of the job, the plane that stands for it, and the binder and powder in it.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "stages/data/units.h"
 
@@ -50,6 +51,21 @@ struct Layer {
   /// it, so the upper one lies 1 nm under the top: a face that ends the layer is still cut.
   Nm lowest_plane() const { return bottom; }
   Nm highest_plane() const { return bottom + thickness - 1; }
+};
+
+/// Per cent of the powder's voids: a number, or a formula of the position (stages/dose/field.h).
+struct Saturation {
+  double percent = 0;
+  std::string formula;  // of x, y and z in mm; empty: the number
+
+  Saturation() = default;
+  Saturation(double of_voids) : percent(of_voids) {}
+  static Saturation of(std::string text) {
+    Saturation saturation;
+    saturation.formula = std::move(text);
+    return saturation;
+  }
+  bool operator==(const Saturation&) const = default;
 };
 
 /// Pixels of a powder in layers that the vat of another one feeds: its binder falls into that other powder.

@@ -8,7 +8,6 @@
 
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
-#include "stages/data/saturation.h"
 
 namespace lamina::dose {
 

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
-#include "stages/heights/steepest.h"
+#include "stages/support/clocks.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
 
@@ -76,18 +75,14 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
 Study study_of(const SurfaceIndex& index, const Options& options, Plan plan) {
   Study study;
   study.options = options;
   study.boundaries = boundaries_of(plan.table);
   for (std::uint32_t i = 0; i < plan.table.size(); ++i) study.reasons.push_back(plan.table[i].reason);
-  const auto start = Clock::now();
+  const Stopwatch watch;
   study.evaluation = evaluate(index, study.boundaries, options);
-  study.evaluate_seconds = seconds_since(start);
+  study.evaluate_seconds = watch.elapsed().wall;
   study.plan = std::move(plan);
   return study;
 }
@@ -95,10 +90,10 @@ Study study_of(const SurfaceIndex& index, const Options& options, Plan plan) {
 }  // namespace
 
 Result<Study> study(const SurfaceIndex& index, const Options& options) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   Result<Plan> plan = plan_heights(index, options);
   if (!plan) return plan.error();
-  const double seconds = seconds_since(start);
+  const double seconds = watch.elapsed().wall;
   Study study = study_of(index, options, std::move(*plan));
   study.plan_seconds = seconds;
   study.name = mode_name(options.mode);

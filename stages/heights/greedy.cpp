@@ -4,18 +4,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
+#include <span>
 
 namespace lamina::heights {
 
 namespace {
-
-// The least thickness that covers what is left, if any does.
-std::uint32_t covering(const ThicknessSet& set, std::int64_t left, std::uint32_t maximum) {
-  for (std::uint32_t i = 0; i < maximum; ++i) {
-    if (set.values[i] >= left) return i;
-  }
-  return maximum;
-}
 
 // The peaks, and how many more the documents' rule has.
 std::vector<Flat> find_peaks(const SurfaceIndex& index, const Options& options, std::uint32_t& small) {
@@ -170,7 +163,9 @@ bool GreedyLayers::add_by_cusp(Plan& plan) {
   }
   const bool limited = chosen + 1 < set.size();
   plan.stepped_back.push_back(limited && cusp_of(set.values[chosen + 1], at_bottom) <= options_.cusp);
-  const std::uint32_t last = covering(set, top_ - bottom, chosen);
+  // The least thickness that covers what is left, if any does.
+  const auto thinner = std::span(set.values).first(chosen);
+  const auto last = static_cast<std::uint32_t>(std::ranges::lower_bound(thinner, top_ - bottom) - thinner.begin());
   plan.table.add(set.values[last], last < chosen ? LayerReason::kFlat : limited ? LayerReason::kCusp : LayerReason::kUniform);
   return true;
 }

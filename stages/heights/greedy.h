@@ -9,14 +9,13 @@
 #include "stages/data/buffer.h"
 #include "stages/heights/candidate_heights.h"
 #include "stages/heights/heights.h"
-#include "stages/heights/steepest.h"
 
 namespace lamina::heights {
 
-/// The slopes that a layer meets: those in its cells of the ladder, or those that the plane on top of it cuts.
+/// The slopes that a layer meets: those in its cells of the candidates, or those that the plane on top of it cuts.
 class SlopesByHeight {
  public:
-  /// The ladder must outlive this object, the index need not.
+  /// The candidate heights must outlive this object, the index need not.
   SlopesByHeight(const SurfaceIndex& index, const Options& options, const CandidateHeights& candidate_heights, Slope slope)
       : candidate_heights_(candidate_heights),
         plane_(options.facets == Facets::kPlane),
@@ -27,7 +26,7 @@ class SlopesByHeight {
   bool plane() const { return plane_; }
   Steepness at(std::uint32_t i) const { return i < values_.size() ? values_[i] : 0; }
 
-  /// Grows upwards from a rung: the flattest slope of a layer from there to each of increasing heights.
+  /// Grows upwards from a candidate height: the flattest slope of a layer from there to each of increasing heights.
   class Growing {
    public:
     Growing(const SlopesByHeight& slopes, std::int64_t bottom) : slopes_(slopes), cell_(slopes.candidate_of(bottom)) {}
@@ -67,9 +66,9 @@ class SlopesByHeight {
 /// it needs, at most greatest / least.
 class GreedyLayers {
  public:
-  /// options  checked, of one of these modes. ladder  that their thicknesses reach. plan  empty; gets what is known before any
-  ///          layer
-  /// cost  reads every facet once; 4 bytes per cell of the ladder are kept
+  /// options  checked, of one of these modes. candidate_heights  that their thicknesses reach
+  /// plan     empty; gets what is known before any layer
+  /// cost  reads every facet once; 4 bytes per cell of the candidates are kept
   GreedyLayers(const SurfaceIndex& index, const Options& options, CandidateHeights candidate_heights, Plan& plan);
   GreedyLayers(const GreedyLayers&) = delete;
   GreedyLayers& operator=(const GreedyLayers&) = delete;

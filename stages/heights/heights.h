@@ -152,7 +152,7 @@ std::int64_t slab_height(const ThicknessSet& set);
 /// Whether slabs of these thicknesses are low enough. errors  kUsage
 Status check_slab(const ThicknessSet& set);
 
-/// The best table for every part (see optimal.h) of those that keep to the slabs.
+/// The best table for every part (of Mode::kOptimal) of those that keep to the slabs.
 /// index  used up
 /// errors  of check_slab; as plan_heights
 Result<PerPartPlan> plan_per_part(SurfaceIndex index, const Options& options);

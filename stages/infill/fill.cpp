@@ -8,9 +8,7 @@
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/simplify.h"
 #include "stages/infill/layout.h"
-#include "stages/infill/raster.h"
-#include "stages/infill/spacing.h"
-#include "stages/infill/waves.h"
+#include "stages/infill/lines.h"
 
 namespace lamina::infill {
 namespace {
@@ -32,22 +30,11 @@ Status append_lines(const ContoursView& region, const FillContext& context, cons
   const Contours turned = frame.to(region);
   const auto positions = positions_across(turned, frame, context, parameters);
   if (!positions) return positions.error();
+  // Crests are counted from the part's side as well.
   if (is_wave(parameters.pattern)) {
-    // Crests are counted from the part's side as well.
-    std::int64_t start_u = INT64_MAX;
-    const Box& part = context.part;
-    for (const Nm x : {part.lo.x, part.hi.x}) {
-      for (const Nm y : {part.lo.y, part.hi.y}) start_u = std::min<std::int64_t>(start_u, frame.to(Point2{x, y}).x);
-    }
-    return append_waves(turned, parameters, *positions, start_u, frame, out);
+    return append_waves(turned, parameters, *positions, frame.to(context.part).lo.x, frame, out);
   }
-  RasterOptions options{parameters.width, parameters.longest_link, parameters.shortest_line};
-  if (parameters.longest_link < 0) {
-    std::int64_t widest = 0;
-    for (std::size_t i = 1; i < positions->at.size(); ++i) widest = std::max(widest, positions->at[i] - positions->at[i - 1]);
-    options.longest_link = 3 * widest;
-  }
-  append_raster(turned, *positions, frame, options, out);
+  append_raster(turned, parameters, *positions, frame, out);
   return {};
 }
 
@@ -201,15 +188,11 @@ Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& r
   const auto positions = positions_across(turned, frame, context, parameters);
   if (!positions) return positions.error();
   if (is_wave(parameters.pattern)) {
-    Nm low = turned.point.front().x, high = low;
-    for (const Point2 p : turned.point) low = std::min(low, p.x), high = std::max(high, p.x);
-    const std::uint64_t of_wave = wave_points(parameters, std::int64_t{high} - low);
-    const std::uint64_t all = positions->at.size() * of_wave;
     const WaveBound waves = bound_waves(turned, parameters, *positions);
     bound.points += waves.points;
     bound.paths += waves.pieces;
     bound.intervals += waves.pieces;
-    bound.scratch_bytes += kOfClipper * (own + std::min(all, of_wave + wave_batch(own)));
+    bound.scratch_bytes += kOfClipper * (own + waves.at_once);
   } else {
     const std::uint64_t crossings = count_crossings(turned, *positions);
     bound.points += crossings + own;
@@ -232,13 +215,6 @@ Status append_fill(Outlines outlines, const FillContext& context, const FillPara
     if (region.size() == 0) return {};
   }
   return append_lines(region, context, parameters, out);
-}
-
-Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
-  if (contours.size() == 0) return {};
-  auto outlines = outlines_of(contours, context, parameters);
-  if (!outlines) return outlines.error();
-  return append_fill(std::move(*outlines), context, parameters, out);
 }
 
 }  // namespace lamina::infill

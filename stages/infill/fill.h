@@ -20,11 +20,6 @@ namespace lamina::infill {
 /// errors  kUsage, one line that names what is wrong
 Status check(const FillParameters& parameters);
 
-/// Appends walls, then the filling.
-/// contours  clean, of one body
-/// errors    kUsage: a distance between lines that is not positive, a formula that fails; kInternal of Clipper
-Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
-
 /// Where the centres of beads are, or may be: all deposited lines are made of these alone.
 struct Outlines {
   std::vector<Contours> walls;  // from the surface inwards; one that would hold nothing ends them
@@ -39,10 +34,11 @@ struct Outlines {
 
 /// Each outline is the one before moved inwards, which is the contours moved so far; then ends of edges shorter than 0.05 mm
 /// are merged where that moves it by no more than the tolerance of the context.
-/// errors  as append_fill
+/// contours  clean, of one body
+/// errors    kUsage: a distance between lines that is not positive, a formula that fails; kInternal of Clipper
 Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
 
-/// The same, with the outlines made beforehand.
+/// Appends walls, then the filling. errors  as outlines_of
 Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
 /// What append_fill may come to, counted before anything is deposited: lines are placed and their crossings with the region
@@ -54,7 +50,7 @@ struct FillBound {
   std::uint64_t intervals = 0;      // of one kind each, into which files divide paths
   std::uint64_t scratch_bytes = 0;  // while they are made
 };
-/// errors  as append_fill
+/// errors  as outlines_of
 /// cost    O(P log L) for P points of the region and L lines; of curves, an eighth of the cost of append_fill
 Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
                              const FillParameters& parameters);

@@ -40,7 +40,7 @@ struct FillParameters {
   std::vector<Nm> gaps{0};                             // edge to edge; may be negative
   std::uint32_t group = 1;                             // beads in contact before a gap
   std::vector<std::pair<std::int64_t, Nm>> gap_table;  // (height above the part's bottom, gap), heights increasing
-  std::string gap_expression;                          // mm; see spacing.h for its variables
+  std::string gap_expression;                          // mm; see layout.h for its variables
   std::vector<Nm> distances;                           // centre to centre, in turn; empty: by gaps
 
   // --- stagger: lines of layers with the same angle are moved sideways by these amounts in turn

@@ -11,7 +11,7 @@
 
 #include "stages/data/units.h"
 #include "stages/program/dialect.h"
-#include "stages/support/text/gcode_number.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::program {
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "stages/data/grid.h"
-#include "stages/data/jetting.h"
 #include "stages/data/levels.h"
 #include "stages/data/status.h"
 #include "stages/replay/machine.h"

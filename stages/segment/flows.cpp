@@ -7,7 +7,6 @@
 #include "stages/data/plot.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/text/number_text.h"
-#include "stages/support/text/table.h"
 
 namespace lamina::segment {
 namespace {

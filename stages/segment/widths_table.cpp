@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
-#include "stages/support/text/table.h"
 #include "stages/support/text/value.h"
 
 namespace lamina::segment {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "stages/bead/line.h"
-#include "stages/bead/section.h"
 #include "stages/bead/spread.h"
 #include "tests/bead/stabilisation.h"
 #include "tests/segment/table.h"

@@ -16,7 +16,7 @@ namespace lamina::bead {
 struct AdjacentBead {
   double centre_mm;  // across the lines, increasing
   double area_mm2;
-  double width_mm;  // alone (section.h)
+  double width_mm;  // alone (line.h)
 };
 
 struct SqueezedBead {

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/bead/lag.h"
-#include "stages/bead/section.h"
+#include "stages/bead/line.h"
 #include "stages/data/buffer.h"
 
 namespace lamina::bead {

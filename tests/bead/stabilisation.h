@@ -8,7 +8,7 @@
 
 #include <span>
 
-#include "stages/bead/machine.h"
+#include "stages/bead/line.h"
 
 namespace lamina::bead {
 

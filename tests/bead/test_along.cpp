@@ -4,8 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/bead/contacts.h"
-#include "stages/bead/section.h"
+#include "stages/bead/deposition.h"
 
 namespace lamina::bead {
 namespace {
@@ -34,7 +33,8 @@ TEST(FlowAlong, WhatHasNoSpaceGoesToTheNearestPositionsThatHaveSome) {
   Buffer<DepositedPiece> pieces = crowded_lines(0.56);
   const Buffer<DepositedPiece> before = pieces;
   Buffer<PieceSides> sides;
-  const double over = find_contacts(pieces, kAlongHeight, sides);
+  Buffer<PieceClearance> clearances;
+  const double over = find_contacts(pieces, kAlongHeight, sides, clearances);
   ASSERT_GT(over, 1e-3);
   EXPECT_LT(flow_along(pieces, kAlongHeight, sides), 0.05 * over);
   EXPECT_NEAR(volume_along(pieces), volume_along(before), 1e-9);
@@ -56,7 +56,8 @@ TEST(FlowAlong, BeadsWithSpaceStayAsTheyAre) {
   Buffer<DepositedPiece> pieces = crowded_lines(0.44);
   const Buffer<DepositedPiece> before = pieces;
   Buffer<PieceSides> sides, alone;
-  EXPECT_EQ(flow_along(pieces, kAlongHeight, sides), find_contacts(before, kAlongHeight, alone));
+  Buffer<PieceClearance> clearances;
+  EXPECT_EQ(flow_along(pieces, kAlongHeight, sides), find_contacts(before, kAlongHeight, alone, clearances));
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     EXPECT_EQ(pieces[i].area_mm2, before[i].area_mm2);
     EXPECT_EQ(pieces[i].width_mm, before[i].width_mm);

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/bead/contacts.h"
-#include "stages/bead/section.h"
+#include "stages/bead/deposition.h"
 #include "tests/bead/neighbours.h"
 
 namespace lamina::bead {
@@ -42,7 +41,8 @@ TEST(Contacts, BeadsThatReachEachOtherHoldWhatTheyAreMadeOf) {
   for (const double angle : {0.0, 0.4, 1.5707963267948966, -2.0}) {
     const auto pieces = rows_of_pieces({0, 0.40, 0.86}, {0.45, 0.40, 0.40}, angle);
     Buffer<PieceSides> sides;
-    EXPECT_EQ(find_contacts(pieces, kContactHeight, sides), 0);
+    Buffer<PieceClearance> clearances;
+    EXPECT_EQ(find_contacts(pieces, kContactHeight, sides, clearances), 0);
     const std::size_t first = 50, second = 150, third = 250;
     EXPECT_LT(sides[first].right.corner_mm, 0) << "nothing lies there";
     EXPECT_GE(sides[first].left.corner_mm, 0);
@@ -73,7 +73,8 @@ TEST(Contacts, ARowHasTheSidesOfARow) {
   const std::vector<double> centres{0, 0.42, 0.86, 1.28}, widths{0.42, 0.47, 0.40, 0.50};
   const auto pieces = rows_of_pieces(centres, widths, 0);
   Buffer<PieceSides> sides;
-  find_contacts(pieces, kContactHeight, sides);
+  Buffer<PieceClearance> clearances;
+  find_contacts(pieces, kContactHeight, sides, clearances);
   std::vector<AdjacentBead> row;
   for (std::size_t i = 0; i < centres.size(); ++i) row.push_back({centres[i], bead_area(widths[i], kContactHeight), widths[i]});
   Buffer<SqueezedBead> squeezed;
@@ -92,25 +93,27 @@ TEST(Contacts, WhatHasNoSpaceGoesToTheOtherSides) {
   const auto pieces = rows_of_pieces({0, 0.3}, {0.45, 0.45}, 0);
   const double area = bead_area(0.45, kContactHeight), over = area - 0.3 * kContactHeight;
   Buffer<PieceSides> sides;
-  EXPECT_EQ(find_contacts(pieces, kContactHeight, sides), 0);
+  Buffer<PieceClearance> clearances;
+  EXPECT_EQ(find_contacts(pieces, kContactHeight, sides, clearances), 0);
   EXPECT_EQ(sides[50].left.corner_mm, 0) << "no cusp is left";
   EXPECT_NEAR(sides[50].right.reach_mm, 0.225 + over / 2 / kContactHeight, 1e-6);
   // Between two others it has none at all.
   const auto crowded = rows_of_pieces({0, 0.3, 0.6}, {0.45, 0.45, 0.45}, 0);
-  EXPECT_GT(find_contacts(crowded, kContactHeight, sides), 0);
+  EXPECT_GT(find_contacts(crowded, kContactHeight, sides, clearances), 0);
 }
 
 TEST(Contacts, BeadsThatCrossAndTheOwnLineAreNoNeighbours) {
   Buffer<DepositedPiece> pieces = rows_of_pieces({0}, {0.5}, 0);
   for (const DepositedPiece& piece : rows_of_pieces({-1}, {0.5}, 1.5707963267948966)) pieces.push_back(piece);
   Buffer<PieceSides> sides;
-  find_contacts(pieces, kContactHeight, sides);
+  Buffer<PieceClearance> clearances;
+  find_contacts(pieces, kContactHeight, sides, clearances);
   for (const PieceSides& side : sides) {
     EXPECT_LT(side.left.corner_mm, 0);
     EXPECT_LT(side.right.corner_mm, 0);
   }
   pieces.clear();
-  EXPECT_EQ(find_contacts(pieces, kContactHeight, sides), 0);
+  EXPECT_EQ(find_contacts(pieces, kContactHeight, sides, clearances), 0);
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 
 #include "stages/bead/deposition.h"
 #include "stages/bead/predicted_tables.h"
-#include "stages/bead/section.h"
 
 namespace lamina::bead {
 namespace {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "stages/bead/line.h"
-#include "stages/bead/section.h"
 
 namespace lamina::bead {
 namespace {

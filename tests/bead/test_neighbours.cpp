@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "stages/bead/section.h"
+#include "stages/bead/line.h"
 #include "tests/bead/neighbours.h"
 
 namespace lamina::bead {

@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <vector>
 
 #include "stages/bead/line.h"
-#include "stages/bead/section.h"
 
 namespace lamina::bead {
 namespace {
@@ -37,16 +35,6 @@ TEST(Section, AStarvedBeadStaysPressedAnUnderfedOneLetsGoUntilTheLayerIsFilledAg
   EXPECT_FALSE(stays_pressed(0.05, 0.05, true, 0.3));
   EXPECT_FALSE(stays_pressed(0.05, 0.1, false, 0.3));
   EXPECT_TRUE(stays_pressed(0.08, 0.05, false, 0.3));
-}
-
-TEST(BeadMachine, WrongNumbersAreNamedInOneLine) {
-  EXPECT_TRUE(check(BeadMachine{0.1, 0, std::numeric_limits<double>::infinity()}).ok());
-  EXPECT_EQ(check(BeadMachine{0, 0.05, 400}).error().message,
-            "bead.area_mm2: 0 mm2; the cross-section of 100 % has to be above 0");
-  EXPECT_EQ(check(BeadMachine{0.1, -1, 400}).error().message, "bead.tau_s: -1 s; a lag has to be 0 or above");
-  EXPECT_EQ(check(BeadMachine{0.1, 0, 0}).error().message,
-            "bead.acceleration_mm_s2: 0 mm/s2; an acceleration has to be above 0");
-  EXPECT_FALSE(check(BeadMachine{0.1, std::nan(""), 400}).ok());
 }
 
 /// Speeds at all joints when the whole line is known.

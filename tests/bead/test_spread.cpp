@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "stages/bead/section.h"
+#include "stages/bead/line.h"
 #include "tests/bead/anet.h"
 
 namespace lamina::bead {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stages/heights/candidate_heights.h"
-#include "stages/infill/spacing.h"
+#include "stages/infill/layout.h"
 #include "stages/support/text/escape.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/number_text.h"
@@ -91,7 +91,7 @@ std::vector<std::string> tree_seeds() {
   return {"a = 1\nb = [1, 2.5, \"x\"]\n[c.d]\ne = { f = true, g = 1979-05-27T07:32:00Z }\n[[h]]\ni = '''x'''\n"};
 }
 
-const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/spacing", "", "formula.dict", 256});
+const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/layout", "", "formula.dict", 256});
 const Registered kTexts({"texts", read_texts, text_seeds, "stages/support/text stages/heights/candidate_heights", "", {}, 256});
 const Registered kTree({"toml", read_tree, tree_seeds, "stages/support/text/toml", ".toml", "toml.dict", 2048});
 

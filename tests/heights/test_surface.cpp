@@ -10,7 +10,6 @@
 #include "stages/formats/rp3/rp3.h"
 #include "stages/heights/candidate_heights.h"
 #include "stages/heights/heights.h"
-#include "stages/heights/steepest.h"
 #include "tests/heights/surfaces.h"
 
 namespace lamina::heights {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include "stages/load/load.h"
 #include "stages/slice/slice.h"
@@ -93,9 +94,16 @@ infill::FillContext context_of(const ContoursView& contours, std::uint32_t index
   return context;
 }
 
+Status fill(const ContoursView& contours, const infill::FillContext& context, const infill::FillParameters& parameters,
+            Toolpaths& out) {
+  auto outlines = infill::outlines_of(contours, context, parameters);
+  if (!outlines) return outlines.error();
+  return infill::append_fill(std::move(*outlines), context, parameters, out);
+}
+
 Toolpaths filled(const ContoursView& contours, const infill::FillContext& context, const infill::FillParameters& parameters) {
   Toolpaths paths;
-  const Status status = infill::append_fill(contours, context, parameters, paths);
+  const Status status = fill(contours, context, parameters, paths);
   EXPECT_TRUE(status.ok()) << (status ? "" : status.error().message);
   return paths;
 }

@@ -30,6 +30,9 @@ const Contours& outline(const std::string& name);
 /// The contours' box, 20 mm high, and layer `index` of 0.2 mm.
 infill::FillContext context_of(const ContoursView& contours, std::uint32_t index = 0);
 
+/// Appends the fill of contours. errors  of infill::outlines_of
+Status fill(const ContoursView& contours, const infill::FillContext& context, const infill::FillParameters& parameters,
+            Toolpaths& out);
 Toolpaths filled(const ContoursView& contours, const infill::FillContext& context, const infill::FillParameters& parameters);
 
 /// Whether a path ends where it begins.

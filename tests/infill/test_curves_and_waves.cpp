@@ -6,7 +6,7 @@
 #include <random>
 
 #include "stages/infill/layout.h"
-#include "stages/infill/waves.h"
+#include "stages/infill/lines.h"
 #include "tests/infill/outlines.h"
 #include "tests/slice/contour_laws.h"
 

@@ -123,7 +123,7 @@ TEST(Fill, AFormulaHasToHoldWithinThePartOnly) {
     for (const MicroDegrees angle : {0, 30'000'000}) {
       parameters.angle_base = angle;
       Toolpaths paths;
-      const Status status = infill::append_fill(square, context_of(square), parameters, paths);
+      const Status status = fill(square, context_of(square), parameters, paths);
       ASSERT_TRUE(status.ok()) << status.error().message;
       EXPECT_GT(paths.size(), 0u);
     }
@@ -143,7 +143,7 @@ TEST(Fill, WhatCannotBeDepositedIsOneClearLine) {
   const auto message = [&](const FillParameters& parameters) {
     Toolpaths paths;
     Status status = infill::check(parameters);
-    if (status) status = infill::append_fill(square, context_of(square), parameters, paths);
+    if (status) status = fill(square, context_of(square), parameters, paths);
     EXPECT_FALSE(status.ok());
     if (status) return std::string();
     EXPECT_EQ(status.error().fault, Fault::kUsage);

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "stages/load/threemf/archive.h"
-#include "stages/support/text/part_name.h"
+#include "stages/support/text/escape.h"
 #include "tests/load/archives.h"
 #include "tests/load/files.h"
 

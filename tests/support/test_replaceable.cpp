@@ -3,7 +3,7 @@
 #include <array>
 #include <filesystem>
 
-#include "stages/support/io/file_target.h"
+#include "stages/support/io/file.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

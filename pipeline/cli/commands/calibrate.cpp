@@ -12,7 +12,6 @@
 #include "stages/formats/chart/chart.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 

@@ -10,7 +10,7 @@
 #include "pipeline/report/summary.h"
 #include "stages/formats/stl/mesh_stl.h"
 #include "stages/formats/threemf/threemf.h"
-#include "stages/support/io/file_target.h"
+#include "stages/support/io/file.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/version.h"

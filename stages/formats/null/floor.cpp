@@ -13,7 +13,6 @@
 
 #include "stages/support/clocks.h"
 #include "stages/support/io/file.h"
-#include "stages/support/io/file_target.h"
 #include "stages/support/io/temporary.h"
 
 namespace lamina::formats {

@@ -9,7 +9,7 @@
 #include "stages/data/buffer.h"
 #include "stages/load/text.h"
 #include "stages/support/late/zip.h"
-#include "stages/support/text/part_name.h"
+#include "stages/support/text/escape.h"
 
 namespace lamina::load {
 namespace {

@@ -14,7 +14,7 @@
 #include "stages/load/threemf/extensions.h"
 #include "stages/load/threemf/roles.h"
 #include "stages/load/threemf/xml.h"
-#include "stages/support/text/part_name.h"
+#include "stages/support/text/escape.h"
 
 namespace lamina::load {
 namespace {

@@ -184,24 +184,13 @@ void FileReader::go_to(std::uint64_t offset, std::uint64_t lines) {
   state.offset = state.taken = offset;
   state.line = lines;
   state.status = {};
-  if (state.file < 0) {
-    state.begin = static_cast<std::size_t>(std::min<std::uint64_t>(offset, state.end));
-    state.taken = state.end;
-    return;
-  }
   state.begin = state.end = 0;
   state.at_end = ::lseek(state.file, static_cast<off_t>(offset), SEEK_SET) < 0;
 }
 
 bool FileReader::read_at(std::uint64_t offset, std::span<char> to) const {
-  const State& state = *state_;
-  if (state.file < 0) {
-    if (offset > state.size || to.size() > state.size - offset) return false;
-    std::copy_n(state.buffer.data() + offset, to.size(), to.data());
-    return true;
-  }
   while (!to.empty()) {
-    const ssize_t got = ::pread(state.file, to.data(), to.size(), static_cast<off_t>(offset));
+    const ssize_t got = ::pread(state_->file, to.data(), to.size(), static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return false;
     to = to.subspan(static_cast<std::size_t>(got));

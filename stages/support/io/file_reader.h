@@ -1,7 +1,7 @@
 // stages/support/io/file_reader.h: the one way to open and read a file.
 //
 // A name leads to a regular file or to one line of error: a pipe without a writer, a device, a directory or a file
-// without line ends costs neither time nor memory. Text in memory is read through the same calls, for tests and fuzzing.
+// without line ends costs neither time nor memory.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +42,7 @@ class FileReader {
 
   const std::string& path() const;
   std::uint64_t size() const;  // bytes; 0 of a stream
-  int descriptor() const;      // at the file's start until text() or next() is called; -1 for text in memory
+  int descriptor() const;      // at the file's start until text() or next() is called
 
   /// All that has not been read. errors  rules.fault: cannot be read, or longer than the rules allow
   Result<std::string> text();

@@ -28,13 +28,6 @@ int open_folder(const std::string& folder) {
   return ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
-int sync_and_close(int folder) {
-  if (folder < 0) return 0;  // it may be written, but not be read
-  const int reason = sync_file(folder);
-  ::close(folder);
-  return reason;
-}
-
 }  // namespace
 
 int sync_file(int file) {
@@ -44,7 +37,13 @@ int sync_file(int file) {
   return 0;
 }
 
-int sync_folder(const std::string& folder) { return sync_and_close(open_folder(folder)); }
+int sync_folder(const std::string& folder) {
+  const int file = open_folder(folder);
+  if (file < 0) return 0;  // it may be written, but not be read
+  const int reason = sync_file(file);
+  ::close(file);
+  return reason;
+}
 
 int sync_folder_of(const std::string& file) { return sync_folder(std::filesystem::path(file).parent_path().string()); }
 

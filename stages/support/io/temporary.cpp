@@ -154,6 +154,14 @@ bool another_writes(int folder, const std::string& target, const std::string& ow
   return written;
 }
 
+// A signal handler may touch nothing but lock-free atomics.
+std::array<std::atomic<const char*>, 1024> watched;
+std::atomic<bool> removing{false};
+static_assert(std::atomic<const char*>::is_always_lock_free);
+
+std::mutex notes_mutex;
+std::vector<std::string> notes;
+
 }  // namespace
 
 std::string part_of(const std::string& file) { return file + std::string(kPart); }
@@ -277,18 +285,6 @@ Status check_not_being_written(const std::string& path) {
   const FolderTurn turn(path);
   return another_writes(turn.folder(), path, {}, false) ? Status(busy(path)) : Status();
 }
-
-namespace {
-
-// A signal handler may touch nothing but lock-free atomics.
-std::array<std::atomic<const char*>, 1024> watched;
-std::atomic<bool> removing{false};
-static_assert(std::atomic<const char*>::is_always_lock_free);
-
-std::mutex notes_mutex;
-std::vector<std::string> notes;
-
-}  // namespace
 
 std::error_code MadeFolders::make(const std::string& folder) {
   namespace fs = std::filesystem;

@@ -3,9 +3,32 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <cstdarg>
+#include <cstdio>
 #include <cstring>
 
+#include "stages/support/late/embree.h"
+#include "stages/support/late/tiff.h"
+#include "stages/support/late/zip.h"
+
 namespace lamina {
+namespace {
+
+int keep_first_message(TIFF*, void* user, const char*, const char* format, va_list arguments) {
+  std::string& message = *static_cast<std::string*>(user);
+  if (!message.empty()) return 1;
+  char text[256];
+  std::vsnprintf(text, sizeof text, format, arguments);
+  message = text;
+  return 1;
+}
+
+int keep_warning_of_damage(TIFF* tiff, void* user, const char* module, const char* format, va_list arguments) {
+  const bool harmless = std::strstr(format, "Unknown field") != nullptr;
+  return harmless ? 1 : keep_first_message(tiff, user, module, format, arguments);
+}
+
+}  // namespace
 
 Status load_library(const char* file, std::span<const LateFunction> functions) {
   void* const library = ::dlopen(file, RTLD_LAZY | RTLD_LOCAL);
@@ -25,6 +48,23 @@ Status load_library(const char* file, std::span<const LateFunction> functions) {
                    fmt::format("{} has no {}; install the version that lamina was built with", file, function.name)};
   }
   return {};
+}
+
+LAMINA_LATE_LIBRARY(LAMINA_EMBREE, LAMINA_EMBREE_FILE, load_embree)
+LAMINA_LATE_LIBRARY(LAMINA_ZIP, LAMINA_ZIP_FILE, load_zip)
+static Status load_tiff();
+LAMINA_LATE_LIBRARY(LAMINA_TIFF, LAMINA_TIFF_FILE, load_tiff)
+
+TiffOptions strict_tiff_options(std::string& message) {
+  if (const Status loaded = load_tiff(); !loaded) {
+    if (loaded.error().fault != Fault::kMemory) message = loaded.error().message;
+    return nullptr;
+  }
+  TiffOptions options(TIFFOpenOptionsAlloc());
+  if (options == nullptr) return nullptr;
+  TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_first_message, &message);
+  TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_warning_of_damage, &message);
+  return options;
 }
 
 }  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/support/text/escape.h: escapes text for manual pages, Markdown and shells, and splits lines as shells do.
+// stages/support/text/escape.h: escapes text for manual pages, Markdown and shells, splits lines, and decodes names of parts.
 #pragma once
 
 #include <cstddef>
@@ -32,6 +32,14 @@ std::string fish_word(std::string_view text);
 
 /// Base 64 as in RFC 4648, padded, without line ends.
 std::string base64(std::span<const std::byte> bytes);
+
+// --- names of parts in Open Packaging packages, such as 3MF files.
+
+/// The name of a part of a package as it is compared: a leading slash, lower case, "%20" decoded, "." and ".." resolved.
+///
+/// folder  where a name without a leading slash is searched, such as "/3d/"
+/// source  ISO/IEC 29500-2 (Open Packaging Conventions), 6.2 and 6.3
+std::string part_name(std::string_view name, std::string_view folder = "/");
 
 // --- words of a line.
 

@@ -130,10 +130,7 @@ const Json* Json::begin() const {
   return list == nullptr ? nullptr : list->data();
 }
 
-const Json* Json::end() const {
-  const List* list = std::get_if<List>(&value_);
-  return list == nullptr ? nullptr : list->data() + list->size();
-}
+const Json* Json::end() const { return begin() == nullptr ? nullptr : begin() + size(); }
 
 Json& Json::emplace_back() {
   if (is_null()) value_ = List();
@@ -177,33 +174,27 @@ void Json::erase(std::string_view name) {
     std::erase_if(*members, [&](const Member& member) { return member.name == name; });
 }
 
-const std::string& Json::text() const {
-  const std::string* text = std::get_if<std::string>(&value_);
-  return text == nullptr ? (fail("text"), *text) : *text;
+template <class Held>
+const Held& Json::held(std::string_view expected) const {
+  const Held* value = std::get_if<Held>(&value_);
+  if (value == nullptr) fail(expected);
+  return *value;
 }
 
-bool Json::boolean() const {
-  const bool* truth = std::get_if<bool>(&value_);
-  return truth == nullptr ? (fail("a truth value"), false) : *truth;
-}
+const std::string& Json::text() const { return held<std::string>("text"); }
+bool Json::boolean() const { return held<bool>("a truth value"); }
+const Json::List& Json::elements() const { return held<List>("a list"); }
 
 std::int64_t Json::whole() const {
   if (const auto* number = std::get_if<std::uint64_t>(&value_)) return static_cast<std::int64_t>(*number);
   if (const auto* number = std::get_if<double>(&value_)) return static_cast<std::int64_t>(*number);
-  const auto* number = std::get_if<std::int64_t>(&value_);
-  return number == nullptr ? (fail("a number"), 0) : *number;
+  return held<std::int64_t>("a number");
 }
 
 double Json::number() const {
   if (const auto* number = std::get_if<std::int64_t>(&value_)) return static_cast<double>(*number);
   if (const auto* number = std::get_if<std::uint64_t>(&value_)) return static_cast<double>(*number);
-  const auto* number = std::get_if<double>(&value_);
-  return number == nullptr ? (fail("a number"), 0) : *number;
-}
-
-const Json::List& Json::elements() const {
-  const List* list = std::get_if<List>(&value_);
-  return list == nullptr ? (fail("a list"), *list) : *list;
+  return held<double>("a number");
 }
 
 void Json::fail(std::string_view expected) const {

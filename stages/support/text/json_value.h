@@ -134,6 +134,8 @@ class Json {
       return std::uint64_t{number};
     }
   }
+  template <class Held>
+  const Held& held(std::string_view expected) const;  // errors  throws JsonError: another kind than expected
   bool boolean() const;
   std::int64_t whole() const;  // of an unsigned number its bits
   double number() const;

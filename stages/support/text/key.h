@@ -7,6 +7,7 @@
 //   word<kModes, &Job::heights, &HeightsRequest::mode>({"heights", "mode", "--heights", "MODE", "how layers are decided"})
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "stages/support/text/changes.h"
 #include "stages/support/text/toml.h"
 #include "stages/support/text/value.h"
 
@@ -54,25 +56,16 @@ struct Key : KeyName {
   void copy(const Target& from, Target& to) const { copy_value(*this, from, to); }
 
   /// The words that it takes, for completion.
-  constexpr Key with_words(std::vector<std::string_view> (*all)()) const {
-    Key key = *this;
-    key.words = all;
-    return key;
-  }
+  constexpr Key with_words(std::vector<std::string_view> (*all)()) const { return with(&Key::words, all); }
   /// The default of optional equipment: kept texts leave the key out at this value.
-  constexpr Key unsaid_at(std::string_view same) const {
+  constexpr Key unsaid_at(std::string_view same) const { return with(&Key::unsaid, same); }
+  constexpr Key with_form(Form other) const { return with(&Key::form, other); }
+  constexpr Key shown_if(bool (*condition)(const Target&)) const { return with(&Key::shown, condition); }
+  /// The key with another value of one of its fields.
+  template <class Class, class Value>
+  constexpr Key with(Value Class::*which, std::type_identity_t<Value> other) const {
     Key key = *this;
-    key.unsaid = same;
-    return key;
-  }
-  constexpr Key with_form(Form other) const {
-    Key key = *this;
-    key.form = other;
-    return key;
-  }
-  constexpr Key shown_if(bool (*condition)(const Target&)) const {
-    Key key = *this;
-    key.shown = condition;
+    key.*which = other;
     return key;
   }
 
@@ -141,28 +134,25 @@ const Key<Inner>& inner_of(const Key<Target>& key) {
 /// A number, a switch, or a list of numbers.
 template <auto... Path>
 constexpr auto field(const KeyName& name, const Limits& limits = {}) {
-  using Target = key_detail::TargetOf<Path...>;
-  using K = Key<Target>;
-  K key = key_detail::begin<Target, Path...>(name, key_detail::kForm<key_detail::ValueOf<Path...>>, limits);
-  key.read_text = [](const K& self, std::string_view text, Target& target) {
+  auto key =
+      key_detail::begin<key_detail::TargetOf<Path...>, Path...>(name, key_detail::kForm<key_detail::ValueOf<Path...>>, limits);
+  key.read_text = [](const auto& self, std::string_view text, auto& target) {
     return read_value(text, self.limits, member<Path...>(target));
   };
-  key.write_text = [](const K&, const Target& target) { return value_text(member<Path...>(target)); };
-  key.check_target = [](const K& self, const Target& target) { return check_value(member<Path...>(target), self.limits); };
+  key.write_text = [](const auto&, const auto& target) { return value_text(member<Path...>(target)); };
+  key.check_target = [](const auto& self, const auto& target) { return check_value(member<Path...>(target), self.limits); };
   return key;
 }
 
 /// A word of a fixed list.
 template <const auto& Words, auto... Path>
 constexpr auto word(const KeyName& name) {
-  using Target = key_detail::TargetOf<Path...>;
-  using K = Key<Target>;
-  K key = key_detail::begin<Target, Path...>(name, Form::kString);
-  key.read_text = [](const K&, std::string_view text, Target& target) {
+  auto key = key_detail::begin<key_detail::TargetOf<Path...>, Path...>(name, Form::kString);
+  key.read_text = [](const auto&, std::string_view text, auto& target) {
     return read_word(Words, text, member<Path...>(target));
   };
-  key.write_text = [](const K&, const Target& target) { return write_word(Words, member<Path...>(target)); };
-  key.check_target = [](const K& self, const Target& target) {
+  key.write_text = [](const auto&, const auto& target) { return write_word(Words, member<Path...>(target)); };
+  key.check_target = [](const auto& self, const auto& target) {
     return std::string(self.write_text(self, target).empty() ? "is none of its values" : "");
   };
   key.words = [] { return words_of(Words); };
@@ -173,13 +163,12 @@ constexpr auto word(const KeyName& name) {
 /// std::string Write(const Value&). Without a path the value is the whole target.
 template <class Target, auto Read, auto Write, auto... Path>
 constexpr Key<Target> custom(const KeyName& name, Form form) {
-  using K = Key<Target>;
-  K key = key_detail::begin<Target, Path...>(name, form);
-  key.read_text = [](const K&, std::string_view text, Target& target) -> std::string {
+  auto key = key_detail::begin<Target, Path...>(name, form);
+  key.read_text = [](const auto&, std::string_view text, auto& target) -> std::string {
     return Read(text, member<Path...>(target));
   };
-  key.write_text = [](const K&, const Target& target) -> std::string { return Write(member<Path...>(target)); };
-  key.check_target = [](const K&, const Target& target) -> std::string {
+  key.write_text = [](const auto&, const auto& target) -> std::string { return Write(member<Path...>(target)); };
+  key.check_target = [](const auto&, const auto& target) -> std::string {
     const std::string text = Write(member<Path...>(target));
     auto copy = member<Path...>(target);
     return text.empty() ? std::string() : std::string(Read(text, copy));
@@ -199,25 +188,23 @@ constexpr auto text(const KeyName& name) {
   return custom<key_detail::TargetOf<Path...>, read, write, Path...>(name, Form::kString);
 }
 
-/// A structure: std::string Read(const TomlValue&, Value&, Place&), and Write(const Value&) gives TOML of one value.
+/// A structure: std::string Read(const TomlValue&, Value&, TextPosition&), and Write(const Value&) gives TOML of one value.
 template <auto Read, auto Write, auto... Path>
 constexpr auto structure(const KeyName& name) {
-  using Target = key_detail::TargetOf<Path...>;
-  using K = Key<Target>;
-  K key = key_detail::begin<Target, Path...>(name, Form::kToml);
-  key.read_tree = [](const K&, const TomlValue& tree, Target& target, TextPosition& at) -> std::string {
+  auto key = key_detail::begin<key_detail::TargetOf<Path...>, Path...>(name, Form::kToml);
+  key.read_tree = [](const auto&, const TomlValue& tree, auto& target, TextPosition& at) -> std::string {
     return Read(tree, member<Path...>(target), at);
   };
-  key.read_text = [](const K& self, std::string_view text, Target& target) -> std::string {
+  key.read_text = [](const auto& self, std::string_view text, auto& target) -> std::string {
     TextPosition unused;
     const auto tree = read_toml_value(text);
     return self.read_tree(self, tree ? *tree : TomlValue{TomlValue::Kind::kText, std::string(text), {}, {}, {}}, target,
                           unused);
   };
-  key.write_text = [](const K&, const Target& target) -> std::string { return Write(member<Path...>(target)); };
-  key.check_target = [](const K& self, const Target& target) -> std::string {
+  key.write_text = [](const auto&, const auto& target) -> std::string { return Write(member<Path...>(target)); };
+  key.check_target = [](const auto& self, const auto& target) -> std::string {
     const std::string text = self.write(target);
-    Target copy = target;
+    auto copy = target;
     return text.empty() ? std::string() : self.read(text, copy);
   };
   return key;
@@ -226,26 +213,24 @@ constexpr auto structure(const KeyName& name) {
 /// A key of a member's table as a key of the target; the member's table must outlive it.
 template <auto... Path, class Inner>
 auto inside(const Key<Inner>& inner, std::string_view section, unsigned decides) {
-  using Target = key_detail::TargetOf<Path...>;
-  using K = Key<Target>;
-  K key = key_detail::begin<Target, Path...>(inner, inner.form, inner.limits);
+  auto key = key_detail::begin<key_detail::TargetOf<Path...>, Path...>(inner, inner.form, inner.limits);
   key.section = section;
   key.decides = decides;
   key.inner = &inner;
   key.words = inner.words;
-  key.read_text = [](const K& self, std::string_view text, Target& target) {
+  key.read_text = [](const auto& self, std::string_view text, auto& target) {
     return key_detail::inner_of<Inner>(self).read(text, member<Path...>(target));
   };
-  key.read_tree = [](const K& self, const TomlValue& tree, Target& target, TextPosition& at) {
+  key.read_tree = [](const auto& self, const TomlValue& tree, auto& target, TextPosition& at) {
     return key_detail::inner_of<Inner>(self).read(tree, member<Path...>(target), at);
   };
-  key.write_text = [](const K& self, const Target& target) {
+  key.write_text = [](const auto& self, const auto& target) {
     return key_detail::inner_of<Inner>(self).write(member<Path...>(target));
   };
-  key.check_target = [](const K& self, const Target& target) {
+  key.check_target = [](const auto& self, const auto& target) {
     return key_detail::inner_of<Inner>(self).check(member<Path...>(target));
   };
-  key.copy_value = [](const K& self, const Target& from, Target& to) {
+  key.copy_value = [](const auto& self, const auto& from, auto& to) {
     key_detail::inner_of<Inner>(self).copy(member<Path...>(from), member<Path...>(to));
   };
   return key;
@@ -330,6 +315,78 @@ std::string sections_text(std::span<const Key<Target>> keys, const Target& targe
     text += key_line(key.name, key.form, value) + "\n";
   }
   return text;
+}
+
+// --- changes of keys, with or without a range of heights.
+
+/// "2.7:3", for messages.
+std::string range_name(double from_mm, double to_mm);
+
+/// Removes from_mm and to_mm from a table into the arguments. returns "" or an error message
+std::string take_ends(TomlValue& table, double& from_mm, double& to_mm, TextPosition& at);
+
+/// "is an array of tables; ..." for any other value, else "".
+std::string check_tables(const TomlValue& value, std::string_view example);
+
+template <class Target>
+void apply(std::span<const Key<Target>> keys, const Changes<Target>& changes, Target& target) {
+  for (const std::size_t key : changes.keys) keys[key].copy(changes.values, target);
+}
+
+template <class Target>
+std::string read_changes(const TomlValue& table, std::span<const Key<Target>> keys, Changes<Target>& changes,
+                         TextPosition& at) {
+  if (!table.is_table()) return "is a table of keys, as in { gap_mm = 0.1 }";
+  Changes<Target> read;
+  auto wrong = read_table(table, keys.front().section, keys, read.values, at, &read.keys);
+  std::ranges::sort(read.keys);
+  read.keys.erase(std::unique(read.keys.begin(), read.keys.end()), read.keys.end());
+  if (wrong.empty()) changes = std::move(read);
+  return wrong;
+}
+
+/// "gap_mm = [0], angle_deg = 90"
+template <class Target>
+std::string changes_text(std::span<const Key<Target>> keys, const Changes<Target>& changes) {
+  std::string text;
+  for (const std::size_t key : changes.keys) {
+    text += (text.empty() ? "" : ", ") + key_line(keys[key].name, keys[key].form, keys[key].write(changes.values));
+  }
+  return text;
+}
+
+/// Ranges in the order of their heights, disjoint.
+template <class Target>
+std::string read_ranges(const TomlValue& list, std::span<const Key<Target>> keys, std::vector<Range<Target>>& ranges,
+                        TextPosition& at) {
+  if (auto wrong = check_tables(list, "from_mm, to_mm and the keys that differ"); !wrong.empty()) return wrong;
+  std::vector<Range<Target>> read;
+  for (TomlValue table : list.value) {
+    Range<Target>& range = read.emplace_back();
+    at = table.position;
+    if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
+    const std::string name = range_name(range.from_mm, range.to_mm);
+    if (auto wrong = read_changes(table, keys, range.changes, at); !wrong.empty()) return fmt::format("{}: {}", name, wrong);
+    for (std::size_t i = 0; i + 1 < read.size(); ++i) {
+      if (range.from_mm >= read[i].to_mm || read[i].from_mm >= range.to_mm) continue;
+      return fmt::format("{} overlaps {}; end one where the other begins", name, range_name(read[i].from_mm, read[i].to_mm));
+    }
+  }
+  std::ranges::sort(read, {}, &Range<Target>::from_mm);
+  ranges = std::move(read);
+  return {};
+}
+
+/// "[{ from_mm = 2.7, to_mm = 3, gap_mm = [0] }]", empty if there is none.
+template <class Target>
+std::string ranges_text(std::span<const Key<Target>> keys, const std::vector<Range<Target>>& ranges) {
+  std::string text;
+  for (const Range<Target>& range : ranges) {
+    const std::string changes = changes_text(keys, range.changes);
+    text += fmt::format("{}{{ from_mm = {}, to_mm = {}{}{} }}", text.empty() ? "" : ", ", number_text(range.from_mm),
+                        number_text(range.to_mm), changes.empty() ? "" : ", ", changes);
+  }
+  return text.empty() ? text : fmt::format("[{}]", text);
 }
 
 }  // namespace lamina

@@ -120,4 +120,37 @@ std::string read_shard(std::string_view text, std::array<std::uint32_t, 2>& shar
   return {};
 }
 
+std::string mm_text(double millimetres) {
+  const double rounded =
+      static_cast<double>(static_cast<std::int64_t>(millimetres * 1e4 + (millimetres < 0 ? -0.5 : 0.5))) / 1e4;
+  return fmt::format("{:.4f}", rounded == 0 ? 0.0 : rounded);
+}
+
+std::string plain_text(double value, int digits) {
+  std::string text = fmt::format("{:.{}f}", value, digits);
+  if (digits == 0) return text;
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::string feed_text(double mm_s) {
+  return mm_s * 60 < 1 ? fmt::format("{:.2f}", mm_s * 60) : fmt::format("{:.0f}", mm_s * 60);
+}
+
+char separator_of(std::string_view header) {
+  return header.find('\t') != std::string_view::npos ? '\t' : header.find(';') != std::string_view::npos ? ';' : ',';
+}
+
+std::vector<std::string> cells_of(std::string_view line, char separator) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  std::vector<std::string> cells;
+  for (std::string_view cell : split(line, std::string_view(&separator, 1))) {
+    while (!cell.empty() && (cell.front() == ' ' || cell.front() == '"')) cell.remove_prefix(1);
+    while (!cell.empty() && (cell.back() == ' ' || cell.back() == '"')) cell.remove_suffix(1);
+    cells.emplace_back(cell);
+  }
+  return cells;
+}
+
 }  // namespace lamina

@@ -39,4 +39,26 @@ std::string_view trimmed(std::string_view text);
 /// The shortest text that reads back as the same number; never -0.
 std::string number_text(double value);
 
+// --- numbers of G-code: decimal, with a point, without an exponent.
+
+/// mm with four digits (a tenth of a micrometre), never -0.
+std::string mm_text(double millimetres);
+
+/// A number with up to so many digits behind the point, and no exponent, which G-code does not know.
+std::string plain_text(double value, int digits);
+
+/// The least that is written of a roller's turns a minute, and of seconds to dry: a thousandth.
+inline constexpr int kPlainDigits = 3;
+
+/// mm a minute, as F words have it: whole ones but below 1, never 0.
+std::string feed_text(double mm_s);
+
+// --- lines of user-edited tables, separated by commas, semicolons or tabs.
+
+/// The column separator of a table, detected from its first line.
+char separator_of(std::string_view header);
+
+/// The cells of a line without surrounding blanks and quotes.
+std::vector<std::string> cells_of(std::string_view line, char separator);
+
 }  // namespace lamina

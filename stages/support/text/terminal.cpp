@@ -8,11 +8,8 @@
 #include <utility>
 
 namespace lamina {
-namespace {
 
 constexpr std::string_view kBegin = "\r\x1b[K";  // of the line, with nothing on it
-
-}  // namespace
 
 bool is_terminal() { return ::isatty(STDERR_FILENO) == 1; }
 

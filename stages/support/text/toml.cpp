@@ -25,6 +25,71 @@
 namespace lamina {
 namespace {
 
+/// No file of lamina has keys of more parts, or more values.
+constexpr std::uint32_t kMaxKeyParts = 16, kMaxValues = 1'000'000;
+
+/// Where a string that begins at `at` ends, one behind its quotes. An unclosed string of one line ends with the line,
+/// where the parser stops too.
+std::size_t end_of_string(std::string_view text, std::size_t at) {
+  const char quote = text[at];
+  const bool escapes = quote == '"';
+  const std::string_view three = escapes ? R"(""")" : "'''";
+  const bool several_lines = text.substr(at, 3) == three;
+  for (at += several_lines ? 3 : 1; at < text.size(); ++at) {
+    if (escapes && text[at] == '\\') {
+      ++at;
+    } else if (!several_lines && (text[at] == quote || text[at] == '\n')) {
+      return at + (text[at] == quote ? 1 : 0);
+    } else if (several_lines && text.substr(at, 3) == three) {
+      at += 3;
+      for (int more = 0; more < 2 && at < text.size() && text[at] == quote; ++more) ++at;  // quotes at the string's end
+      return at;
+    }
+  }
+  return text.size();
+}
+
+/// Counts brackets and braces, parts of dotted keys (those of table headers too), and values before the parser sees the text:
+/// it recurses for each part of a key, and holds some 200 bytes a value. Strings and comments are passed over.
+Status check_bounds(std::string_view text, const std::string& where) {
+  std::uint32_t depth = 0, dots = 0, values = 0, line = 1;
+  std::size_t line_start = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const auto beyond = [&](const std::string& what) {
+      const std::size_t column = at - line_start + 1;
+      return Error{Fault::kUsage, fmt::format("{}:{}:{}: {}; no job or profile has that", where, line, column, what)};
+    };
+    const char c = text[at];
+    if (c == '"' || c == '\'') {
+      const std::size_t end = end_of_string(text, at);
+      for (; at < end; ++at) {
+        if (text[at] != '\n') continue;
+        ++line;
+        line_start = at + 1;
+      }
+      continue;
+    }
+    if (c == '#') {
+      at = std::min(text.find('\n', at), text.size());
+      continue;
+    }
+    if (c == '.' && ++dots >= kMaxKeyParts) return beyond(fmt::format("a key of more than {} parts", kMaxKeyParts));
+    if (c == ',' || c == '=' || c == '[' || c == ']' || c == '{' || c == '}' || c == '\n') dots = 0;
+    if ((c == '[' || c == '{') && ++depth > kDeepestText) return beyond(fmt::format("more than {} levels", kDeepestText));
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    // A list has a value for each comma, an assignment or a header begins one.
+    if ((c == ',' || c == '=' || c == '[') && ++values > kMaxValues) {
+      return beyond(fmt::format("more than {} values", kMaxValues));
+    }
+    if (c == '\n') {
+      ++line;
+      line_start = at + 1;
+    }
+    ++at;
+  }
+  return {};
+}
+
 TomlValue tree_of(const toml::node& node) {
   TomlValue tree;
   tree.position = {static_cast<std::uint32_t>(node.source().begin.line),
@@ -81,10 +146,7 @@ void TomlValue::remove(std::string_view name_of_value) {
 }
 
 Result<TomlValue> read_toml(std::string_view text, const std::string& where) {
-  if (const BeyondBound beyond = toml_beyond_bounds(text); !beyond.what.empty()) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}:{}:{}: {}; no job or profile has that", where, beyond.line, beyond.column, beyond.what)};
-  }
+  if (Status status = check_bounds(text, where); !status) return status.error();
   const toml::parse_result parsed = toml::parse(text);
   if (parsed) return tree_of(parsed.table());
   const toml::source_position at = parsed.error().source().begin;

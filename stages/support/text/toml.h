@@ -36,7 +36,8 @@ struct TomlValue {
   void remove(std::string_view name_of_value);
 };
 
-/// Parses a file. errors  kUsage: invalid TOML, or beyond the bounds of json_text.h, "where:line:column: what"
+/// Parses a file. errors  kUsage, "where:line:column: what": invalid TOML, or more than 16 levels or parts of a key, or than a
+/// million values
 Result<TomlValue> read_toml(std::string_view text, const std::string& where);
 
 /// Parses a single value such as [1, 2] or { gap_mm = 0.1 }; nothing for invalid TOML.

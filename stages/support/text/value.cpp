@@ -3,29 +3,9 @@
 #include "stages/support/text/readable.h"
 
 namespace lamina {
-namespace {
-
-template <class Whole>
-std::string read_whole_value(std::string_view text, const Limits& limits, Whole& value) {
-  std::int64_t whole = 0;
-  auto wrong = read_whole(text, static_cast<std::int64_t>(limits.low), static_cast<std::int64_t>(limits.high), whole);
-  if (wrong.empty()) value = static_cast<Whole>(whole);
-  return wrong;
-}
-
-}  // namespace
 
 std::string read_value(std::string_view text, const Limits& limits, double& value) {
   return read_number(text, limits.low, limits.high, limits.unit, value);
-}
-std::string read_value(std::string_view text, const Limits& limits, std::int64_t& value) {
-  return read_whole_value(text, limits, value);
-}
-std::string read_value(std::string_view text, const Limits& limits, std::uint32_t& value) {
-  return read_whole_value(text, limits, value);
-}
-std::string read_value(std::string_view text, const Limits& limits, std::int32_t& value) {
-  return read_whole_value(text, limits, value);
 }
 std::string read_value(std::string_view text, const Limits&, bool& value) { return read_switch(text, value); }
 

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <string>
 #include <string_view>
@@ -30,10 +32,14 @@ struct Limits {
 
 // --- one value
 std::string read_value(std::string_view text, const Limits& limits, double& value);
-std::string read_value(std::string_view text, const Limits& limits, std::int64_t& value);
-std::string read_value(std::string_view text, const Limits& limits, std::uint32_t& value);
-std::string read_value(std::string_view text, const Limits& limits, std::int32_t& value);
 std::string read_value(std::string_view text, const Limits& limits, bool& value);
+template <std::integral Whole>
+std::string read_value(std::string_view text, const Limits& limits, Whole& value) {
+  std::int64_t whole = 0;
+  auto wrong = read_whole(text, static_cast<std::int64_t>(limits.low), static_cast<std::int64_t>(limits.high), whole);
+  if (wrong.empty()) value = static_cast<Whole>(whole);
+  return wrong;
+}
 
 std::string check_value(double value, const Limits& limits);
 std::string check_value(std::int64_t value, const Limits& limits);
@@ -49,13 +55,6 @@ inline std::string value_text(bool value) { return value ? "true" : "false"; }
 
 // --- lists, with commas between the values
 std::string check_length(std::size_t length, const Limits& limits);
-
-template <class T>
-std::string list_text(std::span<const T> values) {
-  std::string text;
-  for (const T& value : values) text += (text.empty() ? "" : ",") + value_text(value);
-  return text;
-}
 
 /// A list of fixed length; of two values, as in 490x380 too.
 template <class T, std::size_t N>
@@ -85,27 +84,18 @@ std::string read_value(std::string_view text, const Limits& limits, std::vector<
   values = std::move(read);
   return {};
 }
-template <class T, std::size_t N>
-std::string check_value(const std::array<T, N>& values, const Limits& limits) {
-  for (const T& value : values) {
-    if (auto wrong = check_value(value, limits); !wrong.empty()) return wrong;
-  }
-  return {};
-}
-template <class T>
-std::string check_value(const std::vector<T>& values, const Limits& limits) {
-  for (const T& value : values) {
+template <std::ranges::sized_range List>
+std::string check_value(const List& values, const Limits& limits) {
+  for (const auto& value : values) {
     if (auto wrong = check_value(value, limits); !wrong.empty()) return wrong;
   }
   return check_length(values.size(), limits);
 }
-template <class T, std::size_t N>
-std::string value_text(const std::array<T, N>& values) {
-  return list_text(std::span<const T>(values));
-}
-template <class T>
-std::string value_text(const std::vector<T>& values) {
-  return list_text(std::span<const T>(values));
+template <std::ranges::sized_range List>
+std::string value_text(const List& values) {
+  std::string text;
+  for (const auto& value : values) text += (text.empty() ? "" : ",") + value_text(value);
+  return text;
 }
 
 // --- values that may be absent; absent ones have no text

@@ -7,7 +7,6 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
-#include "stages/data/jetting.h"
 #include "stages/data/levels.h"
 #include "stages/data/status.h"
 
