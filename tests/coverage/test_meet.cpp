@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "stages/coverage/meet/facet_group.h"
-#include "stages/coverage/meet/triangles_meet.h"
 #include "stages/geometry/isa.h"
 #include "tests/program/machines.h"
 
