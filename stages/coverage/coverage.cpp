@@ -1,7 +1,6 @@
 #include "stages/coverage/coverage.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,14 +21,11 @@ constexpr double kUnit = 1024;
 constexpr std::int64_t kMaxParts = 8;  // of a facet along z, each of one number a slab
 constexpr double kUsualPixels = 4;     // that layers are thick: decides alone which of two bounds a facet goes to
 
-double along_z(const Triangle& t) {
-  return std::abs((static_cast<double>(t.b.x) - t.a.x) * (static_cast<double>(t.c.y) - t.a.y) -
-                  (static_cast<double>(t.b.y) - t.a.y) * (static_cast<double>(t.c.x) - t.a.x)) /
-         2;
-}
-double along_x(const Triangle& t) {
-  return std::abs((static_cast<double>(t.b.y) - t.a.y) * (static_cast<double>(t.c.z) - t.a.z) -
-                  (static_cast<double>(t.b.z) - t.a.z) * (static_cast<double>(t.c.y) - t.a.y)) /
+/// Area of the facet on the plane of two axes.
+template <auto kU, auto kV>
+double projected_area(const Triangle& t) {
+  return std::abs((static_cast<double>(t.b.*kU) - t.a.*kU) * (static_cast<double>(t.c.*kV) - t.a.*kV) -
+                  (static_cast<double>(t.b.*kV) - t.a.*kV) * (static_cast<double>(t.c.*kU) - t.a.*kU)) /
          2;
 }
 
@@ -138,7 +134,7 @@ void HeldBound::add(const Triangle& facet, bool suspect) {
   if (t.b.z < t.a.z) std::swap(t.a, t.b);
   if (t.c.z < t.b.z) std::swap(t.b, t.c);
   if (t.b.z < t.a.z) std::swap(t.a, t.b);
-  const double area = along_z(t), side = along_x(t);
+  const double area = projected_area<&Point3::x, &Point3::y>(t), side = projected_area<&Point3::y, &Point3::z>(t);
   if (t.a == t.b && t.b == t.c) return;  // no facet
   const double steps = top_level_ * side * rows_per_nm_;
   const Facet own{t,

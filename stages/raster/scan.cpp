@@ -84,7 +84,7 @@ void LayerReport::add_solid(const LayerReport& solid) {
   open_rows += solid.open_rows;
 }
 
-void ScanConverter::sort_segments(const RowBand& band, const Segments& segments) {
+void ScanConverter::fill(const RowBand& band, const Segments& segments) {
   const std::uint32_t first_row = band.first_row, rows = band.rows();
   position_.assign(std::size_t{rows} + 1, 0);
   std::uint32_t* const position = position_.data();
@@ -106,10 +106,8 @@ void ScanConverter::sort_segments(const RowBand& band, const Segments& segments)
   crossings_ = total;
   ensure_capacity(crossing_, std::size_t{total} + RowsTask::kMoreCrossings);
   crossing_.resize(std::size_t{total} + RowsTask::kMoreCrossings);
-}
-
-void ScanConverter::fill(const RowBand& band, const Segments& segments) {
-  band.kernels.fill({band.sampling, segments, band.placed, band.plane, band.first_row, position_.data(), crossing_.data()});
+  for (const Closing& closing : closing_) crossing_[position[closing.row - first_row]++] = closing.crossing;
+  band.kernels.fill({band.sampling, segments, band.placed, band.plane, first_row, position, crossing_.data()});
 }
 
 /// The crossings that close the part whose crossings are filled in.
@@ -142,7 +140,6 @@ void ScanConverter::close_open_parts(const RowBand& band, const Segments& segmen
     const std::uint32_t instance = instance_of(*i);
     of_part_.size = 0;
     for (; i != of_open_parts_.end() && instance_of(*i) == instance; ++i) of_part_.append(segments, *i);
-    sort_segments(band, of_part_);
     fill(band, of_part_);
     close_part(band, closings);
   }
@@ -188,8 +185,6 @@ void ScanConverter::append_rows(const RowBand& band, const Segments& segments, F
   }
 
   close_open_parts(band, segments, report);
-  sort_segments(band, segments);
-  for (const Closing& closing : closing_) crossing_[position_[closing.row - band.first_row]++] = closing.crossing;
   fill(band, segments);
   report.segments += static_cast<std::uint32_t>(segments.size);
   report.crossings += crossings_;

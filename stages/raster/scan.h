@@ -65,7 +65,7 @@ class ScanConverter {
     std::uint32_t crossing;  // column * 2 + (1 if it enters)
   };
 
-  void sort_segments(const RowBand& band, const Segments& segments);
+  /// Puts the crossings of the segments, and those of closing_, row by row.
   void fill(const RowBand& band, const Segments& segments);
   void close_open_parts(const RowBand& band, const Segments& segments, LayerReport& report);
   void close_part(const RowBand& band, Buffer<Closing>& closings) const;

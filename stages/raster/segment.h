@@ -1,4 +1,4 @@
-// stages/raster/segment.h: where one triangle meets one layer plane, and the exact columns of its crossings.
+// stages/raster/segment.h: where one triangle of a mesh meets one layer plane, and the exact columns of its crossings.
 //
 // Everything that decides a pixel is a comparison of whole numbers. Doubles only guess; whenever a guess lies so close
 // to a whole number that rounding could have moved it across, integers answer instead.
@@ -19,10 +19,10 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
-#include "stages/geometry/isa.h"
 
 namespace lamina::raster {
 

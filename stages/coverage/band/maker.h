@@ -14,7 +14,7 @@ namespace lamina::coverage {
 
 struct CoverageReport;
 
-/// What all rows share.
+/// How shares become levels.
 struct Rule {
   FillRule fill;
   std::uint32_t top_level;  // n
