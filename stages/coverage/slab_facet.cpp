@@ -8,7 +8,7 @@ namespace {
 /// By how much a corner may lie off, of the facet's size (docs/coverage.md).
 constexpr double kCornerMargin = 0x1p-48;
 
-/// One of two ways along the border, from the highest corner downwards.
+/// One of the two runs of edges along the border, from the highest corner downwards.
 struct Way {
   Trapezoid::TrapezoidSide side;
   double end;        // y of the next corner
