@@ -4,7 +4,6 @@
 #include "bench/named_parts.h"
 #include "stages/heights/heights.h"
 #include "stages/raster/beams.h"
-#include "stages/raster/height_runs.h"
 
 namespace lamina::bench {
 namespace {
@@ -16,7 +15,7 @@ void tree(benchmark::State& state, const NamedJob& job, const std::string& path)
   std::vector<raster::ClusteredMesh> meshes;
   std::uint64_t primitives = 0;
   for (Mesh& mesh : part.meshes) {
-    meshes.push_back(raster::make_clusters(mesh));
+    meshes.push_back(raster::make_clusters({&mesh, 1}).front());
     primitives += raster::HeightRuns(meshes.back().bounds).count();
   }
   std::vector<raster::PlacedMesh> placed;

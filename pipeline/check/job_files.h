@@ -9,7 +9,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/formats/images/image.h"
-#include "stages/raster/materials.h"
+#include "stages/raster/images.h"
 #include "stages/replay/machine.h"
 
 namespace lamina::pipeline {

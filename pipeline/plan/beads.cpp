@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/raster/porous.h"
 #include "stages/segment/expand.h"
 #include "stages/segment/predict.h"
 

@@ -10,7 +10,6 @@
 #include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
 #include "stages/program/bed.h"
-#include "stages/raster/mirror.h"
 
 namespace lamina::pipeline {
 namespace {

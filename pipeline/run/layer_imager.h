@@ -10,7 +10,7 @@
 #include "stages/checks/thin.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/runs.h"
-#include "stages/raster/materials.h"
+#include "stages/raster/images.h"
 #include "stages/raster/raster.h"
 
 namespace lamina::pipeline {

@@ -1,14 +1,12 @@
 #include "stages/coverage/coverage.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <bit>
+#include <cmath>
+#include <utility>
 #include <vector>
 
-#include "stages/coverage/edges.h"
-#include "stages/coverage/held_bound.h"
 #include "stages/coverage/meet/meetings.h"
 #include "stages/geometry/blocks/block_maker.h"
 #include "stages/geometry/interval_table.h"
@@ -16,6 +14,217 @@
 
 namespace lamina::coverage {
 namespace {
+
+// --- how many facets and runs of levels a layer can have, before it is planned.
+
+constexpr double kUnit = 1024;
+constexpr std::int64_t kMaxParts = 8;  // of a facet along z, each of one number a slab
+constexpr double kUsualPixels = 4;     // that layers are thick: decides alone which of two bounds a facet goes to
+
+/// Area of the facet on the plane of two axes.
+template <auto kU, auto kV>
+double projected_area(const Triangle& t) {
+  return std::abs((static_cast<double>(t.b.*kU) - t.a.*kU) * (static_cast<double>(t.c.*kV) - t.a.*kV) -
+                  (static_cast<double>(t.b.*kV) - t.a.*kV) * (static_cast<double>(t.c.*kU) - t.a.*kU)) /
+         2;
+}
+
+std::int64_t units(double amount) { return static_cast<std::int64_t>(std::ceil(amount * kUnit * (1 + 1e-9))); }
+
+/// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMaxSlabs; 112 bytes a slab.
+///
+/// In plan view, the piece of a facet in a layer is convex: of area A, width w and depth d in voxels it touches at most A + 2 w
+/// + 2 d + 4 voxels, in d + 2 rows. Twice its width is how far its border runs along x: along the facet's edges, of
+/// which each slab has its share, and along the cuts with the layer's two planes, which grow evenly up to the middle corner and
+/// shrink again, as areas for each nm of height do.
+///
+/// Of a steep facet, and of one that meets others, each voxel may be a run of levels. Along a row of a flat one coverage only
+/// rises or only falls, by its area projected along x over that of the row: of levels 0 .. n it passes n times that many, and
+/// the contributions of other facets begin or end with them.
+class HeldBound {
+ public:
+  /// top_level  n. cost  some ten nanoseconds a facet
+  HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level);
+  /// Of a layer between two heights, nm in the frame of the mesh, but for its scratch_bytes. cost  O(1)
+  LayerBound at(std::int64_t bottom, std::int64_t top) const;
+  std::uint64_t bytes() const { return slab_.capacity() * sizeof(Slab); }
+
+ private:
+  static constexpr std::size_t kMaxSlabs = 8192;
+  static constexpr std::uint32_t kFinest = 12;  // 4 micrometres
+
+  /// Voxels, or levels x nm of height, in 1024ths, so that sums do not depend on their order.
+  struct Sums {
+    std::int64_t voxels = 0, runs = 0, rows = 0;
+    std::int64_t levels = 0;  // that shares of flat facets pass, times the thickness of the layer
+    void add(const Sums& more, std::int64_t times) {
+      voxels += times * more.voxels, runs += times * more.runs, rows += times * more.rows;
+      levels += times * more.levels;
+    }
+  };
+  struct Slab {
+    Sums below;               // of areas and edges in all slabs below
+    Sums cut;                 // of any plane within
+    Sums floor;               // of flat facets at its lower end, which no layer from there on holds
+    std::uint64_t begin = 0;  // facets whose lowest corner lies in slabs below
+    std::uint64_t end = 0;    // whose highest one does, or where they end
+  };
+  struct Facet;
+  void add(const Triangle& facet, bool suspect);
+  void add_edge(const Facet& facet, const Point3& a, const Point3& b);
+  void add_parts(const Facet& facet);
+  void spread(std::int64_t first, std::int64_t end, const Sums& within, const Sums& cut);
+  Slab& slab(std::int64_t number) { return slab_[static_cast<std::size_t>(number + 1)]; }
+  std::int64_t slab_of(std::int64_t z) const { return (z >> shift_) - first_; }
+
+  double columns_per_nm_, rows_per_nm_, top_level_;
+  std::uint32_t shift_ = kFinest;
+  std::int64_t first_ = 0;
+  std::vector<Slab> slab_;  // one more before the lowest, and one behind the highest
+};
+
+struct HeldBound::Facet {
+  Triangle t;           // corners by height
+  bool suspect;         // meets others: samples may say anything
+  bool flat;            // shares that pass levels are fewer than its voxels
+  double area, levels;  // in plan view, voxels; along x, levels x nm
+  double low, middle, high;
+  double rise() const { return high - low; }
+  /// Voxels that a way along x and one along y pass.
+  Sums way(double x, double y, double share) const {
+    // Rows count once more, for what lies between runs of voxels; of flat facets two changes a row.
+    return {units((x + 1.5 * y) * share), units((flat ? y : x + 1.5 * y) * share), units((suspect ? 2 * x + 3 * y : y) * share),
+            0};
+  }
+};
+
+HeldBound::HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level)
+    : columns_per_nm_(grid.x.pixels_per_nm()), rows_per_nm_(grid.y.pixels_per_nm()), top_level_(top_level) {
+  const std::span<const Box> bounds = mesh.bounds();
+  if (bounds.empty()) return;
+  std::int64_t lowest = INT32_MAX, highest = INT32_MIN;
+  for (const Box& box : bounds) {
+    lowest = std::min<std::int64_t>(lowest, box.lo.z);
+    highest = std::max<std::int64_t>(highest, box.hi.z);
+  }
+  const std::size_t maximum = std::min(kMaxSlabs, 64 + 4 * bounds.size());
+  const auto slabs = [&] { return static_cast<std::size_t>((highest >> shift_) - (lowest >> shift_) + 1); };
+  while (slabs() > maximum) ++shift_;
+  first_ = lowest >> shift_;
+  slab_.resize(slabs() + 2);
+  Cluster slack;
+  for (std::uint32_t c = 0; c < bounds.size(); ++c) {
+    const Cluster& cluster = mesh.cluster(c, slack);
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) add(cluster.triangle(lane), (suspects[c] >> lane & 1) != 0);
+  }
+  // Differences become what each slab has, and that what all below have.
+  Sums here, cut, below;
+  std::uint64_t begin = 0, end = 0;
+  for (Slab& slab : slab_) {
+    here.add(slab.below, 1), cut.add(slab.cut, 1);
+    const Slab own = slab;
+    slab = {below, cut, own.floor, begin, end};
+    below.add(here, 1), below.add(own.floor, 1);
+    begin += own.begin, end += own.end;
+  }
+}
+
+void HeldBound::add(const Triangle& facet, bool suspect) {
+  Triangle t = facet;
+  if (t.b.z < t.a.z) std::swap(t.a, t.b);
+  if (t.c.z < t.b.z) std::swap(t.b, t.c);
+  if (t.b.z < t.a.z) std::swap(t.a, t.b);
+  const double area = projected_area<&Point3::x, &Point3::y>(t), side = projected_area<&Point3::y, &Point3::z>(t);
+  if (t.a == t.b && t.b == t.c) return;  // no facet
+  const double steps = top_level_ * side * rows_per_nm_;
+  const Facet own{t,
+                  suspect,
+                  !suspect && kUsualPixels * area >= top_level_ * side,
+                  area * columns_per_nm_ * rows_per_nm_,
+                  steps,
+                  static_cast<double>(t.a.z),
+                  static_cast<double>(t.b.z),
+                  static_cast<double>(t.c.z)};
+  ++slab(slab_of(t.a.z)).begin;
+  ++slab(slab_of(std::int64_t{t.c.z} - 1)).end;
+  add_edge(own, t.a, t.b);
+  add_edge(own, t.b, t.c);
+  add_edge(own, t.a, t.c);
+  add_parts(own);
+}
+
+/// Adds to each of the slabs [first, end).
+void HeldBound::spread(std::int64_t first, std::int64_t end, const Sums& within, const Sums& cut) {
+  slab(first).below.add(within, 1), slab(first).cut.add(cut, 1);
+  slab(end).below.add(within, -1), slab(end).cut.add(cut, -1);
+}
+
+void HeldBound::add_edge(const Facet& facet, const Point3& a, const Point3& b) {
+  const double x = std::abs(static_cast<double>(b.x) - a.x) * columns_per_nm_;
+  const double y = std::abs(static_cast<double>(b.y) - a.y) * rows_per_nm_;
+  const double rise = static_cast<double>(b.z) - a.z, height = std::ldexp(1.0, static_cast<int>(shift_));
+  const Sums way = facet.way(x, y, rise > height ? height / rise : 1);
+  const std::int64_t first = slab_of(a.z);
+  if (rise == 0 && (first + first_) << shift_ == a.z) return slab(first).floor.add(way, 1);
+  spread(first, slab_of(std::max<std::int64_t>(a.z, std::int64_t{b.z} - 1)) + 1, way, {});
+}
+
+void HeldBound::add_parts(const Facet& f) {
+  const double low = f.low, middle = f.middle, high = f.high, rise = f.rise();
+  const std::int64_t first = slab_of(f.t.a.z);
+  const auto within = [&](double share) {
+    return Sums{units(f.area * share), units(f.flat ? 0 : f.area * share), units(f.suspect ? 2 * f.area * share : 0),
+                f.flat ? units(f.levels * share) : 0};
+  };
+  if (rise == 0) {
+    if ((first + first_) << shift_ == f.t.a.z) return slab(first).floor.add(within(1), 1);
+    return spread(first, first + 1, within(1), {});
+  }
+  // The cut through the middle corner ends on the edge between the other two.
+  const double at = (middle - low) / rise;
+  const double x = std::abs(f.t.a.x + at * (static_cast<double>(f.t.c.x) - f.t.a.x) - f.t.b.x) * columns_per_nm_;
+  const double y = std::abs(f.t.a.y + at * (static_cast<double>(f.t.c.y) - f.t.a.y) - f.t.b.y) * rows_per_nm_;
+  // Shares of that cut at a height, and of the area below.
+  const auto tent = [&](double z) {
+    return z < middle ? (z - low) / (middle - low) : z > middle ? (high - z) / (high - middle) : 1;
+  };
+  const auto below = [&](double z) {
+    if (z < middle) return (z - low) * (z - low) / (rise * (middle - low));
+    return z < high ? 1 - (high - z) * (high - z) / (rise * (high - middle)) : 1;
+  };
+  const double height = std::ldexp(1.0, static_cast<int>(shift_));
+  const std::int64_t slabs = slab_of(std::int64_t{f.t.c.z} - 1) + 1 - first, parts = std::min(slabs, kMaxParts);
+  for (std::int64_t p = 0; p < parts; ++p) {
+    const std::int64_t from = first + slabs * p / parts, end = first + slabs * (p + 1) / parts;
+    const double bottom = std::max(low, static_cast<double>((from + first_) << shift_));
+    const double top = std::min(high, static_cast<double>((end + first_) << shift_));
+    const double maximum = bottom <= middle && middle <= top ? 1 : std::max(tent(bottom), tent(top));
+    const double share = end - from == 1 ? below(top) - below(bottom) : 2 * maximum * height / rise;
+    spread(from, end, within(std::min(1.0, share)), f.way(x, y, maximum));
+  }
+}
+
+LayerBound HeldBound::at(std::int64_t bottom, std::int64_t top) const {
+  if (slab_.empty() || top <= bottom) return {};
+  const auto last_slab = static_cast<std::int64_t>(slab_.size()) - 3;
+  if (slab_of(top - 1) < 0 || slab_of(bottom) > last_slab) return {};
+  const auto low = static_cast<std::size_t>(std::max<std::int64_t>(0, slab_of(bottom)) + 1);
+  const auto high = static_cast<std::size_t>(std::min(last_slab, slab_of(top - 1)) + 1);
+  const Slab &first = slab_[low], &above = slab_[high + 1];
+  Sums sum = above.below;
+  sum.add(first.below, -1), sum.add(first.cut, 1), sum.add(slab_[high].cut, 1);
+  if (slab_of(bottom) >= 0) sum.add(first.floor, -1);
+  const std::uint64_t facets = above.begin - first.end;
+  const auto whole = [](double amount) { return static_cast<std::uint64_t>(std::max(0.0, amount) / kUnit * (1 + 1e-3)) + 1; };
+  // Corners of each facet, and voxels that reach a nanometre beyond their edges.
+  constexpr std::uint64_t kCorners = 7;
+  const double levels = static_cast<double>(sum.levels) / static_cast<double>(top - bottom);
+  const std::uint64_t voxels = whole(static_cast<double>(sum.voxels)) + kCorners * facets;
+  const std::uint64_t runs = std::min(voxels, whole(static_cast<double>(sum.runs) + levels) + kCorners * facets);
+  return {facets, voxels, runs, std::min(2 * runs, whole(static_cast<double>(sum.rows)) + kCorners * facets), 0};
+}
+
+// ---
 
 /// A mesh, and what was found out about it once.
 struct CoveredMesh {
@@ -34,10 +243,6 @@ struct Copy {
 
 /// Boxes that each facet of a copy is compared with.
 constexpr std::size_t kMaxOthers = 64;
-
-bool boxes_meet(const Box& a, const Box& b) {
-  return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y && a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
-}
 
 Box moved(const Box& box, const Point3& by) {
   if (box.empty()) return box;
@@ -70,8 +275,7 @@ void find_others(std::span<const Mesh> meshes, std::vector<Copy>& copies) {
 /// Whether a facet of the copy, where it stands, may meet another copy or lie within it.
 bool is_near_others(const Copy& copy, const Triangle& facet) {
   if (copy.others.empty()) return false;
-  Box box;
-  box.add(facet.a), box.add(facet.b), box.add(facet.c);
+  const Box box = box_of(facet);
   return std::ranges::any_of(copy.others, [&](const Box& other) { return boxes_meet(box, other); });
 }
 
@@ -95,14 +299,10 @@ struct Coverage::State {
       : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(limited_isa(widest)) {}
 
   std::uint32_t bands() const { return (grid.rows() + kBandRows - 1) / kBandRows; }
-  HeldBound::HeldCount held_in(const Layer& layer) const;
+  LayerBound held_in(const Layer& layer) const;
   void gather(const Layer& layer, CoverageScratch& scratch) const;
   void order_by_band(CoverageScratch& scratch) const;
 };
-
-Coverage::Coverage(Coverage&&) noexcept = default;
-Coverage& Coverage::operator=(Coverage&&) noexcept = default;
-Coverage::~Coverage() = default;
 
 Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
                                  FillRule rule, std::uint32_t levels, Isa isa) {
@@ -115,19 +315,19 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
                                             "leave out --levels",
                                             mesh.name)};
   }
-  Coverage coverage;
-  coverage.state_ = std::make_unique<State>(grid, Rule{rule, levels - 1}, isa);
-  State& state = *coverage.state_;
-  for (const Instance& instance : instances) state.copies.push_back({instance.mesh, instance.offset, false, {}});
-  find_others(meshes, state.copies);
+  const auto state = std::make_shared<State>(grid, Rule{rule, levels - 1}, isa);
+  for (const Instance& instance : instances) state->copies.push_back({instance.mesh, instance.offset, false, {}});
+  find_others(meshes, state->copies);
   std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     meshes[i].blocks = blocks[i];
     IntervalTable<Nm> index = heights_of(blocks[i]->bounds());
     Suspects suspects = find_suspects(*blocks[i], index, isa);
     HeldBound held(*blocks[i], suspects, grid, levels - 1);
-    state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
+    state->meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
   }
+  Coverage coverage;
+  coverage.state_ = state;
   return coverage;
 }
 
@@ -204,11 +404,11 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
   return report;
 }
 
-HeldBound::HeldCount Coverage::State::held_in(const Layer& layer) const {
-  HeldBound::HeldCount held;
+LayerBound Coverage::State::held_in(const Layer& layer) const {
+  LayerBound held;
   for (const Copy& copy : copies) {
     const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
-    HeldBound::HeldCount own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
+    LayerBound own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
     if (copy.crowded || !copy.others.empty()) own.runs = own.voxels, own.edges = 2 * own.voxels;  // facets may meet others
     held.facets += own.facets, held.voxels += own.voxels, held.runs += own.runs, held.edges += own.edges;
   }
@@ -217,21 +417,15 @@ HeldBound::HeldCount Coverage::State::held_in(const Layer& layer) const {
 
 LayerBound Coverage::bound(const Layer& layer) const {
   const State& state = *state_;
-  const HeldBound::HeldCount held = state.held_in(layer);
+  LayerBound bound = state.held_in(layer);
+  const std::uint64_t columns = state.grid.columns(), voxels = columns * state.grid.rows();
   // Samples of a row come on top where facets meet.
-  const std::uint64_t columns = state.grid.columns(), rows = state.grid.rows(), facets = held.facets + held.facets / 8;
-  const std::uint64_t bytes = facets * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
-                              sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2) +
-                              BandMaker::bytes_of(held.facets, state.grid.columns());
-  return {held.facets, std::min(held.voxels, columns * rows), std::min(held.runs, columns * rows), held.edges, bytes};
-}
-
-std::uint64_t Coverage::suspects() const {
-  std::uint64_t count = 0;
-  for (const CoveredMesh& mesh : state_->meshes) {
-    for (const std::uint16_t bits : mesh.suspects) count += static_cast<std::uint64_t>(std::popcount(bits));
-  }
-  return count;
+  bound.scratch_bytes = (bound.facets + bound.facets / 8) * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
+                        sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2) +
+                        BandMaker::bytes_of(bound.facets, state.grid.columns());
+  bound.voxels = std::min(bound.voxels, voxels);
+  bound.runs = std::min(bound.runs, voxels);
+  return bound;
 }
 
 std::uint64_t Coverage::index_bytes() const {
@@ -240,7 +434,5 @@ std::uint64_t Coverage::index_bytes() const {
   for (const CoveredMesh& mesh : state_->meshes) total += mesh.index.bytes() + bytes_held(mesh.suspects) + mesh.held.bytes();
   return total;
 }
-
-const PixelGrid& Coverage::grid() const { return state_->grid; }
 
 }  // namespace lamina::coverage

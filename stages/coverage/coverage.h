@@ -51,20 +51,20 @@ struct CoverageReport {
   std::uint64_t held_voxels = 0;     // that hold facets
   std::uint64_t sampled_voxels = 0;  // whose share is that of samples
   std::uint64_t inspected = 0;       // voxels whose samples were counted, for a facet in them meets another one
-  std::uint64_t exact_voxels = 0;    // that rationals decided; a stretch of one share counts once
+  std::uint64_t exact_voxels = 0;    // that rationals decided; an interval of one share counts once
   std::uint64_t scratch_bytes = 0;
 };
 
 /// What a layer has at most, before it is planned.
 struct LayerBound {
   std::uint64_t facets = 0;
-  std::uint64_t voxels = 0;         // that hold facets, or end a stretch of full ones
+  std::uint64_t voxels = 0;         // that hold facets, or end an interval of full ones
   std::uint64_t runs = 0;           // of its levels
   std::uint64_t edges = 0;          // changes of the image of those of one level and more
   std::uint64_t scratch_bytes = 0;  // its levels left out
 };
 
-/// Immutable once built; any number of threads may request layers.
+/// Immutable once built, and copies share it; any number of threads may request layers.
 class Coverage {
  public:
   /// meshes     triangles are moved into Mesh::blocks, unless they are there: later users of the meshes share these
@@ -75,9 +75,6 @@ class Coverage {
   /// cost       O(T log T): which facets meet others is found once (meet/meetings.h)
   static Result<Coverage> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
                                 FillRule rule, std::uint32_t levels, Isa isa = Isa::kAuto);
-  Coverage(Coverage&&) noexcept;
-  Coverage& operator=(Coverage&&) noexcept;
-  ~Coverage();
 
   /// The levels of the layer's voxels, into `out` (its capacity is reused).
   /// cost  O(facets near the layer + voxels that hold facets), no matter how large the bed is; the same bytes on any thread
@@ -85,15 +82,12 @@ class Coverage {
 
   /// What the layer has at most. cost  O(copies)
   LayerBound bound(const Layer& layer) const;
-  /// Facets of all meshes that meet others, or whose front is not empty: voxels that hold them are sampled.
-  std::uint64_t suspects() const;
   std::uint64_t index_bytes() const;
-  const PixelGrid& grid() const;
 
  private:
   Coverage() = default;
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<const State> state_;
 };
 
 }  // namespace lamina::coverage

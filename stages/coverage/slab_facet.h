@@ -1,15 +1,64 @@
-// stages/coverage/slab_facet.h: what of a facet lies in a layer.
+// stages/coverage/slab_facet.h: where voxels end along a side of the bed, what of a facet lies in a layer, and the trapezoids
+// that make it up.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
-#include <utility>
 
-#include "stages/coverage/edges.h"
 #include "stages/data/buffer.h"
+#include "stages/data/grid.h"
 #include "stages/data/mesh.h"
 
 namespace lamina::coverage {
+
+/// nm of the edge before pixel i; that of pixel `count` ends the last one.
+constexpr std::int64_t edge(const PixelAxis& axis, std::int64_t i) { return i * axis.span / axis.dots; }
+
+/// All edges of an axis; doubles hold them exactly. 8 bytes a pixel.
+class Edges {
+ public:
+  explicit Edges(const PixelAxis& axis) : per_nm_(axis.pixels_per_nm()), count_(axis.count) {
+    edge_.resize(std::size_t{axis.count} + 1 + kMore);
+    for (std::uint32_t i = 0; i < edge_.size(); ++i) edge_[i] = static_cast<double>(edge(axis, i));
+    narrowest_ = static_cast<double>(axis.span);
+    for (std::uint32_t i = 0; i < axis.count; ++i) {
+      widest_ = std::max(widest_, width(i));
+      narrowest_ = std::min(narrowest_, width(i));
+    }
+  }
+
+  /// A pixel at or before that of `nm` is at nm x per_nm(), one at or behind it at (nm + kBehind) x per_nm(): edges are up to
+  /// 1 nm below i pixels.
+  double per_nm() const { return per_nm_; }
+  static constexpr double kBehind = 1.0625;
+
+  /// kMore edges follow those of the axis, for who reads several at once.
+  const double* data() const { return edge_.data(); }
+  static constexpr std::uint32_t kMore = 16;
+
+  double operator[](std::uint32_t i) const { return edge_[i]; }
+  double width(std::uint32_t i) const { return edge_[i + 1] - edge_[i]; }
+  double widest() const { return widest_; }
+  double narrowest() const { return narrowest_; }
+  std::uint32_t count() const { return count_; }
+  std::uint64_t bytes() const { return bytes_held(edge_); }
+
+  /// The pixel in which `nm` lies, the one behind if it lies on an edge; the nearest one of the bed.
+  std::uint32_t at(double nm) const {
+    const double guess = nm * per_nm_;
+    auto i = guess <= 0 ? 0 : std::min(static_cast<std::uint32_t>(guess), count() - 1);
+    while (i > 0 && edge_[i] > nm) --i;
+    while (i + 1 < count() && edge_[i + 1] <= nm) ++i;
+    return i;
+  }
+
+ private:
+  double per_nm_;
+  std::uint32_t count_;
+  double widest_ = 0, narrowest_ = 0;
+  Buffer<double> edge_;
+};
 
 // --- what lies behind a piece of a facet, in doubles for all voxels and in rationals for the few that
 // doubles do not decide.
@@ -19,7 +68,7 @@ struct Corner {
   Number x, y, z;
 };
 
-/// A convex piece of a facet. A triangle that four planes have cut has at most seven corners.
+/// A convex piece of a facet. A triangle that four planes have cut has up to seven corners.
 template <class Number>
 struct Piece {
   std::array<Corner<Number>, 8> corner;
@@ -53,47 +102,7 @@ Number area_along_x(const Corner<Number>& a, const Corner<Number>& b, const Corn
   return ((b.z - a.z) * (c.y - a.y) - (b.y - a.y) * (c.z - a.z)) / 2;
 }
 
-/// A triangle as what lies behind it, towards +x, sees it: its area along x by x. The area before x rises with the square of
-/// the distance from the first corner, and falls short of all by the square of that from the last.
-template <class Number>
-struct Tent {
-  Number x0, x1, x2;  // corners, in order
-  Number area;        // projected along x; positive where +x goes into the solid
-
-  Tent() = default;
-  Tent(const Corner<Number>& a, const Corner<Number>& b, const Corner<Number>& c) : x0(a.x), x1(b.x), x2(c.x) {
-    if (x1 < x0) std::swap(x0, x1);
-    if (x2 < x1) std::swap(x1, x2);
-    if (x1 < x0) std::swap(x0, x1);
-    area = area_along_x(a, b, c);
-  }
-
-  Number mean() const { return (x0 + x1 + x2) / 3; }
-  /// Area before x.
-  Number before(const Number& x) const {
-    if (x <= x0) return Number(0);
-    if (x >= x2) return area;
-    if (x < x1) return area * ((x - x0) * (x - x0) / ((x1 - x0) * (x2 - x0)));
-    return area - area * ((x2 - x) * (x2 - x) / ((x2 - x1) * (x2 - x0)));
-  }
-  /// Volume between the triangle and x, behind it.
-  Number behind(const Number& x) const {
-    if (x <= x0) return Number(0);
-    if (x >= x2) return area * (x - mean());
-    if (x < x1) return area * ((x - x0) / 3 * ((x - x0) * (x - x0) / ((x1 - x0) * (x2 - x0))));
-    return area * (x - mean()) + area * ((x2 - x) / 3 * ((x2 - x) * (x2 - x) / ((x2 - x1) * (x2 - x0))));
-  }
-};
-
 // ---
-
-/// Room for `count` elements, an eighth more than that at most; what was in it is lost.
-template <class T>
-void ensure_capacity(Buffer<T>& buffer, std::size_t count) {
-  if (count <= buffer.capacity()) return;
-  buffer = {};
-  buffer.reserve(count + count / 8);
-}
 
 /// How far computed corners may lie from where they are, nm, and more: those of facets of 4 m by 4 million roundings.
 inline constexpr double kSlack = 1.0 / 1024;
@@ -121,5 +130,29 @@ double volume_behind(const SlabFacet& facet, double end);
 
 /// Fills in everything; false if nothing of the facet lies between the heights, or it has no area at all.
 bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::int64_t top, const Edges& rows, SlabFacet& out);
+
+// --- the piece of a facet between two of its corners, projected along x. Two edges of the facet's piece within the layer bound
+// it, and a plane of one y at each end. So each row of voxels cuts a trapezoid out of it again, by two chords.
+
+/// nm, from the lowest corner of the facet's box.
+struct Trapezoid {
+  /// An edge: a point of it, and what a step along y adds.
+  struct TrapezoidSide {
+    double y, x, z, dx, dz;
+  };
+  TrapezoidSide on, back;             // in the order of the facet's corners downwards, and against it
+  double low, high;                   // y at its ends
+  double left, right;                 // x that it reaches
+  double slope_margin;                // by which x of a chord may be off
+  double from_x, from_y;              // the lowest corner, on the bed
+  double size;                        // of the facet
+  std::uint32_t facet;                // its index in the layer
+  std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included
+  bool edgewise, suspect;             // as SlabFacet has them
+};
+
+/// Appends the trapezoids of a facet, up to one less than it has corners, from the highest down; one without height if the
+/// facet has none.
+void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& rows, Buffer<Trapezoid>& to);
 
 }  // namespace lamina::coverage

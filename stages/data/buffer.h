@@ -38,6 +38,15 @@ std::size_t bytes_held(const Buffer<T>& buffer) {
   return buffer.capacity() * sizeof(T);
 }
 
+/// Capacity for `count` elements, and where it has to grow an eighth more, so that layers that need ever more move the buffer
+/// rarely and never double it; what was in it is lost then.
+template <class T>
+void ensure_capacity(Buffer<T>& buffer, std::size_t count) {
+  if (count <= buffer.capacity()) return;
+  buffer = {};
+  buffer.reserve(count + count / 8);
+}
+
 }  // namespace lamina
 
 /// Made once, optimised: of the copies that files make of what they do not inline, linkers take any, also that of a file that

@@ -70,4 +70,37 @@ class BeadRaster {
 /// A grid to inspect the beads in a box: pixels of 50 um, larger ones where there were more than 20 000 along a side.
 PixelGrid bead_grid(const Box& box);
 
+// --- a part of beads: segments of paths become beads of pixels, and the part keeps what they cover.
+
+/// Widths of beads, nm. Walls are as wide as their paths.
+struct BeadWidths {
+  bool segmented = false;  // what fills next to thick and thin segments is `continuous`, else as wide as its path
+  Nm thick = 0, thin = 0, continuous = 0;
+
+  Nm of(const PathInterval& s) const;
+};
+
+/// Deposits the segments of a part in a layer, in their order.
+class BeadPen {
+ public:
+  /// beads  gains them; outlives the pen
+  BeadPen(BeadRaster& beads, const BeadWidths& widths, BeadEnds ends) : beads_(beads), widths_(widths), ends_(ends) {}
+
+  void deposit(const PathInterval& s);
+
+ private:
+  BeadRaster& beads_;
+  BeadWidths widths_;
+  BeadEnds ends_;
+  Nm last_width_ = 0;
+  Thickness last_ = Thickness::kReference;
+  PathKind last_kind_ = PathKind::kOuter;
+};
+
+/// Leaves those pixels of the image that beads cover or that lie in its shell; none is added.
+/// beads    all beads of the layer, on the grid of the image
+/// inner    what of the image lies below the shell, or nullptr without a shell
+/// scratch  of the image's kind
+void keep_beads(Runs& image, BeadRaster& beads, const Runs* inner, Runs& scratch);
+
 }  // namespace lamina::raster

@@ -12,7 +12,7 @@
 
 namespace lamina::raster {
 
-CrossingSums::CrossingSums(Nm lowest, Nm highest, std::size_t maximum, Isa isa) : kernels_(tents_for(limited_isa(isa))) {
+CrossingSums::CrossingSums(Nm lowest, Nm highest, std::size_t maximum, Isa isa) : kernels_(kernels_for(limited_isa(isa))) {
   const auto slabs_between = [&] { return (std::int64_t{highest} >> shift_) - (lowest >> shift_) + 1; };
   while (slabs_between() > static_cast<std::int64_t>(maximum)) ++shift_;
   first_ = lowest >> shift_;
@@ -25,16 +25,16 @@ void CrossingSums::add(const ClusteredMesh& mesh, std::uint32_t cluster) {
   const Box& bounds = mesh.bounds[cluster];
   if (bounds.height() == 0) return;
   Sides sides;
-  const MeshBlocks::Indexed indexed = mesh.indexed(cluster);
+  const MeshBlocks::Indexed indexed = mesh.blocks->indexed(cluster);
   if (indexed.cluster != nullptr) {
-    kernels_.find(*indexed.cluster, indexed.vertex, sides);
+    kernels_.load_sides(*indexed.cluster, indexed.vertex, sides);
   } else {
-    const Cluster& listed = mesh.listed(cluster);
+    const Cluster& listed = mesh.blocks->listed(cluster);
     std::memcpy(sides.z, listed.z, sizeof sides.z);
     std::memcpy(sides.y, listed.y, sizeof sides.y);
   }
   Tents tents;
-  kernels_.raise(sides, shift_, first_, tents);
+  kernels_.raise_tents(sides, shift_, first_, tents);
   double* const bend = bend_.data();
   std::int32_t* const segments = segments_.data();
   for (std::uint32_t i = 0; i < kClusterSize; ++i) {
@@ -107,19 +107,18 @@ namespace {
 
 using Clusters = tbb::blocked_range<std::uint32_t>;
 
-struct Heights {
-  Nm lowest = INT32_MAX, highest = INT32_MIN;
-  Heights with(const Heights& more) const { return {std::min(lowest, more.lowest), std::max(highest, more.highest)}; }
-};
-
-Heights heights_of(const ClusteredMesh& mesh) {
-  const auto add = [&](const Clusters& range, Heights sum) {
-    for (std::uint32_t c = range.begin(); c != range.end(); ++c) sum = sum.with({mesh.bounds[c].lo.z, mesh.bounds[c].hi.z});
+/// Around all clusters.
+Box box_of(const ClusteredMesh& mesh) {
+  const auto add = [&](const Clusters& range, Box sum) {
+    for (std::uint32_t c = range.begin(); c != range.end(); ++c) sum.add(mesh.bounds[c]);
     return sum;
   };
+  const auto join = [](Box a, const Box& b) {
+    a.add(b);
+    return a;
+  };
   constexpr std::uint32_t kTogether = 16384;
-  return tbb::parallel_reduce(Clusters(0, mesh.cluster_count(), kTogether), Heights(), add,
-                              [](const Heights& a, const Heights& b) { return a.with(b); });
+  return tbb::parallel_reduce(Clusters(0, mesh.cluster_count(), kTogether), Box(), add, join);
 }
 
 }  // namespace
@@ -128,13 +127,13 @@ CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa) {
   if (mesh.cluster_count() == 0) return {0, 0, 1, isa};
   constexpr std::uint32_t kTogether = 1024;  // clusters
   constexpr std::size_t kFiner = 16;         // times as many slabs as are kept
-  const Heights heights = heights_of(mesh);
+  const Box box = box_of(mesh);
   const std::size_t maximum = std::min(CrossingSums::kMaxSlabs, kFiner * max_slabs_of(mesh.cluster_count()));
   const Clusters clusters(0, mesh.cluster_count(), kTogether);
   const auto add = [&](const Clusters& range, CrossingSums& to) {
     for (std::uint32_t c = range.begin(); c != range.end(); ++c) to.add(mesh, c);
   };
-  CrossingSums all(heights.lowest, heights.highest, maximum, isa);
+  CrossingSums all(box.lo.z, box.hi.z, maximum, isa);
   if (clusters.size() <= kTogether) {
     add(clusters, all);
     return all;

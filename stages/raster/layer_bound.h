@@ -7,7 +7,6 @@
 
 #include "stages/data/grid.h"
 #include "stages/geometry/isa.h"
-#include "stages/raster/kernels/tents.h"
 #include "stages/raster/scan.h"
 
 namespace lamina::raster {
@@ -24,7 +23,7 @@ namespace lamina::raster {
 class CrossingSums {
  public:
   /// lowest, highest  between which clusters lie, nm
-  /// most             slabs at most, within kMaxSlabs
+  /// maximum          of slabs, within kMaxSlabs
   /// isa              the widest instruction set to use; sums are the same with any
   CrossingSums(Nm lowest, Nm highest, std::size_t maximum = kMaxSlabs, Isa isa = Isa::kAuto);
 
@@ -45,7 +44,7 @@ class CrossingSums {
     std::vector<Slab> slab;
     const Slab* at(std::int64_t plane) const;  // nullptr: nothing is there
     /// Leaves out slabs without anything at both ends, and joins the others in pairs, of which the larger counts, until there
-    /// are no more than `most`, at least 2.
+    /// are no more than `maximum`, which is 2 or more.
     void fit(std::size_t maximum);
   };
   Table table() const;
@@ -54,7 +53,7 @@ class CrossingSums {
   static constexpr std::uint32_t kFinest = 12;  // 4 micrometres
   static constexpr std::size_t kBeyond = 3;     // changes up to three slabs above the highest facet
 
-  const TentKernels& kernels_;
+  const Kernels& kernels_;
   std::uint32_t shift_ = kFinest;
   std::int32_t first_ = 0;
   // How much more than in the slab below: of the slope of the depth, and of counts.

@@ -3,13 +3,13 @@
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "stages/geometry/interval_table.h"
 #include "stages/geometry/isa.h"
 #include "stages/raster/beams.h"
-#include "stages/raster/clusters.h"
-#include "stages/raster/cut_clusters.h"
 #include "stages/raster/layer_bound.h"
 
 namespace lamina::raster {
@@ -24,18 +24,6 @@ constexpr std::size_t kMaxClusters = 1 << 16;
 
 /// Segments that a kernel may write behind those of a layer.
 constexpr std::uint64_t kMoreSegments = kClusterSize;
-
-/// Elements that a buffer for `count` of them gets: an eighth more, so that layers that need ever more move it rarely.
-std::uint64_t with_spare(std::uint64_t count) { return count + count / 8; }
-
-/// Empties the buffer and makes room. A bound is given beforehand, so buffers never double as they fill.
-template <class T>
-void ensure_capacity(Buffer<T>& buffer, std::uint64_t count) {
-  buffer.clear();
-  if (count <= buffer.capacity()) return;
-  buffer = {};
-  buffer.reserve(with_spare(count));
-}
 
 }  // namespace
 
@@ -56,17 +44,12 @@ struct Rasterizer::State {
       : grid(pixel_grid), sampling(pixel_grid), rule(fill_rule), kernels(kernels_for(isa)) {}
 };
 
-Rasterizer::Rasterizer(Rasterizer&&) noexcept = default;
-Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
-Rasterizer::~Rasterizer() = default;
-
 Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
                                      FillRule rule, bool rays, bool contours, Isa isa) {
   const Result<Isa> usable = usable_isa(isa);
   if (!usable) return usable.error();
-  Rasterizer rasterizer;
-  rasterizer.state_ = std::make_unique<State>(grid, rule, *usable);
-  State& state = *rasterizer.state_;
+  const auto shared = std::make_shared<State>(grid, rule, *usable);
+  State& state = *shared;
   std::int64_t lowest = grid.y.length, highest = 0;
   for (const Instance& instance : instances) {
     const Box& box = meshes[instance.mesh].bounds;
@@ -102,6 +85,8 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
     if (!beams) return beams.error();
     state.beams.push_back(std::move(*beams));
   }
+  Rasterizer rasterizer;
+  rasterizer.state_ = shared;
   return rasterizer;
 }
 
@@ -111,6 +96,7 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   const LayerBound::CrossingCount bound = state.bound.front().at(plane);
   const std::uint32_t rows = state.grid.rows();
   out.columns = state.grid.columns();
+  out.change.clear();
   ensure_capacity(out.change, bound.crossings + RowsTask::kMoreCrossings);
   out.row_offset.reserve(std::size_t{rows} + 1);
   out.row_offset.assign(1, 0);
@@ -119,9 +105,9 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
     scratch.segments.size = 0;
     scratch.segments.ensure_capacity(std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kMoreSegments);
-    cut_clusters(state.kernels, state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
-    scratch.scan.append_rows(state.kernels, state.sampling, scratch.segments, state.placed, plane, state.rule, first_row,
-                             last_row, out, report);
+    const RowBand band{state.kernels, state.sampling, state.placed, plane, first_row, last_row};
+    cut_clusters(band, visits, scratch.segments);
+    scratch.scan.append_rows(band, scratch.segments, state.rule, out, report);
   };
   // Bands from the back of the bed to its front, the order of the image's rows.
   const auto each_band = [&](auto&& take) {
@@ -131,6 +117,7 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
       last = first;
     }
   };
+  scratch.visits.clear();
   ensure_capacity(scratch.visits, bound.clusters);
   if (engine == Engine::kRays) {
     each_band([&](std::uint32_t first, std::uint32_t last) {
@@ -176,35 +163,40 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const bool caps = std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.cluster_count(); });
   const std::uint64_t closing = open ? 2 * count.segments * (Segments::kBytes + 4) + 5 * 8 * count.crossings : 0;
   const std::uint64_t visits = (count.clusters > kMaxClusters ? 3 : 1) * count.clusters * sizeof(ClusterVisit);
-  // Crossings and changes; the place of each row, its offset, and whether it is capped.
-  return with_spare(visits + (count.segments + kMoreSegments) * Segments::kBytes +
-                    2 * 4 * (count.crossings + RowsTask::kMoreCrossings)) +
-         4 * (positions + rows + 2) + (open || caps ? positions : 0) + closing;
+  const std::uint64_t buffers = visits + (count.segments + kMoreSegments) * Segments::kBytes +
+                                2 * 4 * (count.crossings + RowsTask::kMoreCrossings);  // crossings and changes
+  // Where each row begins, its offset, and whether it is capped.
+  return buffers + buffers / 8 + 4 * (positions + rows + 2) + (open || caps ? positions : 0) + closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }
 
 void Rasterizer::mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const {
-  raster::mark_crossed(state_->placed, planes, crossed);
-}
-
-Isa Rasterizer::isa() const { return state_->kernels.isa; }
-
-std::uint64_t Rasterizer::mesh_bytes() const {
-  std::uint64_t total = 0;
-  for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bytes();
-  return total;
+  Cluster capacity;
+  std::set<std::pair<const ClusteredMesh*, Nm>> visited;
+  const auto first_from = [&](std::int64_t z) { return std::ranges::lower_bound(planes, z) - planes.begin(); };
+  for (const PlacedMesh& one : state_->placed) {
+    if (!visited.emplace(one.mesh, one.offset.z).second) continue;
+    const std::int64_t lift = one.offset.z;
+    for (std::uint32_t c = 0; c < one.mesh->cluster_count(); ++c) {
+      const Box& box = one.mesh->bounds[c];
+      if (first_from(box.lo.z + lift) == first_from(box.hi.z + lift)) continue;
+      const auto& z = one.mesh->blocks->cluster(c, capacity).z;
+      for (std::uint32_t i = 0; i < kClusterSize; ++i) {
+        const auto [lowest, highest] = std::minmax({z[0][i], z[1][i], z[2][i]});
+        std::fill(crossed.begin() + first_from(lowest + lift), crossed.begin() + first_from(highest + lift), std::uint8_t{1});
+      }
+    }
+  }
 }
 
 std::uint64_t Rasterizer::index_bytes() const {
   std::uint64_t total = bytes_held(state_->sampling.row_centre) + state_->placed.capacity() * sizeof(PlacedMesh);
   total += state_->bound.front().bytes();
-  for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bounds_bytes();
+  for (const ClusteredMesh& mesh : state_->meshes) total += mesh.blocks->bounds_bytes();
   for (const IntervalTable<Nm>& heights : state_->heights) total += heights.bytes();
   for (const BeamIndex& beams : state_->beams) total += beams.bytes();
   return total;
 }
-
-const PixelGrid& Rasterizer::grid() const { return state_->grid; }
 
 }  // namespace lamina::raster

@@ -30,7 +30,7 @@ struct LayerScratch {
   std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(near) + segments.bytes() + scan.bytes(); }
 };
 
-/// Immutable once built; layers may be requested from any number of threads.
+/// Immutable once built, and copies share it; layers may be requested from any number of threads.
 class Rasterizer {
  public:
   /// meshes     triangles are moved out of them, into blocks: 13 to 36 bytes a triangle (mesh_blocks.h)
@@ -41,9 +41,6 @@ class Rasterizer {
   /// cost       O(T); Embree's tree is one primitive a cluster of 16 triangles, copies share it
   static Result<Rasterizer> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
                                   FillRule rule, bool rays, bool contours, Isa isa = Isa::kAuto);
-  Rasterizer(Rasterizer&&) noexcept;
-  Rasterizer& operator=(Rasterizer&&) noexcept;
-  ~Rasterizer();
 
   /// The runs of the layer at height `plane` (nm), into `out` (its capacity is reused).
   /// cost  O(facets near the plane + crossings log(crossings of a row)); no allocation once the scratch is warm
@@ -54,18 +51,16 @@ class Rasterizer {
   /// Crossings that the layer at `plane` may have at most.
   std::uint64_t crossings_bound(Nm plane) const;
 
-  /// Sets the entry of every plane that a facet crosses (cut_clusters.h).
+  /// Sets the entry of every plane that a facet crosses; planes rise. cost  O(C log P) for C clusters of each mesh at its own
+  /// height, and 16 times that for those that meet a plane
   void mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const;
 
-  Isa isa() const;  // that kernels use, not kAuto
-  std::uint64_t mesh_bytes() const;
   std::uint64_t index_bytes() const;  // trees, boxes and buckets
-  const PixelGrid& grid() const;
 
  private:
   Rasterizer() = default;
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<const State> state_;
 };
 
 }  // namespace lamina::raster

@@ -1,4 +1,4 @@
-// stages/raster/scan.h: segments of a layer become runs.
+// stages/raster/scan.h: clusters that an engine found become segments, and these become runs.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,27 @@
 #include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/data/runs.h"
-#include "stages/raster/clusters.h"
 #include "stages/raster/kernels/kernels.h"
 #include "stages/raster/segment.h"
 
 namespace lamina::raster {
 
 using ClusterVisits = Buffer<ClusterVisit>;
+
+/// Geometry rows [first_row, last_row) of a layer, which are drawn at once.
+struct RowBand {
+  const Kernels& kernels;
+  const PixelSampling& sampling;
+  std::span<const PlacedMesh> placed;
+  Nm plane;  // on the bed
+  std::uint32_t first_row, last_row;
+
+  std::uint32_t rows() const { return last_row - first_row; }
+};
+
+/// Appends the segments of the clusters' facets in the rows of the band.
+/// out  has capacity for as many as there are facets that the plane cuts and kClusterSize more, else it grows
+void cut_clusters(const RowBand& band, std::span<const ClusterVisit> visits, Segments& out);
 
 /// What a layer reported besides its runs.
 struct LayerReport {
@@ -25,7 +39,7 @@ struct LayerReport {
   std::uint32_t first_capped_instance = 0;                 // of the facet that closes that row
   std::uint64_t scratch_bytes = 0;
 
-  /// Adds the crossings and rows of another solid of the layer; places come from the first solid that has any.
+  /// Adds the crossings and rows of another solid of the layer; rows to report come from the first solid that has any.
   void add_solid(const LayerReport& solid);
 };
 
@@ -36,10 +50,8 @@ struct LayerReport {
 /// of them: the row beyond is drawn as if the part ended there.
 class ScanConverter {
  public:
-  /// Appends rows last_row - 1 down to first_row (image order) to `out`; `segments` lie within these rows.
-  void append_rows(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
-                   std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row, std::uint32_t last_row,
-                   Runs& out, LayerReport& report);
+  /// Appends the band's rows, the last one first (image order), to `out`; `segments` lie within these rows.
+  void append_rows(const RowBand& band, const Segments& segments, FillRule rule, Runs& out, LayerReport& report);
 
   std::uint64_t bytes() const {
     return bytes_held(position_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + of_part_.bytes() +
@@ -53,23 +65,11 @@ class ScanConverter {
     std::uint32_t crossing;  // column * 2 + (1 if it enters)
   };
 
-  /// Unset crossings of a band; an eighth more room where it has to grow, so that bytes() follows what bands need.
-  void set_crossings(std::size_t count) {
-    if (count > crossing_.capacity()) {
-      crossing_ = {};
-      crossing_.reserve(count + count / 8);
-    }
-    crossing_.resize(count);
-  }
-  void sort_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows);
-  void fill(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments, std::span<const PlacedMesh> placed,
-            Nm plane, std::uint32_t first_row);
-  void close_open_parts(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
-                        std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row, std::uint32_t rows,
-                        LayerReport& report);
-  void close_part(std::uint32_t first_row, std::uint32_t rows, Buffer<Closing>& closings) const;
-  void report_caps(const Segments& segments, std::span<const PlacedMesh> placed, std::uint32_t first_row, std::uint32_t rows,
-                   LayerReport& report);
+  /// Puts the crossings of the segments, and those of closing_, row by row.
+  void fill(const RowBand& band, const Segments& segments);
+  void close_open_parts(const RowBand& band, const Segments& segments, LayerReport& report);
+  void close_part(const RowBand& band, Buffer<Closing>& closings) const;
+  void report_caps(const RowBand& band, const Segments& segments, LayerReport& report);
 
   Buffer<std::uint32_t> position_;       // per geometry row of the band: where its next crossing goes
   Buffer<std::uint32_t> crossing_;       // column * 2 + (1 if it enters), row by row

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stages/geometry/blocks/block_maker.h"
+
 namespace lamina::raster {
 namespace {
 
@@ -11,6 +13,15 @@ using Int128 = __int128;
 constexpr double kNearNm = 1.5;
 
 }  // namespace
+
+std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes, Isa isa) {
+  const std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes, isa);
+  std::vector<ClusteredMesh> clustered;
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    clustered.push_back({blocks[i], blocks[i]->bounds(), blocks[i]->first_cap(), meshes[i].closed});
+  }
+  return clustered;
+}
 
 PixelSampling::PixelSampling(const PixelGrid& grid)
     : x(grid.x),
@@ -48,7 +59,7 @@ void Segments::append(const Segments& other, std::size_t i) {
 
 ExactTriangle exact_triangle(const SegmentOrigin& origin, std::span<const PlacedMesh> placed) {
   const PlacedMesh& part = placed[origin.instance];
-  const Triangle facet = part.mesh->triangle(origin.facet / kClusterSize, origin.facet % kClusterSize);
+  const Triangle facet = part.mesh->blocks->triangle(origin.facet / kClusterSize, origin.facet % kClusterSize);
   const auto on_bed = [&](const Point3& p) { return Point3{p.x + part.offset.x, p.y + part.offset.y, p.z + part.offset.z}; };
   return {on_bed(facet.a), on_bed(facet.b), on_bed(facet.c)};
 }

@@ -1,4 +1,4 @@
-// stages/raster/segment.h: where one triangle meets one layer plane, and the exact columns of its crossings.
+// stages/raster/segment.h: where one triangle of a mesh meets one layer plane, and the exact columns of its crossings.
 //
 // Everything that decides a pixel is a comparison of whole numbers. Doubles only guess; whenever a guess lies so close
 // to a whole number that rounding could have moved it across, integers answer instead.
@@ -14,13 +14,31 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/choices.h"
 #include "stages/data/grid.h"
-#include "stages/raster/clusters.h"
+#include "stages/data/mesh.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 
 namespace lamina::raster {
+
+/// A mesh in clusters of 16 neighbouring triangles, the shape that both engines read; copies share them.
+struct ClusteredMesh {
+  std::shared_ptr<const MeshBlocks> blocks;
+  std::span<const Box> bounds;  // nm, of each cluster
+  std::uint32_t first_cap;      // clusters from here on hold only triangles that repair added
+  bool closed;                  // as Mesh::closed
+
+  std::uint32_t cluster_count() const { return static_cast<std::uint32_t>(bounds.size()); }
+};
+
+/// Groups the triangles of meshes into clusters and takes them out of the meshes (block_maker.h).
+/// cost: O(T), parallel; nothing where the loader has made blocks
+std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes, Isa isa = Isa::kAuto);
 
 /// Geometry rows [first, first + count()) of the cut of one triangle, and how it stands.
 struct SegmentRows {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "stages/coverage/band/trapezoid.h"
 #include "stages/coverage/coverage.h"
 #include "tests/coverage/oracle.h"
 #include "tests/raster/shapes.h"

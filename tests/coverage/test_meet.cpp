@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "stages/coverage/meet/facet_group.h"
-#include "stages/coverage/meet/triangles_meet.h"
 #include "stages/geometry/isa.h"
 #include "tests/program/machines.h"
 
@@ -87,7 +86,8 @@ Reported predicted_lines(const PairKernels& kernels, const FacetGroup& a, const 
     const auto& edge = found->edge[i];
     EXPECT_TRUE(reported.edges.insert({edge.a, edge.b, edge.edge_a, edge.edge_b}).second);
   }
-  for (std::uint32_t i = 0; i < found->uncertain_count; ++i) reported.uncertain.insert({found->uncertain[i].a, found->uncertain[i].b});
+  for (std::uint32_t i = 0; i < found->uncertain_count; ++i)
+    reported.uncertain.insert({found->uncertain[i].a, found->uncertain[i].b});
   for (std::uint32_t i = 0; i < found->alikes; ++i) reported.alike.insert({found->alike[i].a, found->alike[i].b});
   return reported;
 }

@@ -131,9 +131,9 @@ TEST(CoverageModels, RealPartsHaveTheLevelsOfTheContract) {
       compare_layer(model, layer, image, 16, random, sum);
     }
     ++parts;
-    std::cout << file.filename().string() << ": " << model.facets.size() << " facets, " << coverage->suspects()
-              << " suspect, built in " << built.count() << " s; voxels with facets " << held << ", looked at " << inspected
-              << ", sampled " << sampled << ", by rationals " << exact << '\n';
+    std::cout << file.filename().string() << ": " << model.facets.size() << " facets, built in " << built.count()
+              << " s; voxels with facets " << held << ", looked at " << inspected << ", sampled " << sampled
+              << ", by rationals " << exact << '\n';
     EXPECT_EQ(sum.wrong, 0u);
     if (HasFailure()) return;
   }

@@ -6,7 +6,6 @@
 
 #include "stages/geometry/interval_table.h"
 #include "stages/raster/beams.h"
-#include "stages/raster/height_runs.h"
 #include "tests/raster/shapes.h"
 
 namespace lamina::test {
@@ -88,7 +87,7 @@ TEST(Beams, FindEveryClusterThatContoursFindInTheirRowsOnce) {
     std::vector<raster::ClusteredMesh> meshes;
     for (const int solids : {3, 1500}) {
       Mesh mesh = make_mesh(random_tetrahedra(solids, pick));
-      meshes.push_back(raster::make_clusters(mesh));
+      meshes.push_back(raster::make_clusters({&mesh, 1}).front());
     }
     std::vector<raster::PlacedMesh> placed;
     for (std::uint32_t i = 0; i < 1 + seed % 4; ++i) {  // one of each, or copies of one

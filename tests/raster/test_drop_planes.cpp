@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/raster/materials.h"
+#include "stages/raster/images.h"
 #include "tests/program/machines.h"
 
 namespace lamina::raster {

@@ -7,15 +7,14 @@
 #include <random>
 
 #include "stages/geometry/isa.h"
-#include "stages/raster/cut_clusters.h"
 #include "stages/raster/kernels/kernels.h"
+#include "stages/raster/scan.h"
 #include "tests/raster/shapes.h"
 
 namespace lamina::test {
 namespace {
 
 using raster::ExactTriangle;
-using raster::kClusterSize;
 using raster::Kernels;
 using raster::SegmentRows;
 using raster::Segments;
@@ -100,7 +99,7 @@ struct PlacedClusters {
       : offset(seed % 2 == 0 ? Point3{0, 0, 0} : Point3{1'234'567, 7'654'321, 111'111}),
         mesh(clusters_of(random_facets(kind, bed, offset, seed, clusters * kClusterSize), strip)),
         placed(instances, {&mesh, offset}) {
-    EXPECT_EQ(mesh.indexed(0).cluster != nullptr, strip);
+    EXPECT_EQ(mesh.blocks->indexed(0).cluster != nullptr, strip);
     for (std::uint32_t i = 0; i < mesh.cluster_count(); ++i) {
       for (std::uint32_t k = 0; k < placed.size(); ++k) visits.push_back({i, (i / 3 + k) % instances});
     }
@@ -108,14 +107,14 @@ struct PlacedClusters {
 
   static raster::ClusteredMesh clusters_of(Mesh facets, bool strip) {
     if (strip) facets = as_strip(facets);
-    return raster::make_clusters(facets);
+    return raster::make_clusters({&facets, 1}).front();
   }
 };
 
 Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
              std::array<std::uint32_t, 2> rows) {
   Segments segments;
-  raster::cut_clusters(kernels, sampling, part.placed, part.visits, plane, rows[0], rows[1], segments);
+  raster::cut_clusters({kernels, sampling, part.placed, plane, rows[0], rows[1]}, part.visits, segments);
   return segments;
 }
 

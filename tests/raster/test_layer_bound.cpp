@@ -45,7 +45,7 @@ TEST(LayerBound, IsNeverBelowWhatRandomSolidsHave) {
     const std::vector<Instance> instances{{0, {0, 0, 0}}, {0, {1'234, 777'777, 0}}, {0, {99, 3, 500'001}}};
     const PixelGrid grid{{1200, 130'000'000}, {static_cast<std::int64_t>(100 + random() % 2400), 130'000'000}};
     Mesh mesh = make_mesh(triangles), again = mesh;
-    const raster::ClusteredMesh clusters = raster::make_clusters(again);
+    const raster::ClusteredMesh clusters = raster::make_clusters({&again, 1}).front();
     std::vector<raster::PlacedMesh> placed;
     for (const Instance& instance : instances) placed.push_back({&clusters, instance.offset});
     const LayerBound bound(placed, {&clusters, 1}, {raster::sum_crossings(clusters).table()}, grid);
@@ -76,7 +76,7 @@ TEST(CrossingSums, OfPartsOfAMeshBoundTheWholeInAnyOrder) {
   };
   Triangles triangles = random_tetrahedra(900, pick);
   Mesh mesh = make_mesh(triangles);
-  const raster::ClusteredMesh clusters = raster::make_clusters(mesh);
+  const raster::ClusteredMesh clusters = raster::make_clusters({&mesh, 1}).front();
   const CrossingSums none_yet(mesh.bounds.lo.z, mesh.bounds.hi.z);
   std::vector<CrossingSums> parts(7, none_yet);
   CrossingSums whole = none_yet, all = none_yet;
@@ -189,9 +189,9 @@ TEST(Tents, AreTheSameBitsWithEveryInstructionSetAndReturnToNothing) {
     }
     raster::Sides plain_sides, sides;
     raster::Tents plain, tents;
-    raster::tents_for(Isa::kPlain).find(cluster, vertices.data(), plain_sides);
-    raster::tents_for(Isa::kPlain).raise(plain_sides, shift, -(1 << (27 - shift)), plain);
-    for (std::uint32_t lane = 0; lane < raster::kClusterSize; ++lane) {
+    raster::kernels_for(Isa::kPlain).load_sides(cluster, vertices.data(), plain_sides);
+    raster::kernels_for(Isa::kPlain).raise_tents(plain_sides, shift, -(1 << (27 - shift)), plain);
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
       EXPECT_EQ(plain_sides.z[1][lane], vertices[cluster.corner[1][lane]].z);
       EXPECT_EQ(plain_sides.y[2][lane], vertices[cluster.corner[2][lane]].y);
       EXPECT_GE(plain.begin[lane], 0);
@@ -202,9 +202,9 @@ TEST(Tents, AreTheSameBitsWithEveryInstructionSetAndReturnToNothing) {
       EXPECT_EQ(std::ldexp(up, 16), std::floor(std::ldexp(up, 16)));
     }
     for (const Isa isa : {Isa::kAvx2, Isa::kAvx512}) {
-      const raster::TentKernels& kernels = raster::tents_for(limited_isa(isa));
-      kernels.find(cluster, vertices.data(), sides);
-      kernels.raise(sides, shift, -(1 << (27 - shift)), tents);
+      const raster::Kernels& kernels = raster::kernels_for(limited_isa(isa));
+      kernels.load_sides(cluster, vertices.data(), sides);
+      kernels.raise_tents(sides, shift, -(1 << (27 - shift)), tents);
       ASSERT_EQ(std::memcmp(&sides, &plain_sides, sizeof sides), 0) << i;
       ASSERT_EQ(std::memcmp(&tents, &plain, sizeof tents), 0) << i;
     }
@@ -217,7 +217,7 @@ TEST(CrossingSums, WhatEndsBelowAGapIsNotCountedAboveIt) {
     Triangles triangles = box({0, 0, 0}, {kDeep, kDeep, 2'000'000});
     for (const Triangle& t : box({0, 0, 2'000'000 + gap}, {kDeep, kDeep, kTop})) triangles.push_back(t);
     Mesh mesh = make_mesh(triangles);
-    const raster::ClusteredMesh clusters = raster::make_clusters(mesh);
+    const raster::ClusteredMesh clusters = raster::make_clusters({&mesh, 1}).front();
     CrossingSums sums(0, kTop);
     for (std::uint32_t c = 0; c < clusters.cluster_count(); ++c) sums.add(clusters, c);
     const CrossingSums::Table table = sums.table();

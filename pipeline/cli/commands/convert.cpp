@@ -12,7 +12,7 @@
 #include "stages/dose/shares.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/layer_images.h"
-#include "stages/raster/mirror.h"
+#include "stages/raster/images.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/temporary.h"

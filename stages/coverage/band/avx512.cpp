@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "stages/coverage/band/kernels.h"
+#include "stages/coverage/band/maker.h"
 #include "stages/geometry/targets.h"
 
 #if defined(LAMINA_WIDE_KERNELS)

@@ -136,7 +136,7 @@ LAMINA_LANES bool is_even(const double* partial, const double* passed) {
   return true;
 }
 
-/// Levels of a stretch, from `winding` before it; returns that behind it.
+/// Levels of a span, from `winding` before it; returns that behind it.
 LAMINA_LANES std::int64_t sweep_span(const RowTask& row, const ColumnSpan& span, std::uint32_t& level, Changes& changes) {
   const Eight top = all(row.top), spoilt = all(row.spoilt * row.top), rounding = all(0x1p-49);
   double cover = static_cast<double>(span.winding) * row.area;

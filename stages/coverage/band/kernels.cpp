@@ -5,19 +5,16 @@
 namespace lamina::coverage {
 
 namespace plain {
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-             BandSums& sums);
-void sweep(const RowTask& row, Changes& changes);
+BandKernels::Deposit deposit;
+BandKernels::Sweep sweep;
 }  // namespace plain
 namespace avx2 {
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-             BandSums& sums);
-void sweep(const RowTask& row, Changes& changes);
+BandKernels::Deposit deposit;
+BandKernels::Sweep sweep;
 }  // namespace avx2
 namespace avx512 {
-void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
-             BandSums& sums);
-void sweep(const RowTask& row, Changes& changes);
+BandKernels::Deposit deposit;
+BandKernels::Sweep sweep;
 }  // namespace avx512
 
 const BandKernels& band_kernels_for([[maybe_unused]] Isa isa) {

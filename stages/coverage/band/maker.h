@@ -5,13 +5,117 @@
 #include <span>
 
 #include "stages/coverage/band/kernels.h"
-#include "stages/coverage/band/resolver.h"
+#include "stages/coverage/slab_facet.h"
 #include "stages/data/buffer.h"
+#include "stages/data/choices.h"
 #include "stages/data/levels.h"
 
 namespace lamina::coverage {
 
 struct CoverageReport;
+
+/// How shares become levels.
+struct Rule {
+  FillRule fill;
+  std::uint32_t top_level;  // n
+};
+
+/// What all rows of a layer share; outlives the layer.
+struct BandSlab {
+  /// nm; a voxel's nominal sides, which true ones differ from by less than 1.
+  struct VoxelSides {
+    double x, y, z;
+  };
+  const PixelAxis &columns, &rows;
+  const Edges& edges;  // of columns
+  Rule rule;
+  VoxelSides sides;
+  std::int64_t bottom, top;  // nm
+  std::span<const SlabFacet> facets;
+};
+
+/// A row of voxels in a layer, nm.
+struct Strip {
+  std::int64_t y0, y1, z0, z1;
+  double area() const { return static_cast<double>(y1 - y0) * static_cast<double>(z1 - z0); }
+};
+
+// --- levels of voxels that doubles do not decide, and of those that facets share which meet others.
+
+/// Winding numbers at 8 x 8 x 8 points a voxel, along 64 lines of a row. Counts an interval of columns at once; keeps its
+/// buffers.
+class Samples {
+ public:
+  struct SampleCount {
+    std::uint16_t solid = 0;   // samples that the fill rule calls solid
+    std::uint16_t others = 0;  // samples whose winding number is neither 0 nor 1
+  };
+
+  /// taken  facets that reach the columns; none reaches columns outside
+  /// cost   64 lines a facet, one step a column and line
+  void count(const BandSlab& slab, const Strip& strip, const ColumnSpan& span, std::span<const RowFacet> taken);
+
+  const SampleCount& at(std::uint32_t column) const { return count_[column - first_]; }
+  bool knows(std::uint32_t column) const { return column >= first_ && column < end_; }
+  void forget() { first_ = end_ = 0; }
+  std::uint64_t bytes() const { return bytes_held(crossing_) + bytes_held(count_); }
+
+ private:
+  /// Where a facet crosses a line: at or before that sample, counted from the first column.
+  struct Crossing {
+    std::uint32_t line;
+    std::int32_t sign;
+    std::uint64_t sample;
+    friend bool operator<(const Crossing& a, const Crossing& b) {
+      return a.line != b.line ? a.line < b.line : a.sample < b.sample;
+    }
+  };
+  void cross(const BandSlab& slab, const Strip& strip, const Triangle& facet);
+
+  std::uint32_t first_ = 0, end_ = 0;
+  Buffer<Crossing> crossing_;
+  Buffer<SampleCount> count_;
+};
+
+/// One row after the other; keeps its buffers.
+class RowResolver {
+ public:
+  struct BandPieces {
+    std::span<const Trapezoid> piece;
+    std::span<const ColumnReach> reach;
+  };
+  /// pieces  of the band whose first row is `first`; all outlive the row
+  void start(const BandSlab& slab, BandPieces pieces, std::uint32_t row, std::uint32_t first, CoverageReport& report);
+  /// levels  eight, a byte each, the first lowest; returned with the requested ones
+  std::uint64_t decide(const OpenLanes& open_lanes, std::uint64_t levels);
+  /// Where the level of the last column that decide() decided, which holds no facet with area along x, ends.
+  std::uint32_t even_until() const { return even_end_; }
+  /// Columns [begin, end), which hold no facet, lie at that winding number, neither 0 nor 1.
+  void free(std::int64_t winding, std::uint32_t begin, std::uint32_t end);
+  std::uint64_t bytes() const { return bytes_held(facet_) + samples_.bytes(); }
+
+ private:
+  void list_facets();
+  void take(const ColumnSpan& span);
+  bool resolve_lane(const OpenLanes& open_lanes, std::uint32_t lane, std::uint8_t& level);
+  std::uint8_t exact(const OpenLanes& open_lanes, std::uint32_t lane);
+
+  const BandSlab* slab_ = nullptr;
+  CoverageReport* report_ = nullptr;
+  BandPieces pieces_;
+  std::uint32_t row_ = 0, first_row_ = 0;
+  Strip strip_{};
+  bool is_listed_ = false;
+  Buffer<RowFacet> facet_;           // of the row, by the first column that they reach
+  std::span<const RowFacet> taken_;  // of the interval at work
+  std::uint32_t taken_first_ = 0;    // where it begins
+  double spoilt_ = 0;
+  std::uint32_t even_begin_ = 0, even_end_ = 0;  // columns of one share
+  std::uint8_t even_level_ = 0;
+  Samples samples_;
+};
+
+// ---
 
 /// One band of rows after the other, from the back of the bed; keeps its buffers.
 ///
@@ -33,7 +137,7 @@ class BandMaker {
     return cells_.bytes() + resolver_.bytes() + bytes_held(active_) + bytes_held(reach_) + bytes_held(column_) +
            bytes_held(level_);
   }
-  /// At most, for a layer of so many facets on a grid of so many columns.
+  /// Bound of bytes(), for a layer of so many facets on a grid of so many columns.
   static std::uint64_t bytes_of(std::uint64_t facets, std::uint32_t columns);
 
  private:

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "stages/coverage/band/kernels.h"
+#include "stages/coverage/band/maker.h"
 
 #if defined(__SSE2__)
 #include <emmintrin.h>

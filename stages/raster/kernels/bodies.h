@@ -108,6 +108,8 @@ void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets);
 void cut(const CutTask& task, CutFacets& facets);
 void fill(const FillTask& task);
 std::uint32_t* rows(const RowsTask& task);
+void load_sides(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+void raise_tents(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
 }  // namespace plain
 
 #if defined(LAMINA_WIDE_KERNELS)
@@ -118,6 +120,7 @@ LAMINA_AVX2 void gather_listed(const ListedSource& source, Nm plane, CutFacets& 
 LAMINA_AVX2 void cut(const CutTask& task, CutFacets& facets);
 LAMINA_AVX2 void fill(const FillTask& task);
 LAMINA_AVX2 std::uint32_t* rows(const RowsTask& task);
+LAMINA_AVX2 void raise_tents(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
 }  // namespace avx2
 
 namespace avx512 {
@@ -127,6 +130,8 @@ LAMINA_AVX512 void gather_listed(const ListedSource& source, Nm plane, CutFacets
 LAMINA_AVX512 void cut(const CutTask& task, CutFacets& facets);
 LAMINA_AVX512 void fill(const FillTask& task);
 LAMINA_AVX512 std::uint32_t* rows(const RowsTask& task);
+LAMINA_AVX512 void load_sides(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+LAMINA_AVX512 void raise_tents(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
 }  // namespace avx512
 #endif
 

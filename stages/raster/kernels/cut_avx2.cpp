@@ -152,7 +152,7 @@ LAMINA_INLINE __m256i pairs(__m128i first, __m128i second) {
                                  1);
 }
 
-/// Appends the segments of the live ones of four facets; room is there.
+/// Appends the segments of the live ones of four facets; the arrays are long enough.
 LAMINA_INLINE void cut_four(Cutter& cutter, const CutFacets& facets, std::uint32_t i, int live, __m128i instance) {
   const PixelSampling& sampling = cutter.sampling;
   const auto whole = [&](std::uint32_t which) LAMINA_AVX2 { return four(facets.number[which] + i); };

@@ -62,11 +62,10 @@ LAMINA_INLINE Points corners_at(const Nm* base, const std::int32_t* corner) {
   return {_mm512_unpacklo_epi64(xy_ab, xy_cd), _mm512_unpackhi_epi64(xy_ab, xy_cd), _mm512_unpacklo_epi64(z_ab, z_cd)};
 }
 
-/// Numbers of 16 facets (CutFacets::Number), each kStride behind the one before.
-template <std::uint32_t kStride>
+/// Numbers of 16 facets (CutFacets::Number).
 struct Sixteen {
   const Nm* number;
-  LAMINA_INLINE const Nm* at(std::uint32_t which) const { return number + which * kStride; }
+  LAMINA_INLINE const Nm* at(std::uint32_t which) const { return number + which * CutFacets::kStride; }
   LAMINA_INLINE __m512i whole(std::uint32_t which) const { return _mm512_loadu_si512(at(which)); }
   LAMINA_INLINE __m512d real(std::uint32_t which, std::uint32_t first) const {
     return _mm512_cvtepi32_pd(load8(at(which) + first));
@@ -103,8 +102,7 @@ LAMINA_INLINE Cutter cutter_for(const CutTask& task) {
 }
 
 /// The rows of eight ends at y, which lie on the edges whose y and z follow `edge_x`.
-template <std::uint32_t kStride>
-LAMINA_INLINE __m256i end_rows(const Cutter& cutter, Sixteen<kStride> of, std::uint32_t edge_x, std::uint32_t i, __mmask8 live,
+LAMINA_INLINE __m256i end_rows(const Cutter& cutter, Sixteen of, std::uint32_t edge_x, std::uint32_t i, __mmask8 live,
                                __m512d y) {
   const __m512d guess = _mm512_add_pd(_mm512_mul_pd(y, cutter.rows_in_nm), cutter.row_shift);
   const __m256i row = _mm512_cvttpd_epi32(guess);
@@ -129,8 +127,7 @@ struct Cuts {
   __m512d column, columns_per_nm;
   __mmask8 flat;
 };
-template <std::uint32_t kStride>
-LAMINA_INLINE Cuts cut_eight(const Cutter& cutter, Sixteen<kStride> of, std::uint32_t i, __mmask8 live) {
+LAMINA_INLINE Cuts cut_eight(const Cutter& cutter, Sixteen of, std::uint32_t i, __mmask8 live) {
   const __m512d left_z = of.real(CutFacets::kLeftZ, i), right_z = of.real(CutFacets::kRightZ, i);
   const __m512d share = _mm512_div_pd(of.real(CutFacets::kUp, i), _mm512_mul_pd(left_z, right_z));
   const __m512d to_left = _mm512_mul_pd(share, right_z), to_right = _mm512_mul_pd(share, left_z);
@@ -160,9 +157,8 @@ LAMINA_INLINE void put_pairs(void* to, __m512i first, __m512i second) {
   _mm512_storeu_si512(static_cast<__m512i*>(to) + 1, _mm512_permutex2var_epi32(first, high, second));
 }
 
-/// Appends the segments of the live ones of 16 facets; room is there.
-template <std::uint32_t kStride>
-LAMINA_INLINE void cut_sixteen(Cutter& cutter, Sixteen<kStride> of, __mmask16 live, __m512i facet, __m512i instance) {
+/// Appends the segments of the live ones of 16 facets; the arrays are long enough.
+LAMINA_INLINE void cut_sixteen(Cutter& cutter, Sixteen of, __mmask16 live, __m512i facet, __m512i instance) {
   const Cuts low = cut_eight(cutter, of, 0, static_cast<__mmask8>(live)),
              high = cut_eight(cutter, of, 8, static_cast<__mmask8>(live >> 8));
   const __m512i row = both(low.row, high.row), other_row = both(low.other_row, high.other_row);
@@ -248,8 +244,8 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
   const __m512i of_instance = _mm512_set1_epi32(static_cast<int>(instance));
   Cutter cutter = cutter_for(task);
   for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {
-    cut_sixteen(cutter, Sixteen<CutFacets::kStride>{facets.number[0] + i}, crossed[i / kClusterSize],
-                _mm512_loadu_si512(found.facet + i), of_instance);
+    cut_sixteen(cutter, Sixteen{facets.number[0] + i}, crossed[i / kClusterSize], _mm512_loadu_si512(found.facet + i),
+                of_instance);
   }
   task.out.size = cutter.to;
   found.size = 0;
@@ -287,8 +283,8 @@ void cut(const CutTask& task, CutFacets& facets) {
   for (std::uint32_t i = 0; i < facets.size; i += kClusterSize) {
     const unsigned live = facets.size - i >= kClusterSize ? 0xFFFFu : (1u << (facets.size - i)) - 1;
     const __m512i instance = _mm512_loadu_si512(facets.instance + i);
-    cut_sixteen(cutter, Sixteen<CutFacets::kStride>{facets.number[0] + i}, static_cast<__mmask16>(live),
-                _mm512_loadu_si512(facets.facet + i), instance);
+    cut_sixteen(cutter, Sixteen{facets.number[0] + i}, static_cast<__mmask16>(live), _mm512_loadu_si512(facets.facet + i),
+                instance);
   }
   task.out.size = cutter.to;
   facets.size = 0;

@@ -60,7 +60,7 @@ std::uint32_t facets_met(const FacetSteps& steps, std::uint8_t step) {
 #endif
 }
 
-/// That of a facet which the plane does not cut may have no room in 32 bits; it is not used.
+/// That of a facet which the plane does not cut may not fit into 32 bits; it is not used.
 Nm less(Nm a, Nm b) { return static_cast<Nm>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)); }
 
 /// What floating point says of all facets: the rows that their ends begin, and the lines through both.

@@ -32,13 +32,13 @@ std::uint32_t crossing_of(const FillTask& task, std::size_t segment, const Exact
 }  // namespace
 
 const Kernels& kernels_for([[maybe_unused]] Isa isa) {
-  static constexpr Kernels kPlain{Isa::kPlain, plain::find, plain::cut_found, plain::gather_listed,
-                                  plain::cut,  plain::fill, plain::rows};
+  static constexpr Kernels kPlain{Isa::kPlain, plain::find, plain::cut_found,  plain::gather_listed, plain::cut,
+                                  plain::fill, plain::rows, plain::load_sides, plain::raise_tents};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::find, avx2::cut_found, avx2::gather_listed,
-                                 avx2::cut,  avx2::fill, avx2::rows};
-  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::find, avx512::cut_found, avx512::gather_listed,
-                                   avx512::cut,  avx512::fill, avx512::rows};
+  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::find, avx2::cut_found,   avx2::gather_listed, avx2::cut,
+                                 avx2::fill, avx2::rows, plain::load_sides, avx2::raise_tents};
+  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::find, avx512::cut_found,  avx512::gather_listed, avx512::cut,
+                                   avx512::fill, avx512::rows, avx512::load_sides, avx512::raise_tents};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif

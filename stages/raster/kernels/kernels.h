@@ -1,4 +1,5 @@
-// stages/raster/kernels/kernels.h: the inner loops of the bitmaps, a body for each instruction set.
+// stages/raster/kernels/kernels.h: the inner loops of the bitmaps, and of what their layers are bounded by, a body for each
+// instruction set.
 //
 // All bodies of a loop give the same numbers, bit for bit. Integers are the same in any width; doubles are IEEE 754's
 // operations in the same order, lane by lane, and nothing is fused (-ffp-contract=off). Where a double does not decide,
@@ -39,8 +40,8 @@ struct IndexedSource {
   }
 };
 
-/// Facets of one instance that a plane may cut, by the places of their corners. Behind each array room for the widest store;
-/// what is fetched early may lie behind the last facet.
+/// Facets of one instance that a plane may cut, by the positions of their corners. Behind each array is a margin for the widest
+/// store; what is fetched early may lie behind the last facet.
 struct alignas(64) FoundFacets {
   static constexpr std::uint32_t kCapacity = 256;
 
@@ -60,7 +61,7 @@ struct alignas(64) FoundFacets {
 };
 
 /// Facets that a plane cuts, on the bed, turned so that the tip is alone on its side of the plane: it cuts the two edges
-/// that start there. A number an array, and behind each room for the widest store.
+/// that start there. A number an array, and behind each a margin for the widest store.
 struct alignas(64) CutFacets {
   static constexpr std::uint32_t kCapacity = FoundFacets::kCapacity;
   static constexpr std::uint32_t kStride = kCapacity + kClusterSize;
@@ -100,10 +101,26 @@ struct RowsTask {
   std::uint32_t rows;
   FillRule rule;
   std::uint32_t* changes;  // the first of the image
-  std::uint32_t* change;   // where the next one goes; room for one a crossing and kMoreCrossings
+  std::uint32_t* change;   // where the next one goes; capacity for one a crossing and kMoreCrossings
   std::uint32_t* row_end;  // of each row, back row first: where its changes end
 
   static constexpr std::uint32_t kMoreCrossings = 64;
+};
+
+/// A cluster projected along x.
+struct alignas(64) Sides {
+  Nm z[3][kClusterSize];
+  Nm y[3][kClusterSize];
+};
+
+/// The tents of a cluster's facets (layer_bound.h). Facets that no plane cuts have neither slopes nor count.
+struct alignas(64) Tents {
+  std::int32_t begin[kClusterSize], end[kClusterSize];  // slabs that the facet reaches, the latter beyond the last
+  std::int32_t top[kClusterSize], fall[kClusterSize];   // from here on it no longer rises, and it falls
+  /// nm a slab. Multiples of 2^-16: doubles add them to the same sum in any order while it stays below 2^37. Each is the same
+  /// number times the slabs of the other slope, so that a tent returns to exactly nothing.
+  float up[kClusterSize], down[kClusterSize];
+  std::int32_t count[kClusterSize];  // 1 where a plane cuts it
 };
 
 struct Kernels {
@@ -130,6 +147,12 @@ struct Kernels {
   /// Sorts each row's crossings and writes where the fill rule changes, rows from the back of the band to its front.
   /// returns  the end of the changes
   std::uint32_t* (*rows)(const RowsTask& task);
+
+  /// Fetches an indexed cluster's corners.
+  void (*load_sides)(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+
+  /// Slabs are 2^shift nm high and counted from `first`, and no more than 2^13.
+  void (*raise_tents)(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
 };
 
 /// The bodies for an instruction set that this processor has (geometry/isa.h), not kAuto.

@@ -1,7 +1,7 @@
 // Corners of a cluster are fetched eight at a time with AVX-512, y and z as one number of 64 bits.
 //
 // Nothing is computed: each lane gets the numbers that the plain loop does.
-#include "stages/raster/kernels/tents.h"
+#include "stages/raster/kernels/bodies.h"
 
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>

@@ -1,12 +1,13 @@
-// One body, compiled for each instruction set: a loop over lanes that compilers turn into vectors. Whole numbers and IEEE 754's
-// operations lane by lane, none of them fused (-ffp-contract=off), so that every width gives the same bits.
-#include "stages/raster/kernels/tents.h"
-
-#include <bit>
-
+// Tents of facets: one body, compiled for each instruction set: a loop over lanes that compilers turn into vectors. Whole
+// numbers and IEEE 754's operations lane by lane, none of them fused (-ffp-contract=off), so that every width gives the same
+// bits.
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #endif
+
+#include <bit>
+
+#include "stages/raster/kernels/bodies.h"
 
 namespace lamina::raster {
 namespace {
@@ -19,7 +20,7 @@ LAMINA_BODY std::int32_t less(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b));
 }
 
-/// The next float that has 11 bits: at most a thousandth more. Times up to 2^13 it is a float.
+/// The next float that has 11 bits: up to a thousandth more. Times up to 2^13 it is a float.
 LAMINA_BODY float raised(float x) { return std::bit_cast<float>((std::bit_cast<std::int32_t>(x) + 0x1FFF) & ~0x1FFF); }
 
 /// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added, and by
@@ -62,7 +63,9 @@ inline __m128 two_at(const std::uint16_t* corner, const Point3* vertices) {
 }
 #endif
 
-void find(const IndexedCluster& cluster, const Point3* vertices, Sides& sides) {
+}  // namespace
+
+void plain::load_sides(const IndexedCluster& cluster, const Point3* vertices, Sides& sides) {
   for (std::uint32_t k = 0; k < 3; ++k) {
 #if defined(__SSE2__)
     for (std::uint32_t i = 0; i < kClusterSize; i += 4) {
@@ -80,29 +83,16 @@ void find(const IndexedCluster& cluster, const Point3* vertices, Sides& sides) {
   }
 }
 
-void raise_plain(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
+void plain::raise_tents(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
   tents_body(sides, shift, first, tents);
 }
 #if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 void raise_avx2(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
+void avx2::raise_tents(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
   tents_body(sides, shift, first, tents);
 }
-LAMINA_AVX512 void raise_avx512(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
+void avx512::raise_tents(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
   tents_body(sides, shift, first, tents);
 }
 #endif
-
-}  // namespace
-
-const TentKernels& tents_for(Isa isa) {
-  static constexpr TentKernels kPlain{find, raise_plain};
-#if defined(LAMINA_WIDE_KERNELS)
-  static constexpr TentKernels kAvx2{find, raise_avx2}, kAvx512{avx512::load_sides, raise_avx512};
-  if (isa == Isa::kAvx512) return kAvx512;
-  if (isa == Isa::kAvx2) return kAvx2;
-#endif
-  static_cast<void>(isa);
-  return kPlain;
-}
 
 }  // namespace lamina::raster

@@ -20,7 +20,7 @@
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
 #include "stages/formats/images/image.h"
-#include "stages/raster/materials.h"
+#include "stages/raster/images.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/toml.h"
 

@@ -1,4 +1,4 @@
-// stages/raster/materials.h: the images of a layer that has several materials.
+// stages/raster/images.h: images of a layer as runs: turned over, and those of several materials.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +9,10 @@
 #include "stages/data/status.h"
 
 namespace lamina::raster {
+
+/// x: columns are reversed (left becomes right); y: rows are reversed. Both may be requested at once; mirroring twice
+/// gives the image back. O(runs + rows).
+void mirror(const RunsView& runs, bool x, bool y, Runs& out);
 
 /// Images of one material each, while the solids of a layer are drawn over each other.
 struct MaterialImages {
@@ -31,15 +35,15 @@ bool add_image(Runs&& image, Runs& whole);
 /// The images of a layer's files put together: of each material, of each drop of a pixel, or of both.
 class DropPlanes {
  public:
-  /// most    drops of a pixel; at least 1
-  /// shared  a pixel can get drops of several materials
+  /// maximum  drops of a pixel, 1 or more
+  /// shared   a pixel can get drops of several materials
   DropPlanes(std::uint32_t maximum, bool shared) : max_(maximum), shared_(shared) {}
 
   /// Images come material by material, those of a material drop by drop, all of one size. drop  of its material, from 0
   /// errors  kVerification: its pixels contradict the others, "get no drop before"; `planes` are then of no use
   Status add(Runs&& image, std::uint32_t drop);
 
-  /// The pixels that get at least one drop of any material, two, ...: `most` of them, once an image was added.
+  /// The pixels that get one drop or more of any material, two or more, ...: `maximum` of them, once an image was added.
   std::vector<Runs> planes;
 
  private:

@@ -1,4 +1,4 @@
-#include "stages/raster/materials.h"
+#include "stages/raster/images.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +8,24 @@
 #include "stages/geometry/combine.h"
 
 namespace lamina::raster {
+
+void mirror(const RunsView& runs, bool x, bool y, Runs& out) {
+  const std::uint32_t rows = runs.rows();
+  out.columns = runs.columns;
+  out.row_offset.resize(std::size_t{rows} + 1);
+  out.change.resize(runs.change.size());
+  out.row_offset[0] = 0;
+  std::uint32_t* next = out.change.data();
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const auto row = runs.row(y ? rows - 1 - r : r);
+    if (x) {
+      for (std::size_t i = row.size(); i-- > 0;) *next++ = runs.columns - row[i];
+    } else {
+      for (const std::uint32_t column : row) *next++ = column;
+    }
+    out.row_offset[r + 1] = static_cast<std::uint32_t>(next - out.change.data());
+  }
+}
 
 void MaterialImages::start(std::size_t materials, std::uint32_t columns, std::uint32_t rows) {
   image.resize(materials);
@@ -66,16 +84,11 @@ bool add_image(Runs&& image, Runs& whole) {
 
 namespace {
 
-bool meets(const RunsView& a, const RunsView& b) {
-  Runs common;
-  combine(a, b, SetOperation::kIntersection, common);
-  return !common.change.empty();
-}
-
-bool lies_within(const RunsView& inner, const RunsView& outer) {
-  Runs beyond;
-  combine(inner, outer, SetOperation::kDifference, beyond);
-  return beyond.change.empty();
+/// Whether the operation leaves no pixel.
+bool leaves_none(const RunsView& a, const RunsView& b, SetOperation operation) {
+  Runs result;
+  combine(a, b, operation, result);
+  return result.change.empty();
 }
 
 void merge(const Runs& image, Runs& plane) {
@@ -95,12 +108,12 @@ Status DropPlanes::add(Runs&& image, std::uint32_t drop) {
     planes.resize(max_, none);
   }
   if (drop >= max_) return wrong(fmt::format("get more than {} drops", max_));
-  if (drop > 0 && !lies_within(image, before_)) return wrong("get no drop before");
+  if (drop > 0 && !leaves_none(image, before_, SetOperation::kDifference)) return wrong("get no drop before");
   if (max_ > 1) before_ = image;
   if (!shared_) {
     if (planes[drop].change.empty()) {
       planes[drop] = std::move(image);
-    } else if (drop == 0 && meets(planes[0], image)) {
+    } else if (drop == 0 && !leaves_none(planes[0], image, SetOperation::kIntersection)) {
       return wrong("another material's image sets as well");
     } else {
       merge(image, planes[drop]);
