@@ -8,7 +8,6 @@
 
 #include "pipeline/machine/profiles.h"
 #include "stages/data/status.h"
-#include "stages/segment/measured.h"
 #include "stages/segment/pieces.h"
 
 namespace lamina::pipeline {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "stages/raster/porous.h"
-#include "stages/segment/expand.h"
-#include "stages/segment/predict.h"
+#include "stages/segment/cut.h"
+#include "stages/segment/segmentation.h"
 
 namespace lamina::pipeline {
 namespace {

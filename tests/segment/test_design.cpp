@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "stages/segment/design/search.h"
+#include "stages/segment/design.h"
 #include "tests/segment/slow_printer.h"
 
 namespace lamina::segment {

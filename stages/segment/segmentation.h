@@ -1,4 +1,5 @@
-// stages/segment/predict.h: what a segmented filling will be, before anything is printed.
+// stages/segment/segmentation.h: a segmented filling: how its lines are deposited, resolved from settings and the calibration,
+// and what it will be, before anything is printed.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +8,7 @@
 #include "stages/data/status.h"
 #include "stages/data/units.h"
 #include "stages/segment/calibration.h"
-#include "stages/segment/cut.h"
+#include "stages/segment/settings.h"
 
 namespace lamina::segment {
 
@@ -42,12 +43,45 @@ Status check(const Segmentation& segmentation, double bead_width_mm);
 /// touch.
 std::vector<Warning> warnings(const Segmentation& segmentation, const Calibration& calibration);
 
-/// A pore between a thin stretch and the continuous line next to it (pore_geometry.h).
+/// A pore between a thin stretch and the continuous line next to it.
 struct Pores {
   double length_mm, width_mm;
   double aspect;       // width / length
   double density_mm2;  // pores in a mm2 of a layer: two at each thin stretch
 };
 Pores predict_pores(const Segmentation& segmentation);
+
+/// Beads that are no further apart than this, mm, bond: they spread by as much.
+inline constexpr double kBondGap = 0.02;
+
+/// Widths of beads, mm.
+struct PoreBeads {
+  double thick, thin;
+  double other;  // of the line next to them
+};
+
+/// 0 or below: closed.
+struct PoreSize {
+  double length_mm, width_mm;
+  double gap_mm;  // between the thick segments and the other line
+};
+
+/// Beads are deposited as by a round pen: thick segments end in half circles that reach into the thin one, so a pore is shorter
+/// than the thin segment by one thick width; across, it is what the distance of the lines leaves between the thin segment and
+/// the other line.
+/// length    mm, of the thin segment, between two thick ones
+/// distance  mm, between the centres of the lines
+inline PoreSize pore_geometry(const PoreBeads& beads, double length, double distance) {
+  return {length - beads.thick, distance - (beads.thin + beads.other) / 2, distance - (beads.thick + beads.other) / 2};
+}
+
+/// Absent widths, speeds and spacings come from the calibration, in proportion to the bead.
+/// bead_mm  width of the filling's beads, > 0
+/// errors   of check(): kUsage, one line that begins with the key's name
+Result<Segmentation> resolve(const SegmentSettings& settings, const Calibration& calibration, double bead_mm);
+
+/// Centre-to-centre distances, mm, from each line to the next, in turn from line 0.
+/// first  number of a segmented line
+std::vector<double> line_distances(const Segmentation& segmentation, std::int32_t first);
 
 }  // namespace lamina::segment
