@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/geometry/blocks/cluster.h"
-
 namespace lamina::coverage {
 namespace {
 

@@ -130,7 +130,7 @@ void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t
 }
 
 void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
-              std::span<std::uint8_t> result) {
+                  std::span<std::uint8_t> result) {
   fill_parts(window, columns, full, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
     const std::uint8_t* level = levels.level.data() + levels.row_offset[r];
     part_row.add(runs_of(levels, r), weight, [&](std::size_t run) { return std::uint64_t{level[run]}; });

@@ -24,7 +24,6 @@
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
-#include "stages/geometry/angle.h"
 #include "stages/segment/segmentation.h"
 #include "stages/segment/settings.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "stages/geometry/bead_section.h"
-#include "stages/segment/segmentation.h"
+#include "stages/geometry/contours/contact.h"
 
 namespace lamina::segment {
 
@@ -43,14 +43,6 @@ void MoveTable::make(const PathInterval& s, MoveEntry& entry) const {
 namespace {
 
 constexpr double kNear = 10;  // nm: places are rounded, and so are the ends of lines
-
-double distance_to(Point2 p, Point2 a, Point2 b) {
-  const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y;
-  const double px = static_cast<double>(p.x) - a.x, py = static_cast<double>(p.y) - a.y;
-  const double square = dx * dx + dy * dy;
-  const double share = square > 0 ? std::clamp((px * dx + py * dy) / square, 0.0, 1.0) : 0;
-  return std::hypot(px - share * dx, py - share * dy);
-}
 
 /// Calls use(path points i .. end) for every run of one line or curve.
 template <class Use>

@@ -9,7 +9,6 @@
 
 #include "stages/geometry/blocks/kernels/kernels.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
-#include "stages/geometry/blocks/sorted_block.h"
 #include "stages/geometry/isa.h"
 
 namespace lamina {

@@ -7,8 +7,6 @@
 namespace lamina {
 namespace {
 
-int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
-
 class ContactSearch {
  public:
   ContactSearch(const ContoursView& contours, MonotoneScratch& scratch)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 
@@ -59,13 +60,14 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
 
 // --- whether two straight stretches share a point, exactly.
 
-/// 1: p lies left of the line from a to b, -1: right of it, 0: on it
-inline int side_of(Point2 a, Point2 b, Point2 p) {
+/// Twice the area of a triangle, nm^2: above 0 if p lies left of the line from a to b, below 0 right of it.
+inline std::int64_t doubled_area(Point2 a, Point2 b, Point2 p) {
   // Coordinates of a bed differ by less than 2^31, so nothing overflows.
-  const std::int64_t area =
-      (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
-  return area > 0 ? 1 : area < 0 ? -1 : 0;
+  return (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
 }
+
+inline int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
+inline int side_of(Point2 a, Point2 b, Point2 p) { return sign(doubled_area(a, b, p)); }
 
 /// Whether the boxes around stretches ab and cd share a point.
 inline bool boxes_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
@@ -77,6 +79,15 @@ inline bool boxes_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
 inline bool intervals_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
   // Boxes meet, so collinear stretches do.
   return boxes_meet(a, b, c, d) && side_of(a, b, c) * side_of(a, b, d) <= 0 && side_of(c, d, a) * side_of(c, d, b) <= 0;
+}
+
+/// nm from a point to the nearest one of a stretch, in floating point.
+inline double distance_to(Point2 p, Point2 a, Point2 b) {
+  const double ux = static_cast<double>(b.x) - a.x, uy = static_cast<double>(b.y) - a.y;
+  const double vx = static_cast<double>(p.x) - a.x, vy = static_cast<double>(p.y) - a.y;
+  const double length2 = ux * ux + uy * uy;
+  const double share = length2 > 0 ? std::clamp((ux * vx + uy * vy) / length2, 0.0, 1.0) : 0;
+  return std::hypot(vx - share * ux, vy - share * uy);
 }
 
 }  // namespace lamina

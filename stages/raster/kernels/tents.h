@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "stages/data/choices.h"
-#include "stages/geometry/blocks/cluster.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/targets.h"
 
 namespace lamina::raster {
