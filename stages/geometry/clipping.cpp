@@ -61,8 +61,6 @@ Error refusal(const char* why) {
   return {Fault::kInternal, fmt::format("contours of a layer cannot be combined: {}; please report this with the part", why)};
 }
 
-Error refusal(const std::exception& why) { return is_shortage(why) ? out_of_memory() : refusal(why.what()); }
-
 /// What `act` leaves in `out`. Clipper swallows its own std::bad_alloc, and ClipperOffset then answers with less or nothing: so
 /// the result of an act during which memory ran out, in any thread, is discarded.
 template <class Act>
@@ -73,7 +71,7 @@ Result<Contours> guarded(Act&& act) {
   try {
     status = act(out);
   } catch (const std::exception& exception) {
-    status = refusal(exception);
+    status = is_shortage(exception) ? out_of_memory() : refusal(exception.what());
   }
   if (refused_allocations() != before) return out_of_memory();
   if (!status) return status.error();
@@ -129,16 +127,14 @@ void put(Point2 at, double x, double y, Contours& to) {
   to.point.push_back({rounded(at.x + x), rounded(at.y + y)});
 }
 
-/// Moves contours by one distance, one after the other. Buffers are reused.
-class OffsetCurve {
+/// Moves contours by one distance, piece by piece. Buffers are reused.
+class Offset {
  public:
   /// distance  nm to the right of the edges: outwards
-  explicit OffsetCurve(double distance) : distance_(distance) {}
+  explicit Offset(double distance) : distance_(distance) {}
 
-  /// Appends the curve of a closed contour as one contour: what it goes round once is the region, the contour's solid being on
-  /// the left. A corner that closes is one point if its edges are long enough, else a loop by way of the contour's corner.
-  /// returns  whether there is no such loop
-  bool append(std::span<const Point2> points, Contours& out);
+  /// Appends the region of contours [begin, end), whose curves meet those of no other contour. clean  so are the contours
+  Status append_piece(const ContoursView& contours, std::uint32_t begin, std::uint32_t end, bool clean, Contours& out);
 
  private:
   struct OffsetEdge {
@@ -147,13 +143,17 @@ class OffsetCurve {
   };
 
   bool corner(const OffsetEdge& in, const OffsetEdge& out, Contours& to) const;
+  bool append_curve(std::span<const Point2> points);
 
   double distance_;
   std::vector<OffsetEdge> edges_;
+  Contours curves_;
+  ContactScratch contact_;
+  Buffer<std::uint32_t> group_;
 };
 
 /// Puts what the corner between two edges becomes. returns  false for a loop
-bool OffsetCurve::corner(const OffsetEdge& in, const OffsetEdge& out, Contours& to) const {
+bool Offset::corner(const OffsetEdge& in, const OffsetEdge& out, Contours& to) const {
   const double sine = in.nx * out.ny - in.ny * out.nx, cosine = in.nx * out.nx + in.ny * out.ny;
   const bool opens = sine * distance_ >= 0;
   const double reach = std::abs(distance_ * sine) / (1 + cosine);  // along both edges, from the corner
@@ -174,7 +174,10 @@ bool OffsetCurve::corner(const OffsetEdge& in, const OffsetEdge& out, Contours& 
   return false;
 }
 
-bool OffsetCurve::append(std::span<const Point2> points, Contours& out) {
+/// Appends the curve of a closed contour as one contour: what it goes round once is the region, the contour's solid being on
+/// the left. A corner that closes is one point if its edges are long enough, else a loop by way of the contour's corner.
+/// returns  whether there is no such loop
+bool Offset::append_curve(std::span<const Point2> points) {
   edges_.clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point2 a = points[i], b = points[i + 1 < points.size() ? i + 1 : 0];
@@ -183,36 +186,26 @@ bool OffsetCurve::append(std::span<const Point2> points, Contours& out) {
     if (length > 0) edges_.push_back({dy / length, -dx / length, length, b});
   }
   bool plain = true;
-  for (std::size_t i = 0; i < edges_.size(); ++i) plain &= corner(edges_[i], edges_[i + 1 < edges_.size() ? i + 1 : 0], out);
-  out.close();
+  for (std::size_t i = 0; i < edges_.size(); ++i) plain &= corner(edges_[i], edges_[i + 1 < edges_.size() ? i + 1 : 0], curves_);
+  curves_.close();
   return plain;
 }
 
-/// Buffers of offset_contours, reused from piece to piece.
-struct OffsetScratch {
-  Contours curves;
-  ContactScratch contact;
-  Buffer<std::uint32_t> group;
-};
-
-/// Appends the region of contours [begin, end), whose curves meet those of no other contour. clean  so are the contours
-Status append_piece(const ContoursView& contours, std::uint32_t begin, std::uint32_t end, bool clean, OffsetCurve& curve,
-                    OffsetScratch& scratch, Contours& out) {
-  Contours& curves = scratch.curves;
-  curves.clear();
+Status Offset::append_piece(const ContoursView& contours, std::uint32_t begin, std::uint32_t end, bool clean, Contours& out) {
+  curves_.clear();
   bool plain = clean;
-  for (std::uint32_t c = begin; c < end; ++c) plain &= curve.append(contours[c], curves);
-  if (plain) tidy(curves);
-  if (!plain || find_contacts(curves, scratch.contact, scratch.group)) {
-    const auto merged = curve_union(curves);
+  for (std::uint32_t c = begin; c < end; ++c) plain &= append_curve(contours[c]);
+  if (plain) tidy(curves_);
+  if (!plain || find_contacts(curves_, contact_, group_)) {
+    const auto merged = curve_union(curves_);
     if (!merged) return merged.error();
     out.append(*merged);
     return {};
   }
-  scratch.group.clear();
-  if (const auto nested = nest(curves, FillRule::kPositive, scratch.group); !nested) return nested.error();
-  order_by_outer(curves);
-  out.append(curves);
+  group_.clear();
+  if (const auto nested = nest(curves_, FillRule::kPositive, group_); !nested) return nested.error();
+  order_by_outer(curves_);
+  out.append(curves_);
   return {};
 }
 
@@ -234,15 +227,14 @@ Result<Contours> intersect_contours(const ContoursView& one, const ContoursView&
 }
 
 Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance) {
-  OffsetCurve curve(static_cast<double>(distance));
-  OffsetScratch scratch;
+  Offset offset(static_cast<double>(distance));
   Contours out;
   const bool ordered = is_ordered_by_outer(contours);
   for (std::uint32_t begin = 0, end = 0; begin < contours.size(); begin = end) {
     // Outer contours that shrink, each with its holes, stay apart.
     end = distance < 0 && ordered ? begin + 1 : contours.size();
     while (end < contours.size() && doubled_area(contours[end]) < 0) ++end;
-    if (Status status = append_piece(contours, begin, end, ordered, curve, scratch, out); !status) return status.error();
+    if (Status status = offset.append_piece(contours, begin, end, ordered, out); !status) return status.error();
   }
   return out;
 }

@@ -27,25 +27,6 @@ std::span<const std::uint32_t> runs_of(const LevelsView& levels, std::uint32_t r
   return levels.change.subspan(2 * first, 2 * (last - first));
 }
 
-}  // namespace
-
-PixelWindow window_of(const RunsView& runs) {
-  return window_of_rows(runs, [&](std::uint32_t r) { return runs.row(r); });
-}
-
-PixelWindow window_of(const LevelsView& levels) {
-  return window_of_rows(levels, [&](std::uint32_t r) { return runs_of(levels, r); });
-}
-
-PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
-  if (one.empty()) return other;
-  if (other.empty()) return one;
-  return {std::min(one.left, other.left), std::max(one.right, other.right), std::min(one.top, other.top),
-          std::max(one.bottom, other.bottom)};
-}
-
-namespace {
-
 /// One row of results. Lengths along x are in units of 1 / columns of a pixel, so that a pixel is `columns` units and a
 /// part is `window.width()` units, whole numbers both.
 class PartRow {
@@ -122,6 +103,21 @@ void fill_parts(const PixelWindow& window, std::uint32_t columns, std::uint64_t 
 }
 
 }  // namespace
+
+PixelWindow window_of(const RunsView& runs) {
+  return window_of_rows(runs, [&](std::uint32_t r) { return runs.row(r); });
+}
+
+PixelWindow window_of(const LevelsView& levels) {
+  return window_of_rows(levels, [&](std::uint32_t r) { return runs_of(levels, r); });
+}
+
+PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
+  if (one.empty()) return other;
+  if (other.empty()) return one;
+  return {std::min(one.left, other.left), std::max(one.right, other.right), std::min(one.top, other.top),
+          std::max(one.bottom, other.bottom)};
+}
 
 void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
   fill_parts(window, columns, 1, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {

@@ -15,7 +15,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -25,7 +24,6 @@
 #include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
 #include "stages/segment/segmentation.h"
-#include "stages/segment/settings.h"
 
 namespace lamina::segment {
 
@@ -70,17 +68,16 @@ void cut_line(const LineCut& cut, std::int64_t from, std::int64_t to, Visit&& vi
     }
     return visit(begin, to, thin ? Thickness::kThin : Thickness::kThick);
   }
+  const std::int64_t end = std::max<std::int64_t>(cut.min_end, 1);
   std::int64_t next;  // where the first thin stretch begins
   std::int64_t last;  // where it may begin at the latest
   if (cut.rule == CutRule::kThickEnds) {
-    const std::int64_t end = std::max<std::int64_t>(cut.min_end, 1);
     const std::int64_t available = to - from - 2 * end + cut.thick;
     const std::int64_t count = available < period ? 0 : available / period;
     if (count == 0) return visit(from, to, Thickness::kThick);
     next = from + (to - from - count * period + cut.thick) / 2;
     last = next + (count - 1) * period;
   } else {
-    const std::int64_t end = std::max<std::int64_t>(cut.min_end, 1);
     next = cut.origin + ceil_div(from + end - cut.origin, period) * period;
     last = to - end - cut.thin;
     if (next > last) return visit(from, to, Thickness::kThick);

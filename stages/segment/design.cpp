@@ -21,8 +21,6 @@ constexpr double kMinThin = 1.0;
 // Di Nisio 2022, Tables 7 and 8: lengths, and what the spacings leave between the widths of Tables 13 to 15.
 constexpr Interval kMeasuredThick{1.5, 1.5}, kMeasuredThin{1.5, 2.0}, kMeasuredGap{0, 0.01};
 
-double rounded(double value, double steps) { return std::round(value * steps) / steps; }
-
 }  // namespace
 
 Result<DesignLimits> DesignLimits::of(const Extruder& machine, const Calibration& calibration) {
@@ -64,23 +62,22 @@ Choice DesignLimits::nearest(Choice choice) const {
   return choice;
 }
 
-SegmentSettings DesignLimits::settings_of(const Choice& choice) const {
+SegmentSettings DesignLimits::settings_of(const Choice& choice, bool exact) const {
+  const auto written = [&](double value, double steps) { return exact ? value : std::round(value * steps) / steps; };
   SegmentSettings settings;
   settings.on = true;
   settings.continuous = choice.continuous;
-  settings.thick_extrusion = rounded(choice.extrusion, 10);
-  settings.thick_mm = rounded(choice.thick_mm, 1000);
-  settings.thin_mm = rounded(choice.thin_mm, 1000);
+  settings.thick_extrusion = written(choice.extrusion, 10);
+  settings.thick_mm = written(choice.thick_mm, 1000);
+  settings.thin_mm = written(choice.thin_mm, 1000);
   settings.thin_speed = kThinSpeed;
   const RepeatedReading widths = repeated_at(*calibration_, settings.thick_extrusion);
-  settings.thick_speed = rounded(widths.thick_speed_percent, 10);
+  settings.thick_speed = written(widths.thick_speed_percent, 10);
   const Spacing spacing = spacing_for(widths.thick_mm, widths.continuous_mm, choice.gap_mm);
-  settings.spacing_sc_mm = rounded(spacing.segmented, 10'000);
-  settings.spacing_cc_mm = rounded(widths.continuous_mm, 10'000);
+  settings.spacing_sc_mm = written(spacing.segmented, 10'000);
+  settings.spacing_cc_mm = written(widths.continuous_mm, 10'000);
   return settings;
 }
-
-Result<Segmentation> DesignLimits::plan_of(const Choice& choice) const { return plan_of(settings_of(choice)); }
 
 Result<Segmentation> DesignLimits::plan_of(const SegmentSettings& settings) const {
   return resolve(settings, *calibration_, calibration_->width_mm);
@@ -301,16 +298,8 @@ class RatioSearch {
   static constexpr double kAside = 1e-3;
   static constexpr double kFarWeight = 0.1, kSamePlan = 1e-3;  // in units of what is free
 
-  /// Not rounded to what is written.
   Residuals residuals(const Choice& choice) const {
-    SegmentSettings settings = limits_.settings_of(choice);
-    settings.thick_extrusion = choice.extrusion;
-    settings.thick_mm = choice.thick_mm;
-    settings.thin_mm = choice.thin_mm;
-    const RepeatedReading widths = repeated_at(limits_.calibration(), choice.extrusion);
-    settings.spacing_sc_mm = spacing_for(widths.thick_mm, widths.continuous_mm, choice.gap_mm).segmented;
-    settings.spacing_cc_mm = widths.continuous_mm;
-    const Result<Segmentation> plan = limits_.plan_of(settings);
+    const Result<Segmentation> plan = limits_.plan_of(limits_.settings_of(choice, true));
     Residuals all;
     all.fill(1e6);
     if (!plan) return all;

@@ -12,7 +12,6 @@
 #include "stages/data/status.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/segmentation.h"
-#include "stages/segment/settings.h"
 
 namespace lamina::segment {
 
@@ -48,10 +47,9 @@ class DesignLimits {
   /// stay away by no more than 0.02 mm. Lengths of thick segments are between 1 and 2.4 mm.
   Choice nearest(Choice choice) const;
 
-  /// The key's values, as they are written: lengths to a micrometre, spacings to 0.1 um, percent to 0.1.
-  SegmentSettings settings_of(const Choice& choice) const;
+  /// The key's values, as they are written unless `exact`: lengths to a micrometre, spacings to 0.1 um, percent to 0.1.
+  SegmentSettings settings_of(const Choice& choice, bool exact = false) const;
   /// The plan with the widths that the machine's beads will have. errors  of resolve()
-  Result<Segmentation> plan_of(const Choice& choice) const;
   Result<Segmentation> plan_of(const SegmentSettings& settings) const;
 
   /// The plan with the widths that toolpaths are written with: that of continuous lines is of the deposit at 100 %, not the

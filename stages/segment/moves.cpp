@@ -58,6 +58,11 @@ void for_each_run(const ToolpathsView& paths, Use use) {
   }
 }
 
+/// A thin segment relative to the lines of the layer below: it is at one position along them and reaches across.
+struct Over {
+  Nm position, low, high;
+};
+
 }  // namespace
 
 LineNeighbours::LineNeighbours(const ToolpathsView& paths, const LayerCut& cut) : paths_(paths), cut_(cut) {
@@ -170,15 +175,6 @@ void PoreCounter::check(const std::optional<double>& distance_mm, double other_m
   counts_.length_mm += pore.length_mm;
   counts_.width_mm += pore.width_mm;
 }
-
-namespace {
-
-/// A thin segment relative to the lines of the layer below: it is at one position along them and reaches across.
-struct Over {
-  Nm position, low, high;
-};
-
-}  // namespace
 
 void count_crossed(const ToolpathsView& paths, const LayerCut& cut, const ToolpathsView& above, const LayerCut& cut_above,
                    PoreCounts& counts) {

@@ -169,29 +169,6 @@ std::string add_row(const Columns& columns, const std::vector<std::string>& cell
   return {};
 }
 
-}  // namespace
-
-Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium) {
-  auto file = FileReader::open(path, {.fault = Fault::kInput, .max_bytes = kMaxTableBytes, .streams = true});
-  if (!file) return file.error();
-  Columns columns;
-  char separator = ',';
-  std::vector<FlowGroup> groups;
-  for (std::string_view line; file->next(line);) {
-    if (line.empty() || line[0] == '#' || line == "\r") continue;
-    const bool header = columns.names.empty();
-    if (header) separator = separator_of(line);
-    auto cells = cells_of(line, separator);
-    const std::string wrong = header ? columns.read(std::move(cells)) : add_row(columns, cells, medium, groups);
-    if (!wrong.empty()) return Error{Fault::kInput, fmt::format("{}:{}: {}", path, file->line_number(), wrong)};
-  }
-  if (!file->status()) return file->status().error();
-  if (!groups.empty()) return groups;
-  return Error{Fault::kInput, path + ": holds no measurements; the first line names the columns, the others hold numbers"};
-}
-
-namespace {
-
 constexpr const char *kInk = "000000", *kPale = "dddddd";
 constexpr double kPlotLeft = 80, kPlotTop = 50, kPlotWidth = 520, kPlotHeight = 320;
 
@@ -225,6 +202,25 @@ void draw_axes(double max_v, double max_y, const GradientUnit& unit, bool gas, P
 }
 
 }  // namespace
+
+Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium) {
+  auto file = FileReader::open(path, {.fault = Fault::kInput, .max_bytes = kMaxTableBytes, .streams = true});
+  if (!file) return file.error();
+  Columns columns;
+  char separator = ',';
+  std::vector<FlowGroup> groups;
+  for (std::string_view line; file->next(line);) {
+    if (line.empty() || line[0] == '#' || line == "\r") continue;
+    const bool header = columns.names.empty();
+    if (header) separator = separator_of(line);
+    auto cells = cells_of(line, separator);
+    const std::string wrong = header ? columns.read(std::move(cells)) : add_row(columns, cells, medium, groups);
+    if (!wrong.empty()) return Error{Fault::kInput, fmt::format("{}:{}: {}", path, file->line_number(), wrong)};
+  }
+  if (!file->status()) return file->status().error();
+  if (!groups.empty()) return groups;
+  return Error{Fault::kInput, path + ": holds no measurements; the first line names the columns, the others hold numbers"};
+}
 
 Plot draw_fit(const FlowGroup& group, const Permeability& fit, bool gas) {
   double max_v = 0, max_y = 0;

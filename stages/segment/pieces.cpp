@@ -42,44 +42,42 @@ TestPiece thin_intervals(std::string name, std::string task, std::array<double, 
 }
 
 void add_flow_and_level(const PieceRequest& request, std::vector<TestPiece>& pieces) {
-  TestPiece flow{"2-flow",
-                 fmt::format("two walls and nothing else; measure the wall in several places (wall_mm): it should be {} mm",
-                             number_text(2 * request.width_mm)),
-                 {20, 20, std::ceil(10 / request.height_mm) * request.height_mm}};
+  TestPiece& flow = pieces.emplace_back(
+      TestPiece{"2-flow",
+                fmt::format("two walls and nothing else; measure the wall in several places (wall_mm): it should be {} mm",
+                            number_text(2 * request.width_mm)),
+                {20, 20, std::ceil(10 / request.height_mm) * request.height_mm}});
   flow.walls = 2;
   flow.lines = flow.segmented = false;
-  TestPiece level{"3-level",
-                  fmt::format("lines 5 mm apart on 100 x 100 mm; level the bed until all of them are {} +- 0.01 mm wide",
-                              number_text(request.width_mm)),
-                  {100, 100, request.height_mm}};
+  TestPiece& level = pieces.emplace_back(
+      TestPiece{"3-level",
+                fmt::format("lines 5 mm apart on 100 x 100 mm; level the bed until all of them are {} +- 0.01 mm wide",
+                            number_text(request.width_mm)),
+                {100, 100, request.height_mm}});
   level.walls = 0;
   level.distance_mm = 5;
   level.segmented = false;
-  pieces.push_back(std::move(flow));
-  pieces.push_back(std::move(level));
 }
 
 void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
   const std::vector<double>&speeds = request.thin_speeds, &extrusions = request.thin_extrusions;
-  TestPiece speed = thin_intervals(
+  TestPiece& speed = pieces.emplace_back(thin_intervals(
       "4-speed",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
           "the thin stretch (thin_mm), the widest one after it (thick_mm), and how far from the start of the thin stretch the bead is as wide as "
           "before (stable_mm)",
           speeds.size(), number_text(speeds.front()), number_text(speeds.back())),
-      {width_for(speeds.size(), request.width_mm), 50, request.height_mm});
+      {width_for(speeds.size(), request.width_mm), 50, request.height_mm}));
   speed.thin_speed_sweep = speeds;
-  TestPiece extrusion = thin_intervals(
+  TestPiece& extrusion = pieces.emplace_back(thin_intervals(
       "4-extrusion",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin with {} to {} % of the extrusion from right to left; measure the narrowest place (thin_mm)",
           extrusions.size(), number_text(extrusions.front()), number_text(extrusions.back())),
-      {width_for(extrusions.size(), request.width_mm), 50, request.height_mm});
+      {width_for(extrusions.size(), request.width_mm), 50, request.height_mm}));
   extrusion.thin_speed = 100;
   extrusion.thin_extrusion_sweep = extrusions;
-  pieces.push_back(std::move(speed));
-  pieces.push_back(std::move(extrusion));
   for (const double percent : request.extrusions) {
     pieces.push_back(lines_to_measure(
         fmt::format("4-repeated-{}", number_text(percent)),
@@ -107,26 +105,6 @@ void add_layers(const PieceRequest& request, std::vector<TestPiece>& pieces) {
     }
   }
 }
-
-}  // namespace
-
-PieceRequest preset_pieces() {
-  PieceRequest request;
-  for (int percent = 125; percent <= 400; percent += 25) request.thin_speeds.push_back(percent);
-  for (int percent = 90; percent >= 10; percent -= 10) request.thin_extrusions.push_back(percent);
-  request.extrusions = {75, 100, 125};
-  return request;
-}
-
-std::vector<TestPiece> test_pieces(const PieceRequest& request) {
-  std::vector<TestPiece> pieces;
-  add_flow_and_level(request, pieces);
-  add_lines(request, pieces);
-  add_layers(request, pieces);
-  return pieces;
-}
-
-namespace {
 
 Error at_row(const Measured& row, const std::string& what) { return {Fault::kInput, fmt::format("row {}: {}", row.row, what)}; }
 
@@ -172,7 +150,52 @@ Spacing spacing_of(const Calibration::Repeated& widths, const MeasuringSettings&
   return {published_spacing(widths.thick_mm, settings.width_mm) + settings.gap_mm, settings.width_mm + settings.gap_mm};
 }
 
+constexpr Word<Measured::Test> kTests[] = {{"flow", Measured::Test::kFlow},
+                                           {"speed", Measured::Test::kSpeed},
+                                           {"extrusion", Measured::Test::kExtrusion},
+                                           {"repeated", Measured::Test::kRepeated}};
+
+constexpr std::string_view kColumns[] = {"test",     "percent", "thick_speed_percent", "region",   "wall_mm",
+                                         "thick_mm", "thin_mm", "continuous_mm",       "stable_mm"};
+
+/// Sets one cell. returns "" or what is wrong
+std::string set_cell(std::string_view column, const std::string& text, Measured& row) {
+  if (column == "test") return read_word(kTests, text, row.test);
+  if (column == "region") {
+    row.region = text;
+    return {};
+  }
+  if (text.empty()) return {};
+  if (column == "percent") return read_number(text, 0.001, 10'000, " %", row.percent);
+  if (column == "thick_speed_percent") return read_number(text, 0.001, 10'000, " %", row.thick_speed_percent);
+  double value = 0;
+  auto wrong = read_number(text, 0.001, 100, " mm", value);
+  if (!wrong.empty()) return wrong;
+  (column == "wall_mm"         ? row.wall
+   : column == "thick_mm"      ? row.thick
+   : column == "thin_mm"       ? row.thin
+   : column == "continuous_mm" ? row.continuous
+                               : row.stable) = value;
+  return {};
+}
+
 }  // namespace
+
+PieceRequest preset_pieces() {
+  PieceRequest request;
+  for (int percent = 125; percent <= 400; percent += 25) request.thin_speeds.push_back(percent);
+  for (int percent = 90; percent >= 10; percent -= 10) request.thin_extrusions.push_back(percent);
+  request.extrusions = {75, 100, 125};
+  return request;
+}
+
+std::vector<TestPiece> test_pieces(const PieceRequest& request) {
+  std::vector<TestPiece> pieces;
+  add_flow_and_level(request, pieces);
+  add_lines(request, pieces);
+  add_layers(request, pieces);
+  return pieces;
+}
 
 Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const MeasuringSettings& settings,
                                   const std::string& source) {
@@ -254,39 +277,6 @@ Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const Measu
   if (repeated.empty()) machine.advice.push_back("no widths of repeated stretches: spacings cannot follow from them");
   return machine;
 }
-
-namespace {
-
-constexpr Word<Measured::Test> kTests[] = {{"flow", Measured::Test::kFlow},
-                                           {"speed", Measured::Test::kSpeed},
-                                           {"extrusion", Measured::Test::kExtrusion},
-                                           {"repeated", Measured::Test::kRepeated}};
-
-constexpr std::string_view kColumns[] = {"test",     "percent", "thick_speed_percent", "region",   "wall_mm",
-                                         "thick_mm", "thin_mm", "continuous_mm",       "stable_mm"};
-
-/// Sets one cell. returns "" or what is wrong
-std::string set_cell(std::string_view column, const std::string& text, Measured& row) {
-  if (column == "test") return read_word(kTests, text, row.test);
-  if (column == "region") {
-    row.region = text;
-    return {};
-  }
-  if (text.empty()) return {};
-  if (column == "percent") return read_number(text, 0.001, 10'000, " %", row.percent);
-  if (column == "thick_speed_percent") return read_number(text, 0.001, 10'000, " %", row.thick_speed_percent);
-  double value = 0;
-  auto wrong = read_number(text, 0.001, 100, " mm", value);
-  if (!wrong.empty()) return wrong;
-  (column == "wall_mm"         ? row.wall
-   : column == "thick_mm"      ? row.thick
-   : column == "thin_mm"       ? row.thin
-   : column == "continuous_mm" ? row.continuous
-                               : row.stable) = value;
-  return {};
-}
-
-}  // namespace
 
 Result<std::vector<Measured>> read_widths(const std::string& path) {
   auto file = FileReader::open(path, {.fault = Fault::kInput, .max_bytes = kMaxTableBytes, .streams = true});

@@ -16,36 +16,33 @@ struct MonotoneChain {
   Point2 lo, hi;
 };
 
-struct MonotoneScratch {
+/// Reused from layer to layer.
+struct ContactScratch {
+  // --- contours that are compared by halving
   Buffer<MonotoneChain> chain;
   Buffer<std::uint32_t> open;
   Buffer<std::pair<std::uint32_t, std::uint32_t>> contact;  // contours, one with itself too; some may come more than once
-
-  std::uint64_t bytes() const { return bytes_held(chain) + bytes_held(open) + bytes_held(contact); }
-};
-
-/// Leaves in scratch.contact enough of the pairs of contours in contact (contact.h says what that is) to join every
-/// group of them.
-///
-/// returns  false if the contours wind so much, or lie so close, that a grid is better; what is found then is void
-/// cost     O(P) for P points, else gives up after a few comparisons a point
-bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch);
-
-inline constexpr std::uint32_t kNoContact = UINT32_MAX;
-
-/// Reused from layer to layer.
-struct ContactScratch {
+  // --- and by cells
   Buffer<std::uint32_t> offset;   // cells + 1
   Buffer<std::uint32_t> edge;     // of each cell: the number of an edge's first point
   Buffer<std::uint32_t> next;     // point -> next point of its contour
   Buffer<std::uint32_t> contour;  // point -> its contour
   Buffer<std::uint32_t> root;     // contour -> another one of its group
-  MonotoneScratch monotone;
 
   std::uint64_t bytes() const {
-    return bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root) + monotone.bytes();
+    return bytes_held(chain) + bytes_held(open) + bytes_held(contact) + bytes_held(offset) + bytes_held(edge) +
+           bytes_held(next) + bytes_held(contour) + bytes_held(root);
   }
 };
+
+/// Leaves in scratch.contact enough of the pairs of contours in contact (find_contacts() says what that is) to join every
+/// group of them.
+///
+/// returns  false if the contours wind so much, or lie so close, that a grid is better; what is found then is void
+/// cost     O(P) for P points, else gives up after a few comparisons a point
+bool find_monotone_contacts(const ContoursView& contours, ContactScratch& scratch);
+
+inline constexpr std::uint32_t kNoContact = UINT32_MAX;
 
 /// Groups contours by contact: two are in contact if an edge of one shares a point with an edge of the other, exactly,
 /// and a contour is in contact with itself if two of its edges that are not neighbours share a point. Contours without

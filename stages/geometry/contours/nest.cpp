@@ -130,63 +130,6 @@ Status group_union(const Contours& contours, std::uint32_t group_number, const B
   return {};
 }
 
-}  // namespace
-
-Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::uint32_t>& group) {
-  const std::uint32_t count = contours.size();
-  const std::vector<Outline> outlines = outlines_of(contours);
-  const std::vector<std::int32_t> outside = windings_outside(contours, outlines, group);
-  // 0: drop, 1: keep, -1: keep reversed
-  const auto turn_of = [&](std::uint32_t c) {
-    const bool solid_outside = is_solid(rule, outside[c]);
-    const bool solid_inside = is_solid(rule, outside[c] + (outlines[c].turns_left ? 1 : -1));
-    return solid_inside == solid_outside ? 0 : solid_inside == outlines[c].turns_left ? 1 : -1;
-  };
-  if (!group.empty()) {
-    Contours out;
-    std::uint32_t merged = 0;
-    for (std::uint32_t c = 0; c < count; ++c) {
-      if (group[c] == kNoContact) {
-        if (const int turn = turn_of(c); turn != 0) append(contours[c], turn < 0, out);
-      } else if (group[c] == c) {
-        if (Status status = group_union(contours, c, group, outside[c], rule, out); !status) return status.error();
-        ++merged;
-      }
-    }
-    contours = std::move(out);
-    return merged;
-  }
-  // In place.
-  std::uint32_t kept_points = 0, kept_contours = 0, begin = 0;
-  for (std::uint32_t c = 0; c < count; ++c) {
-    const std::uint32_t end = contours.offset[c + 1];
-    if (const int turn = turn_of(c); turn != 0) {
-      const auto first = contours.point.begin() + kept_points;
-      if (kept_points != begin) std::copy(contours.point.begin() + begin, contours.point.begin() + end, first);
-      kept_points += end - begin;
-      if (turn < 0) std::reverse(first, contours.point.begin() + kept_points);
-      contours.offset[++kept_contours] = kept_points;
-    }
-    begin = end;
-  }
-  contours.offset.resize(kept_contours + 1);
-  contours.point.resize(kept_points);
-  return 0u;
-}
-
-bool same_nesting(const Contours& contours, const Contours& others) {
-  const std::vector<Outline> outlines = outlines_of(others);
-  const std::vector<std::int32_t> outside = windings_outside(others, outlines, {});
-  const auto clean = [&](std::uint32_t c) { return outside[c] == (outlines[c].turns_left ? 0 : 1); };
-  bool all = true;
-  for (std::uint32_t c = 0; c < others.size(); ++c) all = all && clean(c);
-  if (all) return true;
-  // Contours that touch each other wind otherwise, before as after.
-  return outside == windings_outside(contours, outlines_of(contours), {});
-}
-
-namespace {
-
 constexpr std::uint32_t kNone = UINT32_MAX;
 
 /// 1: inside, 0: on the contour, -1: outside
@@ -241,6 +184,59 @@ std::vector<std::uint32_t> outers_of(const Contours& contours, const std::vector
 }
 
 }  // namespace
+
+Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::uint32_t>& group) {
+  const std::uint32_t count = contours.size();
+  const std::vector<Outline> outlines = outlines_of(contours);
+  const std::vector<std::int32_t> outside = windings_outside(contours, outlines, group);
+  // 0: drop, 1: keep, -1: keep reversed
+  const auto turn_of = [&](std::uint32_t c) {
+    const bool solid_outside = is_solid(rule, outside[c]);
+    const bool solid_inside = is_solid(rule, outside[c] + (outlines[c].turns_left ? 1 : -1));
+    return solid_inside == solid_outside ? 0 : solid_inside == outlines[c].turns_left ? 1 : -1;
+  };
+  if (!group.empty()) {
+    Contours out;
+    std::uint32_t merged = 0;
+    for (std::uint32_t c = 0; c < count; ++c) {
+      if (group[c] == kNoContact) {
+        if (const int turn = turn_of(c); turn != 0) append(contours[c], turn < 0, out);
+      } else if (group[c] == c) {
+        if (Status status = group_union(contours, c, group, outside[c], rule, out); !status) return status.error();
+        ++merged;
+      }
+    }
+    contours = std::move(out);
+    return merged;
+  }
+  // In place.
+  std::uint32_t kept_points = 0, kept_contours = 0, begin = 0;
+  for (std::uint32_t c = 0; c < count; ++c) {
+    const std::uint32_t end = contours.offset[c + 1];
+    if (const int turn = turn_of(c); turn != 0) {
+      const auto first = contours.point.begin() + kept_points;
+      if (kept_points != begin) std::copy(contours.point.begin() + begin, contours.point.begin() + end, first);
+      kept_points += end - begin;
+      if (turn < 0) std::reverse(first, contours.point.begin() + kept_points);
+      contours.offset[++kept_contours] = kept_points;
+    }
+    begin = end;
+  }
+  contours.offset.resize(kept_contours + 1);
+  contours.point.resize(kept_points);
+  return 0u;
+}
+
+bool same_nesting(const Contours& contours, const Contours& others) {
+  const std::vector<Outline> outlines = outlines_of(others);
+  const std::vector<std::int32_t> outside = windings_outside(others, outlines, {});
+  const auto clean = [&](std::uint32_t c) { return outside[c] == (outlines[c].turns_left ? 0 : 1); };
+  bool all = true;
+  for (std::uint32_t c = 0; c < others.size(); ++c) all = all && clean(c);
+  if (all) return true;
+  // Contours that touch each other wind otherwise, before as after.
+  return outside == windings_outside(contours, outlines_of(contours), {});
+}
 
 void order_by_outer(Contours& contours) {
   const std::uint32_t count = contours.size();
