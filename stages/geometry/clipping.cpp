@@ -186,7 +186,8 @@ bool Offset::append_curve(std::span<const Point2> points) {
     if (length > 0) edges_.push_back({dy / length, -dx / length, length, b});
   }
   bool plain = true;
-  for (std::size_t i = 0; i < edges_.size(); ++i) plain &= corner(edges_[i], edges_[i + 1 < edges_.size() ? i + 1 : 0], curves_);
+  for (std::size_t i = 0; i < edges_.size(); ++i)
+    plain &= corner(edges_[i], edges_[i + 1 < edges_.size() ? i + 1 : 0], curves_);
   curves_.close();
   return plain;
 }

@@ -4,7 +4,6 @@
 #include <vector>
 
 namespace lamina {
-
 namespace {
 
 /// Image: RunsView or LevelsView; row  begin and end of each run of a row

@@ -375,10 +375,6 @@ Status check(const std::vector<double>& tops, double layer_mm) {
 
 double last_layer(double height_mm, double layer_mm) { return std::ceil(height_mm / layer_mm - 1e-6); }
 
-std::optional<double> between(const std::optional<double>& bottom, const std::optional<double>& top, double share) {
-  return bottom && top ? std::optional(*bottom + share * (*top - *bottom)) : std::nullopt;
-}
-
 }  // namespace
 
 Result<std::vector<double>> equal_tops(double height_mm, std::uint32_t steps, double layer_mm) {
@@ -414,10 +410,11 @@ std::vector<TargetStep> steps_of(const PoreTarget& bottom, const PoreTarget& top
   const double low = middle(steps.front()), way = middle(steps.back()) - low;
   for (TargetStep& step : steps) {
     const double share = way > 0 ? (middle(step) - low) / way : 0;
-    step.target.porosity = between(bottom.porosity, top.porosity, share);
-    step.target.permeability_m2 = between(bottom.permeability_m2, top.permeability_m2, share);
-    step.target.pore_width_mm = between(bottom.pore_width_mm, top.pore_width_mm, share);
-    step.target.pore_length_mm = between(bottom.pore_length_mm, top.pore_length_mm, share);
+    for (const auto value :
+         {&PoreTarget::porosity, &PoreTarget::permeability_m2, &PoreTarget::pore_width_mm, &PoreTarget::pore_length_mm}) {
+      const std::optional<double>&low_value = bottom.*value, &high_value = top.*value;
+      if (low_value && high_value) step.target.*value = *low_value + share * (*high_value - *low_value);
+    }
   }
   return steps;
 }

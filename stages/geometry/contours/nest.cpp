@@ -102,18 +102,16 @@ void append(std::span<const Point2> points, bool reversed, Contours& out) {
 
 /// The union of the contours of one group about which the others wind `outside` times. Frames around the group represent them;
 /// their remains are removed again.
-Status group_union(const Contours& contours, std::uint32_t group_number, const Buffer<std::uint32_t>& group,
-                   std::int32_t outside, FillRule rule, Contours& out) {
+Status group_union(const Contours& contours, std::span<const Outline> outlines, std::uint32_t group_number,
+                   const Buffer<std::uint32_t>& group, std::int32_t outside, FillRule rule, Contours& out) {
   constexpr std::int64_t kAway = 1'000'000;
   Contours own;
   Point2 lo{INT32_MAX, INT32_MAX}, hi{INT32_MIN, INT32_MIN};
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     if (group[c] != group_number) continue;
     append(contours[c], false, own);
-    for (const Point2 p : contours[c]) {
-      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
-      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
-    }
+    lo = {std::min(lo.x, outlines[c].lo.x), std::min(lo.y, outlines[c].lo.y)};
+    hi = {std::max(hi.x, outlines[c].hi.x), std::max(hi.y, outlines[c].hi.y)};
   }
   const auto within = [](std::int64_t v) { return static_cast<Nm>(std::clamp<std::int64_t>(v, INT32_MIN, INT32_MAX)); };
   const Point2 a{within(lo.x - kAway), within(lo.y - kAway)}, b{within(hi.x + kAway), within(hi.y + kAway)};
@@ -202,7 +200,7 @@ Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::
       if (group[c] == kNoContact) {
         if (const int turn = turn_of(c); turn != 0) append(contours[c], turn < 0, out);
       } else if (group[c] == c) {
-        if (Status status = group_union(contours, c, group, outside[c], rule, out); !status) return status.error();
+        if (Status status = group_union(contours, outlines, c, group, outside[c], rule, out); !status) return status.error();
         ++merged;
       }
     }
