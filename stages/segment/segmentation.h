@@ -64,20 +64,21 @@ struct Segmentation {
   }
 };
 
+/// Absent widths, speeds and spacings come from the calibration, in proportion to the bead.
+/// bead_mm  width of the filling's beads, > 0
+/// errors   of check(): kUsage, one line that begins with the key's name
+Result<Segmentation> resolve(const SegmentSettings& settings, const Calibration& calibration, double bead_mm);
+
+/// Centre-to-centre distances, mm, from each line to the next, in turn from line 0.
+/// first  number of a segmented line
+std::vector<double> line_distances(const Segmentation& segmentation, std::int32_t first);
+
 /// Whether it can be deposited. errors  kUsage, one line that begins with the key's name (as in [segment])
 Status check(const Segmentation& segmentation, double bead_width_mm);
 
 /// What a user should know, of the code "pores": a pore that closes, speeds outside of what was measured, beads that do not
 /// touch.
 std::vector<Warning> warnings(const Segmentation& segmentation, const Calibration& calibration);
-
-/// A pore between a thin stretch and the continuous line next to it.
-struct Pores {
-  double length_mm, width_mm;
-  double aspect;       // width / length
-  double density_mm2;  // pores in a mm2 of a layer: two at each thin stretch
-};
-Pores predict_pores(const Segmentation& segmentation);
 
 /// Beads that are no further apart than this, mm, bond: they spread by as much.
 inline constexpr double kBondGap = 0.02;
@@ -103,13 +104,12 @@ inline PoreSize pore_geometry(const PoreBeads& beads, double length, double dist
   return {length - beads.thick, distance - (beads.thin + beads.other) / 2, distance - (beads.thick + beads.other) / 2};
 }
 
-/// Absent widths, speeds and spacings come from the calibration, in proportion to the bead.
-/// bead_mm  width of the filling's beads, > 0
-/// errors   of check(): kUsage, one line that begins with the key's name
-Result<Segmentation> resolve(const SegmentSettings& settings, const Calibration& calibration, double bead_mm);
-
-/// Centre-to-centre distances, mm, from each line to the next, in turn from line 0.
-/// first  number of a segmented line
-std::vector<double> line_distances(const Segmentation& segmentation, std::int32_t first);
+/// A pore between a thin stretch and the continuous line next to it.
+struct Pores {
+  double length_mm, width_mm;
+  double aspect;       // width / length
+  double density_mm2;  // pores in a mm2 of a layer: two at each thin stretch
+};
+Pores predict_pores(const Segmentation& segmentation);
 
 }  // namespace lamina::segment

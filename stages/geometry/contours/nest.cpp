@@ -18,7 +18,7 @@ struct Outline {
   Point2 lo{INT32_MAX, INT32_MAX}, hi{INT32_MIN, INT32_MIN};
   Point2 leftmost{};        // the lowest of these
   bool turns_left = false;  // there: a simple contour does so as on the whole
-  bool outer = false;       // the same, but the tip of a spike does not decide
+  bool outer = false;       // the same; where that is the tip of a spike, by its area
 };
 
 Outline outline_of(std::span<const Point2> points) {
