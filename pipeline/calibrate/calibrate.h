@@ -12,7 +12,7 @@
 
 namespace lamina::pipeline {
 
-/// The empty widths.csv (stages/segment/widths_table.h): one row per line of the pieces.
+/// The empty widths.csv (stages/segment/pieces.h): one row per line of the pieces.
 std::string widths_text(const segment::PieceRequest& request);
 
 struct CalibrationRequest {
