@@ -8,7 +8,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
 #include "stages/formats/stl/mesh_stl.h"
-#include "stages/segment/widths_table.h"
+#include "stages/segment/pieces.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/number_text.h"

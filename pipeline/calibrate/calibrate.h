@@ -8,12 +8,11 @@
 
 #include "pipeline/machine/profiles.h"
 #include "stages/data/status.h"
-#include "stages/segment/measured.h"
 #include "stages/segment/pieces.h"
 
 namespace lamina::pipeline {
 
-/// The empty widths.csv (stages/segment/widths_table.h): one row per line of the pieces.
+/// The empty widths.csv (stages/segment/pieces.h): one row per line of the pieces.
 std::string widths_text(const segment::PieceRequest& request);
 
 struct CalibrationRequest {

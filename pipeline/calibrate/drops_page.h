@@ -4,7 +4,7 @@
 #include <string>
 
 #include "stages/data/plot.h"
-#include "stages/segment/samples.h"
+#include "stages/segment/permeability.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {

@@ -15,7 +15,7 @@
 #include "stages/data/status.h"
 #include "stages/heights/settings.h"
 #include "stages/infill/settings.h"
-#include "stages/segment/settings.h"
+#include "stages/segment/segmentation.h"
 #include "stages/support/text/changes.h"
 
 namespace lamina {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/segment/expand.h"
-#include "stages/segment/predict.h"
+#include "stages/segment/cut.h"
+#include "stages/segment/segmentation.h"
 
 namespace lamina::pipeline {
 namespace {

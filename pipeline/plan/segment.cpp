@@ -8,7 +8,7 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/infill/layout.h"
-#include "stages/segment/resolve.h"
+#include "stages/segment/segmentation.h"
 #include "stages/support/text/number_text.h"
 
 namespace lamina::pipeline {

@@ -12,9 +12,8 @@
 #include "stages/data/status.h"
 #include "stages/infill/parameters.h"
 #include "stages/segment/calibration.h"
-#include "stages/segment/expand.h"
-#include "stages/segment/layer_cut.h"
-#include "stages/segment/predict.h"
+#include "stages/segment/cut.h"
+#include "stages/segment/segmentation.h"
 
 namespace lamina::pipeline {
 

@@ -10,7 +10,7 @@
 #include "pipeline/pores/forward_run.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
-#include "stages/segment/design/gradient.h"
+#include "stages/segment/design.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {

@@ -8,7 +8,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/pores/predict_flow.h"
 #include "stages/data/status.h"
-#include "stages/segment/predict.h"
+#include "stages/segment/segmentation.h"
 
 namespace lamina::pipeline {
 

@@ -11,7 +11,7 @@
 #include "pipeline/pores/pore_page.h"
 #include "stages/formats/plot/plot.h"
 #include "stages/pores/passages.h"
-#include "stages/segment/pore_geometry.h"
+#include "stages/segment/segmentation.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {

@@ -14,7 +14,6 @@
 #include "stages/bead/even_starts.h"
 #include "stages/formats/extrusion_format.h"
 #include "stages/infill/skirt.h"
-#include "stages/segment/deposited/pores.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {

@@ -13,6 +13,10 @@ inline constexpr std::int64_t kNmPerMm = 1'000'000;
 inline constexpr std::int64_t kNmPerInch = 25'400'000;
 inline constexpr std::int64_t kNmReach = 2'147'483'647;
 
+/// An angle in millionths of a degree; 0 is +x, anticlockwise. Directions on the bed are whole ones.
+using MicroDegrees = std::int64_t;
+inline constexpr MicroDegrees kTurn = 360'000'000;
+
 /// Millimetres of a length in nanometres; for reports, never for decisions.
 constexpr double mm(std::int64_t nm) { return static_cast<double>(nm) / kNmPerMm; }
 

@@ -5,6 +5,16 @@
 #include <cstring>
 
 namespace lamina {
+namespace {
+
+std::uint64_t load_word(const std::byte* at, std::size_t bytes) {
+  std::uint64_t word = 0;
+  std::memcpy(&word, at, bytes);
+  if constexpr (std::endian::native == std::endian::little) word = __builtin_bswap64(word);
+  return word;
+}
+
+}  // namespace
 
 void expand_row(std::span<const std::uint32_t> change, std::span<std::byte> row) {
   std::byte* const bytes = row.data();
@@ -23,17 +33,6 @@ void expand_row(std::span<const std::uint32_t> change, std::span<std::byte> row)
     std::memset(bytes + first_byte + 1, 0xFF, last_byte - first_byte - 1);
   }
 }
-
-namespace {
-
-std::uint64_t load_word(const std::byte* at, std::size_t bytes) {
-  std::uint64_t word = 0;
-  std::memcpy(&word, at, bytes);
-  if constexpr (std::endian::native == std::endian::little) word = __builtin_bswap64(word);
-  return word;
-}
-
-}  // namespace
 
 RunsBuilder::RunsBuilder(std::uint32_t columns) {
   runs_.columns = columns;

@@ -10,21 +10,11 @@
 
 namespace lamina {
 
-/// How the corners of an offset that open outwards are made.
-enum class OffsetJoin : std::uint8_t {
-  kMiter,  // sharp, up to twice the distance from the corner, then cut off
-  kRound   // an arc, off by at most 1 micrometre
-};
-
 /// The region that `contours`, of any orientation and overlap, mean by `rule`, as clean contours, each outer one
 /// followed by its holes.
 /// errors  kInternal if Clipper refuses the contours
 /// cost    O((P + X) log P) for P points and X crossings
 Result<Contours> contour_union(const ContoursView& contours, FillRule rule);
-
-/// The region that curves, which may cross themselves, go round counter-clockwise more often than clockwise. As contour_union
-/// in less time, but contours of the result may touch at corners.
-Result<Contours> curve_union(const ContoursView& curves);
 
 /// The region of clean contours less that of others, which may overlap each other: where they share an edge nothing is
 /// left of it. In the order of contour_union.
@@ -34,10 +24,14 @@ Result<Contours> subtract_contours(const ContoursView& contours, const ContoursV
 /// The region that two sets of clean contours share. As subtract_contours.
 Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other);
 
-/// The region of clean contours grown by `distance` nm, shrunk where it is negative, as clean contours; pieces that
-/// shrink away are gone. Contours keep their distance to within 1 nm of rounding where they are straight.
-/// errors  kInternal if Clipper refuses the contours
-Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance, OffsetJoin join = OffsetJoin::kMiter);
+/// The region of clean contours grown by `distance` nm, shrunk where it is negative, as clean contours, each outer one followed
+/// by its holes; pieces that shrink away are gone. Straight edges keep their distance to within 1 nm of rounding. Corners that
+/// open are sharp up to twice the distance from the corner, and beyond cut off square at the distance.
+///
+/// contours  each outer one followed by the holes in it
+/// errors    kInternal if Clipper refuses them
+/// cost      O(P) for P points where no edge vanishes; else O((P + X) log P) for an outer contour and its holes, X crossings
+Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance);
 
 /// The pieces of open lines that lie within clean contours, in any order and direction.
 /// lines   each of two points or more; not closed

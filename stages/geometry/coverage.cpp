@@ -4,7 +4,6 @@
 #include <vector>
 
 namespace lamina {
-
 namespace {
 
 /// Image: RunsView or LevelsView; row  begin and end of each run of a row
@@ -26,25 +25,6 @@ std::span<const std::uint32_t> runs_of(const LevelsView& levels, std::uint32_t r
   const std::size_t first = levels.row_offset[row], last = levels.row_offset[row + 1];
   return levels.change.subspan(2 * first, 2 * (last - first));
 }
-
-}  // namespace
-
-PixelWindow window_of(const RunsView& runs) {
-  return window_of_rows(runs, [&](std::uint32_t r) { return runs.row(r); });
-}
-
-PixelWindow window_of(const LevelsView& levels) {
-  return window_of_rows(levels, [&](std::uint32_t r) { return runs_of(levels, r); });
-}
-
-PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
-  if (one.empty()) return other;
-  if (other.empty()) return one;
-  return {std::min(one.left, other.left), std::max(one.right, other.right), std::min(one.top, other.top),
-          std::max(one.bottom, other.bottom)};
-}
-
-namespace {
 
 /// One row of results. Lengths along x are in units of 1 / columns of a pixel, so that a pixel is `columns` units and a
 /// part is `window.width()` units, whole numbers both.
@@ -123,6 +103,21 @@ void fill_parts(const PixelWindow& window, std::uint32_t columns, std::uint64_t 
 
 }  // namespace
 
+PixelWindow window_of(const RunsView& runs) {
+  return window_of_rows(runs, [&](std::uint32_t r) { return runs.row(r); });
+}
+
+PixelWindow window_of(const LevelsView& levels) {
+  return window_of_rows(levels, [&](std::uint32_t r) { return runs_of(levels, r); });
+}
+
+PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
+  if (one.empty()) return other;
+  if (other.empty()) return one;
+  return {std::min(one.left, other.left), std::max(one.right, other.right), std::min(one.top, other.top),
+          std::max(one.bottom, other.bottom)};
+}
+
 void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
   fill_parts(window, columns, 1, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
     part_row.add(runs.row(r), weight, [](std::size_t) { return std::uint64_t{1}; });
@@ -130,7 +125,7 @@ void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t
 }
 
 void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
-              std::span<std::uint8_t> result) {
+                  std::span<std::uint8_t> result) {
   fill_parts(window, columns, full, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
     const std::uint8_t* level = levels.level.data() + levels.row_offset[r];
     part_row.add(runs_of(levels, r), weight, [&](std::size_t run) { return std::uint64_t{level[run]}; });

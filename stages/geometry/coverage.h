@@ -36,6 +36,6 @@ void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t
 /// The same of levels, each pixel set by its share: 255 where all have the level `full` (no pixel has more), and the mean of
 /// shares where they differ. Of one level it is what the runs are.
 void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
-              std::span<std::uint8_t> result);
+                  std::span<std::uint8_t> result);
 
 }  // namespace lamina

@@ -29,17 +29,18 @@ const char* cap() {
   return value;
 }
 
-}  // namespace
-
-std::string_view isa_name(Isa isa) { return kNames[static_cast<std::size_t>(isa)]; }
-
+/// `isa`, or what a name caps it to.
 Isa capped_isa(Isa isa, const char* cap) {
   if (cap == nullptr) return isa;
   for (Isa named : {Isa::kPlain, Isa::kAvx2}) {
-    if (isa_name(named) == cap) return std::min(isa, named);
+    if (kNames[static_cast<std::size_t>(named)] == cap) return std::min(isa, named);
   }
   return isa;
 }
+
+}  // namespace
+
+std::string_view isa_name(Isa isa) { return kNames[static_cast<std::size_t>(isa)]; }
 
 Isa widest_isa() {
   static const Isa isa = capped_isa(of_processor(), cap());

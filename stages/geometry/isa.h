@@ -17,9 +17,6 @@ std::string_view isa_name(Isa isa);
 /// kAvx2 means AVX2, BMI 1 and 2 and POPCNT; kAvx512 these and AVX-512 F, BW, DQ and VL.
 Isa widest_isa();
 
-/// `isa`, or what a name as above caps it to; nullptr and other texts cap nothing.
-Isa capped_isa(Isa isa, const char* cap);
-
 /// `wanted`, or the widest where that is kAuto or more than the processor has.
 Isa limited_isa(Isa wanted);
 
@@ -27,7 +24,7 @@ Isa limited_isa(Isa wanted);
 /// errors  kUsage if the processor does not have it, or LAMINA_ISA does not allow it
 Result<Isa> usable_isa(Isa wanted);
 
-/// The same for a processor and a value of LAMINA_ISA; nullptr: it is not set.
+/// The same for a processor and a value of LAMINA_ISA: nullptr and texts that are no name cap nothing.
 Result<Isa> usable_isa(Isa wanted, Isa of_processor, const char* cap);
 
 }  // namespace lamina

@@ -12,7 +12,6 @@
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/units.h"
-#include "stages/geometry/angle.h"
 #include "stages/infill/settings.h"
 
 namespace lamina::infill {

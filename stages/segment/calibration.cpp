@@ -25,23 +25,18 @@ Reading interpolate(std::span<const Mark> marks, double x) {
   return {marks.back().y, x <= marks.back().x};
 }
 
-std::vector<Mark> thin_by_speed(const Calibration& calibration) {
-  std::vector<Mark> marks{{100, calibration.width_mm}};
-  for (const auto& row : calibration.by_speed) marks.push_back({row.percent, row.thin_mm});
+/// Marks of a table, in the order of its rows.
+template <class Row>
+std::vector<Mark> marks_of(const std::vector<Row>& rows, double Row::*x, double Row::*y) {
+  std::vector<Mark> marks;
+  for (const Row& row : rows) marks.push_back({row.*x, row.*y});
   return marks;
 }
 
-std::vector<Mark> thin_by_extrusion(const Calibration& calibration) {
-  std::vector<Mark> marks;
-  for (const auto& row : calibration.by_extrusion) marks.insert(marks.begin(), {row.percent, row.thin_mm});
-  marks.push_back({100, calibration.width_mm});
-  return marks;
-}
-
-template <class Member>
-std::vector<Mark> of_repeated(const Calibration& calibration, Member member) {
-  std::vector<Mark> marks;
-  for (const auto& row : calibration.repeated) marks.push_back({row.extrusion_percent, row.*member});
+/// Of increasing speeds, from 100 % on.
+std::vector<Mark> marks_by_speed(const Calibration& calibration, double at_100, double Calibration::BySpeed::*y) {
+  std::vector<Mark> marks = marks_of(calibration.by_speed, &Calibration::BySpeed::percent, y);
+  marks.insert(marks.begin(), {100, at_100});
   return marks;
 }
 
@@ -116,34 +111,37 @@ Status check(const Calibration& calibration) {
 }
 
 Reading thin_width_at_speed(const Calibration& calibration, double percent) {
-  return interpolate(thin_by_speed(calibration), percent);
+  return interpolate(marks_by_speed(calibration, calibration.width_mm, &Calibration::BySpeed::thin_mm), percent);
 }
 
 Reading stable_distance(const Calibration& calibration, double percent) {
-  std::vector<Mark> marks{{100, 0}};
-  for (const auto& row : calibration.by_speed) marks.push_back({row.percent, row.stable_mm});
-  return interpolate(marks, percent);
+  return interpolate(marks_by_speed(calibration, 0, &Calibration::BySpeed::stable_mm), percent);
 }
 
 Reading thin_width_at_extrusion(const Calibration& calibration, double percent) {
-  return interpolate(thin_by_extrusion(calibration), percent);
+  using Row = Calibration::ByExtrusion;
+  std::vector<Mark> marks = marks_of(calibration.by_extrusion, &Row::percent, &Row::thin_mm);
+  std::ranges::reverse(marks);
+  marks.push_back({100, calibration.width_mm});
+  return interpolate(marks, percent);
 }
 
 RepeatedReading repeated_at(const Calibration& calibration, double extrusion_percent) {
   using Row = Calibration::Repeated;
-  const auto at = [&](double Row::*member) { return interpolate(of_repeated(calibration, member), extrusion_percent); };
+  const auto at = [&](double Row::*value) {
+    return interpolate(marks_of(calibration.repeated, &Row::extrusion_percent, value), extrusion_percent);
+  };
   const Reading speed = at(&Row::thick_speed_percent);
   return {speed.value, at(&Row::thick_mm).value, at(&Row::thin_mm).value, at(&Row::continuous_mm).value, speed.inside};
 }
 
 std::optional<Spacing> settled_spacing(const Calibration& calibration, double extrusion_percent) {
+  using Row = Calibration::Spaced;
   if (calibration.spacing.empty()) return std::nullopt;
-  std::vector<Mark> segmented, continuous;
-  for (const auto& row : calibration.spacing) {
-    segmented.push_back({row.extrusion_percent, row.segmented_mm});
-    continuous.push_back({row.extrusion_percent, row.continuous_mm});
-  }
-  return Spacing{interpolate(segmented, extrusion_percent).value, interpolate(continuous, extrusion_percent).value};
+  const auto at = [&](double Row::*value) {
+    return interpolate(marks_of(calibration.spacing, &Row::extrusion_percent, value), extrusion_percent).value;
+  };
+  return Spacing{at(&Row::segmented_mm), at(&Row::continuous_mm)};
 }
 
 Spacing spacing_for(double thick_mm, double continuous_mm, double gap_mm) {

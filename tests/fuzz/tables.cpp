@@ -3,10 +3,8 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "stages/heights/evaluate.h"
-#include "stages/segment/flows.h"
-#include "stages/segment/measured.h"
-#include "stages/segment/samples.h"
-#include "stages/segment/widths_table.h"
+#include "stages/segment/permeability.h"
+#include "stages/segment/pieces.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -95,11 +93,9 @@ std::vector<std::string> flow_seeds() {
 
 const Registered kHeights(
     {"table_heights", read_heights, height_seeds, "stages/heights/evaluate stages/support/text", "", {}, 512});
-const Registered kWidths({"table_widths", read_widths, width_seeds,
-                          "stages/segment/widths_table stages/segment/measured stages/support/text", ".csv", "tables.dict",
-                          1024});
-const Registered kFlows({"table_flows", read_flows, flow_seeds,
-                         "stages/segment/flows stages/segment/permeability stages/segment/samples stages/support/text", ".csv",
+const Registered kWidths({"table_widths", read_widths, width_seeds, "stages/segment/pieces stages/support/text", ".csv",
+                          "tables.dict", 1024});
+const Registered kFlows({"table_flows", read_flows, flow_seeds, "stages/segment/permeability stages/support/text", ".csv",
                          "tables.dict", 1024});
 
 }  // namespace

@@ -57,6 +57,8 @@ Mesh mesh_of_list(const std::vector<Triangle>& triangles, std::uint32_t repaired
   return mesh;
 }
 
+std::shared_ptr<MeshBlocks> blocks_of(Mesh& mesh) { return take_blocks({&mesh, 1}).front(); }
+
 /// The triangles of clusters [begin, end), read in both ways; lanes beyond `count` have to be points within the cluster's box.
 std::vector<Triangle> triangles_in(const MeshBlocks& blocks, std::uint32_t begin, std::uint32_t end, std::uint32_t count) {
   std::vector<Triangle> all;
@@ -82,7 +84,7 @@ std::vector<Triangle> triangles_in(const MeshBlocks& blocks, std::uint32_t begin
 void expect_same_triangles(const std::vector<Triangle>& list, std::uint32_t own) {
   SCOPED_TRACE(std::to_string(list.size()) + " triangles, own: " + std::to_string(own));
   Mesh mesh = mesh_of_list(list, own);
-  const auto blocks = take_blocks(mesh);
+  const auto blocks = blocks_of(mesh);
   EXPECT_TRUE(mesh.triangles.empty());
   const auto count = static_cast<std::uint32_t>(list.size());
   own = std::min(own, count);
@@ -127,14 +129,14 @@ TEST(Blocks, OfRandomMeshesOverFewAndManyVerticesHoldTheSame) {
 TEST(Blocks, TakeTwentyBytesATriangleWithTheirBoxesWhereVerticesAreShared) {
   constexpr std::uint32_t kCount = 50'000;
   Mesh mesh = mesh_of_list(grid_of_facets(kCount));
-  const auto blocks = take_blocks(mesh);
+  const auto blocks = blocks_of(mesh);
   EXPECT_LT(blocks->bytes() + blocks->bounds_bytes(), 16 * kCount);
 }
 
 TEST(Blocks, FullOfDifferentVerticesTakeNoMoreThanTheList) {
   constexpr std::uint32_t kCount = 3 * kBlockSize;
   Mesh mesh = mesh_of_list(facets_apart(kCount));
-  const auto blocks = take_blocks(mesh);
+  const auto blocks = blocks_of(mesh);
   EXPECT_LE(blocks->bytes(), kCount * sizeof(Triangle) + 1024);
   EXPECT_EQ(blocks->cluster_count(), kCount / kClusterSize);
 }
@@ -145,7 +147,7 @@ TEST(Blocks, AreTheSameForEveryNumberOfThreads) {
   const auto made = [&](std::size_t threads) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
     Mesh mesh = mesh_of_list(list, 170'000);
-    return take_blocks(mesh);
+    return blocks_of(mesh);
   };
   const auto one = made(1), eight = made(8);
   const auto all = [](const MeshBlocks& blocks) { return triangles_in(blocks, 0, blocks.cluster_count(), UINT32_MAX); };
@@ -170,7 +172,7 @@ TEST(Blocks, OfManySmallMeshesAreThoseOfEachAloneAndHaveNoPagesOfTheirOwn) {
   EXPECT_LT(mappings(), before + 200);
   ASSERT_EQ(blocks.size(), meshes.size());
   for (std::size_t i = 0; i < meshes.size(); i += 25) {
-    const auto alone = take_blocks(again[i]);
+    const auto alone = blocks_of(again[i]);
     const auto all = [](const MeshBlocks& one) { return triangles_in(one, 0, one.cluster_count(), UINT32_MAX); };
     EXPECT_EQ(all(*blocks[i]), all(*alone)) << i;
     EXPECT_EQ(blocks[i]->bytes(), alone->bytes());
@@ -184,7 +186,7 @@ TEST(Blocks, AreOrderedByHeightSoThatAPlaneMeetsFewClusters) {
   std::vector<Triangle> list = grid_of_facets(kBlockSize);
   for (Triangle& t : list) t.a.z = t.b.z = t.c.z = static_cast<Nm>(random() % kHigh);
   Mesh mesh = mesh_of_list(list);
-  const auto blocks = take_blocks(mesh);
+  const auto blocks = blocks_of(mesh);
   std::int64_t heights = 0;
   for (const Box& box : blocks->bounds()) heights += box.height();
   EXPECT_LT(heights, 4 * kHigh) << "of 256 clusters, each of which is as high as all where there is no order";
@@ -262,7 +264,7 @@ TEST(Blocks, MoveAsAWhole) {
   const Point3 by{5, -7, 1'000'000};
   for (std::vector<Triangle> list : {grid_of_facets(5000), islands(5000)}) {
     Mesh mesh = mesh_of_list(list);
-    const auto blocks = take_blocks(mesh);
+    const auto blocks = blocks_of(mesh);
     blocks->shift(by);
     for (Triangle& t : list) {
       for (Point3* p : {&t.a, &t.b, &t.c}) *p = {p->x + by.x, p->y + by.y, p->z + by.z};
@@ -284,7 +286,7 @@ TEST(Blocks, PassOverNoFacetThatAPlaneCutsAndOverNearlyAllOthers) {
       a = std::exchange(b, c);
     }
     Mesh mesh = mesh_of_list(list);
-    const auto blocks = take_blocks(mesh);
+    const auto blocks = blocks_of(mesh);
     for (const Nm lift : {0, 12'345, -777}) {
       blocks->shift({0, 0, lift});
       std::size_t met = 0, cut = 0;
@@ -318,7 +320,7 @@ TEST(Blocks, NameEveryVertex) {
     Box expected, detected;
     for (const Triangle& t : list) expected.add(t.a), expected.add(t.b), expected.add(t.c);
     Mesh mesh = mesh_of_list(list);
-    mesh.blocks = take_blocks(mesh);
+    mesh.blocks = blocks_of(mesh);
     std::size_t vertices = 0;
     each_vertex(mesh, [&](const Point3& p) { detected.add(p), ++vertices; });
     EXPECT_EQ(detected.lo, expected.lo);

@@ -5,7 +5,7 @@
 
 #include "stages/geometry/bead_section.h"
 #include "stages/segment/calibration.h"
-#include "stages/segment/predict.h"
+#include "stages/segment/segmentation.h"
 #include "tests/segment/table.h"
 
 namespace lamina::segment {

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "stages/segment/cut.h"
-#include "stages/segment/expand.h"
 
 namespace lamina::segment {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "stages/segment/design/search.h"
+#include "stages/segment/design.h"
 #include "tests/segment/slow_printer.h"
 
 namespace lamina::segment {
@@ -16,6 +16,11 @@ DesignLimits limits() {
   const auto found = DesignLimits::of(test::slow_printer(), anet_a8_calibration());
   EXPECT_TRUE(found.ok());
   return *found;
+}
+
+Result<Segmentation> plan_of(const Choice& choice) {
+  const DesignLimits bounds = limits();
+  return bounds.plan_of(bounds.settings_of(choice));
 }
 
 PoreTarget porous(double porosity, double darcy) {
@@ -79,7 +84,7 @@ TEST(SlotModel, CuspsAreVoidThatLeadsNowhere) {
 
 TEST(SlotModel, WiderAndLongerPoresLetMoreThrough) {
   const auto through = [](double gap, double thin, double thick) {
-    const auto plan = limits().plan_of(limits().nearest({1, 100, thick, thin, gap}));
+    const auto plan = plan_of(limits().nearest({1, 100, thick, thin, gap}));
     EXPECT_TRUE(plan.ok());
     return slots_of(*plan, 0.3);
   };
@@ -97,7 +102,7 @@ TEST(DesignLimits, WhatIsRequestedIsBroughtWithinThem) {
   for (const double extrusion : {20.0, 90.0, 300.0}) {
     for (const double far : {-50.0, 50.0}) {
       const Choice choice = limits().nearest({far > 0 ? 9u : 0u, extrusion, far, far, far});
-      const auto plan = limits().plan_of(choice);
+      const auto plan = plan_of(choice);
       ASSERT_TRUE(plan.ok()) << plan.error().message;
       EXPECT_TRUE(warnings(*plan, anet_a8_calibration()).empty()) << extrusion << " " << far;
     }
@@ -135,7 +140,7 @@ TEST(DesignSearch, TargetsWithinTheTablesAreMet) {
 }
 
 TEST(DesignSearch, OfManyTheOneThatWasMeasuredIsTaken) {
-  const auto measured = limits().plan_of({1, 100, 1.5, 1.5, 0.01});
+  const auto measured = plan_of({1, 100, 1.5, 1.5, 0.01});
   ASSERT_TRUE(measured.ok());
   const Slots slots = slots_of(limits().deposited(*measured), 0.3);
   PoreTarget target;
@@ -163,7 +168,7 @@ TEST(DesignSearch, WhatCannotBeReachedIsApproached) {
   for (const double thin : {1.2, 1.8, 2.2})
     for (const double gap : {-0.01, 0.0, 0.018})
       for (const double extrusion : {75.0, 110.0, 125.0})
-        EXPECT_LE(slots_of(limits().deposited(*limits().plan_of(limits().nearest({1, extrusion, 1, thin, gap}))), 0.3).porosity,
+        EXPECT_LE(slots_of(limits().deposited(*plan_of(limits().nearest({1, extrusion, 1, thin, gap}))), 0.3).porosity,
                   maximum.slots.porosity + 1e-4);
   const Design far = search(porous(0, 1e5), limits(), {});
   EXPECT_GT(far.miss, 0.5);

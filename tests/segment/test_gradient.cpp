@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "stages/segment/calibration.h"
-#include "stages/segment/design/gradient.h"
+#include "stages/segment/design.h"
 #include "stages/segment/permeability.h"
 #include "tests/segment/slow_printer.h"
 

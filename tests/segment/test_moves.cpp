@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "stages/geometry/bead_section.h"
-#include "stages/segment/layer_cut.h"
+#include "stages/segment/cut.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::segment {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/segment/flows.h"
 #include "stages/segment/permeability.h"
 #include "tests/segment/table.h"
 

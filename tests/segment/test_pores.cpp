@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "stages/segment/deposited/pores.h"
-#include "stages/segment/layer_cut.h"
-#include "stages/segment/pore_geometry.h"
+#include "stages/segment/cut.h"
+#include "stages/segment/moves.h"
+#include "stages/segment/segmentation.h"
 
 namespace lamina::segment {
 namespace {

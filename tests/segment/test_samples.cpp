@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "stages/segment/samples.h"
+#include "stages/segment/permeability.h"
 #include "tests/segment/table.h"
 
 namespace lamina::segment {

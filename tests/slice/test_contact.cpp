@@ -74,7 +74,7 @@ TEST(ContactGroups, AreThoseOfAllPairsOfEdgesForSmoothRoughAndTouchingContours) 
     const auto expected = groups_of(contours);
     ASSERT_EQ(std::vector<std::uint32_t>(group.begin(), group.end()), expected) << "turn " << turn;
     ASSERT_EQ(any, std::ranges::any_of(expected, [](std::uint32_t g) { return g != kNoContact; }));
-    (find_monotone_contacts(contours, scratch.monotone) ? by_halving : by_grid) += 1;
+    (find_monotone_contacts(contours, scratch) ? by_halving : by_grid) += 1;
     apart += any ? 0 : 1;
   }
   EXPECT_GT(by_halving, 100);

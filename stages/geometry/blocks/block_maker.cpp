@@ -73,6 +73,33 @@ std::uint32_t step_shift(std::uint64_t heights, std::size_t clusters) {
   return static_cast<std::uint32_t>(std::max(0, static_cast<int>(std::bit_width(mean)) - 5));
 }
 
+using Makers = tbb::enumerable_thread_specific<std::unique_ptr<BlockMaker>>;
+
+std::shared_ptr<MeshBlocks> take_blocks_of(Mesh& mesh, Makers& makers) {
+  if (mesh.blocks) return std::move(mesh.blocks);
+  const auto total = static_cast<std::uint32_t>(mesh.triangles.size()), own = std::min(mesh.repaired_from, total);
+  Buffer<Triangle> list = std::move(mesh.triangles);
+  mesh.triangles = {};
+  auto blocks = std::make_shared<MeshBlocks>(own, total - own);
+  constexpr std::uint32_t kTogether = 16;  // blocks, 2.25 MiB of the list
+  tbb::parallel_for(
+      tbb::blocked_range<std::uint32_t>(0, blocks->block_count(), kTogether),
+      [&](const tbb::blocked_range<std::uint32_t>& range) {
+        BlockMaker& maker = *makers.local();
+        Triangle* const begin = list.data() + blocks->first_triangle(range.begin());
+        Triangle* end = begin;
+        for (std::uint32_t b = range.begin(); b != range.end(); ++b) {
+          const std::uint32_t count = blocks->triangles_in(b);
+          maker.make({end, count}, *blocks, b);
+          end += count;
+        }
+        if (blocks->block_count() > kTogether) forget_pages(begin, end);
+      },
+      tbb::simple_partitioner());
+  blocks->seal();
+  return blocks;
+}
+
 }  // namespace
 
 SortedBlock& BlockMaker::sort(std::span<const Triangle> triangles, const MeshBlocks& mesh, std::uint32_t block) {
@@ -110,46 +137,11 @@ void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std
   store(mesh, block);
 }
 
-namespace {
-
-using Makers = tbb::enumerable_thread_specific<std::unique_ptr<BlockMaker>>;
-
-std::shared_ptr<MeshBlocks> take_blocks_of(Mesh& mesh, Makers& makers) {
-  if (mesh.blocks) return std::move(mesh.blocks);
-  const auto total = static_cast<std::uint32_t>(mesh.triangles.size()), own = std::min(mesh.repaired_from, total);
-  Buffer<Triangle> list = std::move(mesh.triangles);
-  mesh.triangles = {};
-  auto blocks = std::make_shared<MeshBlocks>(own, total - own);
-  constexpr std::uint32_t kTogether = 16;  // blocks, 2.25 MiB of the list
-  tbb::parallel_for(
-      tbb::blocked_range<std::uint32_t>(0, blocks->block_count(), kTogether),
-      [&](const tbb::blocked_range<std::uint32_t>& range) {
-        BlockMaker& maker = *makers.local();
-        Triangle* const begin = list.data() + blocks->first_triangle(range.begin());
-        Triangle* end = begin;
-        for (std::uint32_t b = range.begin(); b != range.end(); ++b) {
-          const std::uint32_t count = blocks->triangles_in(b);
-          maker.make({end, count}, *blocks, b);
-          end += count;
-        }
-        if (blocks->block_count() > kTogether) forget_pages(begin, end);
-      },
-      tbb::simple_partitioner());
-  blocks->seal();
-  return blocks;
-}
-
-}  // namespace
-
 std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes, Isa isa) {
   std::vector<std::shared_ptr<MeshBlocks>> blocks(meshes.size());
   Makers makers([isa] { return std::make_unique<BlockMaker>(isa); });
   tbb::parallel_for(std::size_t{0}, meshes.size(), [&](std::size_t i) { blocks[i] = take_blocks_of(meshes[i], makers); });
   return blocks;
-}
-
-std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh, Isa isa) {
-  return std::move(take_blocks(std::span(&mesh, 1), isa).front());
 }
 
 }  // namespace lamina

@@ -9,7 +9,6 @@
 
 #include "stages/geometry/blocks/kernels/kernels.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
-#include "stages/geometry/blocks/sorted_block.h"
 #include "stages/geometry/isa.h"
 
 namespace lamina {
@@ -62,12 +61,9 @@ class BlockMaker {
   std::array<std::uint16_t, kBlockSize> order_;
 };
 
-/// Takes the triangles out of a mesh and makes blocks of them; a mesh that has blocks already gives these. The list's
-/// memory goes back to the system while blocks are made.
+/// Takes the triangles out of meshes and makes blocks of each; a mesh that has blocks already gives these. Meshes of few
+/// triangles are worked on by one thread each, at once. The lists' memory goes back to the system while blocks are made.
 /// cost  O(T), parallel; no more memory than the list and a block a thread
-std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh, Isa isa = Isa::kAuto);
-
-/// The same of many meshes at once: those of few triangles by one thread each.
 std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes, Isa isa = Isa::kAuto);
 
 }  // namespace lamina

@@ -1,16 +1,69 @@
-// stages/geometry/blocks/mesh_blocks.h: a mesh as blocks of triangles whose vertices are stored once.
+// stages/geometry/blocks/mesh_blocks.h: a mesh as blocks of triangles whose vertices are stored once, in clusters of 16
+// neighbouring ones: the shape that every kernel reads.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
-#include "stages/geometry/blocks/cluster.h"
 #include "stages/geometry/blocks/pages.h"
 
 namespace lamina {
+
+inline constexpr std::uint32_t kClusterSize = 16;
+/// Triangles that are ordered and stored together: neighbours of a file's order, 144 KiB, which fits a core's cache.
+inline constexpr std::uint32_t kBlockSize = 4096;
+
+/// 16 triangles, coordinate by coordinate, so that one plane is compared with 16 facets at a time. Corner k of
+/// triangle i is (x[k][i], y[k][i], z[k][i]), nm, frame of the mesh. Unused lanes hold a point, which no plane crosses.
+struct alignas(16) Cluster {
+  Nm z[3][kClusterSize];
+  Nm y[3][kClusterSize];
+  Nm x[3][kClusterSize];
+
+  Triangle triangle(std::uint32_t lane) const {
+    return {{x[0][lane], y[0][lane], z[0][lane]}, {x[1][lane], y[1][lane], z[1][lane]}, {x[2][lane], y[2][lane], z[2][lane]}};
+  }
+};
+static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
+
+/// The heights that the 16 triangles of a cluster reach, in steps that their block defines, modulo 256: enough to skip nearly
+/// all triangles that a plane does not cut, without reading any vertex.
+struct FacetSteps {
+  std::uint8_t low[kClusterSize];   // the step of the lowest corner
+  std::uint8_t span[kClusterSize];  // steps from there to the one 1 nm below the highest corner, or 255: any plane may cut it
+};
+
+/// 16 triangles as numbers of vertices in the table of their block: corner k of triangle i is vertex corner[k][i].
+struct alignas(64) IndexedCluster {
+  FacetSteps steps;
+  std::uint16_t corner[3][kClusterSize];
+};
+static_assert(sizeof(IndexedCluster) == 128);
+
+/// Writes all corners of an indexed cluster. 4 bytes behind the last vertex of the table must be readable.
+void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out);
+
+/// A block while it is made: at most kBlockSize triangles as clusters in the order in which they will be stored, and a hash of
+/// each corner: what each step of making a block reads from a core's cache, coordinate by coordinate. Unused lanes of the last
+/// cluster hold the first corner of the last triangle. 168 KiB.
+struct alignas(64) SortedBlock {
+  static constexpr std::uint32_t kCorners = 3 * kClusterSize;  // of a cluster; corner k of triangle i is k * kClusterSize + i
+
+  std::array<Cluster, kBlockSize / kClusterSize> cluster;
+  std::array<std::uint16_t, 3 * kBlockSize> hash;  // cluster by cluster; equal where vertices are
+  std::uint32_t triangles = 0;
+
+  std::uint32_t clusters() const { return (triangles + kClusterSize - 1) / kClusterSize; }
+
+  /// Takes at least one triangle; order[i] is the i-th of them.
+  void take(std::span<const Triangle> list, std::span<const std::uint16_t> order);
+  /// Hashes by itself, where no caller does.
+  void hash_corners();
+};
 
 /// Triangles in clusters of 16, 256 clusters a block. A block holds each of its vertices once, 12 bytes, and three numbers of
 /// 16 bits and two of 8 a triangle: 14 to 26 bytes a triangle. A block with more than 1.5 vertices a triangle, of a file in

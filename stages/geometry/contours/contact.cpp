@@ -7,11 +7,9 @@
 namespace lamina {
 namespace {
 
-int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
-
 class ContactSearch {
  public:
-  ContactSearch(const ContoursView& contours, MonotoneScratch& scratch)
+  ContactSearch(const ContoursView& contours, ContactScratch& scratch)
       : contours_(contours),
         scratch_(scratch),
         max_chains_(32 + contours.point.size() / 6),
@@ -104,18 +102,10 @@ class ContactSearch {
   }
 
   const ContoursView& contours_;
-  MonotoneScratch& scratch_;
+  ContactScratch& scratch_;
   std::size_t max_chains_;
   std::int64_t comparisons_left_;
 };
-
-}  // namespace
-
-bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch) {
-  return ContactSearch(contours, scratch).run();
-}
-
-namespace {
 
 /// Square cells of 2^shift nm over the box of all points.
 struct CellGrid {
@@ -177,6 +167,10 @@ CellGrid make_grid(const ContoursView& contours) {
 
 }  // namespace
 
+bool find_monotone_contacts(const ContoursView& contours, ContactScratch& scratch) {
+  return ContactSearch(contours, scratch).run();
+}
+
 bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group) {
   group.assign(contours.size(), kNoContact);
   if (contours.size() == 0) return false;
@@ -197,10 +191,10 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
       if (group[c] != kNoContact) group[c] = root_of(c);
     }
   };
-  if (find_monotone_contacts(contours, scratch.monotone)) {
-    for (const auto& [a, b] : scratch.monotone.contact) join(a, b);
+  if (find_monotone_contacts(contours, scratch)) {
+    for (const auto& [a, b] : scratch.contact) join(a, b);
     number_groups();
-    return !scratch.monotone.contact.empty();
+    return !scratch.contact.empty();
   }
   scratch.next.resize(point.size());
   scratch.contour.resize(point.size());

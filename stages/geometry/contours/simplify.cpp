@@ -14,10 +14,6 @@ namespace {
 
 using UInt128 = unsigned __int128;
 
-std::int64_t area_of(Point2 a, Point2 b, Point2 c) {
-  return (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
-}
-
 /// floor(sqrt(value)) for value < 2^124.
 std::int64_t root(UInt128 value) {
   auto guess = static_cast<UInt128>(std::sqrt(static_cast<double>(value)));
@@ -73,10 +69,7 @@ class Ring {
     kept_[low] = kept_[high] = 1;
     split(low, high > low ? high : high + points_.size());
     split(high, low > high ? low : low + points_.size());
-    scratch_.index.clear();
-    for (std::uint32_t i = 0; i < points_.size(); ++i) {
-      if (kept_[i] != 0) scratch_.index.push_back(i);
-    }
+    collect();
     thin_out();
     return encloses();
   }
@@ -110,6 +103,13 @@ class Ring {
       scratch_.open.emplace_back(furthest, last);
     }
     scratch_.inspections += inspected;
+  }
+
+  void collect() {
+    scratch_.index.clear();
+    for (std::uint32_t i = 0; i < points_.size(); ++i) {
+      if (kept_[i] != 0) scratch_.index.push_back(i);
+    }
   }
 
   /// Whether one stretch may stand for the two at `middle`.
@@ -149,10 +149,7 @@ class Ring {
   }
 
   bool encloses() {
-    scratch_.index.clear();
-    for (std::uint32_t i = 0; i < points_.size(); ++i) {
-      if (kept_[i] != 0) scratch_.index.push_back(i);
-    }
+    collect();
     const auto& index = scratch_.index;
     const std::size_t count = index.size();
     if (count < 3) return false;
@@ -160,7 +157,7 @@ class Ring {
     for (std::size_t k = 0; k < count; ++k) {
       const Point2 a = points_[index[k]], b = points_[index[k + 1 < count ? k + 1 : 0]];
       const Point2 c = points_[index[k + 2 < count ? k + 2 : k + 2 - count]];
-      if (area_of(a, b, c) == 0) return false;  // a spike: neighbours in contact are not searched
+      if (doubled_area(a, b, c) == 0) return false;  // a spike: neighbours in contact are not searched
       area += static_cast<__int128>(a.x) * b.y - static_cast<__int128>(b.x) * a.y;
     }
     const __int128 full = doubled_area(points_);
@@ -223,14 +220,6 @@ struct EdgeVector {
 EdgeVector from_to(Point2 a, Point2 b) { return {static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y}; }
 double cross(EdgeVector a, EdgeVector b) { return a.x * b.y - a.y * b.x; }
 
-/// nm from a point to the nearest one of a stretch.
-double apart(Point2 p, Point2 a, Point2 b) {
-  const EdgeVector u = from_to(a, b), v = from_to(a, p);
-  const double length2 = u.x * u.x + u.y * u.y;
-  const double share = length2 > 0 ? std::clamp((u.x * v.x + u.y * v.y) / length2, 0.0, 1.0) : 0;
-  return std::hypot(v.x - share * u.x, v.y - share * u.y);
-}
-
 /// The point for both ends of bc, between a and d.
 Point2 merged(Point2 a, Point2 b, Point2 c, Point2 d) {
   const EdgeVector before = from_to(a, b), own = from_to(b, c), after = from_to(c, d);
@@ -256,7 +245,7 @@ bool append_merged(std::span<const Point2> points, double shortest, double toler
       const Point2 a = out.point.size() > begin ? out.point.back() : points.back();
       const Point2 d = points[i + 2 < count ? i + 2 : i + 2 - count];
       const Point2 p = merged(a, b, c, d);
-      if (apart(p, b, c) <= tolerance && apart(b, a, p) <= tolerance && apart(c, p, d) <= tolerance) {
+      if (distance_to(p, b, c) <= tolerance && distance_to(b, a, p) <= tolerance && distance_to(c, p, d) <= tolerance) {
         out.point.push_back(p);
         --left;
         ++i;
@@ -284,17 +273,13 @@ void merge_short_edges(Contours& contours, Nm shortest, Nm tolerance, MergeScrat
 
 namespace {
 
-std::int64_t cross(Point2 a, Point2 b, Point2 c) {
-  return (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
-}
-
 /// Moves the points of [begin, end) that matter to `out`, which may be `begin`; returns how many those are.
 std::size_t drop_straight(const Point2* begin, const Point2* end, Point2* out) {
   std::size_t size = 0;
   for (const Point2* p = begin; p != end; ++p) {
     const Point2 point = *p;  // `out` may reach it
     while (size > 0) {
-      if (out[size - 1] == point || (size > 1 && cross(out[size - 2], out[size - 1], point) == 0)) {
+      if (out[size - 1] == point || (size > 1 && doubled_area(out[size - 2], out[size - 1], point) == 0)) {
         --size;
       } else {
         break;
@@ -305,9 +290,9 @@ std::size_t drop_straight(const Point2* begin, const Point2* end, Point2* out) {
   // Around the seam.
   std::size_t first = 0;
   while (size - first >= 3) {
-    if (out[size - 1] == out[first] || cross(out[size - 2], out[size - 1], out[first]) == 0) {
+    if (out[size - 1] == out[first] || doubled_area(out[size - 2], out[size - 1], out[first]) == 0) {
       --size;
-    } else if (cross(out[size - 1], out[first], out[first + 1]) == 0) {
+    } else if (doubled_area(out[size - 1], out[first], out[first + 1]) == 0) {
       ++first;
     } else {
       break;

@@ -12,7 +12,7 @@
 #include <cstring>
 
 #include "stages/data/choices.h"
-#include "stages/geometry/blocks/sorted_block.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/targets.h"
 #include "stages/load/repair/census.h"
 #include "stages/load/stl_binary.h"

@@ -13,7 +13,7 @@
 #include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
 #include "stages/raster/raster.h"
-#include "stages/segment/expand.h"
+#include "stages/segment/cut.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
 #include "tests/segment/cylinder.h"

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "stages/data/choices.h"
-#include "stages/geometry/blocks/sorted_block.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/targets.h"
 
 namespace lamina {

@@ -1,4 +1,4 @@
-#include "stages/segment/layer_cut.h"
+#include "stages/segment/cut.h"
 
 #include <fmt/format.h>
 
