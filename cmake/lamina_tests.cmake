@@ -27,19 +27,23 @@ set_target_properties(lamina_call_log PROPERTIES PREFIX "" OUTPUT_NAME call_log)
 # CI runs each test program in one of its two builds, g++ release or clang with sanitizers: programs whose result depends on
 # optimisation in both, whole commands, long runs and what loads OpenImageIO or OpenCV in the release.
 set(lamina_test_both raster coverage load geometry stokes formats)
-set(lamina_test_release commands picture calibration run bead cost dose pores segment slice heights)
+set(lamina_test_release commands picture calibration run pores_of_jobs bead cost dose pores segment slice heights)
+# Whose own code is most of their time, brute force: optimised in the sanitized build, where that takes less than it saves.
+set(lamina_test_optimised checks coverage program)
 
 lamina_sources(all_test_sources "tests/*.cpp")
 list(REMOVE_ITEM all_test_sources ${test_support_sources} ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
 list(TRANSFORM all_test_sources REPLACE "^${PROJECT_SOURCE_DIR}/tests/([^/]*)/.*$" "\\1" OUTPUT_VARIABLE folders)
 list(REMOVE_DUPLICATES folders)
-foreach(folder run ${folders})
+foreach(folder run pores_of_jobs ${folders})
   set(test_sources ${all_test_sources})
-  if(folder STREQUAL "run")  # the rooms of the pipeline are one program, whole runs another
+  if(folder STREQUAL "run")  # the rooms of the pipeline are one program, whole runs and pores of whole jobs others
     list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/run/")
+  elseif(folder STREQUAL "pores_of_jobs")
+    list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/pores/")
   else()
     list(FILTER test_sources INCLUDE REGEX "/tests/${folder}/")
-    list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/run/")
+    list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/(run|pores)/")
   endif()
   if(NOT LAMINA_SCAN)
     list(FILTER test_sources EXCLUDE REGEX "/tests/calibration/scan/")
@@ -59,14 +63,16 @@ foreach(folder run ${folders})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
                         PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
   lamina_libraries_first(test_${folder})
-  if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+  if(LAMINA_SANITIZE AND folder IN_LIST lamina_test_optimised)
+    target_compile_options(test_${folder} PRIVATE -O1)
+  elseif(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
     target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
   endif()
   if(LAMINA_UNITY_TESTS)
     list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp)  # options of its own
     lamina_unity(test_${folder} ${test_sources})
     list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/")
-    list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/(cli|run)/")  # the other rooms have a file or two each
+    list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/(cli|run|pores)/")  # the other rooms have a file or two each
     if(test_sources)
       set_source_files_properties(${test_sources} PROPERTIES UNITY_GROUP tests_pipeline)
     endif()

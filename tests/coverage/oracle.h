@@ -15,6 +15,13 @@
 
 namespace lamina::test {
 
+/// Of the layers of a part, sanitized tests take every third of those that the release takes.
+#ifdef __SANITIZE_ADDRESS__
+constexpr int kThinned = 3;
+#else
+constexpr int kThinned = 1;
+#endif
+
 /// A window of the geometry: columns [left, right), rows [first, last).
 struct VoxelWindow {
   std::uint32_t left, right, first, last;

@@ -60,7 +60,7 @@ void expect_within(const Triangles& triangles, const PixelGrid& grid, Nm height,
   const Instance instance{0, {0, 0, 0}};
   for (const Nm thickness : {10'000, 64'000, 100'000, 250'000}) {
     Mesh mesh = make_mesh(triangles);
-    expect_layers_within({&mesh, 1}, {&instance, 1}, grid, height, thickness, 24, sums);
+    expect_layers_within({&mesh, 1}, {&instance, 1}, grid, height, thickness, 24 / kThinned, sums);
   }
 }
 
@@ -85,7 +85,7 @@ TEST(LayerBound, HoldsForSolidsOnEdgesOfVoxels) {
     }
   }
   expect_within(points, kTenths, 300'000, sums);
-  EXPECT_GT(sums.layers, 300u);
+  EXPECT_GT(sums.layers, 300u / kThinned);
 }
 
 TEST(LayerBound, HoldsForNoise) {
@@ -151,11 +151,11 @@ TEST(LayerBound, HoldsForRealPartsAndIsNear) {
       if (grid.columns() > 4000 || grid.rows() > 4000) continue;
       SCOPED_TRACE(file.string());
       expect_layers_within(part->meshes, part->instances, grid, static_cast<Nm>(part->bounds.height()),
-                           dpi == 150 ? 300'000 : 70'000, 12, sums);
+                           dpi == 150 ? 300'000 : 70'000, 12 / kThinned, sums);
       if (HasFailure()) return;
     }
   }
-  EXPECT_GT(sums.layers, 300u);
+  EXPECT_GT(sums.layers, 300u / kThinned);
   EXPECT_LT(sums.reported_facets, 1.2 * sums.facets);
   EXPECT_LT(sums.reported_runs, 12 * sums.runs);  // 3 where facets are some voxels large
   EXPECT_LT(sums.reported_bytes, 5 * sums.bytes);

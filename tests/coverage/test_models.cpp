@@ -16,7 +16,7 @@
 namespace lamina::test {
 namespace {
 
-constexpr int kLayersOfModel = 36;
+constexpr int kLayersOfModel = 36 / kThinned;
 constexpr int kWindowsOfLayer = 6;
 constexpr std::uintmax_t kLargestFile = 4'000'000;  // beyond, most of the time would go into meetings of facets
 
