@@ -3,7 +3,7 @@
 
     scripts/bench beads     writes bench/beads.md; five minutes
 
-The form that lamina has (docs/bead.md) and others that were tried, computed here by steps of 0.005 mm, apart from stages/bead.
+The form that lamina has (docs/theory/bead.md) and others that were tried, computed here by steps of 0.005 mm, apart from stages/bead.
 Each takes its lag from the distances of Table 11 alone; no width is read for any number.
 """
 import csv

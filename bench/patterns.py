@@ -113,7 +113,7 @@ def page(voxel, folder):
     yield "## Quatrefoil"
     yield ""
     yield ("The source draws curves like honeycombs that are kept apart and does not define them; lamina's are cosines "
-           "([filling.md](../docs/filling.md#patterns)), which do not repeat along x and y at 0 and 90 degrees in turn. So a window of "
+           "([filling.md](../docs/reference/filling.md#patterns)), which do not repeat along x and y at 0 and 90 degrees in turn. So a window of "
            "4.8 x 4.8 x 1.2 mm with closed sides and voxels twice as large, beside lines of about the same porosity there.")
     yield ""
     yield from tables.table(HEAD, waves(reported))

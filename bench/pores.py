@@ -155,7 +155,7 @@ def page(voxel, kept):
     machine = figures.machine(ROOT)
     yield (f"`scripts/bench pores`, commit {figures.commit(ROOT)}, {machine['processor']}, {machine['cores']} cores. "
            "`lamina permeability` of the G-code of a cylinder of 25.4 mm: one period of each plan, voxels of "
-           f"{voxel} um, beads by the model of [docs/bead.md](../docs/bead.md) with the profile anet-a8. Measured: Di Nisio 2022, "
+           f"{voxel} um, beads by the model of [docs/theory/bead.md](../docs/theory/bead.md) with the profile anet-a8. Measured: Di Nisio 2022, "
            "Tables 25 and 17. The model's only numbers are what 100 % feeds, the melt's lag by the stabilisation distances of "
            "Table 11, and the profile's acceleration; nothing is fitted on Tables 12 to 25.")
     yield ""

@@ -5,7 +5,7 @@
 
 Runs lamina_bench (bench/stokes.cpp), which checks its answers. A drag is extrapolated by the square of the voxel's edge, by least
 squares over three sizes; its error is the step from the finest size to that, and at least what a slit of the same hydraulic radius
-may be off by at the finest size (docs/pores.md).
+may be off by at the finest size (docs/theory/pores.md).
 """
 import argparse
 import json

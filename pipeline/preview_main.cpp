@@ -62,7 +62,7 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
                                               : read_flag(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
     if (!status) return status.error();
   }
-  if (request.step && !request.swath) return at_option("--step", "is of a swath; add --swath").error();
+  if (request.step && !request.swath) return at_option("--step", "needs a swath; add --swath").error();
   if (request.swath && (request.layers.every || request.layers.count)) {
     return at_option("--swath", "is drawn in one layer; choose it by --layer, and leave out --count and --every").error();
   }

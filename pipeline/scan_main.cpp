@@ -52,7 +52,7 @@ Result<std::string> compare_with(const Json& request) {
                                          request.at("pixel_nm").at(1).get<double>(), request.at("scan_along_x").get<bool>(),
                                          request.at("photo_um").get<double>()};
   good = good && layer.pixel_x_nm >= 1 && layer.pixel_y_nm >= 1 && layer.photo_um >= 1;
-  if (!good) return Error{Fault::kUsage, "the request holds no image"};
+  if (!good) return Error{Fault::kUsage, "the request contains no image"};
   const auto photo = calibration::read_photo(path, kMin);
   if (!photo) return photo.error();
   const auto comparison = calibration::compare_layer(*photo, layer);

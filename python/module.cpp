@@ -336,7 +336,7 @@ PYBIND11_MODULE(lamina, module) {
   using namespace lamina::python;
   module.doc() =
       "Plans additive-manufacturing jobs: meshes in, the exact 1-bit image of every layer out.\n\n"
-      "Settings are the keys of a job file (docs/job.md), as {'bed.dpi': 600, 'layers.thickness_mm': 0.1}; lamina.keys() lists\n"
+      "Settings are the keys of a job file (docs/reference/job.md), as {'bed.dpi': 600, 'layers.thickness_mm': 0.1}; lamina.keys() lists\n"
       "them. Lengths in settings are mm, as in job files; in arrays they are whole nanometres. What fails raises lamina.Error\n"
       "with one line that says where, what is wrong and what to do.";
   module.attr("__version__") = std::string(version());

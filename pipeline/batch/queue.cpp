@@ -108,7 +108,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
       slot.abandoned = summary_.abandoned = true;
       BatchResult result;
       result.code = static_cast<int>(Fault::kInterrupted);
-      result.reason = "did not stop when it was told to, and was left behind";
+      result.reason = "did not stop after the stop request and was abandoned";
       result.seconds = seconds_since(slot.begun);
       stopped_by(slot, result, ", " + result.reason);
       end(i, std::move(result));

@@ -68,8 +68,9 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   auto journal = Journal::open(path, "another batch is running here right now; wait for it or name another directory");
   if (!journal) return journal.error();
   if (!journal->empty() && !resume && !overwrite) {
-    return usage("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, or name another directory",
-                 path);
+    return usage(
+        "{}: belongs to an earlier batch; continue it with --resume, replace it with --overwrite, or name another directory",
+        path);
   }
   BatchRecord record(std::move(*journal));
   if (resume) {
@@ -88,7 +89,7 @@ const BatchRecord::Earlier* BatchRecord::earlier(const BatchJob& job) const {
 
 Status BatchRecord::append(const Json& entry) {
   const Status status = journal_.append(json_line(entry));
-  return status ? status : Error{status.error().fault, status.error().message + ", and go on with --resume"};
+  return status ? status : Error{status.error().fault, status.error().message + ", and continue with --resume"};
 }
 
 Status BatchRecord::begun(const BatchJob& job, bool unowned) {

@@ -171,8 +171,9 @@ Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, c
   auto widths = File::open(widths_path.string(), {.replace = false});
   if (!widths) return widths.error();
   if (fs::exists(fs::symlink_status(widths_path, failed))) {
-    return Error{Fault::kUsage, fmt::format("{}: has a widths.csv already, which may hold measurements; name another directory",
-                                            request.directory)};
+    return Error{
+        Fault::kUsage,
+        fmt::format("{}: has a widths.csv already, which may contain measurements; name another directory", request.directory)};
   }
   if (!request.overwrite) {
     if (Status status = check_absent(pieces, directory, extension); !status) return status.error();

@@ -95,8 +95,8 @@ std::string correct_rows(const std::vector<std::optional<Located>>& along, const
     rows[r] -= late;
     line += fmt::format("{:+g} um (within {:.1f})", 0 - late, detected[r]->within_um);
   }
-  const char* why = "the photograph does not show them within a tenth of a pixel";
-  if (unreadable + 1 == rows.size()) return fmt::format("rows      not told: {}", why);
+  const char* why = "4 sigma in the photograph is above 0.1 pixel";
+  if (unreadable + 1 == rows.size()) return fmt::format("rows      not reported: {}", why);
   return unreadable == 0 ? line : fmt::format("{}: {}", line, why);
 }
 
@@ -144,7 +144,7 @@ std::vector<std::string> joint_lines(const Json& stitches) {
     if (joint.at("agrees").get<bool>()) continue;
     const auto swath = joint.at("swath").get<std::uint32_t>();
     lines.push_back(fmt::format(
-        "joint {}   shows {} across, {} along the scan from swath {} to {}, which its dashes do not: look at it in the photograph",
+        "stitch {}  shows {} across, {} along the scan from swath {} to {}, unlike its dashes: check it in the photograph",
         swath, reported(joint, "across_um"), reported(joint, "along_um"), swath - 1, swath));
   }
   return lines;
@@ -161,8 +161,7 @@ std::string unreadable_line(const Json& nozzles) {
     }
   }
   if (unreadable == 0) return "";
-  return fmt::format("untold    {} of {} offsets of nozzles: the photograph does not show them within a tenth of a pixel",
-                     unreadable, detected);
+  return fmt::format("omitted   {} of {} nozzle offsets: 4 sigma in the photograph is above 0.1 pixel", unreadable, detected);
 }
 
 std::vector<std::string> take(const Json& json, const Chart& chart, Machine& machine) {
@@ -176,15 +175,15 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
     if (n < nozzles.size() && nozzles[n].is_null()) blocked.insert(n);
   }
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's place",
+  lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's position",
                               json.at("pixels_a_mm").get<double>(), json.at("scatter_um").get<double>()));
   const auto read_along = read_nozzles(nozzles, "along_detected_um", "along_error_um"),
              read_across = read_nozzles(nozzles, "across_detected_um", "across_error_um");
   lines.push_back(positions_line(read_along, read_across));
   machine.head.blocked.assign(blocked.begin(), blocked.end());
   lines.push_back("blocked   " + list_of(machine.head.blocked));
-  if (!weak.empty()) lines.push_back(fmt::format("weak      {}: seen by times, not taken for blocked", list_of(weak)));
-  if (!unreadable.empty()) lines.push_back("unknown   " + list_of(unreadable) + ": nothing of theirs can be seen");
+  if (!weak.empty()) lines.push_back(fmt::format("weak      {}: some dashes missing, not counted as blocked", list_of(weak)));
+  if (!unreadable.empty()) lines.push_back("unknown   " + list_of(unreadable) + ": all of their dashes are hidden");
   if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
   for (std::string& line : joint_lines(json.at("stitches"))) lines.push_back(std::move(line));
@@ -194,9 +193,8 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
     const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
     const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;
     const std::array<double, 2> um{std::round(along_x ? along : across), std::round(along_x ? across : along)};
-    lines.push_back(
-        fmt::format("gain      edges stand out by {:g} um along x, {:g} um along y: take it off with --bleed {:g}x{:g}", um[0],
-                    um[1], std::max(um[0], 0.0), std::max(um[1], 0.0)));
+    lines.push_back(fmt::format("gain      dot gain of {:g} um along x, {:g} um along y: compensate with --bleed {:g}x{:g}",
+                                um[0], um[1], std::max(um[0], 0.0), std::max(um[1], 0.0)));
     machine.head.dot_gain_um = um;
   }
   for (const Json& wedge : json.at("wedges")) {
@@ -264,7 +262,7 @@ Result<std::string> measured_profile(const Machine& machine) {
   const auto grid = again ? resolve_profile(*again) : again.error();
   if (!grid) {  // without a place in a file that is not there
     const std::string& why = grid.error().message;
-    return Error{Fault::kInput, "what was measured gives no valid profile: " + (again ? why : why.substr(why.find(": ") + 2))};
+    return Error{Fault::kInput, "the measured values give no valid profile: " + (again ? why : why.substr(why.find(": ") + 2))};
   }
   return toml;
 }
@@ -273,7 +271,7 @@ Result<std::vector<std::string>> take_over(std::string_view reading, const Chart
   try {
     return take(parse_json(reading), chart, machine);
   } catch (const std::exception& error) {
-    return Error{Fault::kInternal, std::string("lamina-scan told what is no reading: ") + error.what()};
+    return Error{Fault::kInternal, std::string("lamina-scan returned an invalid reading: ") + error.what()};
   }
 }
 

@@ -67,7 +67,7 @@ std::string as_text(const segment::DropsFit& fit) {
   if (fit.plain) text += lines_of(*fit.plain, fit.group.points.size());
   if (!fit.gas) return text;
   return text +
-         fmt::format("compressible, with an outlet at {:.6g} Pa and a flow told at {:.6g} Pa\n", fit.pressures->outlet_pa,
+         fmt::format("compressible, outlet at {:.6g} Pa, reference pressure of the flow {:.6g} Pa\n", fit.pressures->outlet_pa,
                      fit.pressures->reference_pa) +
          lines_of(*fit.gas, fit.expanded.points.size());
 }

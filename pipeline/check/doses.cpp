@@ -139,7 +139,7 @@ std::string DoseCheck::fault_of_target(const LayerRecord& record) const {
                                 ? fmt::format("{:.6g}", target->minimum)
                                 : fmt::format("{:.6g} to {:.6g}", target->minimum, target->maximum);
   return fmt::format(
-      "{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says requested_drops {}",
+      "{} pixels with a target of {} drops each need {:.0f} to {:.0f} drops, the manifest says requested_drops {}",
       record.dosed_pixels, drops, std::ceil(std::max(0.0, minimum)), std::floor(maximum), record.requested_drops);
 }
 

@@ -12,9 +12,9 @@
 
 namespace lamina::pipeline {
 
-/// Works by the formulas of docs/saturation.md in floating point and shares nothing with stages/dose/, which has decided the
-/// drops. What follows from images alone is held exactly: levels of voxels, and the pixels to be filled where each gets a drop.
-/// Where fewer fall, those pixels lie between what the images have and what the boxes of the parts hold.
+/// Works by the formulas of docs/theory/saturation.md in floating point and shares nothing with stages/dose/, which has decided
+/// the drops. What follows from images alone is held exactly: levels of voxels, and the pixels to be filled where each gets a
+/// drop. Where fewer fall, those pixels lie between what the images have and what the boxes of the parts hold.
 class DoseCheck {
  public:
   /// head  outlives this object. machine  of the job; null without one

@@ -183,8 +183,7 @@ void check_frame(const Verification& inspection, VerifyReport& report) {
 void finish_replay(const Verification& inspection, const std::optional<JobCost>& cost) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
   VerifyReport& report = inspection.report;
-  if (inspection.head.materials.empty() && report.replay.vats == 3)
-    report.add("both vats feed, some layers or each, and the job is of one powder");
+  if (inspection.head.materials.empty() && report.replay.vats == 3) report.add("both vats feed, but the job uses one powder");
   report.material = replay::material_of(inspection.machine->profile(), report.replay);
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
@@ -296,11 +295,11 @@ Result<VerifyReport> verify_file(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(manifest_path, error)) {
     const bool begun = fs::is_regular_file(manifest_path + ".part", error);
-    return Error{
-        Fault::kVerification,
-        fmt::format("{}: {}", path,
-                    begun ? "job was interrupted; run again with --resume"
-                          : fmt::format("has no manifest beside it ({}); it is no file of lamina extrude", manifest_path))};
+    return Error{Fault::kVerification,
+                 fmt::format("{}: {}", path,
+                             begun ? "job was interrupted; run again with --resume"
+                                   : fmt::format("has no manifest next to it ({}); name a file that lamina extrude wrote",
+                                                 manifest_path))};
   }
   const auto manifest = read_manifest(manifest_path);
   if (!manifest) return manifest.error();
@@ -328,7 +327,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
   report.directory = directory;
   const std::vector<ManifestFile> files = find_manifests(directory);
   if (files.empty()) {
-    return Error{Fault::kVerification, fmt::format("{}: holds no manifest.json; it is no finished job", directory)};
+    return Error{Fault::kVerification, fmt::format("{}: contains no manifest.json; it is not a finished job", directory)};
   }
   std::vector<Manifest> manifests;
   std::vector<ShardRange> shards;

@@ -33,14 +33,14 @@ std::string program_help() {
       "Usage: lamina COMMAND [OPTIONS] ...\n\nCommands:\n";
   for (const Command* command : kCommands) text += fmt::format("  {:<14}{}\n", command->name, command->summary);
   text +=
-      "\nOptions:\n  -h, --help      this text; lamina COMMAND --help tells all about a command\n"
-      "  --version       the version\n\n"
+      "\nlamina help COMMAND, or lamina COMMAND --help, explains a command; --help-all lists all of its options.\n\n"
+      "Options:\n  -h, --help      this text\n  --version       the version\n\n"
       "Example:\n"
       "  lamina jet bracket.stl --bed 490x380 --dpi 600 --layer 0.05 -o out\n"
       "  lamina verify out\n"
       "  lamina extrude bracket.stl --machine marlin --walls 2 --fill raster --line-distance 2 -o bracket.gcode\n\n"
       "Exit codes: 0 done, 1 internal error, 2 wrong option or job, 3 bad part file or an empty job, 4 output could not be\n"
-      "written, 5 verification failed, a warning with --strict or a wish not met, 6 out of memory, 130 interrupted.\n";
+      "written, 5 verification failed, a warning with --strict or a target not met, 6 out of memory, 130 interrupted.\n";
   return text;
 }
 
@@ -129,6 +129,10 @@ Outcome run_lamina(const std::vector<std::string>& words, Console& console) {
     return static_cast<int>(Fault::kUsage);
   }
   const std::string& name = words.front();
+  if (name == "help" && words.size() == 2) {
+    if (const Command* about = find_command(words[1])) return run_command(*about, {"--help"}, console);
+    return Error{Fault::kUsage, unknown_command(words[1])};
+  }
   if (name == "-h" || name == "--help" || name == "help") return console.print(program_help());
   if (name == "--version" || name == "version") return console.print(fmt::format("lamina {}\n", version()));
   const Command* command = find_command(name);

@@ -70,7 +70,7 @@ Status check_parts_of_file(const std::string& file, const Job& job) {
   for (const PartRequest& part : job.parts) {
     std::error_code error;
     if (part.named_at.empty() || std::filesystem::exists(part.path, error)) continue;
-    return failure(Fault::kInput, "{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
+    return failure(Fault::kInput, "{}: part.path: {}: no such file; correct it (relative paths start at the job file)",
                    part.named_at, part.path);
   }
   return {};
@@ -128,8 +128,8 @@ constexpr std::string_view kUniform = "is of layers that fit the part, and these
                            kAngle = "is of --heights angle; add it", kOptimal = "is of --heights optimal; add it",
                            kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
                            kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
-                           kBeads = "is of beads, and none are asked for; add --fill, --pattern or --walls",
-                           kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
+                           kBeads = "applies to beads, but there are none; add --fill, --pattern or --walls",
+                           kLines = "applies to lines, but there is no pattern; add --fill or --pattern";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
     {"--cusp-of", shrinks, kShrinks, scaled},
@@ -144,7 +144,7 @@ constexpr Need kNeeds[] = {
     {"--flat-tolerance", fits_heights, kUniform},
     {"--time-model", optimal, kOptimal, optimal},
     {"--shell", has_core, "is the depth that is not thinned, and nothing is; add --core, --core-saturation or --fill"},
-    {"--no-dither", dithers, "is of drops that are not whole, and none are asked for; add --levels or --saturation"},
+    {"--no-dither", dithers, "applies to fractions of drops, but there are none; add --levels or --saturation"},
     {"--bead-ends", deposits_beads, kBeads},
     {"--bead", deposits_beads, kBeads},
     {"--bead-gap", deposits_lines, kLines},
@@ -153,7 +153,7 @@ constexpr Need kNeeds[] = {
     {"--angle", deposits_lines, kLines},
     {"--angle-step", deposits_lines, kLines},
     {"--stagger", deposits_lines, kLines},
-    {"--print-speed", deposits_lines, "is of lines that fill, and no pattern is asked for; add --fill, or give --wall-speed"},
+    {"--print-speed", deposits_lines, "applies to filling lines, but there is no pattern; add --fill, or use --wall-speed"},
     {"--segment-rule", cuts_lines, "is of lines; closed curves are cut by their length under every rule, leave it out"},
     {"--spacing-cc", lies_in_pairs,
      "is between continuous lines, and one lies alone between segmented ones; add --continuous 2"},
@@ -258,7 +258,7 @@ std::vector<std::string> notes_on_needs(Product product, const Arguments& argume
   const bool hollow = product == Product::kImages && fills(job) && !deposits_lines(product, job);
   if (hollow && !is_named(job, "fill.pattern") && !is_named(job, "segment.fill")) {
     notes.emplace_back(
-        "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant");
+        "nothing is filled inside the walls, and powder stays loose there; add --fill raster, or --fill none if it is meant");
   }
   for (const std::string& assignment : arguments.all("--set")) {
     const auto key = std::ranges::find_if(job_keys(), [&](const JobKey& k) {

@@ -154,7 +154,7 @@ Result<ImageStack> open_images(const std::string& folder, const Arguments& argum
   if (!request) return request.error();
   for (const char* flag : {"--pixel", "--layer-um", "--threshold", "--dark"}) {
     if (arguments.has(flag) && has_manifest(folder))
-      return usage("{} is for images without a manifest; that of {} tells it, leave it out", flag, one_line(folder));
+      return usage("{} is for images without a manifest; that of {} states it, remove the option", flag, one_line(folder));
   }
   return open_stack(folder, *request);
 }
@@ -191,7 +191,7 @@ Result<WindowRequest> read_window_request(const Arguments& arguments, double vox
 Outcome compare_scan(const Arguments& arguments, Context& context, const formats::GcodeFile& file, const Pile& pile,
                      const bead::DepositionRules* rules) {
   for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--plot", "--no-flow", "--inertia", "--memory"})
-    if (arguments.has(flag)) return usage("{} does nothing beside --scan; leave it out", flag);
+    if (arguments.has(flag)) return usage("{} has no effect with --scan; remove it", flag);
   std::uint32_t range = 16;
   if (Status status = arguments.read("--range", {1, 200}, range); !status) return status;
   range = (range + 7) / 8 * 8;  // that coarse voxels hold it
@@ -202,7 +202,7 @@ Outcome compare_scan(const Arguments& arguments, Context& context, const formats
   const auto comparison = compare_with_scan(file, pile, *scan, selection->size_mm, range, rules);
   if (!comparison) return comparison.error();
   if (!comparison->found())
-    context.say("note: the scan hardly looks like the plan at any of these shifts; is it turned, or give a larger --range?");
+    context.say("note: the scan hardly matches the plan at any of these shifts; check its rotation or use a larger --range");
   return arguments.has("--json") ? context.give(as_json(*comparison)) : context.print(as_text(*comparison));
 }
 
@@ -255,7 +255,7 @@ std::vector<OptionSpec> window_file_options() {
   return {{"--solid", "FILE", "what is solid in the window, as voxels .nrrd, .mha, .vti, or as a closed surface .stl", "",
            "Result"},
           {"--void", "FILE", "the same of its void", "", "Result"},
-          {"--no-flow", "", "tell pores and write files, but compute no flow", "", "Result"}};
+          {"--no-flow", "", "report pores and write files, but compute no flow", "", "Result"}};
 }
 
 std::vector<OptionSpec> stack_options() {
@@ -286,7 +286,7 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   if (!arguments.has("--no-flow") && set_voxels(window->fine) == 0)
     return failure(Fault::kInput,
                    "{}: nothing is solid in the window; take a larger --window, and without a manifest "
-                   "look at --threshold and --dark",
+                   "check --threshold and --dark",
                    one_line(folder));
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = arguments.has("--no-flow") ? pores_alone(window->fine)
@@ -310,7 +310,7 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   const std::string& path = arguments.operands.front();
   if (Status status = check_window_files(arguments); !status) return status;
   if (arguments.has("--inertia") && arguments.has("--no-flow"))
-    return usage("--inertia does nothing beside --no-flow; leave one out");
+    return usage("--inertia has no effect with --no-flow; remove one");
   FlowRequest request;
   request.inertia = arguments.has("--inertia");
   request.section = arguments.has("--plot");
@@ -341,8 +341,8 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   const bool empty = set_voxels(cut->front()) == 0;
   if (empty && flows) return nothing_deposited(path, choice->window.box);
   if (left_out > 0.002)
-    context.say(
-        fmt::format("note: {:.1f} % of what is laid find no room beside their neighbours and are left out", 100 * left_out));
+    context.say(fmt::format("note: {:.1f} % of the deposited volume has no space next to its neighbours and is left out",
+                            100 * left_out));
   const PoreRasters rasters{cut->front(), cut->at(flows ? 1 : 0), cut->at(flows ? 2 : 0)};
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report =

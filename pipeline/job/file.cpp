@@ -57,8 +57,8 @@ void replace_profile(TomlValue& value, std::string_view key, const fs::path& fol
   if (names_stream(file) || !is_profile_path(value.text) || fs::exists(value.text, ignored)) return;
   const bool here = fs::path(said).is_relative() && fs::exists(said, ignored);
   job.missing.emplace_back(value.text,
-                           fmt::format("{}machine.{}: {}: no such machine profile; correct it (a relative path begins "
-                                       "beside the job file{})",
+                           fmt::format("{}machine.{}: {}: no such machine profile; correct it (relative paths start at "
+                                       "the job file{})",
                                        value.position.text(file), key, one_line(value.text),
                                        here ? ", not where lamina runs, where " + one_line(said) + " is" : ""));
 }

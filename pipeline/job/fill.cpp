@@ -74,7 +74,7 @@ constexpr Key<FillSettings> kFillKeys[] = {
                                       "lines are moved sideways by these in turn, layer by layer of one direction"},
                                      list_of(-1000, 1000)),
     word<kTurns, &FillSettings::stagger_every_layer>(
-        {"fill", "stagger_by", "", "angle|layer", "the stagger goes on when the direction comes back, or with every layer"}),
+        {"fill", "stagger_by", "", "angle|layer", "the stagger continues when the direction comes back, or with every layer"}),
     field<&FillSettings::first_line_mm>(
         {"fill", "first_line_mm", "", "MM", "from the part's side to the first line; else one distance from the wall's centre"},
         kFillLength),
@@ -203,10 +203,10 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
     field<&SegmentSettings::first>({"segment", "first_line", "", "N", "number of a segmented line"}, {-1000, 1000}),
     field<&SegmentSettings::spacing_sc_mm>(
         {"segment", "spacing_sc_mm", "--spacing-sc", "MM",
-         "from a segmented line to the continuous one beside it, centre to centre; from the widths if absent"},
+         "spacing of a segmented line and the adjacent continuous one, centre to centre; default: from the widths"},
         kAny),
     field<&SegmentSettings::spacing_cc_mm>(
-        {"segment", "spacing_cc_mm", "--spacing-cc", "MM", "the same between continuous lines"}, kAny),
+        {"segment", "spacing_cc_mm", "--spacing-cc", "MM", "spacing of adjacent continuous lines, centre to centre"}, kAny),
     field<&SegmentSettings::gap_mm>({"segment", "gap_mm", "--segment-gap", "MM",
                                      "wanted between thick beads and their neighbours, for spacings from the widths"},
                                     kAny),
@@ -223,14 +223,17 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
                                                "speeds of thin stretches, from one segmented line to the next: a test piece"},
                                               kAny),
     field<&SegmentSettings::thin_extrusion_sweep>(
-        {"segment", "thin_extrusion_sweep", "", "%,%,...", "the same of their extrusion"}, kAny),
+        {"segment", "thin_extrusion_sweep", "", "%,%,...", "extrusions of thin segments of the lines, in order, in percent"},
+        kAny),
     field<&SegmentSettings::thick_width_mm>({"segment", "thick_width_mm", "--thick-width", "MM",
                                              "width that thick stretches will have; by the calibration if absent"},
                                             kAny),
-    field<&SegmentSettings::thin_width_mm>({"segment", "thin_width_mm", "--thin-width", "MM", "the same of thin ones"}, kAny),
-    field<&SegmentSettings::continuous_width_mm>({"segment", "continuous_width_mm", "", "MM", "the same of continuous lines"},
-                                                 kAny),
-    field<&SegmentSettings::one_direction>({"segment", "one_direction", "", "", "all segmented lines are laid the same way"}),
+    field<&SegmentSettings::thin_width_mm>(
+        {"segment", "thin_width_mm", "--thin-width", "MM", "width of thin segments in mm; default: measured widths"}, kAny),
+    field<&SegmentSettings::continuous_width_mm>(
+        {"segment", "continuous_width_mm", "", "MM", "width of continuous lines in mm; default: measured widths"}, kAny),
+    field<&SegmentSettings::one_direction>(
+        {"segment", "one_direction", "", "", "extrude all segmented lines in the same direction"}),
     field<&SegmentSettings::even_starts>(
         {"segment", "even_starts", "", "", "lines begin with the flow they keep, where the machine's material.lag_s is known"}),
     field<&SegmentSettings::shift_mm>({"segment", "shift_mm", "--pore-shift", "MM[,MM...]",
@@ -280,12 +283,11 @@ std::span<const JobKey> segment_keys() {
     all.push_back(structure<read_segment_ranges, segment_ranges_text, &Job::segment, &SegmentRequest::ranges>(
         {"segment", "range", "", "[{...}]", "other keys between two heights: from_mm, to_mm and the keys that differ",
          decides::moves}));
-    all.push_back(
-        custom<Job, read_filling, write_no_filling>(
-            {"segment", "fill", "--fill", "FILLING",
-             "what is laid inside: segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil"},
-            Form::kString)
-            .with_words(fillings));
+    all.push_back(custom<Job, read_filling, write_no_filling>(
+                      {"segment", "fill", "--fill", "FILLING",
+                       "filling: segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil"},
+                      Form::kString)
+                      .with_words(fillings));
     return all;
   }();
   return keys;

@@ -34,7 +34,7 @@ Status check_dose(const Job& job) {
     if (part.core_saturation_percent && dose.shell_mm == 0)
       return usage("part.core_saturation_percent: is of what lies inside of a shell; add --shell");
     if (part.saturation_percent && !dose.saturation_percent)
-      return usage("part.saturation_percent: changes a saturation that is not asked for; add --saturation");
+      return usage("part.saturation_percent: there is no saturation to change; add --saturation");
   }
   return {};
 }
@@ -67,7 +67,7 @@ Status check_job(const Job& job) {
   if (const auto isa = usable_isa(job.isa); !isa) return isa.error();
   const DoseRequest& dose = job.dose;
   if (!dose.saturation_percent && (dose.core_saturation_percent || !dose.saturation_ranges.empty())) {
-    return usage("dose.{}: changes a saturation that is not asked for; add --saturation",
+    return usage("dose.{}: there is no saturation to change; add --saturation",
                  dose.core_saturation_percent ? "core_saturation_percent" : "saturation_range");
   }
   if (dose.core_saturation_percent && dose.shell_mm == 0)

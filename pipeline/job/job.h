@@ -117,7 +117,7 @@ struct MaterialRange {
   std::string material;
 };
 
-/// The properties of images used as a part (docs/images-as-parts.md) that their files do not state.
+/// The properties of images used as a part (docs/howto/plan_images.md) that their files do not state.
 struct PartImages {
   std::optional<std::array<std::int64_t, 2>> dpi;  // absent: by the tags of the files
   std::optional<double> layer_mm;                  // absent: by the manifest next to them, or the job's

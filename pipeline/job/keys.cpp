@@ -106,8 +106,9 @@ constexpr auto kHeights = &Job::heights;
 constexpr Limits kLength{kMinMm, kMaxMm, " mm"}, kArea{0, 1e9, " mm2"};
 
 const JobKey kHeightsKeys[] = {
-    word<kModes, kHeights, &Request::mode>(heights_key(
-        "mode", "--heights", "MODE", "how layers are decided: uniform, angle, cusp, stepwise, optimal; see docs/heights.md")),
+    word<kModes, kHeights, &Request::mode>(
+        heights_key("mode", "--heights", "MODE",
+                    "how layers are decided: uniform, angle, cusp, stepwise, optimal; see docs/theory/heights.md")),
     custom<Job, read_thickness_text, same_text, kHeights, &Request::thickness_mm>(
         heights_key(
             "thickness_mm", "--thickness", "SET|RANGE",
@@ -126,13 +127,14 @@ const JobKey kHeightsKeys[] = {
         heights_key("peak_angle_deg", "--peak-angle", "DEG", "facets at least this flat, and level, are horizontal faces"),
         {45, 90, " degrees"}),
     field<kHeights, &Request::normal_tolerance>(
-        heights_key("normal_tolerance", "", "", "of the vertical component of a facet's normal, in all comparisons of angles"),
+        heights_key("normal_tolerance", "", "",
+                    "tolerance of the vertical component of a facet's normal, in all comparisons of angles"),
         {0, 0.1}),
-    word<kFacets, kHeights, &Request::facets>(heights_key(
-        "facets", "--facets", "range|plane",
-        "what a layer looks at: facets within it, or only those that its bounding plane cuts, as in the documents")),
+    word<kFacets, kHeights, &Request::facets>(
+        heights_key("facets", "--facets", "range|plane",
+                    "facets that decide a layer: those within it, or only those that its bounding plane cuts (Lima 2009)")),
     field<kHeights, &Request::min_facet_mm2>(
-        heights_key("facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing"), kArea),
+        heights_key("facet_mm2", "--facet-area", "MM2", "facets smaller than this do not affect layers"), kArea),
     word<kPeaks, kHeights, &Request::peaks>(
         heights_key("peaks", "--peaks", "flats|facets",
                     "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)")),
@@ -177,16 +179,15 @@ std::string check_image_format(std::string_view text) {
 std::string check_title(std::string_view) { return {}; }
 
 const JobKey kImageKeys[] = {
-    text<check_image_format, &Job::format>(image_key("format", "--format", "FORMAT", "of the layer files"))
+    text<check_image_format, &Job::format>(image_key("format", "--format", "FORMAT", "file format of layers"))
         .with_words(image_formats),
     word<kFillRules, &Job::fill_rule>(
         {"image", "fill", "--fill-rule", "RULE",
-         "what is solid where shells overlap: nonzero (any), positive (drops shells turned inside out), evenodd",
-         decides::all}),
+         "solid regions of overlapping shells: nonzero (any), positive (without inverted shells), evenodd", decides::all}),
     word<kMirrors, &Job::mirror>(
         image_key("mirror", "--mirror", "x|y|xy|none", "turn the image over: x swaps left and right, y back and front")),
     text<check_title, &Job::title>(
-        image_key("title", "--title", "NAME", "of the job: TIFF layers then tell it, the layer and z in their tags")),
+        image_key("title", "--title", "NAME", "title of the job; TIFF tags then contain it, the layer and z")),
 };
 
 // --- [machine], [dose]
@@ -253,7 +254,7 @@ const JobKey kMachineKeys[] = {
                     "powder, binder and process that change the machine's profile, in their order; lamina machines lists them"),
         Form::kStrings),
     field<&Job::machine, &MachineRequest::scan_speed_mm_s>(
-        printer_key("scan_speed_mm_s", "--scan-speed", "MM/S", "of the head over the bed, instead of the machine's"),
+        printer_key("scan_speed_mm_s", "--scan-speed", "MM/S", "speed of the head over the bed; default: the machine's"),
         {1e-3, 1e6, " mm/s"}),
     field<&Job::machine, &MachineRequest::blocked>(
         printer_key("blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's"),
@@ -271,36 +272,37 @@ const JobKey kDoseKeys[] = {
                  "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it"),
         kBleedUm),
     field<&Job::dose, &DoseRequest::hole_bleed_um>(
-        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "the same at the edges of holes, if it differs there"), kBleedUm),
-    field<&Job::dose, &DoseRequest::first_bleed_um>(
-        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "the same at all edges of the first layers, if it differs there"),
+        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "bleed compensation at the edges of holes, if different"),
         kBleedUm),
-    field<&Job::dose, &DoseRequest::first_layers>(dose_key("first_layers", "--first-layers", "N", "that --first-bleed is of"),
-                                                  {1, 1'000'000})
+    field<&Job::dose, &DoseRequest::first_bleed_um>(
+        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "bleed compensation of the first layers, if different"),
+        kBleedUm),
+    field<&Job::dose, &DoseRequest::first_layers>(
+        dose_key("first_layers", "--first-layers", "N", "number of layers that use --first-bleed"), {1, 1'000'000})
         .shown_if([](const Job& job) { return job.dose.first_layers != DoseRequest().first_layers; }),
     field<&Job::dose, &DoseRequest::shell_mm>(
         dose_key("shell_mm", "--shell", "MM",
                  "depth below the edge of a layer that gets all its binder (with --core or --fill)"),
         {0, 1000, " mm"}),
     field<&Job::dose, &DoseRequest::core>(
-        dose_key("core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1"), {0, 1}),
-    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(
-        dose_key("saturation_percent", "--saturation", "PERCENT|FORMULA",
-                 "of the voids of the powder that binder fills, by as many drops a pixel as it takes; of x, y, z in mm")),
+        dose_key("core", "--core", "SHARE", "share of the pixels inside the shell that is jetted, 0 to 1"), {0, 1}),
+    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(dose_key(
+        "saturation_percent", "--saturation", "PERCENT|FORMULA",
+        "binder as a percentage of the powder's voids, by several drops per pixel if needed; a formula of x, y, z in mm")),
     structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::core_saturation_percent>(
         dose_key("core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
-                 "the same inside of the shell (with --saturation and --shell)")),
+                 "saturation inside the shell (with --saturation and --shell)")),
     structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
         dose_key("saturation_range", "", "[{...}]", "other saturations between two heights above the bed")),
     word<kLevels, &Job::levels>(dose_key("levels", "--levels", "2|4|16|off",
-                                         "of drops by how full a voxel is, exactly, instead of by its centre alone"))
+                                         "grey levels by the exact fill fraction of each voxel, instead of by its centre"))
         .with_form(Form::kBare)
         .shown_if([](const Job& job) { return job.levels > 0; }),
     field<&Job::dose, &DoseRequest::dithered>(
         dose_key("dithered", "--no-dither", "", "round drops to whole ones (with --levels or --saturation)", "false")),
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
         dose_key("bead_ends", "--bead-ends", "round|square",
-                 "of the beads that fill a part, and of their thick and thin stretches"))
+                 "shape of both ends of the beads that fill a part, and of their thick and thin segments"))
         .shown_if([](const Job& job) { return job.dose.bead_ends != BeadEnds::kRound; }),
 };
 
@@ -360,16 +362,19 @@ JobKey number(std::string_view name, std::string_view flag, std::string_view uni
 
 const JobKey kExtrudeKeys[] = {
     number<&ExtrudeRequest::flow>("flow", "--flow", "FACTOR", 0.01, 10, "factor on all that is extruded"),
-    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600, "of all layers"),
-    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "of all layers"),
+    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600,
+                                         "temperature of the nozzle in all layers"),
+    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "temperature of the bed in all layers"),
     number<&ExtrudeRequest::print_mm_s>("print_mm_s", "--print-speed", "MM/S", 0.1, 2000,
-                                        "of filling lines; 100 % of segmented ones"),
-    number<&ExtrudeRequest::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "of walls"),
+                                        "speed of filling lines; 100 % of segmented lines"),
+    number<&ExtrudeRequest::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "speed of walls"),
     number<&ExtrudeRequest::first_layer_mm_s>("first_layer_mm_s", "--first-layer-speed", "MM/S", 0.1, 2000,
-                                              "nothing of the first layer is laid faster, but thin stretches by their share"),
-    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000, "of moves without a bead"),
-    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50, "of filament, before long travels"),
-    number<&ExtrudeRequest::fan_percent>("fan_percent", "--fan", "%", 0, 100, "of the part's fan"),
+                                              "speed limit of the first layer; thin segments are faster by their percentage"),
+    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000,
+                                         "speed of moves without extrusion"),
+    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50,
+                                           "retraction of filament before long travel moves"),
+    number<&ExtrudeRequest::fan_percent>("fan_percent", "--fan", "%", 0, 100, "speed of the part cooling fan"),
     field<&Job::extrude, &ExtrudeRequest::relative_extrusion>({"extrude", "relative_extrusion", "--relative-extrusion",
                                                                "true|false", "count filament from move to move",
                                                                decides::moves})
@@ -473,22 +478,23 @@ const JobKey kRunKeys[] = {
         .with_words(isa_words),
     field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
-        {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G"}, Form::kString),
-    word<kSyncs, &Job::sync>({"run", "sync", "--sync", "WHEN",
-                              "what survives a power cut: job, all of it once it has ended, for some 0.1 s; layer, all but the "
-                              "layers in flight while it runs too, for some ms a layer; off, nothing for certain"}),
+        {"run", "memory", "--memory", "SIZE", "memory of the layers in flight, in addition to the mesh: 256M, 1G"},
+        Form::kString),
+    word<kSyncs, &Job::sync>(
+        {"run", "sync", "--sync", "WHEN",
+         "data that survives a power cut: job, all of it once it has ended, for some 0.1 s; layer, all but the "
+         "layers in flight while it runs too, for some ms a layer; off, nothing for certain"}),
     custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
         {"run", "layers", "--layers", "A:B", "only layers A to B - 1, counted from 0 at the bottom; A: and :B are open"},
         Form::kString),
     field<&Job::strict>({"run", "strict", "--strict", "", "warnings are errors: exit 5, and nothing is written", 0, "true"}),
     field<&Job::allow_empty>({"run", "allow_empty", "--allow-empty", "",
                               "finish a whole job without a single pixel, contour or bead instead of refusing it", 0, "true"}),
-    field<&Job::inspect>({"run", "inspect", "--inspect", "",
-                          "look through the layers for what hangs on nothing, closed hollows, thin places and parts that touch",
-                          0, "true"}),
-    field<&Job::min_wall_mm>(
-        {"run", "min_wall_mm", "--min-wall", "MM", "what --inspect tells as thin; two pixels, or a drop, if absent"},
-        {0, 1000, " mm"}),
+    field<&Job::inspect>(
+        {"run", "inspect", "--inspect", "", "detect islands, trapped powder, thin walls and touching parts", 0, "true"}),
+    field<&Job::min_wall_mm>({"run", "min_wall_mm", "--min-wall", "MM",
+                              "walls thinner than this are reported by --inspect; default: two pixels, or a drop"},
+                             {0, 1000, " mm"}),
     field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
                                 "plan a job although layers get less binder than the machine's powder needs to hold", 0,
                                 "true"})
@@ -540,9 +546,9 @@ const PartKey kPartKeys[] = {
     text<check_path, &PartRequest::path>(part_key(
         "path", "", "FILE", "STL, OBJ or 3MF file, or a folder of layer images; in a job file, relative to that file")),
     text<check_unit, &PartRequest::unit>(
-        part_key("unit", "--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot"))
+        part_key("unit", "--unit", "UNIT", "unit of STL and OBJ files, which state none: mm, cm, m, um, inch, foot"))
         .with_words([] { return std::vector<std::string_view>(std::begin(kUnits), std::end(kUnits)); }),
-    field<&PartRequest::copies>(part_key("copies", "--copies", "N", "of each part, 1 to 1000000"), {1, 1'000'000}),
+    field<&PartRequest::copies>(part_key("copies", "--copies", "N", "copies of each part, 1 to 1000000"), {1, 1'000'000}),
     field<&PartRequest::at_mm>(
         part_key("at_mm", "--at", "X,Y", "where the part's box starts, in mm from the bed's front left; else arranged"),
         {0, kMaxMm, " mm"}),
@@ -562,7 +568,7 @@ const PartKey kPartKeys[] = {
     structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
         part_key("material_range", "", "[{...}]", "other powders between two heights above the part's bottom")),
     field<&PartRequest::images, &PartImages::dpi>(
-        images_key("dpi", "", "DPI|XxY", "of a part that is images, if their files do not tell it"), {1, 25'400, "", true}),
+        images_key("dpi", "", "DPI|XxY", "resolution of image parts whose files state none"), {1, 25'400, "", true}),
     field<&PartRequest::images, &PartImages::layer_mm>(
         images_key("layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's"),
         {0.001, kMaxMm, " mm"}),
@@ -575,21 +581,22 @@ const PartKey kPartKeys[] = {
     field<&PartRequest::images, &PartImages::missing_empty>(
         images_key("missing_empty", "", "", "numbers that are missing among images are empty layers"))
         .shown_if([](const PartRequest& part) { return part.images.missing_empty; }),
-    field<&PartRequest::images, &PartImages::crop>(
-        images_key("crop", "", "", "what of images sticks out of the bed is cut off"))
+    field<&PartRequest::images, &PartImages::crop>(images_key("crop", "", "", "cut off images at the edges of the bed"))
         .shown_if([](const PartRequest& part) { return part.images.crop; }),
     field<&PartRequest::images, &PartImages::resample>(
         images_key("resample", "", "", "images of another dpi than the job's are brought to it"))
         .shown_if([](const PartRequest& part) { return part.images.resample; }),
     field<&PartRequest::bleed_um>(
-        images_key("bleed_um", "", "UM|XxY", "of this part, instead of dose.bleed_um and dose.hole_bleed_um"), kBleedUm),
-    field<&PartRequest::hole_bleed_um>(images_key("hole_bleed_um", "", "UM|XxY", "of this part's holes, if it differs there"),
-                                       kBleedUm),
+        images_key("bleed_um", "", "UM|XxY",
+                   "bleed compensation of this part, instead of dose.bleed_um and dose.hole_bleed_um"),
+        kBleedUm),
+    field<&PartRequest::hole_bleed_um>(
+        images_key("hole_bleed_um", "", "UM|XxY", "bleed compensation of this part's holes, if different"), kBleedUm),
     structure<read_saturation, saturation_text, &PartRequest::saturation_percent>(images_key(
         "saturation_percent", "", "PERCENT|FORMULA",
-        "of this part at all heights, instead of dose.saturation_percent and its ranges; of x, y, z from its corner")),
+        "saturation of this part at all heights, instead of dose.saturation_percent and its ranges; a formula of x, y, z from its corner")),
     structure<read_saturation, saturation_text, &PartRequest::core_saturation_percent>(
-        images_key("core_saturation_percent", "", "PERCENT|FORMULA", "the same inside of its shell; absent: as in it")),
+        images_key("core_saturation_percent", "", "PERCENT|FORMULA", "saturation inside its shell; default: as in the shell")),
 };
 
 constexpr Key<MaterialRange> kMaterialKeys[] = {text<check_material, &MaterialRange::material>({"material_range", "material"})};

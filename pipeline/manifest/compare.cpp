@@ -41,7 +41,7 @@ class PathComparison {
     if (digest->bytes != manifest_.file.bytes) {
       faults_.add(fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, manifest_.file.bytes));
     } else if (has_intervals()) {
-      faults_.add(fmt::format("{}: before its first or behind its last layer it is not what was written", name));
+      faults_.add(fmt::format("{}: its content before the first or after the last layer is not what was written", name));
     } else {
       faults_.add(fmt::format("{}: its content is not what was written", name));
     }
@@ -86,7 +86,7 @@ class PathComparison {
     for (fs::directory_iterator entry(directory_ / "layers", error), end; !error && entry != end; entry.increment(error))
       ++found;
     if (found <= manifest_.layers.size()) return;
-    faults_.add(fmt::format("layers: holds {} files that the manifest does not name", found - manifest_.layers.size()));
+    faults_.add(fmt::format("layers: contains {} files that the manifest does not name", found - manifest_.layers.size()));
   }
 
   fs::path directory_;
@@ -131,7 +131,7 @@ std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record)
 std::string fault_of_one_powder(const LayerRecord& record) {
   for (const ImageRecord& image : record.images) {
     if (image.unfed_pixels > 0)
-      return fmt::format("the job is of one powder, the manifest says {} pixels in another one", image.unfed_pixels);
+      return fmt::format("the job uses one powder, the manifest says {} pixels in another one", image.unfed_pixels);
   }
   return {};
 }
@@ -141,10 +141,11 @@ Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecor
     return record.filled_pixels() > 0 && record.part_pixels.size() != head.parts.size();
   });
   if (unknown == 0 || head.parts.size() < 2) return {};
-  return Error{Fault::kUsage, fmt::format("--quote: {} layers of an earlier run do not say which part their pixels belong to; "
-                                          "plan again with --overwrite, or go on without --quote and let lamina verify --quote "
-                                          "tell all parts as one",
-                                          unknown)};
+  return Error{Fault::kUsage,
+               fmt::format("--quote: {} layers of an earlier run do not say which part their pixels belong to; "
+                           "plan again with --overwrite, or continue without --quote and run lamina verify --quote "
+                           "for one quote of all parts",
+                           unknown)};
 }
 
 std::uint64_t compare_paths(const std::string& directory, const Manifest& manifest, Faults& faults) {
@@ -163,7 +164,8 @@ void check_shards(const std::vector<ShardRange>& shards, std::uint32_t layers, F
   };
   for (const ShardRange& one : shards) {
     const auto [index, of] = one.shard;
-    if (of != count) return faults.add(fmt::format("{}: is of another division than {}", one.name, shards[0].name));
+    if (of != count)
+      return faults.add(fmt::format("{}: is a shard of another number of shards than {}", one.name, shards[0].name));
     missing(index, one.first_layer);
     next = std::max(next, index + 1);
     layer = one.last_layer;

@@ -30,7 +30,7 @@ Status check_same_job(const std::string& path, const Manifest& manifest, const M
                                             what.empty() ? "its parts or keys differ" : what)};
   }
   if (manifest.head.first_layer == head.first_layer && manifest.head.last_layer == head.last_layer) return {};
-  return Error{Fault::kUsage, fmt::format("{}: is of layers {}:{}; resume with the same --layers, or use --overwrite", path,
+  return Error{Fault::kUsage, fmt::format("{}: contains layers {}:{}; resume with the same --layers, or use --overwrite", path,
                                           manifest.head.first_layer, manifest.head.last_layer)};
 }
 
@@ -280,7 +280,7 @@ Status LayeredFile::check_part(const std::string& file, const std::string& manif
   const std::string part = part_of(target->file);
   struct stat status {};
   if (::lstat(part.c_str(), &status) != 0) return {};
-  return Error{Fault::kUsage, fmt::format("{}: is there already, without a record of lamina beside it; remove it, or name "
+  return Error{Fault::kUsage, fmt::format("{}: is there already, without a record of lamina next to it; remove it, or name "
                                           "another file",
                                           part)};
 }

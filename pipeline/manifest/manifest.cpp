@@ -301,7 +301,7 @@ std::string read_line(std::string_view line, const ManifestHead& head, std::uint
   describe_line(io, head, record, paths);
   if (io.good() && !io.ended()) return "is not the line of a layer";
   if (!io.good()) return fmt::format("layer {}: {}", index, io.what());
-  if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
+  if (record.layer.index != index) return fmt::format("has layer {} where layer {} is expected", record.layer.index, index);
   for (const std::string& what : {what_is_impossible(record.layer), what_is_impossible(record.program)}) {
     if (!what.empty()) return fmt::format("layer {}: {}", index, what);
   }
@@ -401,7 +401,7 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   if (!read || read->layers.empty()) return reported;
   if (read->head.grey_drops()) {
     return Error{Fault::kInput,
-                 fmt::format("{}: its images are drops of a pixel as grey, which are no shares of a part; plan its "
+                 fmt::format("{}: its images are drops of a pixel as grey, which are no fill fractions; plan its "
                              "parts again, or copy the images into a folder of their own",
                              one_line(manifest))};
   }

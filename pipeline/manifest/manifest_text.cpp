@@ -45,7 +45,7 @@ bool is_file_name(std::string_view name) {
 PixelAxis possible_axis(std::int64_t dots, std::int64_t length, std::int64_t span) {
   if (dots < 1 || dots > kMaxDots || span < 1 || span > kMaxSpan || span / dots < kMinPixel || length < 1 ||
       length > kNmReach) {
-    throw std::invalid_argument("its grid is none of a bed");
+    throw std::invalid_argument("its grid has an impossible size or resolution");
   }
   return PixelAxis(dots, length, span);
 }
@@ -163,7 +163,7 @@ PixelAxis axis_from(const Json& dots, std::int64_t length) {
 
 Hash128 hash_from(const Json& json) {
   Hash128 hash;
-  if (!read_hex(json.get<std::string>(), hash)) throw std::invalid_argument("a hash is none");
+  if (!read_hex(json.get<std::string>(), hash)) throw std::invalid_argument("invalid hash");
   return hash;
 }
 
@@ -235,7 +235,7 @@ ManifestHead head_from(const Json& json) {
   ManifestHead head;
   const std::string& kind = json.at("kind").text();
   const auto found = std::ranges::find(kKinds, kind, &std::pair<Product, std::string_view>::second);
-  if (found == std::end(kKinds)) throw std::invalid_argument(fmt::format("kind '{}' is none", kind));
+  if (found == std::end(kKinds)) throw std::invalid_argument(fmt::format("unknown kind '{}'", kind));
   head.product = found->first;
   json.at("lamina").get_to(head.version);
   json.at("job").get_to(head.job_toml);
@@ -276,7 +276,7 @@ std::string lines_of(const Json& json) {
 
 std::string what_is_impossible(const Layer& layer) {
   const bool possible = layer.bottom >= 0 && layer.thickness > 0 && std::int64_t{layer.bottom} + layer.thickness <= kNmReach;
-  return possible ? "" : fmt::format("lies at {} nm and is {} nm thick", layer.bottom, layer.thickness);
+  return possible ? "" : fmt::format("is at {} nm and is {} nm thick", layer.bottom, layer.thickness);
 }
 
 std::string what_is_impossible(const ProgramRecord& program) {
@@ -310,9 +310,9 @@ Result<ManifestHead> read_head(const std::string& text) {
   if (!json.is_object()) return wrong("is no manifest of lamina");
   if (!json.contains("manifest") || json.at("manifest") != kManifestVersion) {
     if (!json.contains("lamina")) return wrong("is no manifest of lamina");
-    return wrong(
-        fmt::format("is of another version of lamina, whose manifests differ from those of this one; read it with that "
-                    "version, or plan the job again with --overwrite"));
+    return wrong(fmt::format(
+        "was written by another version of lamina, whose manifests differ from those of this one; read it with that "
+        "version, or plan the job again with --overwrite"));
   }
   if (fraction) return wrong("the head has a number that is not whole; it was changed");
   ManifestHead head;
@@ -323,7 +323,7 @@ Result<ManifestHead> read_head(const std::string& text) {
   }
   // Written again it has to be the same text: then nothing in it was changed, its id holds, and all of it was read.
   if (head_text(head) != text) return wrong("the head is not what was written; it was changed");
-  if (head.first_layer > head.last_layer || head.last_layer > head.layer_count) return wrong("the range is no range");
+  if (head.first_layer > head.last_layer || head.last_layer > head.layer_count) return wrong("its range of layers is invalid");
   if (std::string what = what_is_impossible(head); !what.empty()) return wrong(what);
   return head;
 }

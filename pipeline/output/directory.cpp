@@ -66,7 +66,7 @@ Result<OtherRuns> check_manifests(const Job& job, const Claim* claim) {
     if (joins(job, file)) {
       found.shared = true;
     } else if (is_own && !job.resume && !job.overwrite) {
-      if (file.partial) return refuse("an interrupted job", "go on with --resume, or start over with --overwrite");
+      if (file.partial) return refuse("an interrupted job", "continue with --resume, or start over with --overwrite");
       return refuse("a finished job",
                     "replace it with --overwrite, check and keep it with --resume, or name another "
                     "directory");
@@ -95,8 +95,8 @@ Status check_output(const Job& job) {
   const bool known = job.resume && has_record(job.output + "/" + manifest_name(job));
   if (!known && !job.overwrite && !found->shared && !layer_files(job.output).empty()) {
     return Error{Fault::kUsage,
-                 fmt::format("{}/layers: holds layers {}; replace them with --overwrite, or name another directory", job.output,
-                             found->begun ? "beside a record without its head" : "without a manifest")};
+                 fmt::format("{}/layers: contains layers {}; replace them with --overwrite, or name another directory",
+                             job.output, found->begun ? "next to a manifest without a header" : "without a manifest")};
   }
   return {};
 }
@@ -111,7 +111,7 @@ Status check_shard_fits(const Job& job, const ManifestHead& head) {
     const auto earlier = read_manifest_head(path);
     if (earlier && same_job(*earlier, head)) continue;
     if (is_own) {
-      return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} "
+      return Error{Fault::kUsage, fmt::format("{}: belongs to another job, whose layers a shard cannot clear away; remove {} "
                                               "first, or name another directory",
                                               path, job.output)};
     }
@@ -188,7 +188,7 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
   const ManifestHead& was = manifest->head;
   if (was.first_layer < head.first_layer || was.last_layer > head.last_layer) {
     return Error{Fault::kUsage,
-                 fmt::format("{}: is of layers {}:{}, which {}:{} would not keep; resume with the same --layers or more, or "
+                 fmt::format("{}: contains layers {}:{}, which {}:{} would not keep; resume with the same --layers or more, or "
                              "choose another directory and join them by lamina merge",
                              path, was.first_layer, was.last_layer, head.first_layer, head.last_layer)};
   }

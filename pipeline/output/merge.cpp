@@ -42,7 +42,7 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
     if (std::ranges::find(detected, canonical) != detected.end()) continue;
     detected.push_back(canonical);
     const std::vector<ManifestFile> files = find_manifests(directory);
-    if (files.empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directory));
+    if (files.empty()) return unmatched(fmt::format("{}: contains no manifest of a shard", directory));
     for (const ManifestFile& file : files) {
       const std::string path = (fs::path(directory) / file.name).string();
       // An earlier merge into this directory was interrupted, or failed to remove the shards' manifests.
@@ -52,8 +52,8 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
       Result<Manifest> manifest = read_manifest(path);
       if (!manifest) return manifest.error();
       if (manifest->head.product != Product::kImages)
-        return unmatched(
-            fmt::format("{}: is of no images, and only their shards are merged; plan all layers in one run", path));
+        return unmatched(fmt::format(
+            "{}: belongs to a job without images, and only image shards are merged; plan all layers in one run", path));
       if (!of_merge || !covers_all(manifest->head)) shards.push_back({directory, path, std::move(*manifest)});
     }
   }
@@ -77,7 +77,7 @@ Status check_coverage(std::vector<Shard>& shards) {
     if (head.first_layer == head.last_layer) continue;  // more shards than layers
     if (head.first_layer > next) return missing(next, head.first_layer);
     if (head.first_layer < next) {
-      return unmatched(fmt::format("{}: holds layer {} that {} holds as well; leave one of them out", shard.path,
+      return unmatched(fmt::format("{}: contains layer {} that {} contains as well; leave one of them out", shard.path,
                                    head.first_layer, before->path));
     }
     next = head.last_layer;
@@ -137,7 +137,7 @@ Result<bool> check_output(const std::string& output, const ManifestHead& head, c
     finished |= !file.partial;
   }
   if (known || !holds_layers(output)) return finished;
-  return Error{Fault::kUsage, fmt::format("{}: holds layers without a manifest; name another directory with -o", output)};
+  return Error{Fault::kUsage, fmt::format("{}: contains layers without a manifest; name another directory with -o", output)};
 }
 
 Status remove_shard_manifests(const std::string& output) {
@@ -208,7 +208,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
     report.layers = whole->manifest.layers.size();
     return report;
   }
-  if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", request.directories.front()));
+  if (shards->empty()) return unmatched(fmt::format("{}: contains no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
   const Status sane = check(*shards, request.strict, request.allow_empty, report);
   if (!sane) return sane.error();

@@ -241,9 +241,9 @@ Status check_slice_output(const Job& job) {
   const OnRecord record = find_on_record(job.output);
   const bool replaces = job.overwrite || (job.resume && (record.finished || record.begun));
   if (!job.overwrite && !job.resume && !manifests.empty()) {
-    return Error{Fault::kUsage, fmt::format("{}: holds {}; {}, or name another directory", job.output,
+    return Error{Fault::kUsage, fmt::format("{}: contains {}; {}, or name another directory", job.output,
                                             manifests.front().partial ? "an interrupted job" : "a job",
-                                            manifests.front().partial ? "go on with --resume, start over with --overwrite"
+                                            manifests.front().partial ? "continue with --resume, start over with --overwrite"
                                                                       : "replace it with --overwrite")};
   }
   const bool knows_plan = job.overwrite || job.slice.file_a_layer || record.finished || record.all_made;
@@ -265,8 +265,9 @@ Status check_slice_output(const Job& job) {
   const auto known = [&](const fs::path& file) { return is_on_record(record, file.filename().string()); };
   if (replaces && (!requests || std::ranges::all_of(layer_files(job), known))) return {};
   if (!layer_files(job).empty()) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};
+    return Error{
+        Fault::kUsage,
+        fmt::format("{}/layers: contains layers; replace them with --overwrite, or name another directory", job.output)};
   }
   const fs::path file = fs::path(job.output) / slice_file_name(job);
   if (!job.slice.file_a_layer && fs::exists(file, error)) {

@@ -95,8 +95,8 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
   }
   if (is_stream(job.output)) {
     if (!job.resume && !sml) return {};
-    return Error{Fault::kUsage, fmt::format("-o {}: is no file, which {} needs; name one", job.output,
-                                            sml ? "the layer table beside an SML file" : "--resume")};
+    return Error{Fault::kUsage, fmt::format("-o {}: is not a file, and {} needs one; name a file", job.output,
+                                            sml ? "the layer table of an SML file" : "--resume")};
   }
   if (Status status = check_not_being_written(job.output); !status) return status;
   if (Status status = LayeredFile::check_part(job.output, manifest_path(job)); !status) return status;
@@ -110,7 +110,8 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
   }
   if (job.resume || !fs::exists(manifest_path(job) + ".part", error)) return {};
   return Error{Fault::kUsage,
-               fmt::format("{}.part: an interrupted job; go on with --resume, or start over with --overwrite", job.output)};
+               fmt::format("{}.part: belongs to an interrupted job; continue with --resume, or start over with --overwrite",
+                           job.output)};
 }
 
 ToolpathFile::ToolpathFile(const Plan& plan)

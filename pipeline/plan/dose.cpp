@@ -118,9 +118,9 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   }
   if (machine == nullptr || machine->head.drop_pl == 0) {
     if (!requested) return {};
-    return Error{Fault::kUsage, fmt::format("--saturation: {}",
-                                            machine == nullptr ? "is of drops, and no machine tells how large; add --machine"
-                                                               : "head.drop_pl of the machine is 0; state its drop")};
+    return Error{Fault::kUsage,
+                 fmt::format("--saturation: {}", machine == nullptr ? "needs the drop volume of a machine; add --machine"
+                                                                    : "head.drop_pl of the machine is 0; set its drop volume")};
   }
   const auto& powder = machine->powder;
   binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
@@ -150,7 +150,7 @@ void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<W
 Status DosePlan::check_images(std::string_view format) const {
   if (format != "tiff-4" || max_drops() <= 15) return {};
   return Error{Fault::kUsage,
-               fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", max_drops())};
+               fmt::format("--format tiff-4: stores up to 15 drops per pixel, the job has {}; choose tiff-8", max_drops())};
 }
 
 bool DosePlan::has_formula(const Layer& layer) const {

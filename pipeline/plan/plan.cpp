@@ -205,7 +205,7 @@ class Planner {
     if (!moves()) return {};
     const Extruder& machine = plan_.moves->profile.machine;
     if (mm(plan_.scene->height) > machine.bed.build_height_mm) {
-      return usage("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them", mm(plan_.scene->height),
+      return usage("the parts are {:.3f} mm high, {} builds {:.3f} mm; turn or scale them", mm(plan_.scene->height),
                    machine.name, machine.bed.build_height_mm);
     }
     const auto format = formats::make_extrusion_format(machine);
@@ -247,9 +247,9 @@ class Planner {
     }
     if (zones.several() && job().fill_rule == FillRule::kEvenOdd && (materials_.several() || job().levels > 0)) {
       return usage(
-          "--fill-rule: evenodd looks at all parts together, and parts have doses of their own and {}; "
+          "--fill-rule: evenodd combines all parts, but parts have different doses and {}; "
           "choose nonzero",
-          job().levels > 0 ? "shares of voxels" : "several materials");
+          job().levels > 0 ? "grey levels" : "several materials");
     }
     if (!zones.bleeds().grows()) return {};
     if (materials_.several())
@@ -297,7 +297,8 @@ class Planner {
   Status foresee_beads() {
     if (plan_.product == Product::kContours && job().slice.format == "3mf" && plan_.sections->fills()) {
       plan_.warnings.push_back(
-          {"not-written", "--format 3mf: slices of 3MF hold contours only, the filling is not in the file; choose svg or cli"});
+          {"not-written",
+           "--format 3mf: slices of 3MF contain contours only, the filling is not in the file; choose svg or cli"});
     }
     if (!moves()) return {};
     warn_of_segments(*plan_.segments, plan_.moves->profile, plan_.sections->fills(), plan_.warnings);
@@ -332,7 +333,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
     const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
     if (formats::find_level_format(job.format) != nullptr && !dosed) {
       return usage(
-          "--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
+          "--format {}: stores grey levels or drops per pixel, and the job has neither; add "
           "--levels 2, 4 or 16, or --machine and --saturation",
           job.format);
     }
@@ -343,10 +344,10 @@ Result<Resolved> resolve(const Job& job, Product product) {
     const auto* format = formats::find_slice_format(job.slice.format);
     if (format == nullptr) return usage("unknown format '{}'", job.slice.format);
     if (!format->paths && fills(job)) {
-      return usage("--format {}: holds contours only; leave out the filling, or choose svg", format->id);
+      return usage("--format {}: contains contours only; leave out the filling, or choose svg", format->id);
     }
     if (job.slice.format == "3mf" && job.slice.file_a_layer) {
-      return usage("--file-a-layer: a 3MF package holds all slices; choose svg or cli, or leave it out");
+      return usage("--file-a-layer: a 3MF package contains all slices; choose svg or cli, or leave it out");
     }
     if (job.heights.per_part) {
       return usage("--per-part: a file of slices has one table of layers for all parts; leave it out");

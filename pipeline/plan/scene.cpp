@@ -84,10 +84,10 @@ Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks
   Result<Part> part = load::load(request.path, options);
   if (!part) return part.error();
   if (part->bounds.empty() || part->instances.empty()) {
-    return Error{Fault::kInput, fmt::format("{}: holds no triangles; nothing to plan", request.path)};
+    return Error{Fault::kInput, fmt::format("{}: contains no triangles; nothing to plan", request.path)};
   }
   if (part->bounds.height() == 0) {
-    return Error{Fault::kInput, fmt::format("{}: all of it lies at z = {} mm, it has no height; nothing to plan", request.path,
+    return Error{Fault::kInput, fmt::format("{}: all of it is at z = {} mm, it has no height; nothing to plan", request.path,
                                             mm(part->bounds.lo.z))};
   }
   Loaded loaded;
@@ -142,7 +142,7 @@ void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std
     scene.parts[second].notes.push_back(
         {false, fmt::format("its box overlaps that of part {} ({}); where solids overlap {}", first + 1,
                             std::filesystem::path(scene.parts[first].path).filename().string(),
-                            job.parts[first].material == job.parts[second].material ? "they are united"
+                            job.parts[first].material == job.parts[second].material ? "their union is printed"
                             : is_images(first) && !is_images(second)                ? "that one's material counts"
                                                                                     : "this one's material counts")});
   }
@@ -224,7 +224,7 @@ Status check_apart(const Job& job, const std::string& path) {
   const fs::path in = fs::weakly_canonical(path, ignored), out = fs::weakly_canonical(job.output, ignored);
   const bool inside = std::ranges::mismatch(out, in).in1 == out.end();
   if (!inside) return {};
-  return usage("{}: lies in the directory that is written; name another one with -o", one_line(path));
+  return usage("{}: is in the output directory; name another one with -o", one_line(path));
 }
 
 /// Dots an inch of the images by key or tags. errors  kInput, kUsage
@@ -233,7 +233,7 @@ Result<std::array<std::int64_t, 2>> dots_of(const PartRequest& part, const forma
   std::array<double, 2> dpi{images.dpi_x(), images.dpi_y()};
   if (part.images.dpi) dpi = {static_cast<double>((*part.images.dpi)[0]), static_cast<double>((*part.images.dpi)[1])};
   if (!(dpi[0] > 0) || !(dpi[1] > 0))
-    return Error{Fault::kInput, fmt::format("{}: its files tell no resolution; give it as part.dpi", one_line(part.path))};
+    return Error{Fault::kInput, fmt::format("{}: its files state no resolution; add part.dpi", one_line(part.path))};
   std::array<std::int64_t, 2> dots{};
   const std::array axes{&grid.x, &grid.y};
   for (std::size_t a = 0; a < 2; ++a) {
@@ -384,7 +384,7 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
   if (!reported) return reported.error();
   if (job.levels > 0 && part.images.threshold != PartImages().threshold)
     return usage(
-        "{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
+        "{}: part.threshold applies to 1-bit images, but --levels reads grey as fill fractions of voxels; leave out "
         "one of them",
         one_line(part.path));
   auto images = formats::LayerImages::open(
@@ -403,8 +403,7 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
     open.thickness = static_cast<Nm>(nm_of(job.layer_mm));
   }
   if (open.thickness <= 0)
-    return usage("{}: no manifest of lamina tells how thick its layers are; give --layer, or part.layer_mm",
-                 one_line(part.path));
+    return usage("{}: no manifest of lamina states the layer thickness; add --layer or part.layer_mm", one_line(part.path));
   if (open.bottom + std::int64_t{open.thickness} * images->layers() > kNmReach)
     return usage("{}: {} layers of {} mm reach beyond {} mm; give thinner ones", one_line(part.path), images->layers(),
                  mm(open.thickness), mm(kNmReach));
@@ -419,9 +418,10 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
         {false, fmt::format("its manifest says that the images are mirrored; --mirror {} turns them back", reported->mirror)});
   if (reported->levels > 0 && reported->levels != job.levels)
     open.notes.push_back(
-        {false, fmt::format("its manifest says that the images are shares of voxels in {} levels, which --levels {} keeps; {}",
-                            reported->levels, reported->levels,
-                            job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
+        {false,
+         fmt::format("its manifest says that the images are fill fractions of voxels in {} levels, which --levels {} keeps; {}",
+                     reported->levels, reported->levels,
+                     job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
   open.images = std::make_shared<const formats::LayerImages>(std::move(*images));
   return open;
 }
@@ -474,7 +474,7 @@ Status fit_layers(const Scene& scene, bool beads, Job& job) {
   }
   const bool named = std::ranges::find(job.named, "layers.thickness_mm") != job.named.end();
   if (named && nm_of(job.layer_mm) != thickness)
-    return usage("{}: layers of {} mm, the job asks for {} mm; leave out --layer", first, mm(thickness),
+    return usage("{}: layers of {} mm, the job requests {} mm; leave out --layer", first, mm(thickness),
                  number_text(job.layer_mm));
   job.layer_mm = mm(thickness);
   return {};

@@ -26,8 +26,8 @@ Status check_spacings(const SegmentSettings& settings, const FillSettings& fill,
                                                         : "";
   if (key.empty()) return {};
   const auto keys = distance_keys(fill);
-  return Error{Fault::kUsage, fmt::format("segment.{}: {}fill.{} says how far lines lie from each other; leave out one of them",
-                                          key, where, keys.empty() ? "group" : keys.front())};
+  return Error{Fault::kUsage, fmt::format("segment.{}: {}fill.{} sets the line spacing as well; leave out one of them", key,
+                                          where, keys.empty() ? "group" : keys.front())};
 }
 
 /// The filling between the same heights as a segmentation, or a new one without changes.
@@ -121,7 +121,7 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
 
 void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profile, bool fills, std::vector<Warning>& warnings) {
   if (!fills) {
-    warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
+    warnings.push_back({"no-bead", "no walls and no filling are requested; give --walls, --fill or both"});
   }
   for (const auto& [heights, range] : segments.segmented()) {
     for (Warning& warning : segment::warnings(range->plan, profile.calibration)) {

@@ -41,10 +41,10 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 /// What keeps a job from levels, and what to do; empty if nothing does.
 std::string_view against_shares(const Job& job, const Materials& materials, const DoseZones& zones) {
   if (materials.several() && job.machine.profile.empty() && formats::find_level_format(job.format) != nullptr)
-    return "one material as grey, for several would lie in one voxel; choose a 1-bit format or name a machine";
+    return "one material as grey, as several would share one voxel; choose a 1-bit format or name a machine";
   if (zones.bleeds().grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
-  if (job.dose.core < 1) return "whole parts; give --core-saturation in place of --core";
+  if (job.dose.core < 1) return "whole parts; give --core-saturation instead of --core";
   if (job.heights.containment != Containment::kAcross) return "the layer as it is; leave out --containment";
   return {};
 }
@@ -99,7 +99,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
   if (job.levels > 0) {
     if (const auto what = against_shares(job, materials, zones); !what.empty()) {
-      return Error{Fault::kUsage, fmt::format("--levels: shares of voxels are those of {}, or leave out --levels", what)};
+      return Error{Fault::kUsage, fmt::format("--levels: fill fractions of voxels need {}, or leave out --levels", what)};
     }
   }
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material, std::uint32_t zone,

@@ -151,7 +151,7 @@ class LayerBeads {
     const double area_mm2 = mm(rules_->within.width()) * mm(rules_->within.depth());
     if (static_cast<double>(pieces_.size()) * rules_->piece_mm > kMaxLineDensity * area_mm2)
       return Error{Fault::kInput,
-                   fmt::format("layer {}: beads lie upon each other many times over; --beads told looks at them", layer.index)};
+                   fmt::format("layer {}: beads overlap many times; analyse them with --beads stated", layer.index)};
     left_out_mm3_ += bead::flow_along(pieces_, rules_->height_mm, sides_);
     for (const bead::DepositedPiece& p : pieces_)
       deposited_mm3_ += p.area_mm2 * std::hypot((mm(p.to.x) - mm(p.from.x)), (mm(p.to.y) - mm(p.from.y)));
@@ -221,11 +221,12 @@ class LayerBeads {
 
 Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& beads, const std::string& machine) {
   if (!beads.empty() && beads != "deposited" && beads != "spread" && beads != "stated")
-    return Error{Fault::kUsage, fmt::format("--beads: '{}' is none of laid, spread, told", one_line(beads))};
+    return Error{Fault::kUsage,
+                 fmt::format("--beads: unknown model '{}'; must be deposited, spread or stated", one_line(beads))};
   const std::string reported =
-      file.states_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
+      file.states_widths() ? "widths are those that the file states" : "widths are those of the fed volume";
   if (beads == "stated" && !machine.empty())
-    return Error{Fault::kUsage, "--machine does nothing beside --beads told; leave one out"};
+    return Error{Fault::kUsage, "--machine has no effect with --beads stated; remove one"};
   if (beads == "stated") return BeadRules{std::nullopt, reported};
   std::optional<Extruder> printer;
   if (!machine.empty()) {
@@ -238,7 +239,7 @@ Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& 
     printer = std::move(*named);
   }
   if (printer) {
-    BeadRules found{rules_of(*printer), fmt::format("widths are those that {} lays: lag {:g} s, {:g} mm/s2", printer->name,
+    BeadRules found{rules_of(*printer), fmt::format("widths are those that {} deposits: lag {:g} s, {:g} mm/s2", printer->name,
                                                     printer->material.lag_s, printer->speed.acceleration_mm_s2)};
     found.rules->spread = beads != "deposited";
     return found;

@@ -19,7 +19,8 @@ struct BeadRules {
   std::string reported;                        // for people: where widths come from
 };
 
-/// beads    "spread": by the bead model (docs/bead.md); "deposited": the same, without spread along their lines; "stated" by
+/// beads    "spread": by the bead model (docs/theory/bead.md); "deposited": the same, without spread along their lines;
+/// "stated" by
 ///          the file; or "": spread where the printer is known
 /// machine  as --machine takes it; "": the one that the file names, if a profile of that name is shipped
 /// errors   kUsage: an unknown printer or word; "deposited" or "spread" without a printer

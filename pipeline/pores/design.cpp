@@ -87,9 +87,9 @@ std::vector<std::string> outside_of(const segment::DesignLimits& limits, const s
   const auto add = [&](std::size_t i, std::string text) {
     if (std::abs(beyond[i]) > 0.02) lines.push_back(std::move(text));
   };
-  add(0, fmt::format("extrusion {:.1f} % lies between those measured", choice.extrusion));
-  add(1, fmt::format("thick stretches of {:.2f} mm; 1.5 were measured", choice.thick_mm));
-  add(2, fmt::format("thin stretches of {:.2f} mm; 1.5 to 2 were measured", choice.thin_mm));
+  add(0, fmt::format("extrusion {:.1f} % is between those measured", choice.extrusion));
+  add(1, fmt::format("thick segments of {:.2f} mm; 1.5 were measured", choice.thick_mm));
+  add(2, fmt::format("thin segments of {:.2f} mm; 1.5 to 2 were measured", choice.thin_mm));
   add(3, fmt::format("thick beads {:+.4f} mm from their neighbours; 0 to 0.01 were measured", choice.gap_mm));
   return lines;
 }
@@ -161,7 +161,7 @@ Status check_together(const DesignRequest& request, double layer_mm, GradientJob
 }
 
 constexpr std::string_view kSure =
-    "sure      +- is of the voxels; prints of this kind by an Anet A8 have lain within a factor of 1.5 of measured k1,\n"
+    "sure      +- is of the voxels; prints of this kind by an Anet A8 were within a factor of 1.5 of measured k1,\n"
     "          2.5 points of measured porosity (bench/pores.md)\n";
 
 std::string lines_text(const segment::SegmentSettings& keys) {
@@ -228,11 +228,11 @@ std::string step_text(const GradientStep& one) {
   const segment::SegmentSettings& keys = one.found.design.settings;
   const ForwardRun& forward = one.found.forward;
   std::string text =
-      fmt::format("{}: wished {}\n", heights_text(one.step.from_mm, one.step.to_mm), target_text(one.step.target));
+      fmt::format("{}: target {}\n", heights_text(one.step.from_mm, one.step.to_mm), target_text(one.step.target));
   text += one.found.met ? fmt::format("  is        {}; within {:.1f} %\n", predicted_lines(forward), 100 * one.found.miss)
-                        : fmt::format("  nearest   {}; not reachable, misses the wish by {:.0f} %\n", predicted_lines(forward),
-                                      100 * one.found.miss);
-  text += fmt::format("  lines     {}\n  laid at   {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
+                        : fmt::format("  nearest   {}; not reachable, misses the target by {:.0f} %\n",
+                                      predicted_lines(forward), 100 * one.found.miss);
+  text += fmt::format("  lines     {}\n  settings  {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
                       lines_text(keys), keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
   if (!forward.resolved) text += "  note      voxels are too coarse for the pores; take a smaller --voxel\n";
   for (const std::string& line : one.found.outside) text += fmt::format("  beyond    {}\n", line);
@@ -355,7 +355,7 @@ std::string predicted_lines(const ForwardRun& forward) {
 std::string as_text(const DesignedJob& found) {
   const segment::SegmentSettings& keys = found.design.settings;
   const ForwardRun& forward = found.forward;
-  std::string text = fmt::format("lines     {}\nlaid at   {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
+  std::string text = fmt::format("lines     {}\nsettings  {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
                                  lines_text(keys), keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
   text += fmt::format("porosity  {:.2f} %, {:.2f} % leads through along z\n", 100 * forward.porosity,
                       100 * forward.porosity_through);
@@ -368,7 +368,7 @@ std::string as_text(const DesignedJob& found) {
   if (!forward.resolved) text += "note      voxels are too coarse for the pores; take a smaller --voxel\n";
   for (const std::string& line : found.outside) text += fmt::format("beyond    {}\n", line);
   if (found.outside.empty()) text += "beyond    nothing: lengths, gaps and extrusion are those that were measured\n";
-  return text + fmt::format("checked   by {} forward run{}; the wish is met within {:.1f} %\n", found.runs,
+  return text + fmt::format("checked   by {} forward run{}; the target is met within {:.1f} %\n", found.runs,
                             found.runs == 1 ? "" : "s", 100 * found.miss);
 }
 
@@ -386,14 +386,14 @@ std::string as_text(const GradientJob& found) {
   std::string text;
   for (const GradientStep& one : found.steps) text += step_text(one);
   text += fmt::format(
-      "whole     porosity {:.2f} %, k1 of the regions in series {:.4g} D along z; where two meet, pores lie upon\n"
-      "          each other only in part, which takes more\n",
+      "whole     porosity {:.2f} %, k1 of the regions in series {:.4g} D along z; where two regions meet, pores\n"
+      "          overlap only in part, which lowers k1\n",
       100 * found.porosity, found.permeability_m2 / segment::kDarcy);
   text += kSure;
   if (const std::string& widths = found.steps.front().found.widths; !widths.empty())
     text += fmt::format("widths    {}\n", widths);
   return text +
-         fmt::format("checked   by {} forward runs, the last {} in one file of all regions; wishes are met within {:.1f} %\n",
+         fmt::format("checked   by {} forward runs, the last {} in one file of all regions; targets are met within {:.1f} %\n",
                      found.runs, found.steps.size(), 100 * found.miss);
 }
 

@@ -64,7 +64,7 @@ Status check_all_filled(const std::string& folder, const Manifest& manifest) {
   if (!thinned && !shares && (without == 0 || rounded)) return {};
   const std::string what =
       thinned  ? fmt::format("{:.4g} % of the pixels of its cores get no drop (--core)", 100 * (1 - job.dose.core))
-      : shares ? "shares of voxels are drops here and there (--levels)"
+      : shares ? "fill fractions of voxels are dithered into drops (--levels)"
                : fmt::format("{} of {} pixels that are to be filled get no drop (--saturation)", without, filled);
   const std::string as_they_are =
       head.named_images() > 0
@@ -144,7 +144,7 @@ Result<Window> window_of_plan(const formats::GcodeFile& file, const Pile& pile, 
     if (side > scan_mm + 1e-9 || window.count[a] == 0)
       return Error{
           Fault::kUsage,
-          fmt::format("--scan: its images have {:.3f} mm along {} beside {} voxels each way to search in; take a smaller "
+          fmt::format("--scan: its images leave {:.3f} mm along {} with a search range of {} voxels each way; take a smaller "
                       "--window or --range",
                       scan_mm, "xyz"[a], range)};
     from[a] = (low[a] + high[a]) / 2 - std::llround(window.count[a] * edge / 2);
@@ -185,9 +185,10 @@ Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowRequest
     twice[a] = wanted >= 2 * factor[a] ? 2 : 1;
     count[a] = wanted / (twice[a] * factor[a]) * (twice[a] * factor[a]);
     if (count[a] == 0)
-      return Error{Fault::kUsage, fmt::format("--window: holds no voxel of {:.4g} um along {}; take a larger one or a smaller "
-                                              "--voxel",
-                                              factor[a] * edge * 1e-3, "xyz"[a])};
+      return Error{Fault::kUsage,
+                   fmt::format("--window: contains no voxel of {:.4g} um along {}; take a larger one or a smaller "
+                               "--voxel",
+                               factor[a] * edge * 1e-3, "xyz"[a])};
     low[a] = stack.part_low[a] + (stack.part[a] - count[a]) / 2;
     voxels *= count[a];
   }
@@ -223,7 +224,7 @@ Result<ScanComparison> compare_with_scan(const formats::GcodeFile& file, const P
   if (!plan) return plan.error();
   if (set_voxels(*plan) == 0)
     return Error{Fault::kInput,
-                 "no bead lies in the middle of the print, where it is compared with the scan; take a --window "
+                 "no bead is in the middle of the print, where it is compared with the scan; take a --window "
                  "that reaches them, or a file of one part"};
   std::array<std::uint32_t, 3> low{}, count{};
   for (std::size_t a = 0; a < 3; ++a) {

@@ -148,7 +148,7 @@ Result<PrintAnalysis> analyse_print(const std::string& path, double density_g_cm
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
   if (!pile) return pile.error();
-  if (pile->layers.empty()) return Error{Fault::kInput, path + ": no layer lies above z = 0; heights count from the bed"};
+  if (pile->layers.empty()) return Error{Fault::kInput, path + ": no layer is above z = 0; heights count from the bed"};
   PrintAnalysis print;
   print.fed_mm3 = file->fed_mm3();
   print.density_g_cm3 = density_g_cm3 > 0 ? density_g_cm3 : file->density_g_cm3();
@@ -198,8 +198,8 @@ std::string as_text(const PoreAnalysis& analysis) {
   for (std::size_t a = 0; a < 3; ++a) {
     const pores::Tortuosity& way = analysis.tortuosities[a];
     text += way.reached == 0
-                ? fmt::format("ways      along {}: none leads through\n", "xyz"[a])
-                : fmt::format("ways      along {}: {:.3f} times as long as the window, {:.3f} to {:.3f}; throat {:.3f} mm\n",
+                ? fmt::format("paths     along {}: none leads through\n", "xyz"[a])
+                : fmt::format("paths     along {}: {:.3f} times as long as the window, {:.3f} to {:.3f}; throat {:.3f} mm\n",
                               "xyz"[a], way.mean, way.minimum, way.maximum, analysis.throat_mm[a]);
   }
   return text + sections_text(analysis.sections);
@@ -232,7 +232,7 @@ std::string as_text(const PrintAnalysis& print) {
   const std::string weight =
       print.density_g_cm3 > 0
           ? fmt::format(", {:.2f} g of {:.3g} g/cm3", print.fed_mm3 * 1e-3 * print.density_g_cm3, print.density_g_cm3)
-          : ", of a filament whose density nothing tells; give --density";
+          : ", filament of unknown density; add --density";
   return fmt::format("fed       {:.1f} mm3 in {} layer{}{}\nbeads     {}\n", print.fed_mm3, print.layers,
                      print.layers == 1 ? "" : "s", weight, print.beads) +
          as_text(print.choice, print.pores) + as_text(print.analysis);
@@ -265,14 +265,14 @@ void add_pores(const std::string& path, Summary& summary) {
   std::error_code ignored;
   if (!names_toolpaths(path) || !fs::is_regular_file(path, ignored)) return;
   if (fs::file_size(path, ignored) > kMaxBytes) {
-    summary.results.emplace_back("void", "of a file this large: lamina info tells it");
+    summary.results.emplace_back("void", "not analysed in a file this large; run lamina info");
     return;
   }
   const Result<PrintAnalysis> print = [&]() -> Result<PrintAnalysis> {
     try {
       return analyse_print(path, 0);
     } catch (const std::exception& fault) {  // the file is whole: an error in its report must not end the command
-      return Error{Fault::kInput, std::string("cannot be told: ") + fault.what()};
+      return Error{Fault::kInput, std::string("cannot be analysed: ") + fault.what()};
     }
   }();
   if (!print) return summary.results.emplace_back("void", print.error().message), void();
@@ -287,7 +287,7 @@ void add_pores(const std::string& path, Summary& summary) {
   for (std::size_t a = 0; a < 3; ++a) {
     tortuosities += analysis.tortuosities[a].reached == 0
                         ? fmt::format("; nothing leads along {}", "xyz"[a])
-                        : fmt::format("; along {} ways {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
+                        : fmt::format("; along {} paths {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
                                       analysis.tortuosities[a].mean, analysis.throat_mm[a]);
   }
   summary.results.emplace_back("tortuosity", std::move(tortuosities));

@@ -126,7 +126,7 @@ Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, c
   }
   result.weak_reynolds = stokes::weak_up_to(*points) * velocity * result.reynolds_per_velocity;
   if (result.points.size() < 3 && !result.settled)
-    return Error{Fault::kInput, "hardly any of these flows finds a steady state: k2 is not told"};
+    return Error{Fault::kInput, "fewer than 3 of these flows reach a steady state: k2 is unknown"};
   const auto fit = segment::fit_permeability(result.points, fluid);
   if (!fit) return Error{fit.error().fault, "inertia hardly resists here, k2 is without bounds: " + fit.error().message};
   result.fit = *fit;

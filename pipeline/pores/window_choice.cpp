@@ -48,7 +48,7 @@ Result<WindowChoice> choose_window(const formats::GcodeFile& file, const Pile& p
                                               mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(maximum)))};
   }
   if (std::min(side[0], side[1]) < kMinSide)
-    return Error{Fault::kInput, "the print is thinner than a micrometre: there is nothing to look at"};
+    return Error{Fault::kInput, "the print is thinner than 1 um; there is nothing to analyse"};
   choice.window.periodic[2] = !requested && repeat->layers > 0;
   choice.first_layer = middle_layer;
   const auto& layers = pile.layers;

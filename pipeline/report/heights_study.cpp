@@ -221,11 +221,11 @@ std::string study_page(const StudiedParts& parts, const Study& study) {
                             e.largest_cusp_layer + 1, e.mean_cusp * 1e-6));
   if (e.above_limit > 0 && !study.reasons.empty() && study.options.mode != Mode::kUniform &&
       study.options.mode != Mode::kAngle) {
-    line("", fmt::format("{} layers of the least thickness have a step above the limit of {} mm; thinner ones would help",
+    line("", fmt::format("{} layers of the minimum thickness have a step above the limit of {} mm; thinner ones would help",
                          e.above_limit, number_text(mm(study.options.cusp))));
   }
   if (const std::size_t back = stepped_back_count(study); back > 0) {
-    line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
+    line("", fmt::format("{} layers are thinner than the slopes at their bottom require: the surface above is flatter", back));
   }
   line("flats", flats_line(study));
   if (const std::string small = small_peaks_text(study.plan, study.options.min_flat_mm2); !small.empty()) line("peaks", small);
@@ -332,8 +332,8 @@ std::string comparison_page(const std::vector<Study>& studies) {
   }
   if (saves) {
     const heights::TimeModel& time = first.options.time.on() ? first.options.time : heights::kPlainTime;
-    text += fmt::format("time: {:g} s a layer and {:g} s a mm2 of its section{}; saved: beside {}\n", time.seconds_per_layer,
-                        time.seconds_per_mm2,
+    text += fmt::format("time: {:g} s a layer and {:g} s a mm2 of its section{}; saved: compared with {}\n",
+                        time.seconds_per_layer, time.seconds_per_mm2,
                         first.options.time.on() ? "" : ", as beads of 0.4 mm at 40 mm/s fill it; --time-model S,S for others",
                         first.name);
   }

@@ -60,7 +60,7 @@ std::string binder_text(const dose::Budget& budget, const dose::BinderCount& cou
       return fmt::format("{} drops of {} pl a full voxel fill {} % of the voids", full, pl, share);
     return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", pl, thinned, share);
   }
-  return fmt::format("{:.2f} % of the voids reached, {:.2f} % asked; {} drops, {:.3f} ml of binder, up to {} a pixel",
+  return fmt::format("{:.2f} % of the voids reached, {:.2f} % requested; {} drops, {:.3f} ml of binder, up to {} a pixel",
                      count.reached_percent(budget), count.requested_percent(budget), readable_count(count.drops()),
                      count.binder_ml(budget), count.max_drops() > 0 ? count.max_drops() : budget.max_drops());
 }

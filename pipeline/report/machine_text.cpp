@@ -37,7 +37,7 @@ std::string maintenance_text(const Machine& machine, const FullLayer& full) {
 std::string sweeps_text(const Machine& machine, const HeadGrid& grid, const DropSweeps& sweeps) {
   const std::uint32_t count = grid.sweeps_for(sweeps.max_drops);
   std::string text =
-      fmt::format("{} over a place for up to {} drop{} a pixel", count, sweeps.max_drops, sweeps.max_drops == 1 ? "" : "s");
+      fmt::format("{} over a position for up to {} drop{} a pixel", count, sweeps.max_drops, sweeps.max_drops == 1 ? "" : "s");
   if (grid.sweep_drops == grid.head_drops) return text + fmt::format(", up to {} in each", grid.sweep_drops);
   text += fmt::format(": {:g} Hz allow {} of the head's {} drops at {:g} mm/s, all of them at {:.1f} mm/s",
                       machine.head.highest_frequency_hz, grid.sweep_drops, grid.head_drops, machine.motion.scan_speed_mm_s,
@@ -94,7 +94,7 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                           (full->drops_seconds > 0
                                ? fmt::format(", {:.1f} s one of {} drops on every pixel", full->drops_seconds, grid.head_drops)
                                : "")
-                    : "not told: the program of a full layer is too long");
+                    : "unknown: the program of a full layer is too long");
   if (full && (machine.maintenance.spits() || machine.maintenance.wipes()))
     line("maintenance", maintenance_text(machine, *full));
   line("dialect", machine.dialect);

@@ -82,8 +82,7 @@ Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& optio
   LoadOptions as_is = options;
   as_is.repair = false;
   as_is.blocks = true;
-  Result<Part> part =
-      load::load(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspect(first, facets); });
+  Result<Part> part = load::load(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspect(first, facets); });
   if (!part) return part;
   as_is.blocks = false;
   sound = false;
@@ -201,7 +200,7 @@ void describe_findings(const Description& description, std::string& text) {
   bool any = inverted > 0;
   for (const PartKind& kind : kKinds) any = any || count_of(description, kind) > 0;
   if (!any) return;
-  text += "\n  found                     count  first places, mm\n";
+  text += "\n  found                     count  first positions, mm\n";
   for (const PartKind& kind : kKinds)
     if (const std::uint64_t count = count_of(description, kind); count > 0)
       text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, readable_count(count), first_positions(description, kind));

@@ -37,13 +37,13 @@ std::string pores_text(const DepositedRange& range) {
                         range.area_mm2 > 0 ? static_cast<double>(p.closed) / range.area_mm2 : 0);
   }
   if (p.open > 0) {
-    text += fmt::format("; {} stay open: lines {:.3f} mm apart, which thick stretches do not bridge", readable_count(p.open),
+    text += fmt::format("; {} stay open: lines {:.3f} mm apart, which thick segments do not bridge", readable_count(p.open),
                         mean(p.distance_mm, p.open));
   }
-  if (p.filled > 0) text += fmt::format("; {} have no room and are filled", readable_count(p.filled));
+  if (p.filled > 0) text += fmt::format("; {} have no space and are filled", readable_count(p.filled));
   if (p.edges > 0) text += fmt::format("; {} at walls and ends of lines", readable_count(p.edges));
   if (p.crossing > 0) {
-    text += fmt::format("; {} of {} thin stretches lie under one of the next layer", readable_count(p.crossed),
+    text += fmt::format("; {} of {} thin segments are under one of the next layer", readable_count(p.crossed),
                         readable_count(p.crossing));
   }
   return text;
@@ -65,10 +65,9 @@ Json pores_json(const DepositedRange& range) {
 }
 
 std::string short_text(const ShortIntervals& shorts, const Extruder& machine) {
-  return fmt::format(
-      "{} stretches are too short for {:g} mm/s2: the shortest has {:.3f} mm, none comes beyond {:.1f} of {:g} mm/s",
-      readable_count(shorts.count), machine.speed.acceleration_mm_s2, shorts.shortest_mm, shorts.reached_mm_s,
-      shorts.commanded_mm_s);
+  return fmt::format("{} segments are too short for {:g} mm/s2: the shortest has {:.3f} mm, none exceeds {:.1f} of {:g} mm/s",
+                     readable_count(shorts.count), machine.speed.acceleration_mm_s2, shorts.shortest_mm, shorts.reached_mm_s,
+                     shorts.commanded_mm_s);
 }
 
 using ContourObserver = Observer<slice::SectionReport>;
@@ -83,7 +82,7 @@ void report_deposited(const DepositedSums& sums, const std::vector<DepositedRang
   const bool solid = porosity.solid_mm3 > 0;
   if (segments.intervals > 0) {
     lines.emplace_back("segments",
-                       fmt::format("{} lines, {} thick and {} thin stretches, {} points", readable_count(segments.lines),
+                       fmt::format("{} lines, {} thick and {} thin segments, {} points", readable_count(segments.lines),
                                    readable_count(segments.intervals - segments.thin), readable_count(segments.thin),
                                    readable_count(segments.points())));
   }
@@ -122,7 +121,7 @@ void report_bead(const Extruder& machine, std::uint32_t left_out, std::string_vi
   facts["bead"] = {{"area", shape}, {"flow", material.flow}, {"feed_ratio", material.feed_ratio}};
   facts["layers_left_out"] = left_out;
   if (left_out == 0) return;
-  lines.emplace_back("top", fmt::format("{} more layer{} left out: empty, the {} lies above the parts", left_out,
+  lines.emplace_back("top", fmt::format("{} more layer{} left out: empty, the {} is above the parts", left_out,
                                         left_out == 1 ? " is" : "s are", cut_at));
 }
 
@@ -185,7 +184,7 @@ class GapObserver : public ContourObserver {
   void report(Summary& summary) const override {
     if (closed_ > 0 || open_chains_ > 0) {
       summary.results.emplace_back("gaps",
-                                   fmt::format("{} closed by straight stretches, the longest {:.6f} mm; {} chains left open",
+                                   fmt::format("{} closed by straight segments, the longest {:.6f} mm; {} chains left open",
                                                readable_count(closed_), largest_mm_, readable_count(open_chains_)));
     }
     summary.facts["gaps_closed"] = closed_;
@@ -232,8 +231,8 @@ class FillingObserver : public ContourObserver {
   void warn(const Summary&, std::vector<Warning>& warnings) override {
     if (!plan_.sections->fills() || contours_ == 0 || paths_ > 0) return;
     warnings.push_back({"no-bead",
-                        "no bead of the filling fits into the parts: they are narrower than walls and filling ask "
-                        "for; give a smaller --bead"});
+                        "no bead of the filling fits into the parts: they are narrower than walls and filling "
+                        "require; give a smaller --bead"});
   }
 
  private:
@@ -263,12 +262,12 @@ class BeadObserver : public MoveObserver {
                              readable_count(totals.travels), totals.travel_mm / 1000));
     const char* none = plan_.moves->profile.machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
                        : plan_.range[0] > 0 ? "none: --layers leaves the first layer out"
-                                            : "none: no room on the bed";
-    summary.results.emplace_back(
-        "skirt", totals.auxiliary_moves == 0
-                     ? std::string(none)
-                     : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts", totals.auxiliary_mm,
-                                   totals.auxiliary_mm3, totals.auxiliary_filament_mm));
+                                            : "none: no space on the bed";
+    summary.results.emplace_back("skirt",
+                                 totals.auxiliary_moves == 0
+                                     ? std::string(none)
+                                     : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, in addition to the parts",
+                                                   totals.auxiliary_mm, totals.auxiliary_mm3, totals.auxiliary_filament_mm));
   }
 
  private:

@@ -28,7 +28,7 @@ std::vector<std::string> totals_text(const Totals& totals) {
                     (count.added > 0 ? fmt::format(", which adds {} sweeps", readable_count(count.added)) : ""));
   }
   lines.push_back(
-      fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
+      fmt::format("offsets   drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
                   count.farthest_along_um, count.farthest_across_um));
   const bool feeds = count.fed_mm[0] != 0 || count.fed_mm[1] != 0;
   lines.push_back(fmt::format("printing  {}: {:.1f} m scanned, {:.1f} m other travel{}",
@@ -41,7 +41,7 @@ std::vector<std::string> totals_text(const Totals& totals) {
   }
   lines.push_back(std::move(material));
   if (count.spits + count.wipes + count.refills > 0) {
-    lines.push_back(fmt::format("care      fired off the bed {} times, {} drops; wiped {} times; {} pauses to fill vats",
+    lines.push_back(fmt::format("head      fired off the bed {} times, {} drops; wiped {} times; {} pauses to fill vats",
                                 readable_count(count.spits), readable_count(count.spat), readable_count(count.wipes),
                                 readable_count(count.refills)));
   }

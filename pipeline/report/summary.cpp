@@ -32,12 +32,12 @@ void add_costs(const Summary& s, std::vector<NamedText>& lines) {
                                          readable_seconds(s.load_seconds), readable_seconds(s.index_seconds),
                                          readable_seconds(s.layer_seconds), steps));
   lines.emplace_back(
-      "memory", fmt::format("{} at most (mesh {}, index {}; room kept for layers {} of {}, {} at once)",
+      "memory", fmt::format("{} at most (mesh {}, index {}; reserved for layers {} of {}, {} at once)",
                             readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes), readable_bytes(s.index_bytes),
                             readable_bytes(s.peak_layer_bytes), readable_bytes(s.memory_budget_bytes), s.max_layers_in_flight));
   if (s.oversized_layers > 0) {
     lines.emplace_back(
-        "", fmt::format("{} layers ran alone: each holds more than --memory by itself", readable_count(s.oversized_layers)));
+        "", fmt::format("{} layers ran alone: each needs more than --memory by itself", readable_count(s.oversized_layers)));
   }
 }
 

@@ -115,8 +115,8 @@ void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   if (!on()) return;
   if (kept_) {
     warnings.push_back({"not-inspected",
-                        "layers of an earlier run were kept: what hangs together was not looked at; run the job "
-                        "anew, or as a dry run, with --inspect"});
+                        "layers of an earlier run were kept and are not inspected; run the job "
+                        "again, or as a dry run, with --inspect"});
     return;
   }
   std::vector<std::string> names;

@@ -108,14 +108,14 @@ double JobChecks::add_contours(const Layer& layer, const slice::LayerContours& c
 std::string JobChecks::why_nothing() const {
   const Job& job = plan_.job;
   if (plan_.product == Product::kMoves && !plan_.sections->fills()) {
-    return "no walls and no filling are asked for: give --walls, --fill or both";
+    return "no walls and no filling are requested: give --walls, --fill or both";
   }
-  if (kept_) return "look at `lamina info`";
+  if (kept_) return "check the parts with `lamina info`";
   if (plan_.scene->instances.empty()) return "no pixel of the images is dark enough: give part.threshold, or part.invert";
   if (const Status status = checks::check_anything(*tally_, sampling_); !status) return status.error().message;
   if (job.dose.saturation_percent) return "--saturation leaves no drop: give a higher one";
-  if (job.dose.core < 1) return "--core leaves no drop: give a greater share, or --shell";
-  return "no bead fits into the parts: they are narrower than walls and filling ask for";
+  if (job.dose.core < 1) return "--core leaves no drop: give a larger fraction, or --shell";
+  return "no bead fits into the parts: they are narrower than walls and filling require";
 }
 
 /// Layers that something is in, or that may be empty: parts may have a gap in height, and beads and doses thin out what is.

@@ -102,12 +102,12 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer, bool shared)
   const bool keep = maker.keeps() && (shared || (kept && (any_layer || !maker.records_from_work())));
   if (Status stopped = maker.stop(keep); !stopped && interrupted) return stopped.error();
   if (interrupted) {
-    return {Fault::kInterrupted, keep        ? "interrupted; finished layers are kept, run again with --resume to go on"
+    return {Fault::kInterrupted, keep        ? "interrupted; finished layers are kept, run again with --resume to continue"
                                  : any_layer ? "interrupted; nothing of it is kept"
                                              : "interrupted before the first layer; nothing was written"};
   }
   if (!keep) return error;
-  return {error.fault, error.message + "; finished layers are kept, go on with --resume"};
+  return {error.fault, error.message + "; finished layers are kept, continue with --resume"};
 }
 
 void report_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {

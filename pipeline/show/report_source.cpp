@@ -21,13 +21,13 @@ Error wrong(const std::string& path, std::string_view what) {
   return {Fault::kVerification, fmt::format("{}: {}", path, what)};
 }
 
-Error changed(const std::string& path) { return wrong(path, "is not the file of the manifest; lamina verify tells more"); }
+Error changed(const std::string& path) { return wrong(path, "is not the file of the manifest; run lamina verify for details"); }
 
 Result<Manifest> finished_manifest(const std::string& position, const std::string& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     if (fs::exists(path + ".part", ignored)) {
-      return wrong(position, "the job is not finished; end it with --resume, then ask for the report");
+      return wrong(position, "the job is not finished; complete it with --resume first");
     }
     return wrong(position,
                  fmt::format("no {}; name a finished directory of lamina jet (shards: run lamina merge first) or a G-code "
@@ -50,7 +50,7 @@ Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead
   }
   auto picture = picture_of_layer(directory, head, record);
   if (picture || !picture.error().message.starts_with("layers/")) return picture;
-  return Error{Fault::kVerification, fmt::format("{}/{}; lamina verify tells more", directory, picture.error().message)};
+  return Error{Fault::kVerification, fmt::format("{}/{}; run lamina verify for details", directory, picture.error().message)};
 }
 
 /// Machine time of a layer, from replaying its program as lamina verify does.
@@ -98,7 +98,7 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
   if (!digest) return digest.error();
   const Manifest& manifest = source.manifest;
   if (digest->bytes != manifest.file.bytes || digest->hash != manifest.file.hash) {
-    return wrong(path, "is not the file of its manifest; lamina verify tells more");
+    return wrong(path, "is not the file of its manifest; run lamina verify for details");
   }
   auto opened = formats::GcodeFile::open(path);
   if (!opened) return opened.error();
@@ -155,7 +155,7 @@ Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const st
   Job job = recorded;
   for (const PartSummary& part : head.parts) {
     if (part.triangles == 0)
-      return Error{Fault::kInput, fmt::format("{}: is images, which have no sides to look at", part.path)};
+      return Error{Fault::kInput, fmt::format("{}: consists of images, which have no side view", part.path)};
   }
   for (PartRequest& part : job.parts) {
     const std::string name = fs::path(part.path).filename().string();

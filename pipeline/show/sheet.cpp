@@ -93,7 +93,7 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
     return Error{Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"};
   }
   if (svg && request.width) {
-    return Error{Fault::kUsage, "--width: is of pictures of pixels, an SVG is in mm; leave it out, or name a .png"};
+    return Error{Fault::kUsage, "--width: applies to pictures of pixels, an SVG is in mm; leave it out, or name a .png"};
   }
   Result<LayerShapes> shapes = series.layer(request.layers.layer.value_or(series.count / 2));
   if (!shapes) return shapes.error();

@@ -336,8 +336,8 @@ void report(const Findings& findings, std::span<const std::string> part, double 
   if (islands.count > 0) {
     warn("islands", islands.spot,
          fmt::format(
-             "{} of {} with nothing below, the largest of {:.3g} mm2 {}: powder alone holds them until they join a part; "
-             "turn the part, or spread the first layers above them with care",
+             "{} of {} with nothing below, the largest of {:.3g} mm2 {}: only powder supports them until they join a part; "
+             "turn the part, or spread the first layers above them carefully",
              of(islands.count, "piece", "pieces"), of(islands.layers, "layer", "layers"), islands.largest, at(islands.spot)));
   }
   if (loose.count > 0) {
@@ -354,31 +354,32 @@ void report(const Findings& findings, std::span<const std::string> part, double 
   }
   if (thin.count > 0) {
     warn("thin", thin.spot,
-         fmt::format("{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may not hold; make them thicker, or "
-                     "tell a smaller --min-wall",
-                     of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)));
+         fmt::format(
+             "{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may break; make them thicker, or set a "
+             "smaller --min-wall",
+             of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)));
   }
   for (const Findings::Touching& pair : touching) {
     const std::string parts = pair.part == pair.other
                                   ? "copies of " + name_of(part, pair.part)
                                   : fmt::format("{} and {}", name_of(part, pair.part), name_of(part, pair.other));
-    warn("touching", pair.spot, fmt::format("{} grow together {}: they come out as one; move them apart", parts, at(pair.spot)),
+    warn("touching", pair.spot,
+         fmt::format("{} touch {}: they are printed as one body; increase their distance", parts, at(pair.spot)),
          pair.part < part.size() ? part[pair.part] : std::string());
   }
   if (bed_edge) {
     warn("bed-edge", *bed_edge,
-         fmt::format("pixels lie at the very edge of the bed, first {}: move the parts inwards", at(*bed_edge)));
+         fmt::format("pixels are at the very edge of the bed, first {}: move the parts inwards", at(*bed_edge)));
   }
   if (stop) {
     constexpr std::uint64_t kMega = 1 << 20;
     warnings.push_back(
         {"not-inspected",
-         fmt::format("{}: to look at layer {} takes about {}, and half of --memory is for that; give --memory {}M or more, or "
-                     "leave out --inspect",
-                     layers == 0 ? "no layer was looked at"
-                                 : fmt::format("layers from {} on were not looked at, and what is told is of those below it",
-                                               stop->layer),
-                     stop->layer, readable_bytes(stop->bytes), (2 * stop->bytes + kMega - 1) / kMega),
+         fmt::format(
+             "{}: inspecting layer {} takes about {}, more than half of --memory; give --memory {}M or more, or omit --inspect",
+             layers == 0 ? "no layer was inspected"
+                         : fmt::format("layers from {} on were not inspected; the results cover only those below", stop->layer),
+             stop->layer, readable_bytes(stop->bytes), (2 * stop->bytes + kMega - 1) / kMega),
          {},
          stop->layer,
          stop->z_mm});

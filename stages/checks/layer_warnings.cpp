@@ -38,7 +38,7 @@ void PathWarnings::report(bool fills, std::uint64_t moves, std::uint32_t layers,
                              undivided.count, layers, undivided.first),
                  warnings);
   if (fills && moves == 0) {
-    warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the filling ask for"});
+    warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the infill require"});
   }
 }
 
@@ -55,8 +55,9 @@ bool RowWarnings::note(Rows& reported, const Layer& layer, std::uint32_t rows, s
 void RowWarnings::report(const std::string& part, std::vector<Warning>& warnings) const {
   capped_.layers.warn(
       "rows-capped",
-      fmt::format("{}: {} rows in {} layers are closed only by the caps put over its openings, first {}; look at `lamina info`",
-                  part, capped_.rows, capped_.layers.count, capped_.position),
+      fmt::format(
+          "{}: {} rows in {} layers are closed only by the caps over its openings, first {}; check the part with `lamina info`",
+          part, capped_.rows, capped_.layers.count, capped_.position),
       warnings, part);
   open_.layers.warn("rows-open",
                     fmt::format("{} rows in {} layers stay open, first {}; each is drawn up to its last crossing; leave out "
@@ -107,13 +108,13 @@ void LayerRecords::add(const Layer& layer, std::uint64_t set_pixels, std::uint64
 Status LayerRecords::check(std::span<const PartSummary> parts, bool thins, bool allow_empty,
                            std::vector<Warning>& warnings) const {
   const bool nothing = std::ranges::find(filled_, 1) == filled_.end();
-  constexpr std::string_view kHint = "look at `lamina info` of the parts, and at the summary of a shard";
+  constexpr std::string_view kHint = "check the parts with `lamina info`, and the summary of a shard";
   if (nothing && !allow_empty) {
-    return Error{Fault::kInput, fmt::format("not one pixel in {} layer{}, so nothing is joined: {}; --allow-empty joins it "
-                                            "nevertheless",
-                                            layers_.size(), layers_.size() == 1 ? "" : "s", kHint)};
+    return Error{Fault::kInput,
+                 fmt::format("not one pixel in {} layer{}, so nothing is merged: {}; --allow-empty merges anyway",
+                             layers_.size(), layers_.size() == 1 ? "" : "s", kHint)};
   }
-  if (nothing) warnings.push_back({"empty", fmt::format("the whole job is empty: {}", kHint)});
+  if (nothing) warnings.push_back({"empty", fmt::format("the job is empty: {}", kHint)});
   report(parts, warnings);
   if (thins) return {};
   std::vector<Solid> solids(parts.size());
@@ -126,11 +127,12 @@ Status LayerRecords::check(std::span<const PartSummary> parts, bool thins, bool 
 void LayerRecords::report(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const {
   warn_of_lost_pixels(lost_, warnings);
   const std::string part = parts.size() == 1 ? one_line(parts.front().path) : std::string();
-  capped_layers_.warn("rows-capped",
-                      fmt::format("{}{} rows in {} layers are closed only by the caps put over openings, first in {}; look at "
-                                  "`lamina info`",
-                                  part.empty() ? "" : part + ": ", capped_, capped_layers_.count, capped_layers_.first),
-                      warnings, part);
+  capped_layers_.warn(
+      "rows-capped",
+      fmt::format(
+          "{}{} rows in {} layers are closed only by the caps over openings, first in {}; check the parts with `lamina info`",
+          part.empty() ? "" : part + ": ", capped_, capped_layers_.count, capped_layers_.first),
+      warnings, part);
 }
 
 void warn_of_lost_pixels(std::uint64_t pixels, std::vector<Warning>& warnings) {
@@ -155,11 +157,13 @@ void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings) {
   if (powder.pixels == 0) return;
   ReportedLayers first;
   first.add(powder.first);
-  first.warn("mixed-powders",
-             fmt::format("{} pixels of {} in {} layers lie in another powder, whose vat feeds those layers, first in {}; "
-                         "--vat-rule says which vat feeds, refuse ends such a job",
-                         readable_count(powder.pixels), one_line(powder.name), powder.layers, first.first),
-             warnings);
+  first.warn(
+      "mixed-powders",
+      fmt::format(
+          "{} pixels of {} in {} layers are in another powder, whose vat feeds those layers, first in {}; --vat-rule sets "
+          "which vat feeds, and refuse ends such a job",
+          readable_count(powder.pixels), one_line(powder.name), powder.layers, first.first),
+      warnings);
 }
 
 Status refuse_warnings(std::span<const Warning> warnings) {

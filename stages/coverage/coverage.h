@@ -12,7 +12,8 @@
 // or below a plane lies below it.
 //
 // Source: signed areas that are accumulated along a row (D. Turner, FreeType's smooth rasterizer, 2001; R. Levien, font-rs,
-// 2016), here with volumes; doubles with a proven bound (docs/coverage.md) and rationals where the bound does not decide.
+// 2016), here with volumes; doubles with a proven bound (docs/theory/coverage.md) and rationals where the bound does not
+// decide.
 #pragma once
 
 #include <cstdint>

@@ -5,7 +5,7 @@
 namespace lamina::coverage {
 namespace {
 
-/// By how much a corner may lie off, of the facet's size (docs/coverage.md).
+/// By how much a corner may lie off, of the facet's size (docs/theory/coverage.md).
 constexpr double kCornerMargin = 0x1p-48;
 
 /// One of the two runs of edges along the border, from the highest corner downwards.

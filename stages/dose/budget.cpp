@@ -187,10 +187,10 @@ void Budget::inspect_field(const Layer& layer, std::uint32_t zone, bool core) {
 
 void Budget::warn_of_none(std::vector<Warning>& warnings) const {
   for (const auto& [of, fault] : none_) {
-    warnings.push_back({"no-drop", fmt::format("{}: {} % is {:.2f} drops a pixel, which rounds to none in {}; leave out "
-                                               "--no-dither, or ask for more",
-                                               key_of(of.first, *targets_, of.second), number_text(fault.requested),
-                                               fault.drops, where(fault.where))});
+    warnings.push_back(
+        {"no-drop",
+         fmt::format("{}: {} % is {:.2f} drops a pixel, which rounds to none in {}; omit --no-dither, or request more",
+                     key_of(of.first, *targets_, of.second), number_text(fault.requested), fault.drops, where(fault.where))});
   }
   for (const auto& [zone, jetted] : jetted_) {
     if (!jetted) warnings.push_back({"no-drop", "part.saturation_percent: 0: that part stays loose powder"});
@@ -205,10 +205,11 @@ Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
   }
   if (!peaks_.where.empty()) {
     warnings.push_back(
-        {"saturation", fmt::format("--saturation: the formula comes to {:.1f} % somewhere in the boxes of the parts, "
-                                   "which needs more than the {} drops a pixel that may be jetted; what lies "
-                                   "there gets {:.1f} %, in {}",
-                                   peaks_.requested, limit_, peaks_.gets, where(peaks_.where))});
+        {"saturation",
+         fmt::format(
+             "--saturation: the formula comes to {:.1f} % somewhere in the boxes of the parts, which needs more than the {} "
+             "drops a pixel that may be jetted; pixels there get {:.1f} %, in {}",
+             peaks_.requested, limit_, peaks_.gets, where(peaks_.where))});
   }
   warn_of_none(warnings);
   if (no_formula_) return *no_formula_;
@@ -220,7 +221,7 @@ Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
   }
   const DoseFault& unbound = allow_unbound ? unbound_ : unbound_anywhere_;
   if (unbound.where.empty()) return {};
-  const std::string requested = has_target() ? fmt::format(" where {} % is asked", number_text(unbound.requested)) : "";
+  const std::string requested = has_target() ? fmt::format(" where {} % is requested", number_text(unbound.requested)) : "";
   const std::string text = fmt::format(
       "{} get {}{:.1f} % of their voids filled{}, and the powder binds from {} % on "
       "(powder.min_saturation_percent)",
@@ -229,7 +230,7 @@ Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
     return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound",
                                             has_target() ? "--saturation" : "dose", text, has_target() ? "a higher" : "a")};
   }
-  warnings.push_back({"saturation", fmt::format("{}, parts may fall apart there", text)});
+  warnings.push_back({"saturation", fmt::format("{}, parts may crumble there", text)});
   return {};
 }
 

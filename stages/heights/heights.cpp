@@ -464,8 +464,8 @@ Result<std::string> check_build_steps(const Machine& machine, const LayerTable& 
   }
   if (off == 0) return std::string();
   return fmt::format(
-      "{} of {} layers, first {}, end beside the {:g} mm steps of {}'s build vat, by up to {:g} mm, and cannot end "
-      "there on the machine; thicknesses that are whole steps can",
+      "{} of {} layers, first {}, end between the {:g} mm steps of {}'s build vat, off by up to {:g} mm, which the machine "
+      "cannot reach; use thicknesses of whole steps",
       off, table.size(), first, mm(step), machine.name, mm(maximum));
 }
 
@@ -503,7 +503,7 @@ Result<Options> options_of(const Settings& settings, double layer_mm) {
 Status check_options(const Options& options) {
   const auto wrong = [](std::string text) { return Error{Fault::kUsage, std::move(text)}; };
   if (options.set.values.empty()) {
-    return wrong("heights.thickness: holds no thickness; give a set as 0.178,0.254 or a range as 0.05..0.30:0.01");
+    return wrong("heights.thickness: contains no thickness; give a set as 0.178,0.254 or a range as 0.05..0.30:0.01");
   }
   Nm before = 0;
   for (const Nm value : options.set.values) {
@@ -601,7 +601,7 @@ Status OnRecord::check_thickness(const Layer& layer) {
   if (options_->mode == Mode::kUniform) {
     return wrong(fmt::format("is {} nm thick as all of the job, the manifest says {}", set.minimum(), layer.thickness));
   }
-  return wrong(fmt::format("is {} nm thick, by the manifest, which is none of the job's thicknesses", layer.thickness));
+  return wrong(fmt::format("is {} nm thick, by the manifest, which is not a thickness of the job", layer.thickness));
 }
 
 bool OnRecord::divides_slab(const Layer& layer) {

@@ -96,7 +96,7 @@ Status check(const FillParameters& parameters) {
   if (parameters.walls > 0 && parameters.wall_width <= 0) return wrong("the wall's bead width has to be above 0");
   if (parameters.build_layers == 0) return wrong("the number of layers with one angle has to be 1 or more");
   if (parameters.group == 0) return wrong("the number of beads in a group has to be 1 or more");
-  if (parameters.gaps.empty()) return wrong("no gap is given; 0 lays beads side by side");
+  if (parameters.gaps.empty()) return wrong("no gap is given; 0 deposits adjacent beads");
   for (const Nm distance : parameters.distances) {
     if (distance <= 0) return wrong(fmt::format("{} mm between lines; the distance has to be above 0", mm(distance)));
   }

@@ -18,7 +18,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
      kSaysAll | kSaysDrops, raw::make_writer},
     {"planes", ".planes", "32-bit padded planes of a swath, as production heads take them; our own definition", 65'535, 31,
      false, kSaysAll | kSaysDrops, planes::make_writer},
-    {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
+    {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a separate motion controller", 300, 0,
      true, kSaysBase | kSaysMaintenance | kSaysSeconds | kSaysCap, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
      kSaysAll, oasis::make_writer, oasis::check},
@@ -47,7 +47,7 @@ Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadG
                              machine.name, machine.head.max_drops, dialect.id)};
   }
   if (grid.nozzles > dialect.max_nozzles) {
-    return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}",
+    return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} supports at most {} nozzles, the head has {}",
                                             machine.name, dialect.id, dialect.max_nozzles, grid.nozzles)};
   }
   if (Status status = check_maintenance(dialect, machine, grid); !status) return status;

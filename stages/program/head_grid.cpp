@@ -99,9 +99,9 @@ Status Builder::check_head() {
                  scan_x_ ? "a scan along x begins left or right" : "a scan along y begins front or back");
   }
   if (const bool across = mount.nozzle_0 == Side::kLeft || mount.nozzle_0 == Side::kRight; across == scan_x_) {
-    return wrong(
-        machine_, "mounting.nozzle_0",
-        scan_x_ ? "with a scan along x nozzle 0 lies back or front" : "with a scan along y nozzle 0 lies left or right");
+    return wrong(machine_, "mounting.nozzle_0",
+                 scan_x_ ? "with a scan along x nozzle 0 is at the back or front"
+                         : "with a scan along y nozzle 0 is at the left or right");
   }
   return {};
 }
@@ -218,7 +218,7 @@ Status Builder::aim_nozzles() {
   }
   if (grid_.worst_line_nm > line_.nm() / 4) {
     return wrong(machine_, rows > 1 ? "head.row_offset_um" : "mounting.dpi",
-                 fmt::format("a nozzle lies {:.1f} um beside its line, more than a quarter of a pixel; use another angle",
+                 fmt::format("a nozzle is {:.1f} um off its line, more than a quarter of a pixel; use another angle",
                              grid_.worst_line_nm / kNmPerUm));
   }
   const double minimum = *std::min_element(behind.begin(), behind.end());
@@ -228,7 +228,7 @@ Status Builder::aim_nozzles() {
     steps[i] = static_cast<std::int64_t>(round_half_down((behind[i] - minimum) / step));
     grid_.worst_position_nm =
         std::max(grid_.worst_position_nm, std::abs((behind[i] - minimum) - static_cast<double>(steps[i]) * step));
-    if (steps[i] > 100'000'000) return wrong(machine_, "head.row_offset_um", "a nozzle lags behind by metres");
+    if (steps[i] > 100'000'000) return wrong(machine_, "head.row_offset_um", "a nozzle lags by metres");
   }
   for (const std::int64_t lag : steps) {
     grid_.lag.push_back(static_cast<std::uint32_t>(lag));
@@ -280,9 +280,10 @@ void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::
   if (grid.joint_shift == 0 || grid.joint_shift % apart != 0) return;
   warnings.push_back(
       {"stitching",
-       fmt::format("{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so that joints of all layers lie "
-                   "over each other; give a number that comes round late, as {}",
-                   machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});
+       fmt::format(
+           "{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so the stitch lines of all layers coincide; give "
+           "a number that repeats late, as {}",
+           machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});
 }
 
 Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {
@@ -293,10 +294,9 @@ Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
   const double passes = std::round(across / head);
   // The last nozzle may be a quarter of a pixel off.
   if (passes < 1 || passes > 64 || std::abs(across / head - passes) * grid.nozzles > 0.25) {
-    return refuse(
-        fmt::format("{:g} dpi across the scan: the head of {} reaches {:.2f} and its multiples; change the "
-                    "tilt or the asked dpi",
-                    across, machine.name, head));
+    return refuse(fmt::format(
+        "{:g} dpi across the scan: the head of {} reaches {:.2f} and its multiples; change the tilt or the requested dpi",
+        across, machine.name, head));
   }
   machine.mounting.passes = static_cast<std::uint32_t>(passes);
   if (machine.mounting.dpi != 0) machine.mounting.dpi = std::round(head * passes * 1e6) / 1e6;
@@ -305,9 +305,8 @@ Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
     const double ticks = std::round(machine.motion.encoder_dpi / along);
     if (ticks < 1 || std::abs(machine.motion.encoder_dpi / ticks - along) > 0.5) {
       return refuse(
-          fmt::format("{:g} dpi along the scan: the encoder of {} has {:g} ticks an inch; ask for a "
-                      "whole fraction of it",
-                      along, machine.name, machine.motion.encoder_dpi));
+          fmt::format("{:g} dpi along the scan: the encoder of {} has {:g} ticks an inch; use an integer fraction of it", along,
+                      machine.name, machine.motion.encoder_dpi));
     }
     machine.motion.ticks_per_pixel = static_cast<std::uint32_t>(ticks);
   } else if (std::abs(along - square) > 0.5) {

@@ -94,7 +94,7 @@ class Checker {
                 {"maintenance.wipe_seconds", maintenance_.wipe_seconds > 0, kSaysSeconds}};
     for (const auto& [key, requested, says] : rows) {
       if (!requested || (dialect_.says & says) == says) continue;
-      return wrong(key, fmt::format("programs of the dialect {} cannot say it (docs/print_program.md has why); leave "
+      return wrong(key, fmt::format("programs of the dialect {} cannot say it (docs/reference/print_program.md has why); leave "
                                     "it to the host, with its time in powder.pause_s and its drops in cost.spit_drops",
                                     dialect_.id));
     }
@@ -107,7 +107,7 @@ class Checker {
     if (Status status = check_own("maintenance.wipe_lines", maintenance_.wipe_lines, true); !status) return status;
     if (powder.refill == VatRefill::kPause && !depths) return wrong("powder.refill", "pauses need powder.vat_depth_mm");
     if (maintenance_.spits() && !maintenance_.spit_mm)
-      return wrong("maintenance.spit_mm", "is missing; give the carriage's place beside the bed");
+      return wrong("maintenance.spit_mm", "is missing; give the carriage's position outside of the bed");
     if (maintenance_.wipes() && !maintenance_.wipe_mm)
       return wrong("maintenance.wipe_mm", "is missing; give x, y of both ends of the wiper");
     return {};
@@ -153,7 +153,7 @@ class Checker {
     for (const auto& [key, is] : {std::pair("maintenance.spit_mm", beyond(maintenance_.spit_mm)),
                                   {"maintenance.wipe_mm", beyond(maintenance_.wipe_mm)},
                                   {"maintenance.cap_mm", beyond(maintenance_.cap_mm)}}) {
-      if (is && !dialect_.has_motion) return wrong(key, fmt::format("{} has places up to {:g} mm", dialect_.id, kMaxMm));
+      if (is && !dialect_.has_motion) return wrong(key, fmt::format("{} has positions up to {:g} mm", dialect_.id, kMaxMm));
     }
     return {};
   }
@@ -162,9 +162,11 @@ class Checker {
     if (Status status = check_reach(); !status) return status;
     const auto check = [&](std::string_view key, const Under& box) -> Status {
       if (!over_bed(machine_, grid_, box)) return {};
-      return wrong(key, fmt::format("nozzles are over the bed there, x {:.2f} to {:.2f} and y {:.2f} to {:.2f} mm of it; give "
-                                    "the carriage a place beside it",
-                                    box.low[0], box.high[0], box.low[1], box.high[1]));
+      return wrong(
+          key,
+          fmt::format("nozzles are over the bed there, x {:.2f} to {:.2f} and y {:.2f} to {:.2f} mm of it; give the carriage a "
+                      "position outside of it",
+                      box.low[0], box.high[0], box.low[1], box.high[1]));
     };
     for (const auto& [key, at] :
          {std::pair("maintenance.spit_mm", maintenance_.spit_mm), {"maintenance.cap_mm", maintenance_.cap_mm}}) {

@@ -80,7 +80,7 @@ class Carer {
       for (int i = 0; i < 4; ++i) line += static_cast<char>(word >> (8 * i) & 255);
     }
     while (line.ends_with('\0')) line.pop_back();
-    if (!printing_.takes_own(line)) reader_.fault(fmt::format("'{}' is none of the machine's own lines here", line));
+    if (!printing_.takes_own(line)) reader_.fault(fmt::format("'{}' is not one of the machine's own lines here", line));
   }
 
   ByteReader& reader_;

@@ -75,7 +75,7 @@ bool take(const ProgramLine& line, GcodeState& state) {
 
 Status check_modes(const GcodeState& state) {
   if (!state.millimetres) return wrong("G21 is missing: layers are in mm");
-  return state.absolute ? Status() : wrong("G90 is missing: layers go to places");
+  return state.absolute ? Status() : wrong("G90 is missing: layers use absolute positions");
 }
 
 /// Layers begin with the build vat's axis at 0, or as far above it as the base is high.
@@ -84,7 +84,7 @@ Status check_zero(const Machine& machine, const GcodeState& state) {
   const auto zero = state.zeroed.find(powder.build_axis[0]);
   const double want = -powder.build_sign * powder.base_mm();
   if (zero == state.zeroed.end() ? powder.base_layers > 0 : std::abs(zero->second - want) > 1e-3) {
-    return wrong(fmt::format("the build vat's axis is told to be at {:g} mm where {:g} have to be",
+    return wrong(fmt::format("the build vat's axis is set to {:g} mm where {:g} have to be",
                              zero == state.zeroed.end() ? 0.0 : zero->second, want));
   }
   return {};
@@ -125,7 +125,7 @@ Status start_of_gcode(const VirtualMachine& machine, std::string_view text) {
     }
     if (oasis && !homed) return wrong(fmt::format("line {}: '{}' before $h has homed the gantry", line.number, line.command));
   }
-  if (nuferbj && !header) return wrong("M810 is missing, which tells nozzles and steps");
+  if (nuferbj && !header) return wrong("M810 is missing, which states nozzles and steps");
   if (Status status = check_modes(state); !status) return status;
   if (Status status = check_zero(profile, state); !status || !oasis) return status;
   // Where homing leaves the gantry (SerialGRBL.py, Home), and from where the layers begin.
@@ -133,7 +133,7 @@ Status start_of_gcode(const VirtualMachine& machine, std::string_view text) {
   const char feed = profile.powder.feed_axes[0][0];
   if (state.zeroed[x] != 5 || state.zeroed[y] != 245) return wrong("G92 has to say that homing leaves the gantry at 5, 245 mm");
   if (!state.zeroed.contains(feed) || !state.zeroed.contains(profile.powder.build_axis[0])) {
-    return wrong("G92 has to say where the pistons stand");
+    return wrong("G92 has to set the positions of the pistons");
   }
   if (std::hypot(state.at[x] - profile.motion.safe_mm[0], state.at[y] - profile.motion.safe_mm[1]) > 1e-3) {
     return wrong(fmt::format("the gantry is left at {:g}, {:g} mm, not where layers begin", state.at[x], state.at[y]));
@@ -166,7 +166,7 @@ Status start_of_brundlefab(const VirtualMachine& machine, std::string_view text)
   if (Status status = check_modes(state); !status) return status;
   if (!homed) return wrong("G28 is missing, which homes X and E");
   if (state.at['E'] != 2)
-    return wrong(fmt::format("the feed bin is left at {:g} mm, from where it has no 2 mm to give way", state.at['E']));
+    return wrong(fmt::format("the feed bin is left at {:g} mm, from where it cannot move down by 2 mm", state.at['E']));
   if (!filled) return wrong("no M0 waits for the feed bin to be filled");
   const double home = machine.profile().powder.roller_mm[0];
   if (tool != "T21" || std::abs(state.at['X'] - home) > 1e-3) {

@@ -75,7 +75,7 @@ void Printing::go_across(double carriage_mm) {
   const double line = across_um(carriage_mm) / machine_.line_um_ - 0.5;
   first_line_ = std::llround(line);
   if (std::abs(line - static_cast<double>(first_line_)) > 0.02) {
-    fault(fmt::format("the head stands {:.2f} lines beside line {}", line - static_cast<double>(first_line_), first_line_));
+    fault(fmt::format("the head is {:.2f} lines off line {}", line - static_cast<double>(first_line_), first_line_));
   }
 }
 
@@ -89,7 +89,7 @@ double Printing::position_of(double step) const {
 std::int64_t Printing::step_at(double carriage_mm) {
   const double one = position_of(1) - position_of(0), step = (carriage_mm - position_of(0)) / one;
   if (std::abs(step - std::round(step)) > 0.05) {
-    fault(fmt::format("{:.4f} mm is {:.2f} steps beside a step", carriage_mm, step - std::round(step)));
+    fault(fmt::format("{:.4f} mm is {:.2f} steps off a step", carriage_mm, step - std::round(step)));
     return 0;
   }
   return std::llround(step);
@@ -132,8 +132,8 @@ void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t d
   const auto& maintenance = profile().maintenance;
   if (maintenance.spits()) check_maintenance("fired off the bed", maintenance.spit_layers, maintenance.spit_seconds, spat_s_);
   if (maintenance.wipes()) check_maintenance("wiped", maintenance.wipe_layers, maintenance.wipe_seconds, wiped_s_);
-  if (maintenance.spits() && wiped_s_ > spat_s_) fault("scans behind the wiper before the head is fired off the bed");
-  if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
+  if (maintenance.spits() && wiped_s_ > spat_s_) fault("scans after the wiper before the head is fired off the bed");
+  if (dwelt_s_ + lamp_blocks_ > 0) fault("scans after the pause in which the layer dries");
 }
 
 // Sweeps of the BrundleFab's bar are as fast as its sprays let them, which its reader holds.
@@ -154,7 +154,7 @@ void Printing::check_speed(double mm_s, bool scanning) {
 bool Printing::has_ramps(double before_mm, double behind_mm, double adjacent_mm) {
   const double ramp = profile().motion.ramp_mm;
   if (std::min(before_mm, behind_mm) > ramp - adjacent_mm) return true;
-  fault(fmt::format("{:g} mm before the first drops and {:g} behind the last are left, where ramps of {:g} have to be",
+  fault(fmt::format("{:g} mm before the first drops and {:g} after the last are left, where ramps of {:g} have to be",
                     before_mm, behind_mm, ramp));
   return false;
 }
@@ -191,8 +191,8 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
     return fault(fmt::format("nozzle {} fires where there is no pixel", number));
   }
   if (drops > profile().head.max_drops) {
-    return fault(
-        fmt::format("nozzle {} fires {} drops at a place, the head has at most {}", number, drops, profile().head.max_drops));
+    return fault(fmt::format("nozzle {} fires {} drops at one position, the head has at most {}", number, drops,
+                             profile().head.max_drops));
   }
   std::uint64_t* const fired = &fired_[(std::size_t{row} * row_words_ + column / 64) * times_bits_];
   const unsigned bit = column % 64;
@@ -268,16 +268,16 @@ void Printing::state_layers(std::uint32_t layers) {
 void Printing::state_heights(std::optional<double> bottom_mm, double thickness_mm) {
   const double bottom = mm(layer_.bottom), thickness = mm(layer_.thickness);
   if (std::abs(thickness_mm - thickness) > 1e-4) {
-    wrong_powder(fmt::format("it is told to be {:g} mm thick where {:g} have to be", thickness_mm, thickness));
+    wrong_powder(fmt::format("its stated thickness is {:g} mm where {:g} have to be", thickness_mm, thickness));
   } else if (bottom_mm && std::abs(*bottom_mm - bottom) > 1e-4) {
-    wrong_powder(fmt::format("it is told to begin at {:g} mm where {:g} have to be", *bottom_mm, bottom));
+    wrong_powder(fmt::format("its stated bottom is at {:g} mm where {:g} have to be", *bottom_mm, bottom));
   }
 }
 
 void Printing::state_sweep(std::uint32_t of) {
-  if (backward_ && !profile().motion.both_directions) fault("runs back, and the profile's head fires on the way there alone");
+  if (backward_ && !profile().motion.both_directions) fault("runs back, and the profile's head fires only in forward sweeps");
   if (swaths_stated_ && *swaths_stated_ != of)
-    fault(fmt::format("is one of {} swaths, those before of {}", of, *swaths_stated_));
+    fault(fmt::format("is one of {} swaths, the preceding ones of {}", of, *swaths_stated_));
   swaths_stated_ = of;
 }
 
@@ -302,8 +302,8 @@ void Printing::check_numbers(std::span<const RunsView> planes) {
   const std::int64_t swaths = left <= lines ? 1 : 1 + (left - lines + stride - 1) / stride;
   const std::int64_t per_position = sweeps_per_position(), of = swaths * mount.passes * per_position;
   if (*swaths_stated_ != of)
-    return fail(fmt::format("layer {}, before its first swath: is told to have {} swaths, and has {}", layer_.index,
-                            *swaths_stated_, of));
+    return fail(
+        fmt::format("layer {}, before its first swath: states {} swaths, and has {}", layer_.index, *swaths_stated_, of));
   const bool further = profile().head.blocked_rule == BlockedRule::kSecondPass && !profile().head.blocked.empty();
   for (const Sweep& sweep : sweeps_) {
     if (sweep.number >= of) {
@@ -339,7 +339,7 @@ std::string Printing::describe_position(std::uint32_t column, std::uint32_t row)
                          position * machine_.ticks_ + nozzle.step_offset);
     }
   }
-  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, position);
+  return fmt::format("layer {}, line {} across, position {} along, which no swath covers", layer_.index, line, position);
 }
 
 // Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
@@ -431,7 +431,7 @@ void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, st
 // Maintenance of head and powder on the virtual machine, in any dialect: stages/replay/printing.h.
 
 void Printing::leaves_wiper(std::string_view what) {
-  if (own_ > 0) fault(fmt::format("{} before all lines of the machine's own stand there", what));
+  if (own_ > 0) fault(fmt::format("{} before all of the machine's own lines", what));
   own_ = 0;
   at_wiper_ = false;
 }
@@ -439,13 +439,13 @@ void Printing::leaves_wiper(std::string_view what) {
 // A wipe is a G1 as fast as the profile has it: travels may have the same ends.
 void Printing::head_is_at(double x_mm, double y_mm, double works_mm_s) {
   const auto& maintenance = profile().maintenance;
-  leaves_wiper("the head goes on");
+  leaves_wiper("the head moves on");
   leaves_position();
   if (lamp_on_) {
     fault(fmt::format("the head moves before '{}', which ends the pause to dry", profile().powder.dry_off_lines.front()));
   }
   if (filled_ && std::hypot(x_mm - profile().motion.safe_mm[0], y_mm - profile().motion.safe_mm[1]) > 1e-3) {
-    fault(fmt::format("the head goes to {:g}, {:g} mm behind the pause to fill vats, not to its safe place", x_mm, y_mm));
+    fault(fmt::format("the head goes to {:g}, {:g} mm after the pause to fill vats, not to its safe position", x_mm, y_mm));
   }
   filled_ = false;
   const bool slow = std::abs(works_mm_s - maintenance.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
@@ -491,7 +491,7 @@ void Printing::outside_bed(double x_mm, double y_mm) {
 
 void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double seconds) {
   const auto& maintenance = profile().maintenance;
-  if (!maintenance.spits() || !maintenance.spit_mm) return fault("fires off the bed, and the profile has no place for it");
+  if (!maintenance.spits() || !maintenance.spit_mm) return fault("fires off the bed, and the profile has no position for it");
   if (std::hypot(x_mm - (*maintenance.spit_mm)[0], y_mm - (*maintenance.spit_mm)[1]) > 1e-3) {
     return fault(fmt::format("fires off the bed at {:g}, {:g} mm, not at {:g}, {:g}", x_mm, y_mm, (*maintenance.spit_mm)[0],
                              (*maintenance.spit_mm)[1]));
@@ -513,11 +513,11 @@ void Printing::waits_capped(std::string_view what) {
   const auto& cap = profile().maintenance.cap_mm;
   const auto at = cap.value_or(profile().motion.safe_mm);
   if (head_at(at)) return;
-  fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe place", at[0], at[1]));
+  fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe position", at[0], at[1]));
 }
 
 void Printing::refills() {
-  if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
+  if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled after the layer's powder");
   waits_capped("the vats are filled");
   filled_ = profile().maintenance.cap_mm.has_value();
   if (++count.refills > 1) fault("waits for the vats to be filled a second time");
@@ -544,23 +544,23 @@ bool Printing::takes_own(std::string_view line) {
     at_wiper_ = false;
     return true;
   }
-  if (own_ > 0) fault(fmt::format("'{}' stands where the machine's own '{}' has to", line, lines[own_]));
+  if (own_ > 0) fault(fmt::format("'{}' is where the machine's own '{}' has to be", line, lines[own_]));
   return false;
 }
 
 void Printing::state_host(std::string_view record, bool of_powder) {
-  if (of_powder && host_spread_) return fault(fmt::format("{} stands behind the layer's powder", record));
+  if (of_powder && host_spread_) return fault(fmt::format("{} comes after the layer's powder", record));
   if (of_powder && record != "FILL" && !head_at_safe()) {
-    return fault(fmt::format("{} stands where the head is not at its safe place, and the powder is spread", record));
+    return fault(fmt::format("{} comes while the head is not at its safe position, and the powder is spread", record));
   }
   host_spread_ = host_spread_ || !of_powder;
 }
 
 void Printing::state_base(std::uint32_t layers, double layer_mm) {
-  if (based_) return fault("tells a base of powder a second time");
+  if (based_) return fault("states a base of powder a second time");
   based_ = true;
   if (layers == base_layers() && std::abs(layer_mm - profile().powder.base_layer_mm) < 1e-6) return;
-  fault(fmt::format("tells a base of {} layers of {:g} mm, where {} of {:g} have to be", layers, layer_mm, base_layers(),
+  fault(fmt::format("states a base of {} layers of {:g} mm, where {} of {:g} have to be", layers, layer_mm, base_layers(),
                     profile().powder.base_layer_mm));
 }
 
@@ -573,15 +573,15 @@ void Printing::check_pauses() {
   const std::uint32_t wipers = profile().maintenance.wipe_lines.empty() ? 0 : count.wipes;
   if (lamp_blocks_ == lamps && wiper_blocks_ == wipers) return;
   wrong_cycle(
-      fmt::format("the machine's own lines stand {} times where {} have to", lamp_blocks_ + wiper_blocks_, lamps + wipers));
+      fmt::format("the machine's own lines come {} times where {} are expected", lamp_blocks_ + wiper_blocks_, lamps + wipers));
 }
 
 // Of a program that moves no powder.
 void Printing::check_stated() {
   check_pauses();
-  if (base_layers() > 0 && !based_) wrong_cycle(fmt::format("its base of {} layers is not told", base_layers()));
+  if (base_layers() > 0 && !based_) wrong_cycle(fmt::format("its base of {} layers is not stated", base_layers()));
   if (const double rpm = profile().powder.roller_rpm; std::abs(rpm_ - rpm) > 1e-3) {
-    wrong_cycle(fmt::format("the roller is told to make {:g} turns a minute where {:g} have to be", rpm_, rpm));
+    wrong_cycle(fmt::format("the stated roller speed is {:g} turns a minute where {:g} have to be", rpm_, rpm));
   }
 }
 
@@ -612,7 +612,7 @@ void Printing::check_way(MovingPart part, double mm_s) {
   }
   const bool roller = part == MovingPart::kRoller;
   if (roller && !head_at_safe()) {
-    wrong_powder(fmt::format("the roller moves while the head is at {:g}, {:g} mm, not at its safe place", (*head_mm_)[0],
+    wrong_powder(fmt::format("the roller moves while the head is at {:g}, {:g} mm, not at its safe position", (*head_mm_)[0],
                              (*head_mm_)[1]));
   }
   // Oasis lowers its pistons before the spreader goes back.
@@ -654,7 +654,7 @@ void Printing::roller_is_at(double mm, bool may_spread) {
   rolled_ = rolled_ || strokes_ > base_layers();
   const double home = profile().powder.roller_mm[0];
   if (rpm_ != 0 && std::abs(mm - home) < 1e-3 && std::abs(roller_mm_ - home) >= 1e-3) {
-    wrong_powder(fmt::format("the roller returns with {:g} turns a minute, and has to stand still", rpm_));
+    wrong_powder(fmt::format("the roller returns with {:g} turns a minute, and must not turn", rpm_));
   }
   roller_mm_ = mm;
 }
@@ -699,7 +699,7 @@ void Printing::pistons_came(double build_mm, double feed_mm) {
   const double height = strokes_ < base_layers() ? powder.base_layer_mm : mm(layer_.thickness);
   const bool build = build_mm * powder.build_sign < 0 || height >= kThickMm;
   if (build && feed_mm * powder.feed_sign > 0) return;
-  wrong_powder(fmt::format("the {} piston comes to its place from above, and has play", build ? "feed" : "build"));
+  wrong_powder(fmt::format("the {} piston comes to its position from above, and has play", build ? "feed" : "build"));
 }
 
 void Printing::check_cycle() {
@@ -719,11 +719,11 @@ void Printing::check_cycle() {
   if (!spread_wrong_.empty()) return wrong_cycle(spread_wrong_);
   // Numbers are written to a tenth of a micrometre.
   if (const double top = mm(std::int64_t{layer_.bottom} + layer_.thickness); std::abs(count.build_mm - top) > 1e-3) {
-    wrong_cycle(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
+    wrong_cycle(fmt::format("the build vat is at {:g} mm where {:g} have to be", count.build_mm, top));
   }
   const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer_.thickness) + base_mm());
   if (std::abs(fed - dose) > 1e-3 * (1 + base_layers()))
-    wrong_cycle(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
+    wrong_cycle(fmt::format("{:g} mm are fed where {:g} have to be", fed, dose));
   check_pauses();
   if (rpm_ != 0) wrong_cycle(fmt::format("the roller still makes {:g} turns a minute when the layer ends", rpm_));
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {

@@ -46,7 +46,7 @@ Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const F
   const double determinant = s2 * s4 - s3 * s3;
   if (!(determinant > 1e-12 * s2 * s4)) {
     return Error{Fault::kInput,
-                 "all points have one velocity; linear and quadratic parts cannot be told apart, measure at more flows"};
+                 "all points have one velocity; linear and quadratic terms cannot be separated, measure at more flow rates"};
   }
   const double a = (t1 * s4 - t2 * s3) / determinant, b = (t2 * s2 - t1 * s3) / determinant;
   double squares = 0, total = 0;
@@ -218,7 +218,8 @@ Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium&
   }
   if (!file->status()) return file->status().error();
   if (!groups.empty()) return groups;
-  return Error{Fault::kInput, path + ": holds no measurements; the first line names the columns, the others hold numbers"};
+  return Error{Fault::kInput,
+               path + ": contains no measurements; the first line names the columns, the others contain numbers"};
 }
 
 Plot draw_fit(const FlowGroup& group, const Permeability& fit, bool gas) {

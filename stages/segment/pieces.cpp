@@ -211,22 +211,22 @@ Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const Measu
         break;
       case Measured::Test::kSpeed:
         if (!row.thin && !row.stable && !row.thick) break;  // not measured
-        if (!row.thin) return at_row(row, "thin_mm is empty; measure the narrowest place of the thin stretch");
+        if (!row.thin) return at_row(row, "thin_mm is empty; measure the narrowest point of the thin stretch");
         if (!row.stable)
           return at_row(
               row, "stable_mm is empty; measure from the start of the thin stretch to where the bead is as wide as before");
-        if (!row.thick) return at_row(row, "thick_mm is empty; measure the widest place after the thin stretch");
+        if (!row.thick) return at_row(row, "thick_mm is empty; measure the widest point after the thin stretch");
         if (row.percent <= 100)
           return at_row(row, fmt::format("percent is {:g}; speeds of thin stretches are above 100", row.percent));
         if (!speeds.emplace(row.percent, &row).second)
-          return at_row(row, fmt::format("{} stands twice", percent_text(row.percent)));
+          return at_row(row, fmt::format("{} is duplicated", percent_text(row.percent)));
         break;
       case Measured::Test::kExtrusion:
         if (!row.thin) break;
         if (row.percent <= 0 || row.percent >= 100)
           return at_row(row, fmt::format("percent is {:g}; extrusions of thin stretches are between 0 and 100", row.percent));
         if (!extrusions.emplace(row.percent, &row).second)
-          return at_row(row, fmt::format("{} stands twice", percent_text(row.percent)));
+          return at_row(row, fmt::format("{} is duplicated", percent_text(row.percent)));
         break;
       case Measured::Test::kRepeated: {
         if (!row.thick && !row.thin && !row.continuous) break;
@@ -243,7 +243,7 @@ Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const Measu
     }
   }
   if (walls.count == 0 && speeds.empty() && extrusions.empty() && repeated.empty()) {
-    return Error{Fault::kInput, "holds no widths; fill in what was measured"};
+    return Error{Fault::kInput, "contains no widths; fill in the measurements"};
   }
   if (walls.count > 0) machine.flow = settings.flow * 2 * settings.width_mm / walls.value();
   for (const auto& [percent, row] : speeds) calibration.by_speed.push_back({percent, *row->thin, *row->stable, *row->thick});
@@ -272,7 +272,7 @@ Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const Measu
     }
     machine.settled.push_back(settled);
   }
-  if (speeds.empty()) machine.advice.push_back("no widths by speed: nothing is known of how long a thin stretch may be");
+  if (speeds.empty()) machine.advice.push_back("no widths by speed: the maximum length of a thin stretch is unknown");
   if (repeated.empty()) machine.advice.push_back("no widths of repeated stretches: spacings cannot follow from them");
   return machine;
 }
@@ -294,11 +294,11 @@ Result<std::vector<Measured>> read_widths(const std::string& path) {
       names = cells_of(line, separator);
       for (std::size_t i = 0; i < names.size(); ++i) {
         if (std::ranges::find(kColumns, names[i]) == std::end(kColumns)) {
-          return wrong(number, fmt::format("column '{}' is none of {}{}", one_line(names[i]), fmt::join(kColumns, ", "),
+          return wrong(number, fmt::format("unknown column '{}'; use {}{}", one_line(names[i]), fmt::join(kColumns, ", "),
                                            suggest(names[i], kColumns)));
         }
         if (std::ranges::find(names, names[i]) < names.begin() + static_cast<std::ptrdiff_t>(i))
-          return wrong(number, fmt::format("column {} stands twice", names[i]));
+          return wrong(number, fmt::format("column {} is duplicated", names[i]));
       }
       if (std::ranges::find(names, "test") == names.end())
         return wrong(number, fmt::format("no column test; the header is {}", fmt::join(kColumns, ",")));
@@ -316,7 +316,7 @@ Result<std::vector<Measured>> read_widths(const std::string& path) {
     rows.push_back(std::move(row));
   }
   if (!file->status()) return file->status().error();
-  if (rows.empty()) return wrong(0, "holds no rows; lamina calibrate -o DIR writes a table to be filled in");
+  if (rows.empty()) return wrong(0, "contains no rows; lamina calibrate -o DIR writes a table to fill in");
   return rows;
 }
 

@@ -2,7 +2,7 @@
 // the printer makes of speed and extrusion according to it.
 //
 // The procedure is that of Di Nisio 2022, Appendix A: 1 parameters, 2 flow, 3 level, 4 widths of thick and thin stretches,
-// 5 spacings, 6 one layer, 7 the part. docs/calibrate.md describes it.
+// 5 spacings, 6 one layer, 7 the part. docs/howto/calibrate.md describes it.
 #pragma once
 
 #include <array>

@@ -246,7 +246,7 @@ void add_legend(const PorePicture& picture, int top, Plot& plot) {
     x += 48 + 7.6 * static_cast<double>(line.size());
   };
   entry(kDarkGrey, fmt::format("{} {:.2f} %{}", picture.solid_name, percent(solid, picture.solid),
-                               layers ? ", layers in two greys by turns, lines in their middles" : ""));
+                               layers ? ", layers in two alternating greys, lines at their centres" : ""));
   entry(kThrough, fmt::format("void that leads through along {} {:.2f} %", "xyz"[picture.axis], percent(leads, picture.solid)));
   entry(kClosed, fmt::format("void that does not {:.2f} %", percent(rest, picture.solid)));
 }

@@ -88,7 +88,7 @@ TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
     EXPECT_EQ(found.thin.locations.size(), below.thin.locations.size());
     EXPECT_LE(found.loose.count, below.loose.count);
     const std::string text = reported(found);
-    EXPECT_EQ(text.find(found.layers == 0 ? "not-inspected: no layer was looked at"
+    EXPECT_EQ(text.find(found.layers == 0 ? "not-inspected: no layer was inspected"
                                           : "not-inspected: layers from " + std::to_string(found.layers) + " on"),
               text.rfind("not-inspected"))
         << text;

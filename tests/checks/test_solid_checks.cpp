@@ -62,7 +62,8 @@ TEST(LaneResolver, WhatShellsHoldTogetherCounts) {
   EXPECT_EQ(codes(checked(400, sampling)), Codes());
   EXPECT_EQ(requested, 1);
   EXPECT_EQ(codes(checked(100, sampling)), Codes{"volume"});
-  EXPECT_NE(checked(100, sampling)[0].text.find("100 mm3 are planned where the mesh holds 400 mm3 (25 %)"), std::string::npos);
+  EXPECT_NE(checked(100, sampling)[0].text.find("100 mm3 are planned where the mesh contains 400 mm3 (25 %)"),
+            std::string::npos);
   sampling.union_mm3 = [](std::uint32_t) { return 0.0; };
   EXPECT_EQ(codes(checked(400, sampling)), Codes{"volume"}) << "not known";
 }

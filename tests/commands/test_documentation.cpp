@@ -38,18 +38,19 @@ std::vector<fs::path> pages() {
   return found;
 }
 
-// docs/commands is what the definitions give: lamina manual --markdown -o docs/commands.
+// docs/reference/commands is what the definitions give: lamina manual --markdown -o docs/reference/commands.
 TEST(Documentation, PagesOfCommandsAreThoseOfTheirDefinitions) {
   std::set<std::string> pages;
-  for (const auto& entry : fs::directory_iterator(kRoot / "docs/commands")) pages.insert(entry.path().filename());
+  for (const auto& entry : fs::directory_iterator(kRoot / "docs/reference/commands")) pages.insert(entry.path().filename());
   for (const pipeline::Command* command : pipeline::commands()) {
     const std::string name = std::string(command->name) + ".md";
     ASSERT_EQ(pages.erase(name), 1u) << name;
-    EXPECT_EQ(read_text(kRoot / "docs/commands" / name), pipeline::markdown_page(pipeline::spec_of(*command))) << name;
+    EXPECT_EQ(read_text(kRoot / "docs/reference/commands" / name), pipeline::markdown_page(pipeline::spec_of(*command)))
+        << name;
     const std::string readme = read_text(kRoot / "README.md");
     EXPECT_NE(readme.find("lamina " + std::string(command->name)), std::string::npos) << command->name;
   }
-  EXPECT_TRUE(pages.empty()) << "docs/commands/" << *pages.begin() << " is of no command";
+  EXPECT_TRUE(pages.empty()) << "docs/reference/commands/" << *pages.begin() << " is of no command";
 }
 
 // What the commands' own programs take is what their definitions say: lamina preview is one of its own.
@@ -63,7 +64,7 @@ TEST(Documentation, PreviewTakesTheOptionsOfItsDefinition) {
 
 // Every --option that a page puts between backticks is one of some command, or of another program that it names.
 TEST(Documentation, EveryOptionThatItNamesExists) {
-  std::set<std::string> known = {"--help", "--version"};
+  std::set<std::string> known = {"--help", "--help-all", "--version"};
   for (const pipeline::Command* command : pipeline::commands()) known.merge(long_flags(pipeline::spec_of(*command)));
   const std::set<std::string> others = {"--install", "--export-sla", "--export-svg", "--sanitize",
                                         "--models",  "--bench",      "--develop"};
@@ -85,7 +86,7 @@ TEST(Documentation, EveryOptionThatItNamesExists) {
 
 // Every key of a machine's profile, with the default that it has.
 TEST(Documentation, EveryKeyOfAMachineIsDocumented) {
-  const std::string page = read_text(kRoot / "docs/machines.md");
+  const std::string page = read_text(kRoot / "docs/reference/machines.md");
   std::string section;
   std::istringstream profile(pipeline::machine_text(Machine()));
   std::size_t checked = 0;
@@ -122,7 +123,7 @@ TEST(Documentation, EveryCommandLineInItCanBeTyped) {
       const std::string bare = std::regex_replace(rest, std::regex("'[^']*'"), "");
       for (std::sregex_iterator word(bare.begin(), bare.end(), flag); word != end; ++word) {
         const std::string name = (*word)[1];
-        EXPECT_TRUE(name == "--help" || long_flags(spec).contains(name))
+        EXPECT_TRUE(name == "--help" || name == "--help-all" || long_flags(spec).contains(name))
             << page.filename() << ": " << at->str() << ": " << name;
         ++checked;
       }

@@ -118,7 +118,7 @@ TEST_F(Jobs, MergeSaysWhatIsMissing) {
   refused({"own1", "own3"}, "layers 16 to 32 of 50");
   refused({"own1", "own2"}, "layers 33 to 49 of 50");
   refused({"own2", "own3"}, "layers 0 to 15 of 50");
-  refused({"two", "own2", "own3"}, "holds layer 16 that");
+  refused({"two", "own2", "own3"}, "contains layer 16 that");
   refused({"own1", "other", "own3"}, "another job");
   fs::remove(directory_ / "own2/layers/000020.tif");
   refused({"own1", "own2", "own3"}, "own2/layers/000020.tif: is missing");
@@ -194,7 +194,8 @@ TEST_F(Jobs, MergeReplacesNoLayersOfUnknownOrigin) {
     fs::remove_all(directory_ / "mine");
     fs::create_directories((directory_.path() / "mine" / name).parent_path());
     write_text(directory_.path() / "mine" / name, "precious");
-    expect_refused("merge own1 own2 -o mine", 2, "mine: holds layers without a manifest; name another directory", directory_);
+    expect_refused("merge own1 own2 -o mine", 2, "mine: contains layers without a manifest; name another directory",
+                   directory_);
   }
   fs::remove_all(directory_ / "mine");
   fs::create_directories(directory_ / "mine/layers");

@@ -167,7 +167,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"heights part.stl --layer 1 --time-model 3", "--time-model: is of --heights optimal"},
       {"calibrate --machine anet-a8 --gap 0.1 -o pieces", "--gap: is of the profile"},
       {"calibrate --machine anet-a8 --exact-spacing -o pieces", "--exact-spacing: is of the profile"},
-      {"preview out --step 3 -o a.png", "--step: is of a swath"},
+      {"preview out --step 3 -o a.png", "--step: needs a swath"},
       {"preview out --swath 1 --count 3 -o a.png", "--swath: is drawn in one layer"},
       {"permeability drops.csv --length 5 --area 3 --diameter 3", "--area and --diameter exclude each other"},
       {"permeability drops.csv --length 5 --area 3 --outlet-pressure 1e5", "--outlet-pressure: is of gases that expand"},
@@ -181,7 +181,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"permeability beads.gcode --window 90,3,1", "--window: 90.000 mm along x are more than the print has"},
       {"info part.stl --density 1.2", "--density: is of toolpaths"},
       {"info beads.gcode --scale 2", "--scale: is of parts"},
-      {"design --machine anet-a8", "nothing is wished for"},
+      {"design --machine anet-a8", "no target; add"},
       {"design --porosity 20", "--machine is missing"},
       {"design --porosity 20 --permeability 9 --pore 0.1x1 --machine anet-a8", "leave one out"},
       {"design --pore 0.9x0.12 --machine anet-a8", "--pore: 0.9 mm is the width and has to be less than the length"},
@@ -197,7 +197,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: is of repair"},
       {"export part.stl --at 1,1 --gap 3 -o x.stl", "--gap: is between parts"},
       {"report beads.gcode --parts part.stl -o a.html", "--parts: is of jobs of images"},
-      {"preview beads.gcode --layer 2 --width 500 -o a.svg", "--width: is of pictures of pixels"},
+      {"preview beads.gcode --layer 2 --width 500 -o a.svg", "--width: applies to pictures of pixels"},
       {"manual jet -o pages", "--output: is for the pages of all commands"},
   };
   for (const auto& row : rows) {
@@ -221,7 +221,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
         "slice part.stl --dry-run --quiet --heights cusp --thickness 0.5,1 --facets plane"}) {
     done(line);
   }
-  EXPECT_NE(done("jet part.stl --layer 1 --dry-run --walls 3").err.find("note: inside of the walls nothing is asked for"),
+  EXPECT_NE(done("jet part.stl --layer 1 --dry-run --walls 3").err.find("note: nothing is filled inside the walls"),
             std::string::npos);
   EXPECT_EQ(done("jet part.stl --layer 1 --dry-run --walls 3 --fill none").err.find("note:"), std::string::npos);
 }
@@ -239,7 +239,7 @@ TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsReported) {
   EXPECT_EQ(done("jet --job walls.toml --dry-run --set fill.pattern=none").err.find("note:"), std::string::npos);
   const std::string slices = "slice part.stl --layer 1 --walls 1 --overwrite -o out --format ";
   const Outcome dropped = done(slices + "3mf"), drawn = done(slices + "svg");
-  EXPECT_NE(dropped.err.find("slices of 3MF hold contours only"), std::string::npos) << dropped.err;
+  EXPECT_NE(dropped.err.find("slices of 3MF contain contours only"), std::string::npos) << dropped.err;
   EXPECT_NE(dropped.err.find("m of bead, not in the file"), std::string::npos) << dropped.err;
   EXPECT_NE(drawn.err.find("m of bead\n"), std::string::npos) << drawn.err;
   EXPECT_EQ(drawn.err.find("contours only"), std::string::npos) << drawn.err;
@@ -257,7 +257,7 @@ TEST_F(OneMeaning, WhatWasRequestedIsAnsweredOnStdout) {
       {"verify part.gcode", "part.gcode: 20 layers"},
       {"preview out -o sheet.png", "sheet.png: 4 of 4 layers"},
       {"preview part.gcode -o layer.svg", "layer.svg: "},
-      {"report out -o page.html", "page.html: 4 of 4 layers to look at"},
+      {"report out -o page.html", "page.html: 4 of 4 layers shown"},
   };
   for (const auto& row : rows) {
     const Outcome outcome = done(row.line);

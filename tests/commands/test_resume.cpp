@@ -171,7 +171,7 @@ TEST_F(Resume, ImagesOfAnOlderJobDoNotMixWithThoseOfTheNewOne) {
   fs::remove(directory_ / "out/manifest.json");
   write_text(directory_ / "out/manifest.json.part", "");  // killed while the older job was removed
   EXPECT_EQ(run(job + "out").code, 2);
-  refused(job + "out --resume", 2, "a record without its head; replace them with --overwrite");
+  refused(job + "out --resume", 2, "a manifest without a header; replace them with --overwrite");
   done(job + "out --overwrite");
   EXPECT_EQ(tree("out"), tree("whole"));
 }
@@ -209,7 +209,7 @@ TEST_F(Resume, ContoursThatNoRecordReportsAreKept) {
       fs::create_directories(directory_ / "out/layers");
       write_text(directory_ / "out/manifest.json.part", head);
       write_text(directory_ / "out/layers/000007.svg", "precious");
-      refused(job + " --resume", 2, "out/layers: holds layers");
+      refused(job + " --resume", 2, "out/layers: contains layers");
       fs::remove_all(directory_ / "out/layers");
       write_text(directory_ / "out/job.toml", "precious");
       refused(job + " --resume", 2, "job.toml: is there already");
@@ -235,11 +235,11 @@ TEST_F(Resume, FilesALayerThatNoRecordReportsAreKept) {
   fs::create_directory(directory_ / "out/layers");
   write_text(directory_ / "out/layers/000003.svg", "precious");
   write_text(directory_ / "out/manifest.json.part", begun(manifest, 2));
-  refused(job + " --resume", 2, "out/layers: holds layers");
+  refused(job + " --resume", 2, "out/layers: contains layers");
   fs::remove(directory_ / "out/manifest.json");
   write_text(directory_ / "out/manifest.json.part", "");
   fs::remove(directory_ / "out/job.toml");
-  refused(job + " --resume", 2, "out/layers: holds layers");
+  refused(job + " --resume", 2, "out/layers: contains layers");
 }
 
 TEST_F(Resume, ImagesThatNoRecordReportsAreKept) {
@@ -247,7 +247,7 @@ TEST_F(Resume, ImagesThatNoRecordReportsAreKept) {
   write_text(directory_ / "out/layers/000000.tif", "precious");
   for (const bool torn : {false, true}) {
     if (torn) write_text(directory_ / "out/manifest.json.part", "");
-    refused("jet part.stl --layer 1 --dpi 60 --quiet -o out --resume", 2, "out/layers: holds layers");
+    refused("jet part.stl --layer 1 --dpi 60 --quiet -o out --resume", 2, "out/layers: contains layers");
   }
   fs::remove(directory_ / "out/layers/000000.tif");
   EXPECT_EQ(planned("jet part.stl --layer 1 --dpi 60 --quiet -o out"), 3);  // killed before its head
@@ -279,7 +279,8 @@ TEST_F(Resume, APipeInsteadOfALayerIsReportedWithWhatHelps) {
     const Outcome outcome = run(job + " --resume");
     EXPECT_EQ(outcome.code, 4);
     EXPECT_NE(outcome.err.find("000002.tif: is a"), std::string::npos) << outcome.err;
-    EXPECT_NE(outcome.err.find("remove it; finished layers are kept, go on with --resume"), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("remove it; finished layers are kept, continue with --resume"), std::string::npos)
+        << outcome.err;
     fs::remove(directory_ / "out/layers/000002.tif");
     EXPECT_EQ(planned(job), 1);
     EXPECT_EQ(tree("out"), whole);

@@ -171,7 +171,7 @@ KindSet known_kinds() {
 
 TEST_F(WarningKinds, AreThoseOfThePageAboutThem) {
   KindSet documented;
-  std::ifstream page(fs::path(LAMINA_TEST_DIR).parent_path() / "docs/warnings.md");
+  std::ifstream page(fs::path(LAMINA_TEST_DIR).parent_path() / "docs/reference/warnings.md");
   const std::regex code("`([a-z]+(-[a-z]+)*)`");
   for (std::string line; std::getline(page, line);) {
     if (!line.starts_with("| `")) continue;
@@ -183,9 +183,8 @@ TEST_F(WarningKinds, AreThoseOfThePageAboutThem) {
 
 TEST_F(WarningKinds, AreThoseOfTheSources) {
   KindSet made;
-  const std::regex code(
-      R"re((?:warnings_?|found)\.(?:push_back|emplace_back)\(\s*(?:Warning)?\{?\s*"([a-z]+(?:-[a-z]+)*)"|)re"
-      R"re((?:\bwarn|\bwarning)\(\s*"([a-z]+(?:-[a-z]+)*)")re");
+  const std::regex code(R"re((?:warnings_?|found)\.(?:push_back|emplace_back)\(\s*(?:Warning)?\{?\s*"([a-z]+(?:-[a-z]+)*)"|)re"
+                        R"re((?:\bwarn|\bwarning)\(\s*"([a-z]+(?:-[a-z]+)*)")re");
   for (const char* folder : {"stages", "pipeline"}) {
     for (const auto& entry : fs::recursive_directory_iterator(fs::path(LAMINA_TEST_DIR).parent_path() / folder)) {
       if (entry.path().extension() != ".cpp") continue;

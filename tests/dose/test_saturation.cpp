@@ -348,7 +348,7 @@ TEST(Budget, NamesTheWorstDose) {
   Budget budget(binder, kTenths, DoseTargets{{15, {}}, {{0.2, 0.3, {5, {}}}}, {DoseTarget{8, {}}}}, 64, 20);
   for (std::uint32_t i = 0; i < 4; ++i) budget.foresee(tenth(i));
   const std::string text = refusal(budget, warnings);
-  EXPECT_NE(text.find("layers 0:4 (z 0.000 to 0.400 mm) get as little as 5.0 % of their voids filled where 5 % is asked"),
+  EXPECT_NE(text.find("layers 0:4 (z 0.000 to 0.400 mm) get as little as 5.0 % of their voids filled where 5 % is requested"),
             std::string::npos)
       << text;
 }

@@ -116,8 +116,8 @@ TEST(GcodeLayers, WithoutTagsLayersAreHeightsAtWhichSomethingIsDeposited) {
 TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePosition) {
   const Directory directory;
   const std::vector<std::pair<std::string, std::string>> files = {
-      {"", "no move in it lays filament"},
-      {"solid nut\nfacet normal 0 0 0\n", "no move in it lays filament"},
+      {"", "no move extrudes filament"},
+      {"solid nut\nfacet normal 0 0 0\n", "no move extrudes filament"},
       {std::string("GIF89a\0\0\0", 9), "line 1: is no text of G-code"},
       {"G28\n" + std::string(1 << 17, 'x'), "line 2: is no text of G-code"},
       {"G1 X1 E1\nG18\nG2 X1 Y1 I1 E2\n", "line 3: an arc in the plane of G18"},

@@ -283,7 +283,7 @@ TEST(Stacks, OfOddFoldersAreReadRightOrRefusedInALine) {
   refused({"a1.pgm", "a1.PGM"}, "has the number of");
   refused({"layers/a1.pgm", "more/a2.pgm"}, "layers");
   refused({"a1.pgm", "a2.jpg"}, "a2.jpg: is of a format that is not read");
-  refused({"a1.pgm", "preview.pgm"}, "preview.pgm: has no number");
+  refused({"a1.pgm", "preview.pgm"}, "preview.pgm: has no layer number");
   {
     test::Directory folder;
     write_pgm(folder / "a1.pgm", one);

@@ -93,7 +93,7 @@ TEST(Read3mfExtensions, PathsLeadToOtherFilesWithTheirOwnUnitsAndIds) {
   EXPECT_CONTAINS(part.meshes[0].name, "object 1 \"a\" in 3d/objects/object 1.model");
   entries.pop_back();
   EXPECT_CONTAINS(refusal(write_file("path.3mf", zip(entries))),
-                  "names 3d/objects/object 1.model, which the file does not hold");
+                  "names 3d/objects/object 1.model, which the file does not contain");
 }
 
 TEST(Read3mfExtensions, PrefixesAndProgramsOwnDefaultsDoNotMatter) {

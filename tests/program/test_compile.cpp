@@ -327,7 +327,7 @@ TEST(HeadGrid, WhatCannotBePrintedIsOneLineThatNamesTheKey) {
   refused([](Machine& m) { m.motion.scan_speed_mm_s = 1000; }, "motion.scan_speed_mm_s");
   refused([](Machine& m) { m.mounting.overlap_lines = 65; }, "mounting.overlap_lines");
   refused([](Machine& m) { m.mounting.scan_from = Side::kFront; }, "mounting.scan_from");
-  refused([](Machine& m) { m.head.row_offset_um = {0, 500}; }, "beside its line");
+  refused([](Machine& m) { m.head.row_offset_um = {0, 500}; }, "off its line");
 }
 
 }  // namespace

@@ -191,10 +191,10 @@ TEST(DropSweeps, AreRefusedOfADialectOfOneDrop) {
 
 TEST(DropSweeps, AreReported) {
   const Machine slow = head_of(7, 350), fast = head_of(7, 700);
-  EXPECT_EQ(sweeps_text(fast, grid_of_head(fast), {12, 0, 0}), "2 over a place for up to 12 drops a pixel, up to 7 in each");
+  EXPECT_EQ(sweeps_text(fast, grid_of_head(fast), {12, 0, 0}), "2 over a position for up to 12 drops a pixel, up to 7 in each");
   EXPECT_EQ(
       sweeps_text(slow, grid_of_head(slow), {7, 20, 12.5}),
-      "3 over a place for up to 7 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them at 5.0 mm/s; "
+      "3 over a position for up to 7 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them at 5.0 mm/s; "
       "that adds 20 sweeps, 12.5 s");
   EXPECT_NE(
       explain(slow, grid_of_head(slow), {}).find("3 of 7 of a pixel in one sweep at that speed, as 4 bits; all at 5.0 mm/s"),

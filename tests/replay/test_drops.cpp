@@ -127,7 +127,7 @@ TEST_P(GreyDrops, AreReplayedDropForDrop) {
     if (maximum == 3 && fired == 3) {  // as many bits
       const auto reported = replay(fewer, views);
       ASSERT_FALSE(reported.ok());
-      EXPECT_NE(reported.error().message.find("drops at a place, the head has at most"), std::string::npos);
+      EXPECT_NE(reported.error().message.find("drops at one position, the head has at most"), std::string::npos);
     }
     Machine slower = resolved.machine;
     slower.head.highest_frequency_hz *= (fired - 0.5) / (allowed + 0.5);

@@ -130,7 +130,7 @@ TEST(Maintenance, ShotsElsewhereOrOnTheBedAreFound) {
   EXPECT_NE(wrong.fault(text).find("fires off the bed where column"), std::string::npos) << wrong.fault(text);
   // And a profile without any takes no shot.
   wrong.resolved.machine.maintenance = {};
-  EXPECT_NE(wrong.fault(text).find("the profile has no place for it"), std::string::npos) << wrong.fault(text);
+  EXPECT_NE(wrong.fault(text).find("the profile has no position for it"), std::string::npos) << wrong.fault(text);
 }
 
 TEST(Maintenance, PausesToDryAreBehindTheSweepsAtTheCapAndAsLongAsStated) {
@@ -233,7 +233,7 @@ TEST(Maintenance, AShotFollowsEachWipeAndVatsAreFilledOnce) {
   const std::size_t wipe = text.find("G0 X-45.0000 Y-30.0000"), shot = text.find("G0 X-45.0000 Y-10.0000");
   const std::string wiping = text.substr(wipe, shot - wipe);
   text.insert(text.find('\n', text.find("M816")) + 1, wiping);
-  EXPECT_NE(bench.fault(text).find("scans behind the wiper before the head is fired off the bed"), std::string::npos);
+  EXPECT_NE(bench.fault(text).find("scans after the wiper before the head is fired off the bed"), std::string::npos);
   const std::string first = bench.program.text.substr(0, bench.program.text.find('\n') + 1);
   const std::string rest = bench.program.text.substr(first.size());
   EXPECT_EQ(bench.fault(first + "M815\n" + rest), "");
@@ -268,7 +268,7 @@ TEST(Maintenance, TheRollersSpeedIsWrittenAndHeld) {
               std::string::npos);
   }
   const MaintenanceBench none("oasis");
-  EXPECT_NE(none.fault(none.with("M4", "M4 S300\n")).find("M4 has no S"), std::string::npos);
+  EXPECT_NE(none.fault(none.with("M4", "M4 S300\n")).find("M4 must not have S"), std::string::npos);
 }
 
 // The first layer of 0.1 mm over a base of 3 x 0.2 mm: 0.7 mm fed in four turns, and a turn that is left out or fed from too
@@ -392,7 +392,7 @@ TEST(Maintenance, ProfilesThatCannotBeKeptAreRefused) {
        [](Machine& m) {
          m.maintenance.cap_mm = {{400, 0}};
        }},
-      {"xaar128-raw", "maintenance.wipe_mm: raw has places up to 2147 mm",
+      {"xaar128-raw", "maintenance.wipe_mm: raw has positions up to 2147 mm",
        [](Machine& m) {
          m.maintenance.wipe_layers = 1, m.maintenance.wipe_mm = {{-3000, 5, -3000, 50}};
        }},

@@ -100,8 +100,8 @@ TEST(Order, OfTheLampAndTheCapIsHeld) {
       printed_parts::all_maintenance_of(m);
       m.maintenance.cap_mm.reset();
     });
-    expect_in(Reordered(open).move("M106", safe).reported(), "while the head is not at its safe place");
-    expect_in(bench.reported(bench.with(bench.find("M106"), "")), "own lines stand");
+    expect_in(Reordered(open).move("M106", safe).reported(), "while the head is not at its safe position");
+    expect_in(bench.reported(bench.with(bench.find("M106"), "")), "own lines come");
     // The lamp is on until its line comes.
     expect_in(bench.reported(bench.with(bench.find("M107"), bench.pieces[bench.find(safe, -1)] + "M107\n")),
               "the head moves before 'M107'");
@@ -116,23 +116,23 @@ TEST(Order, VectorsAreLoadedWhereTheSweepBegins) {
   const std::string begin = bench.pieces[bench.find("M812") + 1];
   const double x = std::stod(begin.substr(4)), ramp = bench.resolved.machine.motion.ramp_mm;
   expect_in(Reordered(bench).replace(fmt::format("X{:.4f}", x), fmt::format("X{:.4f}", x + 1)).reported(),
-            fmt::format("mm before the first drops and {:g} behind", ramp));
+            fmt::format("mm before the first drops and {:g} after", ramp));
 }
 
 TEST(Order, CountsAreThoseOfTheLayer) {
   const TamperBench bench("nuferbj");
   expect_in(Reordered(bench).replace("T9", "T8").reported(), "is of 8 layers, the job has 9");
-  expect_in(Reordered(bench).replace("H0.1000", "H0.2000").reported(), "0.2 mm thick where 0.1 have to be");
+  expect_in(Reordered(bench).replace("H0.1000", "H0.2000").reported(), "thickness is 0.2 mm where 0.1 have to be");
   expect_in(Reordered(bench).replace("M812 S0 T2", "M812 S0 T3").replace("M812 S1 T2", "M812 S1 T3").reported(),
-            "to have 3 swaths, and has 2");
-  expect_in(Reordered(bench).replace("M812 S1 T2", "M812 S1 T3").reported(), "is one of 3 swaths, those before of 2");
+            "states 3 swaths, and has 2");
+  expect_in(Reordered(bench).replace("M812 S1 T2", "M812 S1 T3").reported(), "is one of 3 swaths, the preceding ones of 2");
   expect_in(Reordered(bench).replace("M812 S1", "M812 S2").reported(), "beyond the 2 that the layer has");
   expect_in(
       Reordered(bench).replace("M812 S1", "M812 S7").replace("M812 S0", "M812 S1").replace("M812 S7", "M812 S0").reported(),
       "and the swath of that number at line");
   TamperBench both = bench;
   both.resolved.machine.motion.both_directions = false;
-  expect_in(both.reported(both.program.text), "fires on the way there alone");
+  expect_in(both.reported(both.program.text), "fires only in forward sweeps");
 }
 
 TEST(Order, SpeedsAreThoseOfTheProfile) {
@@ -165,15 +165,15 @@ TEST(Order, OfLinesForTheHp45IsHeld) {
   for (const char* setting : {"SPME", "SER", "SDP", "SDN", "SSID", "BMOD", "BCL"}) {
     expect_in(bench.reported(bench.with(bench.find(setting), "")), fmt::format("lines come before {}: ", setting));
   }
-  expect_in(bench.reported(bench.with(bench.find("SEP"), "")), "before SEP tells where the head stands");
+  expect_in(bench.reported(bench.with(bench.find("SEP"), "")), "before SEP sets the position of the head");
   const std::size_t sweep = bench.find("SBR", -1) + 1;
   ASSERT_TRUE(bench.pieces[sweep].starts_with("G1 "));
   ASSERT_EQ(bench.pieces[sweep + 1], "G4 P0\n");
-  expect_in(bench.reported(bench.with(sweep + 1, "")), "goes on from a sweep without G4 P0");
-  expect_in(bench.reported(bench.with(sweep, "G0" + bench.pieces[sweep].substr(2))), "G0 goes as fast as");
+  expect_in(bench.reported(bench.with(sweep + 1, "")), "moves on from a sweep without G4 P0");
+  expect_in(bench.reported(bench.with(sweep, "G0" + bench.pieces[sweep].substr(2))), "G0 moves as fast as");
   std::string last = bench.pieces[sweep - 1];
   last[last.size() - 30] = 'B';
-  expect_in(bench.reported(bench.with(sweep - 1, last)), "fires on the ways of the next layer");
+  expect_in(bench.reported(bench.with(sweep - 1, last)), "fires on the moves of the next layer");
   // Of the first line hangs what came before: it is read at once, or when the head is there.
   const std::size_t first = bench.find("SBR");
   std::string on = bench.pieces[first];
@@ -237,14 +237,14 @@ TEST(Order, OfRecordsIsHeld) {
   EXPECT_EQ(bench.reported(bench.with(bench.find("ROLL"), safe + roll)), "");
   expect_in(Reordered(bench).insert(cap + fill + safe, "ROLL").reported(), "other numbers");  // it takes time
   expect_in(Reordered(bench).insert(fill, "ROLL").reported(), "the vats are filled while the head is not at its cap");
-  expect_in(Reordered(bench).insert(cap, "ROLL").reported(), "ROLL stands where the head is not at its safe place");
-  expect_in(Reordered(bench).insert(roll, "SWTH", 1).reported(), "ROLL stands behind the layer's powder");
-  expect_in(Reordered(bench).insert(fill, "SWTH", 1).reported(), "FILL stands behind the layer's powder");
+  expect_in(Reordered(bench).insert(cap, "ROLL").reported(), "ROLL comes while the head is not at its safe position");
+  expect_in(Reordered(bench).insert(roll, "SWTH", 1).reported(), "ROLL comes after the layer's powder");
+  expect_in(Reordered(bench).insert(fill, "SWTH", 1).reported(), "FILL comes after the layer's powder");
   const TamperBench still("xaar128-raw", [](Machine& m) {
     printed_parts::all_maintenance_of(m);
     m.powder.roller_rpm = 0;
   });
-  expect_in(Reordered(still).insert(cap + fill, "GOTO").reported(), "behind the pause to fill vats, not to its safe place");
+  expect_in(Reordered(still).insert(cap + fill, "GOTO").reported(), "after the pause to fill vats, not to its safe position");
 }
 
 }  // namespace

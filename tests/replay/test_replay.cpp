@@ -185,7 +185,7 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
 bool names_the_position(const std::string& fault) {
   static const std::regex position(
       "layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath|powder cycle"
-      "|line [0-9]+ across, place [0-9]+ along, which no swath comes over): .*");
+      "|line [0-9]+ across, position [0-9]+ along, which no swath covers): .*");
   return std::regex_match(fault, position);
 }
 

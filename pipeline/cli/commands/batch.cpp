@@ -34,7 +34,7 @@ CommandSpec batch_spec() {
   const auto sync = std::ranges::find(job_keys(), "--sync", &JobKey::flag);
   spec.summary =
       "Runs many jobs in one queue that shares the processors and a memory budget. A job that fails does so alone; each\n"
-      "result and reason is in OUT/summary.json and OUT/summary.tsv. A batch that was killed goes on with --resume.";
+      "result and reason is in OUT/summary.json and OUT/summary.tsv. --resume continues a batch that was killed.";
   spec.operand = "LIST";
   spec.operand_meaning =
       "lists with one command line a line (jet part.stl --dpi 600 -o part), directories of parts and job files, parts, "
@@ -43,13 +43,13 @@ CommandSpec batch_spec() {
       {"-o,--output", "DIR", "directory of the batch; jobs write below it", "", ""},
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
       {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
-      {"--memory", "SIZE", "what all running jobs may hold together: 512M, 4G", "1G", "Run"},
-      {"--sync", "WHEN", "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off", "job", "Run",
+      {"--memory", "SIZE", "memory of all running jobs together: 512M, 4G", "1G", "Run"},
+      {"--sync", "WHEN", "data of jobs and summary that survives a power cut, as in lamina jet: layer, job, off", "job", "Run",
        sync->words()},
       {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
-      {"--resume", "", "go on with an earlier batch in DIR: jobs that are done, and whose files hold, are kept", "", "Run"},
+      {"--resume", "", "continue an earlier batch in DIR; finished jobs with valid files are kept", "", "Run"},
       {"--overwrite", "", "replace an earlier batch in DIR", "", "Run"},
       {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
       {"--quiet", "", "say nothing but errors: a line for each job that fails", "", "Run"}};
@@ -61,7 +61,7 @@ CommandSpec batch_spec() {
       "  lamina batch parts/ --with 'jet --dpi 600 --format png' --jobs 4 --memory 8G -o out\n"
       "  lamina batch jobs.txt night/*.toml -o out --time-limit 3600\n"
       "  lamina batch jobs.txt -o out --resume\n"
-      "  lamina batch parts/ --with info -o look && jq -r '.jobs[] | [.source, .result.closed] | @tsv' look/summary.json";
+      "  lamina batch parts/ --with info -o checked && jq -r '.jobs[] | [.source, .result.closed] | @tsv' checked/summary.json";
   return spec;
 }
 
@@ -284,7 +284,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
   if (summary->interrupted) {
-    context.complain({Fault::kInterrupted, "interrupted; what is done is kept, go on with the same command and --resume"});
+    context.complain({Fault::kInterrupted, "interrupted; finished jobs are kept; continue with the same command and --resume"});
   }
   if (arguments.has("--json")) {
     if (Status status = context.give(json); !status) code = context.complain(status.error());

@@ -94,11 +94,11 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
 std::vector<OptionSpec> powder_calibration_options() {
   return {{"--drops", "N", "powder printer: a job of so many drops, to be weighed", "", "Powder printers"},
           {"--weighed-mg", "MG", "mass of those --drops: the volume of a drop for the profile", "", "Powder printers"},
-          {"--density", "G/ML", "of the binder", "1", "Powder printers"},
+          {"--density", "G/ML", "density of the binder", "1", "Powder printers"},
           {"--scan", "PHOTO", "photograph of a printed chart: blocked nozzles, offsets and dot gain for the profile", "",
            "Powder printers"},
-          {"--chart", "DIR|FILE", "of that chart, as an earlier call wrote it", "", "Powder printers"},
-          {"--overlay", "PNG", "what was seen, drawn over the photograph", "", "Powder printers"}};
+          {"--chart", "DIR|FILE", "the chart that an earlier call wrote", "", "Powder printers"},
+          {"--overlay", "PNG", "picture of the detected marks, drawn over the photograph", "", "Powder printers"}};
 }
 
 Outcome calibrate_powder(const Arguments& arguments, Context& context) {
@@ -142,7 +142,7 @@ CommandSpec calibrate_spec() {
       "the measured widths, the printer's profile with its spacings and speeds. Powder printers: a chart of all nozzles as a\n"
       "print job, or a job of a stated number of drops; then, from a photograph or a mass, the printer's profile.";
   spec.options = {
-      {"--machine", "NAME|FILE", "printer; lamina extrude --help and lamina machines list them", "", "Machine", names_of_all()},
+      {"--machine", "NAME|FILE", "printer; lamina machines lists them", "", "Machine", names_of_all()},
       {"-o,--output", "DIR|FILE", "directory for the pieces; with --measured, the profile to be written", "", "Machine"},
       {"--measured", "FILE", "the widths.csv of the pieces, filled in", "", "Measurements"},
       {"--bead", "MM", "width of a bead at 100 %; the nozzle if absent", "", "Beads"},
@@ -151,10 +151,10 @@ CommandSpec calibrate_spec() {
       {"--exact-spacing", "", "spacings from the mean widths, not rounded to 0.01 mm as in the document", "", "Measurements"},
       {"--overwrite", "", "replace a profile that lamina did not write, or the pieces of an earlier call", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
-      {"--quiet", "", "say nothing but errors", "", "Result"}};
+      {"--quiet", "", "print errors only", "", "Result"}};
   for (OptionSpec& option : powder_calibration_options()) spec.options.push_back(std::move(option));
   spec.closing =
-      "The steps of extrusion printers are those of Di Nisio (2022), Appendix A; docs/calibrate.md tells all of them.\n\n"
+      "The steps of extrusion printers are those of Di Nisio (2022), Appendix A; docs/howto/calibrate.md describes them.\n\n"
       "Examples:\n"
       "  lamina calibrate --machine anet-a8 -o pieces\n"
       "  lamina calibrate --machine anet-a8 --measured pieces/widths.csv -o my-anet.toml\n"

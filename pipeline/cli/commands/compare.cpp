@@ -16,14 +16,14 @@ namespace {
 CommandSpec compare_spec() {
   CommandSpec spec;
   spec.summary =
-      "Finds a layer in a photograph of it, and tells stripes along the scan that were not printed and the area of each\n"
-      "connected part, expected and seen. Exit code 5 if a stripe is missing.";
+      "Finds a layer in a photograph of it, and reports stripes along the scan that were not printed and the area of each\n"
+      "connected part, expected and detected. Exit code 5 if a stripe is missing.";
   spec.operand = "LAYER PHOTO";
   spec.operand_meaning = "image of a layer, as lamina jet wrote it, and a photograph from above (PNG, JPEG, TIFF)";
-  spec.options = {{"--pixel", "UM", "of the sheet that a pixel of the photograph shows, within 5 %", "100", ""},
+  spec.options = {{"--pixel", "UM", "size of a pixel of the photograph on the sheet, within 5 %", "100", ""},
                   {"--machine", "NAME|FILE", "whose scan axis counts; without it x", "", "", names_of(shipped_machines())},
                   {"--json", "", "print one JSON object on stdout", "", ""},
-                  {"--quiet", "", "say nothing but errors", "", ""}};
+                  {"--quiet", "", "print errors only", "", ""}};
   spec.closing = "Examples:\n  lamina compare out/layers/000002.tif photo.png --pixel 254";
   return spec;
 }
@@ -37,7 +37,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   const auto layer = formats::dark_pixels(arguments.operands[0], are_grey_drops(arguments.operands[0]) ? 255 : 128);
   if (!layer) return layer.error();
   if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
-    return failure(Fault::kInput, "{}: tells no resolution; give an image that lamina wrote", arguments.operands[0]);
+    return failure(Fault::kInput, "{}: has no resolution; use an image that lamina wrote", arguments.operands[0]);
   const auto reported = scanned("compare",
                                 {{"photo", arguments.operands[1]},
                                  {"photo_um", photo_um},
@@ -74,6 +74,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command compare_command = {"compare", "a printed layer's photograph beside the layer", compare_spec, run_compare};
+const Command compare_command = {"compare", "compare the photograph of a printed layer with its bitmap", compare_spec,
+                                 run_compare};
 
 }  // namespace lamina::pipeline

@@ -33,17 +33,18 @@ CommandSpec convert_spec() {
   spec.operand = "STACK";
   spec.operand_meaning = "a folder of images .tif, .png, .bmp, .pbm, .pgm, or one file";
   spec.options = {{"-o,--output", "DIR", "directory for the images", "", "Output"},
-                  {"--format", "FORMAT", "of the files", "tiff-g4", "Output"},
-                  {"--levels", "N", "of a grey --format: 2, 4, 16, or 256 of 8 bits; the nearest one", "all it has", "Output"},
+                  {"--format", "FORMAT", "file format", "tiff-g4", "Output"},
+                  {"--levels", "N", "grey levels of a grey --format: 2, 4, 16, or 256 with 8 bits; values are rounded",
+                   "all it has", "Output"},
                   {"--threshold", "N", "grey below it becomes a set pixel, 1 to 255; of 1-bit formats", "128", "Images"},
-                  {"--dpi", "DPI|XxY", "to write, if the images do not tell it", "", "Images"},
+                  {"--dpi", "DPI|XxY", "resolution to write, if the images state none", "", "Images"},
                   {"--invert", "", "bright pixels are set, not dark ones", "", "Images"},
                   {"--mirror", "AXES", "turn the images over: x, y or xy", "", "Images"},
                   {"--missing-empty", "", "missing numbers are empty images", "", "Images"},
                   {"--threads", "N", "at most so many; 0: all of the host", "0", "Run"},
                   {"--overwrite", "", "replace images that are there", "", "Run"},
                   {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
-                  {"--quiet", "", "say nothing but errors", "", "Run"}};
+                  {"--quiet", "", "print errors only", "", "Run"}};
   spec.closing =
       "Examples:\n"
       "  lamina convert slices -o g4                              G4, as lamina jet writes it\n"
@@ -161,7 +162,7 @@ Status choose_format(const Arguments& arguments, const std::string& id, Conversi
   all.bits = formats::find_image_format(id);
   all.grey = formats::find_level_format(id);
   if (all.grey == nullptr && (all.bits == nullptr || all.bits->extension.empty()))
-    return usage("--format {}: is none of the image formats; `lamina jet --help` lists them", id);
+    return usage("--format {}: unknown image format; `lamina jet --help-all` lists them", id);
   const bool nibbles = id == "tiff-4";
   all.full = nibbles ? 15 : 255;
   if (all.grey == nullptr && arguments.has("--levels"))
@@ -202,7 +203,7 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   std::array<double, 2>& dpi = all.dpi;
   dpi = {images->dpi_x(), images->dpi_y()};
   if (given[0] > 0) dpi = {static_cast<double>(given[0]), static_cast<double>(given[1])};
-  if (!(dpi[0] > 0) || !(dpi[1] > 0)) return failure(Fault::kInput, "{}: its files tell no resolution; give --dpi", stack);
+  if (!(dpi[0] > 0) || !(dpi[1] > 0)) return failure(Fault::kInput, "{}: its files state no resolution; add --dpi", stack);
   for (double& one : dpi) {
     if (std::abs(one - std::round(one)) < 0.02) one = std::round(one);  // of whole pixels a metre
   }

@@ -18,35 +18,34 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr const char *kTargets = "Wish: one or two of them", *kGradient = "Regions of a wish with two ends";
+constexpr const char *kTargets = "Target: one or two of them", *kGradient = "Regions of a target with two ends";
 
 CommandSpec design_spec() {
   CommandSpec spec;
   spec.summary =
-      "Finds the segmented filling whose pores are as wished: lengths of thick and thin stretches, spacing, extrusion, speeds and\n"
-      "continuous lines, within what was measured of the machine. Plans it, solves the flow through what is laid, tells what it\n"
-      "will be, and writes the job file. A wish with two ends changes from the bottom to the top, in regions of their own\n"
-      "filling. A wish that cannot be met ends with exit code 5 and the nearest that can.";
+      "Finds the segmented filling with the requested pores: lengths of thick and thin stretches, spacing, extrusion, speeds and\n"
+      "continuous lines, within what was measured of the machine. Plans it, solves the flow through it, reports what it\n"
+      "will be, and writes the job file. A target with two ends changes from the bottom to the top, in regions of their own\n"
+      "filling. A target that cannot be met ends with exit code 5 and the nearest that can.";
   spec.options = {
       {"--porosity", "PERCENT", "void in the filling, as in 24; 20:26 from the bottom to the top", "", kTargets},
       {"--permeability", "DARCY", "k1 along the height, as in 100; 60:150 from the bottom to the top", "", kTargets},
-      {"--pore", "WIDTHxLENGTH", "mm, of the pore beside a thin stretch, as in 0.12x0.9; 0.1x0.9:0.14x0.9 upwards", "",
-       kTargets},
-      {"--height", "MM", "of the part, for wishes with two ends", "", kGradient},
+      {"--pore", "WIDTHxLENGTH",
+       "width and length in mm of the pore next to a thin segment, as in 0.12x0.9; 0.1x0.9:0.14x0.9 upwards", "", kTargets},
+      {"--height", "MM", "height of the part, for targets with two ends", "", kGradient},
       {"--steps", "N", "regions as high as each other", "5", kGradient},
       {"--tops", "MM[,MM...]", "tops of the regions in place of them, the lowest first, the part's height last", "", kGradient},
-      {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine",
-       names_of(shipped_extruders())},
+      {"--machine", "NAME|FILE", "extrusion printer; lamina machines lists them", "", "Machine", names_of(shipped_extruders())},
       {"--voxel", "UM", "edge of a voxel across the lines, micrometres; twice as long, as high", "10", "Solver"},
-      {"-o,--output", "FILE", "job file to be written, as in pores.toml; else it is told alone", "", "Result"},
-      {"--nearest", "", "write the nearest job where the wish cannot be met, and end as if it were met", "", "Result"},
+      {"-o,--output", "FILE", "job file to write, as in pores.toml; default: only report", "", "Result"},
+      {"--nearest", "", "write the nearest job if the target cannot be met, with exit code 0", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
-      {"--quiet", "", "say nothing but errors", "", "Result"}};
+      {"--quiet", "", "print errors only", "", "Result"}};
   spec.closing =
-      "A wish is met if what the solver says of the plan is within 5 % of it; of a pore, what\n"
-      "lamina extrude tells of it. Regions end with whole layers; each is checked in the middle of one file of all of them.\n"
-      "docs/design.md tells what is assumed and measured.\n\n"
+      "A target is met if the solver's result for the plan is within 5 % of it; for a pore, what\n"
+      "lamina extrude reports. Regions end with whole layers; each is checked in the middle of one file of all of them.\n"
+      "docs/howto/design_pores.md states assumptions and measurements.\n\n"
       "Examples:\n"
       "  lamina design --porosity 24 --permeability 100 --machine anet-a8 -o pores.toml\n"
       "  lamina design --pore 0.12x0.9 --machine anet-a8 --voxel 20 -o pores.toml\n"
@@ -108,7 +107,7 @@ Result<TargetEnds> read_target(const Arguments& arguments) {
     if (!status) return status.error();
   }
   const int targets = arguments.has("--porosity") + arguments.has("--permeability") + arguments.has("--pore");
-  if (targets == 0) return usage("nothing is wished for; give --porosity, --permeability or --pore");
+  if (targets == 0) return usage("no target; add --porosity, --permeability or --pore");
   if (targets == 3) return usage("--porosity, --permeability and --pore are more than a filling can follow; leave one out");
   return target;
 }
@@ -189,20 +188,20 @@ Outcome run_design(const Arguments& arguments, Context& context) {
     return give_found(*found, missed_text(*found), arguments, context);
   }
   for (const char* flag : {"--height", "--steps", "--tops"})
-    if (arguments.has(flag)) return at_option(flag, "is of a gradient, and none is wished for, as in --porosity 20:26");
+    if (arguments.has(flag)) return at_option(flag, "needs a gradient, as in --porosity 20:26");
   request->target = target->bottom;
   keep_on_signals();
   const auto found = design_job(*request, go_on);
   if (!found) return found.error();
-  return give_found(
-      *found,
-      fmt::format("nearest is {}, which misses the wish by {:.0f} %", nearest_text(request->target, *found), 100 * found->miss),
-      arguments, context);
+  return give_found(*found,
+                    fmt::format("nearest is {}, which misses the target by {:.0f} %", nearest_text(request->target, *found),
+                                100 * found->miss),
+                    arguments, context);
 }
 
 }  // namespace
 
-const Command design_command = {"design", "the filling whose pores, porosity or permeability are as wished, as a job file",
+const Command design_command = {"design", "design a filling of a target porosity, permeability or pore, as a job file",
                                 design_spec, run_design};
 
 }  // namespace lamina::pipeline

@@ -38,10 +38,10 @@ CommandSpec export_spec() {
   }
   spec.options.insert(spec.options.end(), {{"--overwrite", "", "replace a file that is there", "", "Run"},
                                            {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
-                                           {"--quiet", "", "say nothing but errors", "", "Run"}});
+                                           {"--quiet", "", "print errors only", "", "Run"}});
   spec.closing =
       "Examples:\n"
-      "  lamina export bracket.stl -o fixed.3mf                         repaired; what was done is told\n"
+      "  lamina export bracket.stl -o fixed.3mf                         with the repairs, which are reported\n"
       "  lamina export part.obj --unit inch --rotate 90,0,0 -o upright.stl\n"
       "  lamina export a.stl b.3mf --copies 12 --bed 400x400 -o bed.3mf   the bed as lamina jet would plan it\n"
       "  lamina export --job job.toml -o - | gzip > bed.stl.gz\n";

@@ -27,7 +27,7 @@ constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"j
 CommandSpec heights_spec() {
   CommandSpec spec;
   spec.summary =
-      "Decides the layers of parts and tells them: bottom, thickness, reason, steepest angle and the step that is left.\n"
+      "Decides the layers of parts and prints them: bottom, thickness, reason, steepest angle and the step that is left.\n"
       "lamina jet and lamina slice decide with the same options in the same way.";
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
@@ -37,9 +37,9 @@ CommandSpec heights_spec() {
                        {"-o,--output", "FILE", "write the table there instead of to stdout", "", "Table"},
                        {"--compare", "", "all ways with these thicknesses and limits, one line each", "", "Table"},
                        {"--measure", "FILE", "measure layers that somebody else decided: tops in mm, one a line", "", "Table"},
-                       {"--plot", "FILE", "draw thickness against height beside the part, as .svg or .png", "", "Table"},
+                       {"--plot", "FILE", "draw thickness against height next to the part, as .svg or .png", "", "Table"},
                        {"--overwrite", "", "replace a file that lamina did not write", "", "Table"},
-                       {"--quiet", "", "say nothing but errors beside the table", "", "Table"}});
+                       {"--quiet", "", "print only the table and errors", "", "Table"}});
   spec.closing =
       "Examples:\n"
       "  lamina heights boat.3mf --heights optimal --thickness 0.05..0.3 --cusp 0.1\n"
@@ -62,7 +62,7 @@ Result<HeightsJob> job_of(const Arguments& arguments) {
   Result<Job> read = read_job_options(kHeightsCommandKeys, arguments);
   if (!read) return read.error();
   const Job requested = *read;
-  if (read->parts.empty()) return usage("no part to look at; name one or more STL, OBJ or 3MF files");
+  if (read->parts.empty()) return usage("no part; name one or more STL, OBJ or 3MF files");
   // Heights do not depend on the parts' positions or on the size of the bed.
   if (read->bed_mm || read->machine.profile.empty()) read->bed_mm = kLargestBed.size_mm;
   read->dry_run = true;

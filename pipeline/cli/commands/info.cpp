@@ -30,14 +30,14 @@ CommandSpec info_spec() {
       "STL, OBJ or 3MF file, also gzipped STL and OBJ, toolpaths, as in part.gcode, or layer images, a folder or a file; as many "
       "as you like";
   const std::vector<std::string_view> units = {"mm", "cm", "m", "um", "inch", "foot"}, modes = {"auto", "winding", "off"};
-  spec.options = {{"--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", "mm", "", units},
+  spec.options = {{"--unit", "UNIT", "unit of STL and OBJ files, which state none: mm, cm, m, um, inch, foot", "mm", "", units},
                   {"--scale", "S|X,Y,Z", "factors per axis of the file", "1", ""},
                   {"--rotate", "X,Y,Z", "degrees about x, then y, then z", "0,0,0", ""},
                   {"--drop-bad", "", "drop facets with coordinates that are no numbers", "", ""},
                   {"--repair", "MODE", "how open meshes are closed: auto, winding (approximate) or off", "auto", "", modes},
                   {"--weld", "UM", "repair joins open edges this far apart, in micrometres; 5 grows by itself", "5", ""},
-                  {"--threshold", "N", "of images: grey below it counts as set, 1 to 255", "128", ""},
-                  {"--density", "G/CM3", "of the filament of toolpaths, where the file tells none", "", ""},
+                  {"--threshold", "N", "threshold of images: grey below it counts as set, 1 to 255", "128", ""},
+                  {"--density", "G/CM3", "density of the filament, if the toolpath file states none", "", ""},
                   {"--json", "", "print one JSON object for each part on stdout", "", ""}};
   spec.closing =
       "Examples:\n"
@@ -75,7 +75,7 @@ Status report_images(const std::string& path, int threshold, const Arguments& ar
         {"thickness_mm", mm(reported->thickness)}, {"bottom_mm", mm(reported->bottom)}, {"levels", reported->levels}};
   } else {
     text +=
-        fmt::format("  {:<12}no manifest of lamina tells how thick they are; jet wants --layer or part.layer_mm\n", "layers");
+        fmt::format("  {:<12}no manifest of lamina states the layer thickness; jet needs --layer or part.layer_mm\n", "layers");
     json["layers"] = nullptr;
   }
   const Status status = arguments.has("--json") ? context.give(json) : context.print(text);
@@ -97,7 +97,7 @@ Status check_flags(const Arguments& arguments) {
 }
 
 Outcome run_info(const Arguments& arguments, Context& context) {
-  if (arguments.operands.empty()) return usage("no part to look at; name an STL, OBJ or 3MF file");
+  if (arguments.operands.empty()) return usage("no part; name an STL, OBJ or 3MF file");
   // Read as lamina jet reads them.
   const Result<Job> job = read_job_options("part load", arguments);
   if (!job) return job.error();
@@ -131,6 +131,6 @@ Outcome run_info(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command info_command = {"info", "what is in a part file, is it closed, and where is it not", info_spec, run_info};
+const Command info_command = {"info", "check a mesh file; describe images, toolpaths and manifests", info_spec, run_info};
 
 }  // namespace lamina::pipeline

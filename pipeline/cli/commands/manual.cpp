@@ -47,12 +47,12 @@ CommandSpec manual_spec() {
   spec.operand_meaning = "a command; none for the page of the program";
   for (const Command* command : commands()) spec.operand_words.push_back(command->name);
   spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""},
-                  {"--markdown", "", "pages of commands as Markdown: docs/commands is made by this", "", ""},
+                  {"--markdown", "", "pages of commands as Markdown: docs/reference/commands is made by this", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina manual jet | man -l -\n"
-      "  lamina manual --markdown -o docs/commands";
+      "  lamina manual --markdown -o docs/reference/commands";
   return spec;
 }
 

@@ -22,7 +22,7 @@ CommandSpec merge_spec() {
                   {"--strict", "", "warnings are errors: exit 5, and nothing is joined", "", ""},
                   {"--allow-empty", "", "join a whole job without any pixel", "", ""},
                   {"--json", "", "print one JSON object on stdout", "", ""},
-                  {"--quiet", "", "say nothing but errors", "", ""}};
+                  {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
       "Examples:\n"
       "  for i in 1 2 3 4; do lamina jet part.stl --shard $i/4 -o out; done; lamina merge out -o out\n"

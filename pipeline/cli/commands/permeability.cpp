@@ -50,24 +50,25 @@ CommandSpec permeability_spec() {
       "or a job file, as in job.toml, that lamina extrude or lamina jet takes, and parts in place of its own: it is planned first";
   const std::vector<std::string_view> beads = {"deposited", "spread", "stated"};
   spec.options = {
-      {"--length", "MM", "of the medium along the flow", "", "Medium"},
-      {"--diameter", "MM", "of a round medium", "", "Medium"},
+      {"--length", "MM", "length of the medium along the flow", "", "Medium"},
+      {"--diameter", "MM", "diameter of a round medium", "", "Medium"},
       {"--area", "MM2", "cross-section, in place of a diameter", "", "Medium"},
-      {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
-      {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
+      {"--viscosity", "PA.S", "viscosity of the fluid", "1.81e-05", "Fluid"},
+      {"--density", "KG/M3", "density of the fluid", "1.204", "Fluid"},
       {"--compressible", "", "a gas that expands on its way: (p_in^2 - p_out^2) / (2 p L) too", "", "Fluid"},
       {"--outlet-pressure", "PA", "absolute, behind the medium", "101325", "Fluid"},
-      {"--flow-pressure", "PA", "p, at which flow and density are told; default: that of the outlet", "", "Fluid"},
+      {"--flow-pressure", "PA", "reference pressure of flow and density; default: that of the outlet", "", "Fluid"},
       {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
-      {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers; of images: 2,2,2", "",
+      {"--window", "X,Y,Z", "window of the print in mm; default: the period, else 2,2 and eight layers; of images: 2,2,2", "",
        "Toolpaths and images"},
       {"--voxel", "UM", "edge of a voxel, micrometres; of images: their pixels", "10", "Toolpaths and images"},
-      {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
+      {"--memory", "SIZE", "memory of the flow solver, as in 2G", "1G", "Toolpaths and images"},
       {"--beads", "WORD",
        "spread: as the printer's melt lags and spreads; deposited: no spread along lines; stated: by the file; default: spread by known printers",
        "", "Toolpaths", beads},
-      {"--machine", "NAME|FILE", "printer that lays them, or of a job; default: the one that the file names", "", "Toolpaths"},
-      {"--set", "KEY=VALUE", "of a job file: set any key, as in --set fill.width_mm=0.5", "", "Job"},
+      {"--machine", "NAME|FILE", "printer of the toolpaths or of the job; default: the one that the file names", "",
+       "Toolpaths"},
+      {"--set", "KEY=VALUE", "set any key of a job file, as in --set fill.width_mm=0.5", "", "Job"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
       {"--plot", "FILE", "draw points and parabola; of toolpaths and images sections of flow and pores; .svg or .png", "",
        "Result"},
@@ -79,8 +80,8 @@ CommandSpec permeability_spec() {
   spec.options.insert(plot, images.begin(), images.end());
   spec.closing =
       "Rows of one column `configuration` are fitted group by group, and within it each sample by itself. Standard errors take\n"
-      "all points as independent; where samples differ, the deviation between them tells more. With --compressible both forms are\n"
-      "told, and air has the density that it has at p. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
+      "all points as independent; where samples differ, the deviation between them is more meaningful. With --compressible both forms are\n"
+      "reported, and air has the density that it has at p. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
       "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air;\n"
       "with --compressible, an outlet at 102600 Pa.\n\n"
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
@@ -113,7 +114,7 @@ Result<segment::DropsSettings> read_settings(const Arguments& arguments) {
   if (arguments.has("--compressible")) settings.gas.emplace();
   if (arguments.has("--convention")) {
     if (arguments.text("--convention") != "dinisio2022")
-      return usage("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention")));
+      return usage("--convention: unknown convention '{}'; must be dinisio2022", one_line(arguments.text("--convention")));
     settings.medium = {0.0255, 1e-3 / 60 * 28};
     settings.fluid = {1.87e-5, 998.2};
     if (settings.gas) settings.gas->outlet_pa = 102600;
@@ -310,7 +311,8 @@ Arguments arguments_on(const std::string& files, const Job& job, Product product
 /// own, --set and --machine, and predicts what was written: G-code or bitmaps in a temporary folder, in the place of the job.
 /// The machine decides which of the two; a job without one its first line as lamina saves it, or keys that one of the two
 /// reads alone.
-/// errors  those of reading, checking and running a job, and of analyse_file, with the job's name; kUsage: it is unknown which of
+/// errors  those of reading, checking and running a job, and of analyse_file, with the job's name; kUsage: it is unknown which
+/// of
 ///         the two, toolpaths of another format than G-code
 Outcome predict_job(const Arguments& arguments, Context& context) {
   const std::string& path = arguments.operands.front();

@@ -18,6 +18,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -28,6 +29,7 @@ constexpr std::string_view kNames[] = {"jet", "slice", "extrude"};  // by produc
 struct PlanCommand {
   Product product;
   std::string_view keys;                  // of the job, as options
+  std::string_view basic;                 // options of the short help
   std::string_view summary;               // what it does, for the help
   std::span<const OptionSpec> own;        // switches of the row, among --resume, --overwrite and --dry-run
   std::span<const OptionSpec> overrides;  // help texts that replace those of keys: value, meaning, preset if not ""
@@ -50,6 +52,7 @@ void override_words(std::span<const OptionSpec> overrides, CommandSpec& spec) {
 CommandSpec plan_spec(const PlanCommand& row) {
   CommandSpec spec;
   spec.summary = row.summary;
+  spec.basic = split(row.basic, " ");
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(row.keys, spec);
@@ -60,9 +63,9 @@ CommandSpec plan_spec(const PlanCommand& row) {
   }
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
-  spec.options.push_back({"--timing", "", "tell where the time goes, beside what no program could go below", "", "Run"});
+  spec.options.push_back({"--timing", "", "break down the run time and compare it with the hardware limit", "", "Run"});
   spec.options.push_back({"--json", "", "print the summary as one JSON object on stdout", "", "Run"});
-  spec.options.push_back({"--quiet", "", "say nothing but errors", "", "Run"});
+  spec.options.push_back({"--quiet", "", "print errors only", "", "Run"});
   spec.more = row.closing;
   return spec;
 }
@@ -71,7 +74,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
 std::vector<std::string> notes_on_defaults(const std::string& path, const Job& job) {
   const std::string file = path == "-" ? "the job" : path;
   std::vector<std::string> notes;
-  if (!is_named(job, "fill.walls")) notes.push_back(file + " names no fill.walls: 1 is laid; write walls = 0 for none");
+  if (!is_named(job, "fill.walls")) notes.push_back(file + " names no fill.walls: the default is 1; write walls = 0 for none");
   if (!is_named(job, "layers.thickness_mm") && job.heights.thickness_mm.empty()) {
     notes.push_back(fmt::format("{} names no layers.thickness_mm: layers are {:g} mm, by the printer", file, job.layer_mm));
   }
@@ -148,13 +151,17 @@ constexpr std::string_view kJetKeys =
     "segment.continuous_lines segment.spacing_sc_mm segment.spacing_cc_mm segment.gap_mm segment.shift_mm "
     "segment.thick_width_mm segment.thin_width_mm load run part";
 
+constexpr std::string_view kJetBasic =
+    "--output --bed --dpi --layer --machine --copies --at --rotate --scale --unit --heights --format --levels "
+    "--saturation --inspect --job --resume --memory";
+
 const OptionSpec kJetSwitches[] = {
     {"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two", "",
      "Machine and binder"},
     {"--quote", "CSV", "write what every part uses up and costs as a table (with --machine)", "", "Machine and binder"},
-    {"--resume", "", "go on with an interrupted job; finished layers whose hash holds are kept", "", "Run"},
+    {"--resume", "", "continue an interrupted job; finished layers with a valid hash are kept", "", "Run"},
     {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
-    {"--dry-run", "", "load, place and index, tell what it takes and how long it prints, write nothing", "", "Run"}};
+    {"--dry-run", "", "load, place and index, report material and printing time, write nothing", "", "Run"}};
 
 std::string jet_closing() {
   std::string text = "Formats:\n";
@@ -168,7 +175,7 @@ std::string jet_closing() {
          "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
          "  lamina jet a.stl b.stl --material steel,bronze --machine nuferbj --vat-rule majority -o out\n"
          "  lamina jet a.stl b.stl --machine mine.toml --dry-run --quote quote.csv     what they cost, for the office\n"
-         "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
+         "  lamina jet part.stl --layers 100:110 --format png -o ten       ten layers only\n"
          "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
          "  lamina jet part.stl --fill segmented --thin 1.5 --shell 1 -o out   pores planned by the filling, in a solid shell\n"
          "  lamina jet part.stl --dpi 600 --save-job job.toml --dry-run    write the job, plan nothing\n"
@@ -177,7 +184,7 @@ std::string jet_closing() {
 
 Status complete_jet(const Arguments& arguments, Job& job) {
   if (arguments.has("--quote") && job.machine.profile.empty())
-    return at_option("--quote", "tells what a machine uses up; add --machine");
+    return at_option("--quote", "reports the material of a machine; add --machine");
   if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
   if (!arguments.has("--material")) return {};
   const Status status = set_materials(arguments.text("--material"), job);
@@ -187,6 +194,7 @@ Status complete_jet(const Arguments& arguments, Job& job) {
 PlanCommand jet_row() {
   return {Product::kImages,
           kJetKeys,
+          kJetBasic,
           "Plans a binder-jet job: the exact 1-bit image of every layer of the bed, layers/000000.tif and up from the\n"
           "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.",
           kJetSwitches,
@@ -202,7 +210,11 @@ constexpr std::string_view kSliceKeys =
     "bed.size_mm layers heights placement image.fill load run.output run.threads run.memory run.sync run.layers "
     "run.strict run.allow_empty slice fill segment.fill part";
 
-const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
+constexpr std::string_view kSliceBasic =
+    "--output --layer --format --walls --pattern --bead --line-distance --angle --copies --rotate --scale --unit "
+    "--heights --tolerance --job --resume";
+
+const OptionSpec kSliceSwitches[] = {{"--resume", "", "continue an interrupted job; complete layers are kept", "", "Run"},
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
                                      {"--dry-run", "", "load, place and index, write nothing", "", "Run"}};
 
@@ -219,7 +231,7 @@ Status complete_slice(const Arguments& arguments, Job& job) {
 
 std::string slice_closing() {
   return "Lengths are mm, angles degrees. Keys of a filling that have no option are set by --set fill.KEY=VALUE, between\n"
-         "heights by fill.range, for one part by part.fill; docs/filling.md has all of them.\n\n"
+         "heights by fill.range, for one part by part.fill; docs/reference/filling.md has all of them.\n\n"
          "Examples:\n"
          "  lamina slice bracket.stl --layer 0.1 -o out                      out/bracket.svg\n"
          "  lamina slice bracket.stl --layer 0.05 --format cli-binary -o out\n"
@@ -231,8 +243,9 @@ std::string slice_closing() {
 PlanCommand slice_row() {
   return {Product::kContours,
           kSliceKeys,
+          kSliceBasic,
           "Cuts parts into layers: closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise, as\n"
-          "SVG, CLI or 3MF slices, and fills them if a pattern or walls are asked for.",
+          "SVG, CLI or 3MF slices, and fills them if a pattern or walls are requested.",
           kSliceSwitches,
           kSliceWords,
           slice_closing,
@@ -246,10 +259,14 @@ constexpr std::string_view kExtrudeKeys =
     "layers heights placement machine.profile fill image.fill segment extrude load slice.tolerance_um run.output "
     "run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
 
+constexpr std::string_view kExtrudeBasic =
+    "--output --machine --layer --walls --fill --line-distance --bead --angle --angle-step --print-speed --skirt "
+    "--copies --at --rotate --scale --unit --heights --job --resume";
+
 const OptionSpec kExtrudeSwitches[] = {
-    {"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
+    {"--resume", "", "continue an interrupted job; complete layers are kept", "", "Run"},
     {"--overwrite", "", "replace an earlier file", "", "Run"},
-    {"--dry-run", "", "slice and lay every layer, tell what it takes and how long it prints, write nothing", "", "Run"}};
+    {"--dry-run", "", "plan every layer, report material and printing time, write nothing", "", "Run"}};
 
 const OptionSpec kExtrudeWords[] = {
     {"-o,--output", "FILE", "file for the toolpaths, as in part.gcode or part.sml", "", ""},
@@ -265,9 +282,9 @@ std::string extrude_closing() {
     text += fmt::format("  {:<16}{}\n", shipped.name, profile ? profile->machine.description : "");
   }
   return text +
-         "\nOne wall is laid, and layers are half of the nozzle thick, unless options or a job file say otherwise. Lengths are\n"
+         "\nThe defaults are one wall and layers of half the nozzle diameter; for SML, the first thickness of its table. Lengths are\n"
          "mm, angles degrees.\n"
-         "docs/extrude.md has the profiles and the file formats, docs/segmented.md the segmented filling.\n\n"
+         "docs/reference/extrude.md has the profiles and the file formats, docs/reference/segmented.md the segmented filling.\n\n"
          "Examples:\n"
          "  lamina extrude bracket.stl --machine marlin --layer 0.2 --walls 2 --fill raster --bead-gap 1 -o bracket.gcode\n"
          "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --angle 90 --angle-step 0 -o part.gcode\n"
@@ -296,6 +313,7 @@ std::string extrude_ending(const Arguments& arguments) {
 PlanCommand extrude_row() {
   return {Product::kMoves,
           kExtrudeKeys,
+          kExtrudeBasic,
           "Plans parts for a material extrusion printer: walls, filling and segmented lines as G-code or SML, with what the\n"
           "pores will be. The same parts and options give the same bytes.",
           kExtrudeSwitches,

@@ -21,13 +21,13 @@ CommandSpec preview_spec() {
       {"--swath", "N",
        "layer --layer of a job with a machine while swath N of it is jetted, with the head; middle for the one in the middle",
        "", ""},
-      {"--step", "N", "of the swath, else the middle one", "", ""},
+      {"--step", "N", "position of the swath; default: the middle one", "", ""},
       {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
-      {"--filament", "MM", "diameter of the filament of G-code", "what the file says, else 1.75", ""},
+      {"--filament", "MM", "diameter of the filament of G-code", "the file's, else 1.75", ""},
       {"--layer-height", "MM", "cut G-code, as a spiral, every MM of height", "by tags, heights or turns", ""},
       {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
-      {"--quiet", "", "say nothing but errors", "", ""}};
+      {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina preview out -o sheet.png\n"

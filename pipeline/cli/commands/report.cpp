@@ -18,13 +18,13 @@ CommandSpec report_spec() {
       "Writes one HTML page about a finished job: its layers to leaf, zoom and pan through, the parts from three sides,\n"
       "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
   spec.operand = "DIR|GCODE";
-  spec.operand_meaning = "finished directory of lamina jet, or G-code file of lamina extrude beside its manifest";
+  spec.operand_meaning = "finished directory of lamina jet, or G-code file of lamina extrude with its manifest";
   spec.options = {
       {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
       {"--max-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
       {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
-      {"--quiet", "", "say nothing but errors", "", ""}};
+      {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina report out -o report.html\n"
@@ -63,8 +63,8 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   if (!report) return report.error();
   if (Status status = write_file(output, report->page); !status) return status.error();
   Answer answer(arguments, context);
-  answer.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
-                         readable_bytes(report->page.size())));
+  answer.say(
+      fmt::format("{}: {} of {} layers shown, {}", output, report->held, report->layers, readable_bytes(report->page.size())));
   if (const std::uint64_t bytes = report->page.size(); bytes > options.size_limit && !arguments.has("--quiet"))
     context.say(
         fmt::format("note: {} takes {}, more than --max-bytes; no page of this job is smaller", output, readable_bytes(bytes)));

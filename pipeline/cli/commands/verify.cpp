@@ -60,7 +60,7 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
   if (arguments.has("--quote") && arguments.operands.size() > 1)
     return at_option("--quote", "is of one directory; verify them one by one");
   if (arguments.has("--quote") && arguments.has("--quick"))
-    return at_option("--quote", "tells what programs do that are replayed; leave --quick out");
+    return at_option("--quote", "needs the replay of programs; remove --quick");
   if (Status status = check_quote(arguments, arguments.operands.front()); !status) return status;
   if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
   int code = 0;

@@ -59,6 +59,23 @@ std::string meaning_of(const OptionSpec& option) {
   return option.preset.empty() ? option.meaning : fmt::format("{} (default{}{})", option.meaning, kNoBreak, option.preset);
 }
 
+void add_option_entry(const OptionSpec& option, std::size_t columns, std::string& text) {
+  const std::string flags = fmt::format("{}", fmt::join(split(option.flag, ","), ", "));
+  add_entry(option.value.empty() ? flags : flags + " " + option.value, meaning_of(option), columns, text);
+}
+
+/// The heading and the first lines of the examples at the end of a help.
+std::string first_examples(std::string_view end) {
+  constexpr int kLines = 5;
+  const std::size_t begin = end.find("Examples:");
+  if (begin == std::string_view::npos) return {};
+  std::size_t stop = begin;
+  for (int line = 0; line <= kLines && stop < end.size(); ++line) stop = std::min(end.find('\n', stop), end.size() - 1) + 1;
+  std::string text = "\n" + std::string(end.substr(begin, stop - begin));
+  if (!text.ends_with('\n')) text += '\n';
+  return text;
+}
+
 /// An option of lamina, the options of other slicers that it is called there, and what differs.
 struct SlicerAlias {
   std::string_view ours, theirs, differs = {};
@@ -100,8 +117,8 @@ constexpr SlicerAlias kSlicerAliases[] = {
     {"--output", "--output-dir"},
     {"--quiet", "--loglevel"},
     {"", "--support --supports --support-material --support-enable", "lamina makes no supports"},
-    {"", "--brim --brim-width --brim-line-count", "lamina lays no brim"},
-    {"", "--raft --raft-layers", "lamina lays no raft"},
+    {"", "--brim --brim-width --brim-line-count", "lamina makes no brim"},
+    {"", "--raft --raft-layers", "lamina makes no raft"},
 };
 
 }  // namespace
@@ -156,10 +173,11 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   };
   CLI::App app("", "lamina " + spec.name);
   app.allow_extras();
+  app.set_help_all_flag("--help-all");
 
   Arguments read;
   read.given = arguments;
-  std::vector<std::string_view> known = {"--help"};
+  std::vector<std::string_view> known = {"--help", "--help-all"};
   std::deque<std::vector<std::string>> values;  // addresses must not change
   std::vector<CLI::Option*> options;
   for (const OptionSpec& option : spec.options) {
@@ -176,7 +194,10 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
-    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120));
+    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120), HelpLength::kShort);
+    return read;
+  } catch (const CLI::CallForAllHelp&) {
+    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120), HelpLength::kAll);
     return read;
   } catch (const CLI::Error& error) {
     return wrong(error.what());
@@ -208,8 +229,9 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   return read;
 }
 
-std::string help_text(const CommandSpec& spec, int columns) {
+std::string help_text(const CommandSpec& spec, int columns, HelpLength length) {
   const auto width = static_cast<std::size_t>(std::max(columns, 20));
+  const bool is_short = length == HelpLength::kShort && !spec.basic.empty();
   std::string text;
   wrap(spec.summary, 0, width, 0, text);
   text += fmt::format("\nUsage: lamina {} [OPTIONS]{}\n", spec.name,
@@ -219,13 +241,18 @@ std::string help_text(const CommandSpec& spec, int columns) {
     add_entry(spec.operand, spec.operand_meaning, width, text);
   }
   text += "\nOptions:\n";
-  add_entry("-h, --help", "this text", width, text);
+  if (is_short) {
+    for (const std::string_view flag : spec.basic) add_option_entry(*spec.find(flag), width, text);
+    add_entry("--help-all", fmt::format("all {} options", spec.options.size()), width, text);
+    return text + first_examples(spec.end());
+  }
+  add_entry("-h, --help", spec.basic.empty() ? "this text" : "the most common options", width, text);
+  if (!spec.basic.empty()) add_entry("--help-all", "this text", width, text);
   std::string_view group;
   for (const OptionSpec& option : spec.options) {
     if (option.group != group) text += fmt::format("\n{}:\n", option.group);
     group = option.group;
-    const std::string flags = fmt::format("{}", fmt::join(split(option.flag, ","), ", "));
-    add_entry(option.value.empty() ? flags : flags + " " + option.value, meaning_of(option), width, text);
+    add_option_entry(option, width, text);
   }
   if (const std::string end = spec.end(); !end.empty()) text += "\n" + end + "\n";
   return text;

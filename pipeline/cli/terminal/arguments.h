@@ -28,8 +28,10 @@ struct CommandSpec {
   std::string operand, operand_meaning;         // "PART", "..."; any number
   std::vector<std::string_view> operand_words;  // that it takes; of static storage
   std::vector<OptionSpec> options;
-  std::string closing;                                                // examples, at the end of the help
-  std::string (*more)() = nullptr;                                    // the same, made only when the help is read
+  std::vector<std::string_view>
+      basic;                        // flags of the short help, in the order in which a job needs them; empty: --help has all
+  std::string closing;              // examples, at the end of the help
+  std::string (*more)() = nullptr;  // the same, made only when the help is read
   std::vector<std::pair<std::string_view, std::string_view>> absent;  // other commands' options, and why they are missing here
 
   /// The option named by `flag`, "--output" or "-o", or nullptr.
@@ -46,7 +48,7 @@ Status at_option(std::string_view flag, const std::string& wrong);
 struct Arguments {
   std::vector<std::string> operands;
   std::vector<std::pair<std::string, std::string>> options;  // (spec flag, text); switches with an empty text
-  std::optional<std::string> help;                           // set by --help: show it and do nothing else
+  std::optional<std::string> help;                           // set by --help and --help-all: show it and do nothing else
   std::vector<std::string> given;                            // all words as typed
 
   bool has(std::string_view flag) const;
@@ -64,8 +66,10 @@ struct Arguments {
   }
 };
 
-/// The help of a command, in lines of `columns`; notes and examples stay as they are.
-std::string help_text(const CommandSpec& spec, int columns);
+/// The help of a command, in lines of `columns`; notes and examples stay as they are. Short: the basic options and the first
+/// examples, if the command has basic options.
+enum class HelpLength { kShort, kAll };
+std::string help_text(const CommandSpec& spec, int columns, HelpLength length);
 
 /// Parses the arguments after the command's name.
 /// errors  kUsage: unknown option (with the nearest name), missing value

@@ -19,24 +19,24 @@ struct More {
 };
 constexpr More kMore[] = {
     {"jet",
-     "[concepts](../concepts.md), [what a bitmap means](../bitmap.md), [job files](../job.md), "
+     "[concepts](../../theory/concepts.md), [what a bitmap means](../../theory/bitmap.md), [job files](../job.md), "
      "[print programs](../print_program.md), [formats](../formats.md)"},
     {"slice", "[contours](../slice.md), [filling](../filling.md), [job files](../job.md), [formats](../formats.md)"},
-    {"heights", "[layer heights](../heights.md)"},
+    {"heights", "[layer heights](../../theory/heights.md)"},
     {"extrude",
      "[extrusion](../extrude.md), [segmented lines](../segmented.md), [filling](../filling.md), [job files](../job.md)"},
-    {"calibrate", "[the procedure](../calibrate.md), [segmented lines](../segmented.md)"},
-    {"info", "[concepts](../concepts.md)"},
-    {"export", "[concepts](../concepts.md), [formats](../formats.md)"},
-    {"verify", "[exactness](../exactness.md), [print programs](../print_program.md)"},
+    {"calibrate", "[the procedure](../../howto/calibrate.md), [segmented lines](../segmented.md)"},
+    {"info", "[concepts](../../theory/concepts.md)"},
+    {"export", "[concepts](../../theory/concepts.md), [formats](../formats.md)"},
+    {"verify", "[exactness](../../theory/exactness.md), [print programs](../print_program.md)"},
     {"permeability", "[segmented lines](../segmented.md)"},
-    {"merge", "[more than one machine](../batch.md#more-than-one-machine)"},
-    {"machines", "[machines](../machines.md), [how to add one](../extending.md)"},
+    {"merge", "[more than one machine](../../howto/run_batches.md#more-than-one-machine)"},
+    {"machines", "[machines](../machines.md), [how to add one](../../../CONTRIBUTING.md)"},
     {"preview", "[contours](../slice.md), [print programs](../print_program.md)"},
-    {"report", "[what is on the page](../report.md)"},
-    {"batch", "[many jobs](../batch.md)"},
-    {"completion", "[installing](../install.md)"},
-    {"manual", "[installing](../install.md)"},
+    {"report", "[what is on the page](../../howto/read_reports.md)"},
+    {"batch", "[many jobs](../../howto/run_batches.md)"},
+    {"completion", "[installing](../../howto/install.md)"},
+    {"manual", "[installing](../../howto/install.md)"},
 };
 
 std::string sentence(std::string_view text) {
@@ -59,7 +59,7 @@ std::string title(std::string_view name) {
 /// What every page ends with. The variables are those that the program reads.
 std::string files_and_environment() {
   return ".SH FILES\n.TP\n.I /usr/share/doc/lamina/docs\nwhere packages install the pages that are named docs/NAME.md here\n"
-         ".TP\n.I manifest.json\nin the directory of a job, or NAME.json beside a file of toolpaths: the job as it was resolved, and "
+         ".TP\n.I manifest.json\nin the directory of a job, or NAME.json next to a file of toolpaths: the job as it was resolved, and "
          "the size and hash of every file\n.TP\n.I NAME.part\na file that is being written; it takes its name when it is whole\n"
          ".SH ENVIRONMENT\n.TP\n.B SOURCE_DATE_EPOCH\nseconds since 1970 that date the 3MF files which are written\n";
 }
@@ -106,7 +106,7 @@ std::string man_page(const CommandSpec& spec) {
 
 std::string markdown_page(const CommandSpec& spec) {
   std::string text = fmt::format(
-      "<!-- Made from the definition of the command: lamina manual --markdown -o docs/commands -->\n"
+      "<!-- Made from the definition of the command: lamina manual --markdown -o docs/reference/commands -->\n"
       "# lamina {}\n\n{}\n\n",
       spec.name, sentence(spec.brief));
   text += fmt::format("    lamina {} [OPTIONS]{}\n\n{}\n\n", spec.name, spec.operand.empty() ? "" : " " + spec.operand + " ...",
@@ -129,7 +129,7 @@ std::string markdown_page(const CommandSpec& spec) {
   for (const More& more : kMore) {
     if (more.command == spec.name) text += fmt::format("\nMore: {}.\n", more.pages);
   }
-  return text + "\nExit codes are those of [every command](../../README.md#use).\n";
+  return text + "\nExit codes are those of [every command](../../../README.md#commands).\n";
 }
 
 // --- completion scripts: one traversal of commands and options per shell language
@@ -221,9 +221,9 @@ std::string bash_completion(std::span<const CommandSpec> commands) {
       if (!option.value.empty()) valued += words;
     }
     if (valued.empty()) valued = " ";
-    cases += fmt::format("    {})\n      options=\"{}--help\"; valued=\" {}\"; operands=\"{}\"; operand_files=\"{}\"\n",
-                         command.name, flags.empty() ? " " : flags, valued, joined(command.operand_words),
-                         find(kByValue, command.operand));
+    cases += fmt::format(
+        "    {})\n      options=\"{}--help --help-all\"; valued=\" {}\"; operands=\"{}\"; operand_files=\"{}\"\n", command.name,
+        flags.empty() ? " " : flags, valued, joined(command.operand_words), find(kByValue, command.operand));
     const std::string values = bash_values(command);
     cases += values.empty() ? "      ;;\n" : fmt::format("      case $before in\n{}      esac ;;\n", values);
   }

@@ -14,8 +14,8 @@ std::string man_page(std::span<const CommandSpec> commands);
 /// The manual page of a command.
 std::string man_page(const CommandSpec& command);
 
-/// The page of a command in docs/commands: synopsis, operands, every option with meaning and default, examples, and links to
-/// further documentation.
+/// The page of a command in docs/reference/commands: synopsis, operands, every option with meaning and default, examples, and
+/// links to further documentation.
 std::string markdown_page(const CommandSpec& command);
 
 /// Scripts that make a shell complete commands, options, their values, and files by their endings.

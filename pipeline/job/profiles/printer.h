@@ -1,5 +1,5 @@
 // pipeline/job/profiles/printer.h: profiles of powder printers as TOML (pipeline/machine/shipped/printers/*.toml,
-// docs/machines.md).
+// docs/reference/machines.md).
 #pragma once
 
 #include <span>

@@ -344,12 +344,12 @@ Result<DropLayers> layout_drops(const Machine& machine, const HeadGrid& grid, st
   DropLayers wanted{
       .drops = drops, .a_layer = std::uint64_t{line_end - line} * (position_end - position), .layers = 0, .box = {}};
   if (wanted.a_layer == 0)
-    return Error{Fault::kUsage, fmt::format("bed.size_mm: the bed of {} has no room for drops", machine.name)};
+    return Error{Fault::kUsage, fmt::format("bed.size_mm: the bed of {} is too small for drops", machine.name)};
   const std::uint64_t layers = (drops + wanted.a_layer - 1) / wanted.a_layer;
   if (layers > kMaxLayers)
     return Error{Fault::kUsage,
-                 fmt::format("--drops {}: a layer takes {}, and {} layers are too many; ask for {} drops or fewer", drops,
-                             wanted.a_layer, layers, wanted.a_layer * kMaxLayers)};
+                 fmt::format("--drops {}: at {} drops per layer, {} layers are needed, which is too many; use at most {} drops",
+                             drops, wanted.a_layer, layers, wanted.a_layer * kMaxLayers)};
   wanted.layers = static_cast<std::uint32_t>(layers);
   wanted.box = box_of({line, line_end, position, position_end}, grid);
   return wanted;

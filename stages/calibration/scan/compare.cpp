@@ -390,13 +390,11 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
   comparison.view = first_view(detected, wanted, cells, comparison.likeness);
   if (const double mirrored = mirrored_likeness(detected, wanted, cells);
       mirrored >= kMinLikeness && mirrored > comparison.likeness + kClearly)
-    return Error{Fault::kInput,
-                 "is mirrored: the layer lies in it as in a mirror; turn the picture over, or photograph the layer "
-                 "from above"};
+    return Error{Fault::kInput, "is a mirror image of the layer; flip the picture, or photograph the layer from above"};
   if (comparison.likeness < kMinLikeness)
-    return Error{Fault::kInput,
-                 "does not show the layer: it has to lie upright, turned by at most 6 degrees, with pixels of about "
-                 "the size that --pixel says"};
+    return Error{
+        Fault::kInput,
+        "does not show the layer: it has to be upright, rotated by at most 6 degrees, with a pixel size close to --pixel"};
   for (const double blur : {4.0, 2.0, 1.0}) {
     cv::Mat soft, soft_cells;
     cv::GaussianBlur(detected, soft, {}, blur);
@@ -415,10 +413,9 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
     }
   }
   if (inked.empty())
-    return Error{
-        Fault::kInput,
-        "cannot be compared: no place of the layer, several pixels of the photograph wide, is printed in full, to tell "
-        "the darkness of ink by; where drops are strewn, take the layer of a job without --saturation"};
+    return Error{Fault::kInput,
+                 "cannot be compared: the layer has no fully printed area several pixels of the photograph wide to measure the "
+                 "darkness of ink; if it is dithered, use the layer of a job without --saturation"};
   const double ink = upper_median_of(inked);
   if (ink < 0.05)
     return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};

@@ -122,7 +122,7 @@ Result<std::string> png_of(const cv::Mat& bgr) {
   cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
   output->set_ioproxy(&memory);
   if (!output->open("detected.png", spec) || !output->write_image(OIIO::TypeDesc::UINT8, rgb.ptr()) || !output->close())
-    return Error{Fault::kOutput, "the picture of what was seen: " + output->geterror()};
+    return Error{Fault::kOutput, "the picture of the detected marks: " + output->geterror()};
   return std::string(file.begin(), file.end());
 }
 

@@ -43,9 +43,10 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   if (const double pixels = view->pixels_a_mm(m.x, m.y); pixels * chart.between_mm < kClosest)
     return Error{
         Fault::kInput,
-        fmt::format("a millimetre has {:.1f} pixels; {:.0f} and more are needed to tell the dashes apart: photograph the "
-                    "chart from nearer",
-                    pixels, std::ceil(kClosest / chart.between_mm))};
+        fmt::format(
+            "the photograph has {:.1f} pixels per mm; at least {:.0f} are needed to resolve the dashes: photograph the chart "
+            "from closer",
+            pixels, std::ceil(kClosest / chart.between_mm))};
   ChartReading reading;
   reading.fit = {*view, std::vector<Spot>(chart.swaths), std::vector<Spot>(chart.nozzles)};
   const bool settled = settle(photo, chart, reading);
@@ -62,8 +63,8 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   if (reading.inks.bars_detected > 0 && reading.inks.full < kFaintBar * photo.ink)
     return Error{
         Fault::kInput,
-        "the chart is found, but its bars are not where they should be: photograph it with all four marks, and nothing "
-        "beside it"};
+        "the chart is found, but its bars are not where they should be: photograph it with all four marks and nothing else "
+        "around it"};
   reading.stitches = read_stitches(photo, chart, reading.fit, reading.head, reading.inks);
   return reading;
 }

@@ -129,14 +129,14 @@ constexpr std::uint32_t level_of_samples(std::uint32_t solid, std::uint32_t top_
 /// Half a unit in the last bit of 1.
 constexpr double kEpsilon = 0x1p-53;
 
-/// Roundings of a facet's corners and volumes together, and more (docs/coverage.md counts 190).
+/// Roundings of a facet's corners and volumes together, and more (docs/theory/coverage.md counts 190).
 constexpr double kRoundings = 512;
 
 constexpr std::uint32_t kNoSpan = UINT32_MAX;
 
 double widest_side(const BandSlab& slab, double depth) { return std::max({slab.edges.widest(), depth, slab.sides.z}); }
 
-/// Bound of errors of shares in an interval of columns (docs/coverage.md).
+/// Bound of errors of shares in an interval of columns (docs/theory/coverage.md).
 /// depth  of the row, nm
 /// scale  sum over facets of the longer of a facet's size and the widest side of a voxel, nm
 /// added  numbers that are added up; maximum  what their sum is below, in sections of the row

@@ -223,10 +223,10 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
   if (head.parts.size() > kMaxShort) return refuse("16 bits count up to 65535 bodies; give fewer parts");
   const std::int64_t bottom = layer.layer.bottom, top = bottom + layer.layer.thickness;
   if (in_units(bottom, unit) == in_units(top, unit)) {
-    return refuse(
-        fmt::format("{} mm of thickness are lost in the unit of {} mm, which 16 bits need to reach all; give thicker "
-                    "layers, or place the parts nearer to the bed's corner with --at",
-                    mm(layer.layer.thickness), mm(unit)));
+    return refuse(fmt::format(
+        "{} mm of thickness are lost in the unit of {} mm, which 16 bits need to reach all; give thicker layers, or move the "
+        "parts nearer to the bed's corner with --at",
+        mm(layer.layer.thickness), mm(unit)));
   }
   const auto outside = [&](Point2 p) {
     const std::int64_t low = std::min(p.x, p.y), high = std::max(p.x, p.y);
@@ -236,8 +236,7 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
     const auto found = std::ranges::find_if(points, outside);
     if (found == points.end()) continue;
     return refuse(
-        fmt::format("a point at {}, {} mm is none of the 65536 units of {} mm from the bed's corner; move the parts "
-                    "with --at",
+        fmt::format("a point at {}, {} mm is outside the 65536 units of {} mm from the bed's corner; move the parts with --at",
                     mm(found->x), mm(found->y), mm(unit)));
   }
   for (std::uint32_t c = 0; c < layer.contours.size(); ++c) {

@@ -229,7 +229,7 @@ class LayerCutter {
 
 constexpr double kUsualNozzle = 0.4;  // mm
 
-constexpr ReadRules kRules{.fault = Fault::kUsage, .missing = "cannot be read; name a directory of a job or a G-code file"};
+constexpr ReadRules kRules{.fault = Fault::kUsage, .missing = "cannot be read; give a directory of a job or a G-code file"};
 
 GcodeBead bead_of(const RawBead& raw, double width_mm, std::uint32_t type) {
   const auto nm = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
@@ -329,7 +329,7 @@ Status GcodeSurvey::read_all() {
   if (walk_.fault) return Error{Fault::kUsage, *walk_.fault};
   if (file_.box_.empty()) {
     return Error{Fault::kUsage,
-                 fmt::format("{}: no move in it lays filament; name a G-code file of an extrusion printer", file_.path_)};
+                 fmt::format("{}: no move extrudes filament; give a G-code file of an extrusion printer", file_.path_)};
   }
   return {};
 }

@@ -100,7 +100,7 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
   const auto file = FileReader::open(path, {.fault = Fault::kInput});
   if (!file) return file.error();
   char magic[2] = {};
-  if (!file->read_at(0, magic)) return Error{Fault::kInput, path + ": is empty; take a whole image"};
+  if (!file->read_at(0, magic)) return Error{Fault::kInput, path + ": is empty; use a complete image"};
   const bool is_tiff = (magic[0] == 'I' || magic[0] == 'M') && magic[1] == magic[0];
   if (!is_tiff) return std::vector<std::uint64_t>{0};
   auto pages = tiff_pages(file->descriptor(), path);
@@ -123,8 +123,9 @@ std::string other_layer(const std::string& description, const Layer& layer) {
     return {};
   const std::int64_t lies = layer.bottom, ends = lies + layer.thickness;
   if (number == std::uint64_t{layer.index} + 1 && nm_of(bottom) == lies && nm_of(top) == ends) return {};
-  return fmt::format("tells {}, the manifest says layer {} from {} to {} mm", text.substr(0, static_cast<std::size_t>(end)),
-                     std::uint64_t{layer.index} + 1, number_text(mm(lies)), number_text(mm(ends)));
+  return fmt::format("its description says {}, the manifest says layer {} from {} to {} mm",
+                     text.substr(0, static_cast<std::size_t>(end)), std::uint64_t{layer.index} + 1, number_text(mm(lies)),
+                     number_text(mm(ends)));
 }
 
 }  // namespace

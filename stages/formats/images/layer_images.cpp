@@ -52,18 +52,19 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
     }
     const std::string digits = last == std::string::npos ? "" : stem.substr(before + 1, last - before);
     if (digits.empty() || digits.size() > 18)
-      return Error{Fault::kInput, fmt::format("{}: has no number in its name that tells its layer; name it as a0001.png, or "
-                                              "move it elsewhere",
-                                              one_line(path.string()))};
+      return Error{Fault::kInput,
+                   fmt::format("{}: has no layer number in its name; rename it as a0001.png, or move it elsewhere",
+                               one_line(path.string()))};
     images.push_back({std::stoull(digits), path.string()});
   }
   if (wrong) return Error{Fault::kInput, fmt::format("{}: the folder cannot be read: {}", one_line(folder), wrong.message())};
   if (images.empty() && !nested.empty())
-    return Error{Fault::kInput,
-                 fmt::format("{}: holds no images, but folders; name one of them, as {}", one_line(folder), one_line(nested))};
+    return Error{Fault::kInput, fmt::format("{}: contains no images, only folders; give one of them, as {}", one_line(folder),
+                                            one_line(nested))};
   if (images.empty())
-    return Error{Fault::kInput, fmt::format("{}: holds neither manifest.json of lamina jet nor images .png, .tif, .bmp or .pbm",
-                                            one_line(folder))};
+    return Error{
+        Fault::kInput,
+        fmt::format("{}: contains neither manifest.json of lamina jet nor images .png, .tif, .bmp or .pbm", one_line(folder))};
   std::ranges::sort(images, [](const Numbered& a, const Numbered& b) {
     return a.number != b.number ? a.number < b.number : a.path < b.path;
   });
@@ -72,7 +73,7 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
     if (images[i].number == images[i - 1].number)
       return Error{Fault::kInput, fmt::format("{}: has the number of {}; a layer is one image", one_line(images[i].path),
                                               one_line(fs::path(images[i - 1].path).filename().string()))};
-    return Error{Fault::kInput, fmt::format("{}: number {} is missing before it; put the image there, or number them anew",
+    return Error{Fault::kInput, fmt::format("{}: number {} is missing before it; add that image, or renumber the images",
                                             one_line(images[i].path), images[i - 1].number + 1)};
   }
   return images;
@@ -101,7 +102,7 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
     const auto positions = pages_of(file.path);
     if (!positions) return positions.error();
     if (folder && positions->size() > 1)
-      return Error{Fault::kInput, fmt::format("{}: holds {} images; name the file itself, or write one image a file",
+      return Error{Fault::kInput, fmt::format("{}: contains {} images; give the file itself, or write one image per file",
                                               one_line(file.path), positions->size())};
     while (folder && stack.pages_.size() < file.number - stack.first_number_) {
       stack.pages_.emplace_back();

@@ -34,8 +34,7 @@ Runs part_of(const Runs& image, const std::array<std::uint32_t, 3>& low, const s
 
 Result<ImageStack> stack_of_images(const std::string& folder, const StackRequest& request) {
   if (!(request.pixel_um > 0))
-    return Error{Fault::kUsage,
-                 one_line(folder) + ": no manifest.json of lamina jet tells the size of a pixel; give it as --pixel"};
+    return Error{Fault::kUsage, one_line(folder) + ": no manifest.json of lamina jet states the pixel size; give --pixel"};
   auto images = numbered_images(folder);
   if (!images) return images.error();
   const auto files = std::make_shared<const std::vector<Numbered>>(std::move(*images));

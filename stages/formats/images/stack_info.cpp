@@ -142,7 +142,7 @@ Result<StackInfo> inspect_stack(const std::string& path, int threshold) {
     }
     for (const std::uint64_t page : *pages) positions.push_back({&file.path, page});
     if (info.folder && pages->size() > 1)
-      info.wrong.push_back(fmt::format("{}: holds {} images; name the file itself, or write one image a file",
+      info.wrong.push_back(fmt::format("{}: contains {} images; give the file itself, or write one image per file",
                                        one_line(file.path), pages->size()));
   }
   info.images = positions.size();
@@ -177,7 +177,7 @@ std::string as_text(const StackInfo& info) {
   line("size", fmt::format("{} x {} pixels{}", info.columns, info.rows,
                            reported ? fmt::format(" of {:.6g} x {:.6g} dpi: {:.3f} x {:.3f} mm", info.dpi_x, info.dpi_y,
                                                   info.columns * 25.4 / info.dpi_x, info.rows * 25.4 / info.dpi_y)
-                                    : "; the files tell no resolution"));
+                                    : "; the files state no resolution"));
   line("set", fmt::format("{} pixels, {} to {} an image{}", readable_count(info.set), readable_count(info.min_set),
                           readable_count(info.max_set), info.empty > 0 ? fmt::format("; {} of them empty", info.empty) : ""));
   if (info.kind.bits > 1)
@@ -239,7 +239,7 @@ Result<ImageKind> tiff_kind(int file, const std::string& path, std::uint64_t pag
                                                               : nullptr);
   if (handle == nullptr && own_file >= 0) ::close(own_file);
   if (handle == nullptr || (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0))
-    return Error{Fault::kInput, fmt::format("{}: not a whole TIFF: {}", path, message)};
+    return Error{Fault::kInput, fmt::format("{}: not a complete TIFF: {}", path, message)};
   std::uint16_t bits = 1, photometric = PHOTOMETRIC_MINISWHITE, compression = COMPRESSION_NONE;
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_BITSPERSAMPLE, &bits);
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
@@ -259,7 +259,7 @@ Result<ImageKind> kind_of(const std::string& path, std::uint64_t page) {
   if (!file) return file.error();
   unsigned char head[34] = {};
   if (!file->read_at(0, std::span(reinterpret_cast<char*>(head), std::min<std::uint64_t>(sizeof head, file->size()))))
-    return Error{Fault::kInput, path + ": cannot be read; take a whole image"};
+    return Error{Fault::kInput, path + ": cannot be read; use a complete image"};
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(head, text, length) == 0; };
   if (begins("II", 2) || begins("MM", 2)) return tiff_kind(file->descriptor(), path, page);
   if (begins("\x89PNG", 4)) return ImageKind{"PNG", head[24], head[25] == 3 ? "by its palette" : "0 is black", "deflate"};

@@ -29,12 +29,13 @@ std::uint64_t open_edges(std::span<const Side> sides) {
 /// Whether a repaired mesh is a solid. errors  kInput, without a file: why it is none
 Status check_solid(const Mesh& mesh, const RepairReport& report) {
   const auto hollow = [](std::string why) { return Error{Fault::kInput, std::move(why)}; };
-  if (mesh.triangles.empty()) return hollow("its facets lie loose and enclose nothing");
+  if (mesh.triangles.empty()) return hollow("its facets are unconnected and enclose nothing");
   const Enclosed held = enclosed(mesh);
   if (held.nothing()) return hollow("its facets enclose nothing");
   const double before = std::fabs(report.volume_before_mm3);
   if (held.volume_mm3 >= before / 2) return {};
-  return hollow(fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before));
+  return hollow(
+      fmt::format("its facets are separated: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before));
 }
 
 /// By how much of itself the volume of a welded mesh may be off: 0.02 is 2 %. Corners that lie apart by chance lie as far from
@@ -103,7 +104,7 @@ void describe_repair(const RepairReport& report, double uncertainty, const std::
         uncertainty >= kReportedUncertainty ? fmt::format(": the volume may be off by {:.2g} %", 100 * uncertainty) : ""));
   if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
   if (report.sheets_dropped > 0)
-    note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
+    note(fmt::format("{} with {} dropped (an open rim, attached to the solid, enclosing nothing)",
                      plural(report.sheets_dropped, "stray surface"), plural(report.sheet_facets_dropped, "facet")));
   if (report.flat_dropped > 0)
     note(fmt::format("{} with {} dropped (loose, and flat: enclosing nothing)", plural(report.flat_dropped, "surface"),
@@ -205,11 +206,11 @@ Status close(const Source& source, const std::string& prefix, const LoadOptions&
   const double uncertainty = weld_uncertainty(mesh, report);
   if (uncertainty > kMaxUncertainty && options.weld_nm == kWeldByItself) {
     const std::int64_t distance = weld_that_closes(original, bounds, report.weld_nm - 1);
-    return source.error(
-        fmt::format("{}its open edges lie up to {:.6g} um apart: joining them may change its volume by {:.2g} %; "
-                    "export it as a solid{}",
-                    prefix, static_cast<double>(report.weld_nm) / 1000, 100 * uncertainty,
-                    distance > 0 ? fmt::format(", or say --weld {} if that will do", distance / 1000) : ""));
+    return source.error(fmt::format(
+        "{}its open edges are separated by up to {:.6g} um: joining them may change its volume by {:.2g} %; export it as a "
+        "solid{}",
+        prefix, static_cast<double>(report.weld_nm) / 1000, 100 * uncertainty,
+        distance > 0 ? fmt::format(", or say --weld {} if that will do", distance / 1000) : ""));
   }
   describe_repair(report, uncertainty, prefix, notes);
   return {};
@@ -258,7 +259,7 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
   if (!found.balanced && options.repair && flat) {
     mesh.triangles.clear();
     found = census({});
-    notes.push_back({false, prefix + "lies in a plane: nothing of it is solid"});
+    notes.push_back({false, prefix + "is planar: nothing of it is solid"});
   } else if (!found.balanced && options.repair && options.winding) {
     if (const Status closed = close_by_winding(source, prefix, options, mesh, found, notes); !closed) return closed.error();
   } else if (!found.balanced && options.repair) {

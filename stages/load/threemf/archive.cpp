@@ -234,7 +234,7 @@ Result<std::string> find_start_part(const Source& source, Archive& archive) {
     const std::string target = part_name(one.target);
     const bool needed = is_model || one.type == kThumbnailRelationship;  // what others lead to is not for lamina
     if (needed && !archive.has(target))
-      return source.error(fmt::format("_rels/.rels names {}, which the file does not hold; export it again",
+      return source.error(fmt::format("_rels/.rels names {}, which the file does not contain; export it again",
                                       quoted(std::string_view(one.target))));
     if (is_model && !model.empty())
       return source.error("names more than one 3D model to start from, which 3MF forbids; export it again");

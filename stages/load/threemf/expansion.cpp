@@ -32,7 +32,7 @@ constexpr std::uint64_t kTooMany = std::uint64_t{1} << 62;
 Status resolve(const Source& source, const ModelPackage& package, ObjectReference& reference) {
   const auto found = package.object_of_id.find({reference.file, reference.id});
   if (found == package.object_of_id.end())
-    return source.error(fmt::format("line {} names object {} of {}, which does not hold it; export it again", reference.line,
+    return source.error(fmt::format("line {} names object {} of {}, which does not contain it; export it again", reference.line,
                                     reference.id, package.files[reference.file].name.substr(1)));
   reference.object = found->second;
   return {};
@@ -88,7 +88,7 @@ Status check_content(const Source& source, const ModelPackage& package, const Mo
   if (object.beams > 0 && (package.needs_beams || !has_mesh))
     return refused(kBeamNamespace, fmt::format("has {} beams of", object.beams));
   if (object.low_resolution || (object.sliced && object.components.empty() && (!has_mesh || is_box(object))))
-    return refused(kSliceNamespace, "has slices that say what it is, beside a mesh that only stands for it, of");
+    return refused(kSliceNamespace, "is defined by slices, with a mesh only as placeholder, of");
   if (!has_mesh && object.components.empty() && !object.content.empty())
     return refused(object.content, "consists of geometry of");
   return {};
@@ -360,9 +360,10 @@ void find_cavities(const ModelPackage& package, std::vector<Leaf>& leaves, std::
     search.item(leaves, begin, end);
   }
   if (search.gave_up())
-    notes.push_back({true,
-                     "has too many objects within each other to look for all that are voids: what is inside out and not "
-                     "called a void is planned as a solid"});
+    notes.push_back(
+        {true,
+         "has too many nested objects to detect all voids: inside-out objects that are not reported as voids are planned as "
+         "solids"});
 }
 
 }  // namespace

@@ -411,7 +411,7 @@ class ModelParser : public XmlHandler {
       if (attribute == "unit") {
         package_.files[file_].unit_mm = unit_in_mm(value);
         if (package_.files[file_].unit_mm == 0)
-          refuse(fmt::format("the unit {} is none of 3MF (millimeter, inch, ...); export it again", quoted(value)));
+          refuse(fmt::format("the unit {} is unknown to 3MF (millimeter, inch, ...); export it again", quoted(value)));
       }
       if (attribute == "requiredextensions") require(value);
       if (attribute == "xml:space") refuse("xml:space, which 3MF forbids; export it again");
@@ -484,7 +484,7 @@ class ModelParser : public XmlHandler {
         else if (value == "support" || value == "solidsupport" || value == "surface")
           object.type = ModelObject::Type::kSupport;
         else if (value != "model")
-          refuse(fmt::format("the type {} of an object is none of 3MF; export it again", quoted(value)));
+          refuse(fmt::format("the type {} of an object is unknown to 3MF; export it again", quoted(value)));
       } else if (const XmlName is = attribute_name(attributes[0]); extension_of(is.space).kind == Extension::kSlices) {
         object.sliced = object.sliced || is.local == "slicestackid";
         object.low_resolution = object.low_resolution || (is.local == "meshresolution" && value == "lowres");
@@ -528,7 +528,7 @@ class ModelParser : public XmlHandler {
     }
     if (found != 7) return refuse("a triangle lacks v1, v2 or v3; export it again");
     if (++package_.triangles > triangle_limit_)
-      return refuse(fmt::format("holds more triangles than the limit of {}", triangle_limit_));
+      return refuse(fmt::format("contains more triangles than the limit of {}", triangle_limit_));
     current().triangles.push_back(corners);
   }
 
@@ -588,7 +588,7 @@ Status parse_model(const Source& source, Archive& archive, std::uint32_t file, s
                    ModelPackage& package) {
   const std::string name = package.files[file].name;
   if (!archive.has(name))
-    return source.error(fmt::format("names {}, which the file does not hold; export it again", name.substr(1)));
+    return source.error(fmt::format("names {}, which the file does not contain; export it again", name.substr(1)));
   ModelParser parser(package, file, triangle_limit);
   if (const Status read = archive.read_xml(name, parser.reader); !read) return read;
   if (file == 0 && !parser.has_build()) return source.error(fmt::format("{} has no <build>; export it again", name.substr(1)));

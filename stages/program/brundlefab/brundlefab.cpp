@@ -202,10 +202,10 @@ Status check_shots(const Machine& machine, const Carriage& carriage, const HeadG
   const double ends[] = {carriage.across(0), carriage.across(std::int64_t{grid.lines} - 1)};
   const double low = std::min(ends[0], ends[1]) - head, high = std::max(ends[0], ends[1]) + head;
   if (x > low && x < high) {
-    return wrong("maintenance.spit_mm",
-                 fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x beside it, as 400, "
-                             "over the waste bin",
-                             low, high));
+    return wrong(
+        "maintenance.spit_mm",
+        fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x outside of it, as 400, over the waste bin",
+                    low, high));
   }
   if (x < kPenMm || x >= kPenMm + kLongestXMm) {
     return wrong("maintenance.spit_mm", fmt::format("the pen reaches x {:g} to {:g} mm", kPenMm, kPenMm + kLongestXMm));
@@ -249,7 +249,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
   const double first = carriage.along(0) / kDotMm - 0.5,
                last = carriage.along(static_cast<double>(grid.steps()) - 1) / kDotMm - 0.5;
   if (std::abs(first - std::round(first)) > 0.02) {
-    return wrong("mounting.offset_mm", fmt::format("the ink bar's dots begin at its home, {:.2f} of one beside the image's",
+    return wrong("mounting.offset_mm", fmt::format("the ink bar's dots begin at its home, {:.2f} dots off those of the image",
                                                    first - std::round(first)));
   }
   if (std::llround(std::min(first, last)) < kBrakeDots || std::llround(std::max(first, last)) > kLastDot) {
@@ -261,7 +261,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
                          carriage.across(std::int64_t{grid.lines} + grid.swath_lines())};
   if (std::min(ends[0], ends[1]) < kPenMm || std::max(ends[0], ends[1]) >= kPenMm + kLongestXMm) {
     return wrong("mounting.offset_mm",
-                 fmt::format("the pen reaches x {:g} to {:g} mm, the bands want {:.1f} to {:.1f}", kPenMm, kPenMm + kLongestXMm,
+                 fmt::format("the pen reaches x {:g} to {:g} mm, the bands need {:.1f} to {:.1f}", kPenMm, kPenMm + kLongestXMm,
                              std::min(ends[0], ends[1]), std::max(ends[0], ends[1])));
   }
   if (const auto& [home, far] = powder.roller_mm; std::min(home, far) < 0 || std::max(home, far) >= kLongestXMm) {

@@ -138,14 +138,13 @@ Status check(const Machine& machine, const HeadGrid& grid) {
   }
   if (grid.steps_per_pixel != 1) return wrong("motion.lag_unit", "the HP45 controller fires by pixels; give pixel");
   if (grid.steps() + 2 > kLines) {
-    return wrong("bed.size_mm", fmt::format("a sweep of {} steps; the HP45 controller holds {} lines", grid.steps(), kLines));
+    return wrong("bed.size_mm", fmt::format("a sweep of {} steps; the HP45 controller stores {} lines", grid.steps(), kLines));
   }
   const double pixel_um = grid.step_nm() / 1000, counts = machine.motion.encoder_dpi;
   if (counts > 0 && (!whole(counts) || !resolves(counts, pixel_um))) {
-    return wrong(
-        "motion.encoder_dpi",
-        fmt::format("{:g} counts an inch do not tell pixels of {:.2f} um apart; give whole counts, one or more a pixel", counts,
-                    pixel_um));
+    return wrong("motion.encoder_dpi",
+                 fmt::format("{:g} counts an inch do not resolve pixels of {:.2f} um; give whole counts, one or more a pixel",
+                             counts, pixel_um));
   }
   const double speed = machine.motion.scan_speed_mm_s,
                minimum = kMinCountsPerSecond * kUmPerInch / 1000 / encoder_counts(machine, pixel_um);

@@ -46,7 +46,7 @@ class Firmware {
     number_ = number;
     Block block;
     if (const Status read = brundle::read_block(text, unit_mm_, block); !read) return fault(read.error().message);
-    if (ended_) return fault("goes on behind its end");
+    if (ended_) return fault("continues after its end");
     switch (block.code) {
       case 'M': return message(block);
       case 'T': return tool(block);
@@ -99,7 +99,7 @@ class Firmware {
     std::uint32_t layers = 0;
     if (text.starts_with(kOf)) text.remove_prefix(kOf.size());
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), layers);
-    if (error != std::errc() || end != text.data() + text.size()) return fault("M117 does not tell how many layers there are");
+    if (error != std::errc() || end != text.data() + text.size()) return fault("M117 does not state the number of layers");
     printing_.state_layers(layers);
   }
 
@@ -126,7 +126,7 @@ class Firmware {
     bar_.set_sprays(block['S']);
     const double dots_s = printing_.profile().motion.scan_speed_mm_s / kDotMm;
     if (const auto want = std::max<std::int64_t>(1, std::llround(1000 / dots_s)); bar_.sprays() != want) {
-      fault(fmt::format("S{} is {:.2f} mm/s, and the scan speed asks for S{}", bar_.sprays(), kDotMm * 1000 / bar_.sprays(),
+      fault(fmt::format("S{} is {:.2f} mm/s, and the scan speed requires S{}", bar_.sprays(), kDotMm * 1000 / bar_.sprays(),
                         want));
     }
   }
@@ -156,7 +156,7 @@ class Firmware {
   // G10 L1: at once, before up to four commands that wait; P is the tool, and its parameter too.
   void tool_table(const Block& block) {
     if (!block.has('L') || block['L'] != 1 || !block.has('P')) return unknown(block);
-    if (moved_) return fault("G10 behind the first move of a layer overtakes moves that wait");
+    if (moved_) return fault("G10 after the first move of a layer overtakes moves that wait");
     const auto tool = static_cast<int>(block['P']);
     const auto found = std::ranges::find(kTools, tool);
     if (found == kTools.end()) return fault(fmt::format("there is no tool {}", tool));
@@ -167,7 +167,7 @@ class Firmware {
       position_reported_[row] = true;
     }
     if (std::abs(offset_mm_[row] - kPositionMm[row]) > 1e-3) {
-      return fault(fmt::format("sets tool {} at {:g} mm of the carriage, where {:g} is its place", tool, offset_mm_[row],
+      return fault(fmt::format("sets tool {} at {:g} mm of the carriage, where {:g} is its position", tool, offset_mm_[row],
                                kPositionMm[row]));
     }
     parameters(block, tool);
@@ -222,10 +222,10 @@ class Firmware {
     const auto tool = static_cast<std::size_t>(std::ranges::find(kTools, tool_) - kTools.begin());
     const double from = axis_x_;
     if (!unit_stated_ || !mode_stated_ || !position_reported_[tool]) {
-      return fault(fmt::format("moves before {}: the firmware keeps what another print has set",
-                               !unit_stated_   ? "G21 tells the unit"
-                               : !mode_stated_ ? "G90 tells that places are absolute"
-                                               : fmt::format("G10 tells where tool {} is", tool_)));
+      return fault(fmt::format("moves before {}: the firmware keeps the values of another print",
+                               !unit_stated_   ? "G21 sets the unit"
+                               : !mode_stated_ ? "G90 sets absolute positions"
+                                               : fmt::format("G10 sets the position of tool {}", tool_)));
     }
     axis_x_ = std::clamp<double>(position_[kX] - offset_mm_[tool], 0, kMaxXMm);
     const double way = axis_x_ - from;
@@ -241,8 +241,7 @@ class Firmware {
     printing_.head_moves(std::abs(way), std::abs(way) / seconds, false);
     if (tool_ == kRecoater) printing_.roller_is_at(axis_x_ + kBladeMm);
     if (way > 0 && tool_ == kRecoater) spread_mm_ = moved_mm_;
-    if (way < 0 && moved_mm_[kZ] < spread_mm_[kZ] + 1e-3)
-      fault("the carriage goes back over powder that does not give way to it");
+    if (way < 0 && moved_mm_[kZ] < spread_mm_[kZ] + 1e-3) fault("the carriage returns over powder that has not been lowered");
   }
 
   /// For messages: the band that is being loaded, before it is inked.

@@ -168,7 +168,7 @@ class Hp45Reader {
 void Hp45Reader::read() {
   GcodeLine line;
   while (reader_.next(line)) {
-    if (ended_) return reader_.fault("goes on behind BRL");
+    if (ended_) return reader_.fault("continues after BRL");
     if (line.command == "G4") {
       const double seconds = reader_.number(line, 'P');
       if (seconds > 0 && oasis_ && printing_.profile().powder.dry_s > 0) {
@@ -213,7 +213,7 @@ void Hp45Reader::command(const GcodeLine& line) {
     if (controller_.unread() > 0) {
       return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
     }
-    if (!controller_.idle()) return reader_.fault("the last line is not all off, and fires on the ways of the next layer");
+    if (!controller_.idle()) return reader_.fault("the last line is not all off, and fires on the moves of the next layer");
     if (oasis_ && (spreading_ || !spread_)) return reader_.fault("the layer has no powder spread between M4 and M5");
     if (oasis_) pistons_came();
     axes_.end();
@@ -235,9 +235,9 @@ bool Hp45Reader::ready() {
   const Status encoder = own_encoder();
   const double density = 100 * 25'400 / (kBurstsPerInch * step_um_);
   if (const std::string_view unset = controller_.unset(); !unset.empty()) {
-    reader_.fault(fmt::format("lines come before {}: the controller keeps what another print has set or left", unset));
+    reader_.fault(fmt::format("lines come before {}: the controller keeps the values of another print", unset));
   } else if (!controller_.zeroed()) {
-    reader_.fault("lines come before SEP tells where the head stands");
+    reader_.fault("lines come before SEP sets the position of the head");
   } else if (!encoder) {
     reader_.fault(encoder.error().message);
   } else if (controller_.density() != std::max<std::int64_t>(1, std::llround(density))) {
@@ -272,12 +272,12 @@ void Hp45Reader::move(const GcodeLine& line) {
   const bool sweeping = lines_ > 0, moves = line.command == "G1" || line.command == "G0";
   if (moves && swept_) {
     return reader_.fault(
-        "the head goes on from a sweep without G4 P0, and the controller forgets its speed and way at rest alone");
+        "the head moves on from a sweep without G4 P0, and the controller resets its speed and direction only at rest");
   }
   if (moves && primes_) {
-    return reader_.fault("moves while PRM may still fire: the controller answers at once, and again behind its last burst");
+    return reader_.fault("moves while PRM may still fire: the controller answers at once, and again after its last burst");
   }
-  if (line.command == "G0") return reader_.fault("G0 goes as fast as the motion controller can, whatever F");
+  if (line.command == "G0") return reader_.fault("G0 moves as fast as the motion controller can, regardless of F");
   const double from = axes_.at(scan_.along), neighbour = axes_.at(scan_.across);
   if (!axes_.take(line, sweeping)) {
     return reader_.fault(fmt::format("'{}' is no command of the dialect {}", line.command, oasis_ ? "oasis" : "hp45"));
@@ -324,7 +324,7 @@ void Hp45Reader::move(const GcodeLine& line) {
 bool Hp45Reader::begins_well(double from_um, double to_um) {
   const double way = to_um > from_um ? 1 : -1;
   if (!begins_off_) {
-    reader_.fault("the first line of the sweep is not all off, and may fire from where the head stands");
+    reader_.fault("the first line of the sweep is not all off, and may fire where the head rests");
   } else if (way * (begin_um_ - from_um) <= hp45::kHalfRowGapUm || (lines_ > 1 && ahead_ * way < 0)) {
     reader_.fault("the first line of the sweep is not ahead of both rows, or the second one not ahead of it");
   } else {
@@ -396,7 +396,7 @@ void Hp45Reader::drop(bool sweeping, bool upwards) {
   }
   if (hurried_ > 0) {
     return printing_.fault(
-        "nozzles are on before the encoder has told the speed, 100 counts after rest; the run-up is too short");
+        "nozzles are on before the encoder has measured the speed, 100 counts after rest; the run-up is too short");
   }
   std::vector<std::uint64_t> words(words_);
   for (std::size_t odd = 0, even = 0; printing_.ok() && odd + even < shots_[0].size() + shots_[1].size();) {
@@ -437,7 +437,8 @@ void Hp45Reader::spread(const GcodeLine& line) {
     pistons_came();
   }
   spreading_ = line.command == "M4";
-  if (line.has('S') && powder.roller_rpm == 0) return reader_.fault("M4 has no S: the profile tells no speed of the roller");
+  if (line.has('S') && powder.roller_rpm == 0)
+    return reader_.fault("M4 must not have S: the profile sets no speed of the roller");
   printing_.roller_turns(spreading_ && line.has('S') ? line.word.at('S') : 0);
 }
 

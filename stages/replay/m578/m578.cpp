@@ -65,7 +65,7 @@ void fire_inkjet(const GcodeLine& line, GcodeReader& reader, Printing& printing)
   if (!has_m578(printing.profile().firmware)) {
     return reader.fault(fmt::format("RepRapFirmware {} has no M578", printing.profile().firmware));
   }
-  if (line.has('P')) return reader.fault("M578 reads no P: whatever head is meant, the first one fires");
+  if (line.has('P')) return reader.fault("M578 ignores P: the first head fires, regardless of the one that is meant");
   const std::uint32_t bits = reader.count(line, 'S');
   if (bits >> kInkjetBits != 0) {
     return reader.fault(fmt::format("M578 S{} fires nozzles 0 to {} alone", bits, kInkjetBits - 1));
@@ -88,7 +88,7 @@ void read_m578(std::string_view text, Printing& printing) {
   double begin = 0;
   std::int64_t step = INT64_MIN;
   while (reader.next(line)) {
-    if (ended) return reader.fault("goes on behind M400");
+    if (ended) return reader.fault("continues after M400");
     if (line.command == "M578" && !in_sweep && outside_bed(axes, printing.profile())) {
       spit_inkjet(line, reader, axes, printing);
     } else if (line.command == "M226") {

@@ -150,7 +150,7 @@ void read_nuferbj(std::string_view text, Printing& printing) {
   Loaded loaded(printing.nozzles());  // fired by the next G1 along the scan
   bool in_sweep = false, backward = false, ended = false;
   while (reader.next(line)) {
-    if (ended) return reader.fault("goes on behind M813");
+    if (ended) return reader.fault("continues after M813");
     if (line.command == "M812") {
       if (in_sweep) return reader.fault("a swath begins before the last one was scanned");
       const std::uint32_t direction = reader.count(line, 'D');
@@ -179,7 +179,7 @@ void read_nuferbj(std::string_view text, Printing& printing) {
       axes.end();
       ended = true;
     } else if (!loaded.vectors().empty()) {
-      return reader.fault("only the sweep may follow vectors: the head would come over their steps on another way");
+      return reader.fault("only the sweep may follow vectors: the head would pass their steps in another move");
     } else if (!axes.take(line, false)) {
       return reader.fault(fmt::format("'{}' is no command of the dialect nuferbj", line.command));
     }

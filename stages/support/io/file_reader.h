@@ -28,7 +28,7 @@ struct ReadRules {
   bool streams = false;                          // `-`, /dev/stdin and /dev/fd/N are read as well: pipes by request
 };
 
-/// Bounds by kind of file; docs/job.md and docs/formats.md name them.
+/// Bounds by kind of file; docs/reference/job.md and docs/reference/formats.md name them.
 inline constexpr std::uint64_t kMaxTomlBytes = 16 << 20, kMaxTableBytes = 64 << 20, kMaxListBytes = 256 << 20;
 
 /// Reads a file from its start, whole or line by line. Thread-compatible; movable.

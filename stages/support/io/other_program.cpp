@@ -20,8 +20,7 @@ namespace lamina {
 namespace {
 
 Error not_started(const std::string& program, int reason) {
-  return {Fault::kInternal,
-          fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", program, std::strerror(reason))};
+  return {Fault::kInternal, fmt::format("{}: {}; install it next to lamina or in PATH", program, std::strerror(reason))};
 }
 
 /// The program in this one's folder, or its name for PATH.
@@ -80,7 +79,7 @@ Result<std::string> filter(const std::string& program, const std::string& argume
   std::array<char, 1 << 16> piece;
   while (const std::size_t got = std::fread(piece.data(), 1, piece.size(), out.get())) text.append(piece.data(), got);
   if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return text;
-  if (WIFEXITED(state) && text.empty()) text = fmt::format("{} could not tell its result", program);
+  if (WIFEXITED(state) && text.empty()) text = fmt::format("{} could not report its result", program);
   if (WIFEXITED(state)) return Error{static_cast<Fault>(WEXITSTATUS(state)), text};
   return Error{Fault::kInternal, fmt::format("{} was ended by signal {}", program, WTERMSIG(state))};
 }

@@ -28,7 +28,7 @@ constexpr std::string_view kRenamedKeys[][3] = {
 
 std::string no_such_key(std::string_view section, std::string_view name, std::span<const std::string_view> names) {
   for (const auto& [of, old, now] : kRenamedKeys) {
-    if (of == section && old == name) return fmt::format("is now {}; see docs/job.md", now);
+    if (of == section && old == name) return fmt::format("is now {}; see docs/reference/job.md", now);
   }
   const std::string near = suggest(name, names);
   return near.empty() ? fmt::format("no such key; [{}] has {}", section, fmt::join(names, ", "))
@@ -37,7 +37,7 @@ std::string no_such_key(std::string_view section, std::string_view name, std::sp
 
 std::string no_such_section(std::string_view section, std::span<const std::string_view> names) {
   for (const auto& [of, old, now] : kRenamedKeys) {
-    if (of == section && old.empty()) return fmt::format("is now [{}]; see docs/job.md", now);
+    if (of == section && old.empty()) return fmt::format("is now [{}]; see docs/reference/job.md", now);
   }
   const std::string near = suggest(section, names);
   return near.empty() ? fmt::format("no such section; there are {}", fmt::join(names, ", "))

@@ -153,7 +153,7 @@ constexpr auto word(const KeyName& name) {
   };
   key.write_text = [](const auto&, const auto& target) { return write_word(Words, member<Path...>(target)); };
   key.check_target = [](const auto& self, const auto& target) {
-    return std::string(self.write_text(self, target).empty() ? "is none of its values" : "");
+    return std::string(self.write_text(self, target).empty() ? "is not one of its values" : "");
   };
   key.words = [] { return words_of(Words); };
   return key;

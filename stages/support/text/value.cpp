@@ -22,18 +22,18 @@ std::string check_value(std::int64_t value, const Limits& limits) {
 }
 
 std::string check_length(std::size_t length, const Limits& limits) {
-  if (length < limits.minimum) return fmt::format("holds {} values; give at least {}", length, limits.minimum);
-  if (length > limits.maximum) return fmt::format("holds {} values; give at most {}", length, limits.maximum);
+  if (length < limits.minimum) return fmt::format("has {} values; give at least {}", length, limits.minimum);
+  if (length > limits.maximum) return fmt::format("has {} values; give at most {}", length, limits.maximum);
   return {};
 }
 
 std::string not_one_of(std::string_view text, std::span<const std::string_view> words) {
-  return fmt::format("'{}' is none of {}{}", text, fmt::join(words, ", "), suggest(text, words));
+  return fmt::format("unknown value '{}'; use one of {}{}", text, fmt::join(words, ", "), suggest(text, words));
 }
 
 std::string check_path(std::string_view text) {
-  if (text.empty()) return "is empty; name a file or directory";
-  if (text.find('\0') != std::string_view::npos) return "holds a zero byte; name a file or directory";
+  if (text.empty()) return "is empty; give a file or directory";
+  if (text.find('\0') != std::string_view::npos) return "contains a zero byte; give a file or directory";
   return {};
 }
 

@@ -270,7 +270,7 @@ function fillTexts() {
     if (!rows && !empty) return;
     if (reported++ >= 200) { ++more; return; }
     const number = head.first_layer + i;
-    warn(`layer ${number}: ` + (empty ? head.images ? 'nothing is set' : 'nothing is laid' : `${rows} rows are closed only thanks to repair`), number);
+    warn(`layer ${number}: ` + (empty ? head.images ? 'nothing is set' : 'nothing is deposited' : `${rows} rows are closed only thanks to repair`), number);
   });
   if (more) warn(`and ${more} more layers`);
   if (!warnings.children.length) warn('none');

@@ -230,8 +230,8 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   EXPECT_EQ(machine.head.row_offset_um, (std::vector<double>{0, 2529.5}));
   EXPECT_EQ(machine.head.dot_gain_um, (std::array<double, 2>{31, 12}));
   for (const char* words :
-       {"--bleed 31x12", "was not printed", "unreadable across, +30.0 um (within 2.2) along", "joint 1   shows -41 um across",
-        "1 of 8 offsets", "4 read, within 8 um along the scan and 1 across", "changed by -10.5 um (within ",
+       {"--bleed 31x12", "was not printed", "unreadable across, +30.0 um (within 2.2) along", "stitch 1  shows -41 um across",
+        "1 of 8 nozzle offsets", "4 read, within 8 um along the scan and 1 across", "changed by -10.5 um (within ",
         "50 % of the pixels, 6.2 % saturation: 61 %"})
     EXPECT_EQ(std::ranges::count_if(*lines, [&](const std::string& line) { return line.find(words) != std::string::npos; }), 1)
         << words;

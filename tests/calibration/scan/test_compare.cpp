@@ -1,5 +1,5 @@
 // tests/calibration/scan/test_compare.cpp: layers compared with synthetic images. LAMINA_LAYERS=1000 measures the figures of
-// docs/compare.md.
+// docs/howto/compare_photographs.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -244,7 +244,7 @@ TEST(ComparedLayer, AMirroredPhotographIsRefused) {
       }
       const auto refused = compare_blocks(*sheet, mirrored);
       ASSERT_FALSE(refused);
-      EXPECT_NE(refused.error().message.find("is mirrored"), std::string::npos) << refused.error().message;
+      EXPECT_NE(refused.error().message.find("is a mirror image"), std::string::npos) << refused.error().message;
     }
   }
 }

@@ -1,5 +1,5 @@
 // tests/calibration/scan/test_reading.cpp: charts read from made-up photographs. LAMINA_SCANS=1000 measures the figures of
-// docs/calibrate.md.
+// docs/howto/calibrate.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -115,7 +115,7 @@ Result<calibration::ChartReading> read_trial(const PrintedChart& printed, const 
   return calibration::read_chart_photo(photo_in_memory(picture), printed.chart);
 }
 
-/// A straight line through the nozzles' offsets is equivalent to the picture's scale: docs/calibrate.md has the one
+/// A straight line through the nozzles' offsets is equivalent to the picture's scale: docs/howto/calibrate.md has the one
 /// that is taken off, and along which swaths count: of the slopes of all pairs of nozzles, and of what they leave, the medians.
 struct HeadLine {
   double middle = 0, slope = 0;

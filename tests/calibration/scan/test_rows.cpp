@@ -83,7 +83,7 @@ TEST(ScannedRows, WithinIsSaidOfAllNozzlesThatWereRead) {
   EXPECT_GE(std::stod(read.lines.substr(at + 7)), 66) << read.lines;
   // Too noisy for rows too: the profile's stay, and a line says so.
   EXPECT_EQ(read.row_offset_um, (std::vector<double>{0, 2540, 5080, 7620})) << read.lines;
-  EXPECT_NE(read.lines.find("rows      not told"), std::string::npos) << read.lines;
+  EXPECT_NE(read.lines.find("rows      not reported"), std::string::npos) << read.lines;
 }
 
 }  // namespace

@@ -156,8 +156,8 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
   EXPECT_EQ(lamina({"verify", "out/good"}).code, 0);
   // Each says where it is wrong and what to do.
   EXPECT_EQ(json["jobs"][2]["reason"],
-            "missing.toml:2:6: part.path: nowhere.stl: no such file; correct it (a relative path begins beside the job file)");
-  EXPECT_EQ(json["jobs"][9]["reason"], "half: the job is not finished; end it with --resume, then ask for the report");
+            "missing.toml:2:6: part.path: nowhere.stl: no such file; correct it (relative paths start at the job file)");
+  EXPECT_EQ(json["jobs"][9]["reason"], "half: the job is not finished; complete it with --resume first");
 }
 
 TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {

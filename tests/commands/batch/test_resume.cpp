@@ -125,7 +125,7 @@ TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithSpaceItContinues) 
   Json json = summary("out");
   EXPECT_EQ(outcomes("out"), (Words{"done", "failed", "done"}));
   const std::string reason = json["jobs"][1]["reason"];
-  EXPECT_NE(reason.find("No space left on device); free some space; finished layers are kept, go on with --resume"),
+  EXPECT_NE(reason.find("No space left on device); free some space; finished layers are kept, continue with --resume"),
             std::string::npos)
       << reason;
   EXPECT_EQ(reason.find('\n'), std::string::npos);

@@ -114,8 +114,8 @@ TEST_F(CalibrateProgram, WrongTablesAreOneLineThatNamesThePosition) {
   EXPECT_NE(message("test,percent,thin\nextrusion,90,0.1\n").find("widths.csv:1: column 'thin'"), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nextrusion,90\n").find("2 columns where the header has 3"), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nspeed,200,0.2\n").find("stable_mm is empty"), std::string::npos);
-  EXPECT_NE(message("test,percent,thin_mm\nextrusion,90,\n").find("holds no widths"), std::string::npos);
-  EXPECT_NE(message("").find("holds no rows"), std::string::npos);
+  EXPECT_NE(message("test,percent,thin_mm\nextrusion,90,\n").find("contains no widths"), std::string::npos);
+  EXPECT_NE(message("").find("contains no rows"), std::string::npos);
 }
 
 TEST_F(CalibrateProgram, PiecesAreThoseOfTheDocumentAndTheirFilesBelongTogether) {

@@ -115,9 +115,9 @@ std::string with_exchanged_layers(const std::string& manifest) {
 TEST_F(LayerLines, ThicknessesThatTheJobDoesNotHaveAreFound) {
   const struct {
     const char *heights, *what;
-  } rows[] = {{"optimal --thickness 0.2..0.4:0.05", "nm thick, by the manifest, which is none of the job's thicknesses"},
-              {"angle --thickness 0.2,0.4", "which is none of the job's thicknesses"},
-              {"cusp --cusp 0.08 --thickness 0.2..0.4:0.05", "which is none of the job's thicknesses"},
+  } rows[] = {{"optimal --thickness 0.2..0.4:0.05", "nm thick, by the manifest, which is not a thickness of the job"},
+              {"angle --thickness 0.2,0.4", "which is not a thickness of the job"},
+              {"cusp --cusp 0.08 --thickness 0.2..0.4:0.05", "which is not a thickness of the job"},
               {"stepwise --cusp 0.05 --thickness 0.1..0.4:0.05", "divides no slab of 400000 nm evenly"}};
   for (const auto& [heights, what] : rows) {
     make("jet " + corpus_file("dental_crown.stl") + " --bed 30,30 --dpi 60 --heights " + heights);
@@ -174,7 +174,7 @@ TEST_F(LayerLines, TimesOfAddedSweepsAreThoseOfThePrograms) {
 
 TEST_F(LayerLines, NothingLiesInAnotherPowderWhereThereIsOne) {
   make("jet a.stl --machine nuferbj --layer 0.1 --saturation 70");
-  expect_found("\"unfed_pixels\": 0", "\"unfed_pixels\": 3", "the job is of one powder, the manifest says 3 pixels");
+  expect_found("\"unfed_pixels\": 0", "\"unfed_pixels\": 3", "the job uses one powder, the manifest says 3 pixels");
 }
 
 }  // namespace

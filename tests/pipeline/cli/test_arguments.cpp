@@ -18,7 +18,7 @@ TEST(Help, IsAsWideAsTheTerminalAndNamesEveryOption) {
     spec.closing.clear();  // examples stay as they are
     spec.more = nullptr;
     for (const int columns : {40, 60, 100}) {
-      std::istringstream lines(help_text(spec, columns));
+      std::istringstream lines(help_text(spec, columns, HelpLength::kAll));
       for (std::string line; std::getline(lines, line);) {
         const bool one_word = line.find(' ', line.find_first_not_of(' ')) == std::string::npos;
         const bool a_term = line.starts_with("  -") || line.starts_with("Usage");
@@ -27,12 +27,27 @@ TEST(Help, IsAsWideAsTheTerminalAndNamesEveryOption) {
             << spec.name << ", " << columns << ": " << line;
       }
     }
-    const std::string text = help_text(spec, 100);
+    const std::string text = help_text(spec, 100, HelpLength::kAll);
     for (const OptionSpec& option : spec.options) {
       EXPECT_NE(text.find(option.flag.substr(option.flag.rfind(',') + 1)), std::string::npos) << spec.name << option.flag;
     }
     EXPECT_EQ(text.find("\n\n\n"), std::string::npos) << spec.name;
     EXPECT_EQ(text.find('\1'), std::string::npos) << spec.name;
+  }
+}
+
+TEST(Help, OfCommandsThatPlanIsShortAndNamesTheRest) {
+  for (const std::string name : {"jet", "slice", "extrude"}) {
+    const CommandSpec spec = spec_of(*find_command(name));
+    EXPECT_GE(spec.basic.size(), 15u) << name;
+    EXPECT_LE(spec.basic.size(), 20u) << name;
+    for (const std::string_view flag : spec.basic) ASSERT_NE(spec.find(flag), nullptr) << name << ": " << flag;
+    const std::string text = help_text(spec, 80, HelpLength::kShort);
+    EXPECT_LE(std::ranges::count(text, '\n'), 60) << name << ", 80 columns:\n" << text;
+    for (const std::string_view flag : spec.basic) EXPECT_NE(text.find(flag), std::string::npos) << name << ": " << flag;
+    EXPECT_NE(text.find("--help-all"), std::string::npos) << name;
+    EXPECT_NE(text.find("\nExamples:\n  lamina " + name), std::string::npos) << text;
+    EXPECT_EQ(text.find("\n\n\n"), std::string::npos) << text;
   }
 }
 
@@ -42,7 +57,7 @@ TEST(Help, HasEachHeadingOnce) {
     spec.closing.clear();
     spec.more = nullptr;
     std::multiset<std::string> headings;
-    std::istringstream lines(help_text(spec, 100) + man_page(spec) + markdown_page(spec));
+    std::istringstream lines(help_text(spec, 100, HelpLength::kAll) + man_page(spec) + markdown_page(spec));
     for (std::string line; std::getline(lines, line);) {
       const bool of_help = !line.starts_with(' ') && line.ends_with(':');
       if (of_help || line.starts_with(".SS ") || line.starts_with("## ")) headings.insert(line);
@@ -90,8 +105,8 @@ TEST(SlicerAliases, OfOtherSlicersAreAnsweredWithOurs) {
       {"extrude", "--rotate-x", "'--rotate'"},
       {"extrude", "--support", "lamina makes no supports"},
       {"jet", "--support_material", "lamina makes no supports"},
-      {"extrude", "--brim", "lamina lays no brim"},
-      {"extrude", "--raft-layers", "lamina lays no raft"},
+      {"extrude", "--brim", "lamina makes no brim"},
+      {"extrude", "--raft-layers", "lamina makes no raft"},
   };
   for (const auto& row : rows) EXPECT_NE(requested(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;
   EXPECT_EQ(requested("info", "--layer-height"), "") << "info has no layers";

@@ -75,8 +75,10 @@ TEST(Help, EveryCommandTeachesWithExamplesAndNamesEveryOption) {
     EXPECT_EQ(help.err, "");
     EXPECT_NE(help.out.find("Examples:\n  "), std::string::npos);
     EXPECT_NE(help.out.find("lamina " + command), std::string::npos);
+    EXPECT_EQ(run_lamina({"help", command}, directory.path()).out, help.out);
   }
-  const std::string jet = run_lamina({"jet", "--help"}, directory.path()).out;
+  EXPECT_EQ(run_lamina({"help", "jett"}, directory.path()).code, 2);
+  const std::string jet = run_lamina({"jet", "--help-all"}, directory.path()).out;
   for (const char* flag :
        {"--job",    "--save-job", "--set",       "--bed",      "--dpi",    "--layer",  "--copies",    "--at",
         "--gap",    "--scale",    "--rotate",    "--shrink",   "--unit",   "--engine", "--fill",      "--format",

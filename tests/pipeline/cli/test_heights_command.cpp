@@ -174,7 +174,7 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
       {{"--cover-top"}, "--cover-top: is of --heights angle and optimal"},
       {{"--heights", "cusp", "--thickness", "0.1,0.2", "--cover-top"}, "--cover-top: is of --heights angle and optimal"},
       {{"--cusp-of", "nominal"}, "--cusp-of: is of steps on parts that shrink"},
-      {{"--heights", "optimal", "--thickness", ""}, "--thickness: holds no thickness"},
+      {{"--heights", "optimal", "--thickness", ""}, "--thickness: contains no thickness"},
       {{"--heights", "optimal", "--thickness", "0.3..0.1"}, "--thickness: the least thickness"},
       {{"--heights", "optimal", "--thickness", "0.05..0.3:0.1"}, "end at 0.25 mm and miss 0.3 mm"},
       {{"--heights", "optimal", "--thickness", "-0.1,0.2"}, "--thickness: -0.1"},

@@ -193,7 +193,7 @@ TEST(JobFile, EveryKeyThatDecidesBytesChangesTheCanonicalText) {
 }
 
 TEST(JobFile, EveryKeyIsDocumented) {
-  const std::string page = test::read_text(std::string(LAMINA_TEST_DIR) + "/../docs/job.md");
+  const std::string page = test::read_text(std::string(LAMINA_TEST_DIR) + "/../docs/reference/job.md");
   ASSERT_FALSE(page.empty());
   const auto documented = [&](std::string_view section, std::string_view name, std::string_view flag) {
     const std::string row = "| `" + std::string(section) + "." + std::string(name) + "` |";
@@ -227,7 +227,7 @@ TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
       {"[[part]]\npath = 'a'\ncopies = 0\n", ":3:10: part.copies: 0 is out of range"},
       {"[[part]]\npath = 'a'\nscale = 0\n", ":3:9: part.scale: 0 is out of range"},
       {"[bed\n", ":1:"},
-      {"[image]\nformat = 'tif'\n", ":2:10: image.format: 'tif' is none of"},
+      {"[image]\nformat = 'tif'\n", ":2:10: image.format: unknown value 'tif'; use one of"},
   };
   for (const auto& [text, reported] : jobs) {
     test::write_text(directory / "job.toml", text);

@@ -304,7 +304,7 @@ TEST(Manifest, OfAnotherVersionIsRefused) {
   test::write_text(directory / "manifest.json", other);
   const auto manifest = read_manifest(directory / "manifest.json");
   ASSERT_FALSE(manifest.ok());
-  EXPECT_NE(manifest.error().message.find("of another version of lamina"), std::string::npos) << manifest.error().message;
+  EXPECT_NE(manifest.error().message.find("by another version of lamina"), std::string::npos) << manifest.error().message;
 }
 
 TEST(Manifest, KeptRecordsComeFirstAndNoLayerIsSkipped) {

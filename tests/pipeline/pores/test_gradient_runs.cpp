@@ -131,7 +131,7 @@ TEST(DesignedGradient, WrongEndsAndRegionsAreALine) {
       {"--porosity 20:24 --tops 9,4", "--tops: 4.2 mm is not above 9 mm; name the lowest first"},
       {"--porosity 20:24 --tops 3,high", "--tops: 'high'"},
       {"--porosity 20:24 --tops 3,9 --height 9", "--tops says all regions"},
-      {"--porosity 20 --height 9", "--height: is of a gradient, and none is wished for"},
+      {"--porosity 20 --height 9", "--height: needs a gradient"},
       {"--porosity 20 --tops 3,9", "--tops: is of a gradient"},
       {"--porosity 20:24 --permeability 9:90 --pore 0.1x1 --height 9", "leave one out"},
   };

@@ -118,7 +118,7 @@ TEST_F(ImageStack, WithFaultsIsOneLine) {
     EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
     EXPECT_NE(outcome.err.find(words), std::string::npos) << outcome.err;
   };
-  refused("s", 2, "give it as --pixel");
+  refused("s", 2, "give --pixel");
   refused("s --pixel 10 --window 1,0.1,0.05", 2, "1.000 mm along x are more than the images have: 0.160 mm");
   refused("s --pixel 10 --periodic xa", 2, "is not of the axes");
   refused("s --pixel 10 --length 5", 3, "--length is for tables");
@@ -134,9 +134,9 @@ TEST_F(ImageStack, WithFaultsIsOneLine) {
   refused("s --pixel 10", 3, "has the number of");
   test::write_text(folder / "s/other0003.pbm", "");
   fs::rename(folder / "s/other0003.pbm", folder / "s/cover.pbm");
-  refused("s --pixel 10", 3, "cover.pbm: has no number");
+  refused("s --pixel 10", 3, "cover.pbm: has no layer number");
   fs::create_directory(folder / "none");
-  refused("none --pixel 10", 3, "holds neither");
+  refused("none --pixel 10", 3, "contains neither");
   fs::create_directory(folder / "white");
   for (int z = 1; z <= 6; ++z) write_pbm(numbered(folder / "white", z, ".pbm"), 16, 16, [](auto, auto) { return true; });
   refused("white --pixel 10 --periodic xyz", 3, "nothing is solid in the window");
@@ -289,7 +289,7 @@ TEST_F(ImageStack, OfAPlanThatIsShiftedAndGrownByAVoxelComesBackWithBoth) {
     }
   }
   const test::Outcome dark = run("lines.gcode --scan same --pixel 25 --range 8 --window 1.6,1.6,0.9");
-  EXPECT_NE(dark.err.find("hardly looks like the plan"), std::string::npos) << "solid and void exchanged" << dark.err;
+  EXPECT_NE(dark.err.find("hardly matches the plan"), std::string::npos) << "solid and void exchanged" << dark.err;
   EXPECT_NE(run("lines.gcode --scan same --pixel 25 --dark --range 2.5").err.find("--range: '2.5'"), std::string::npos);
   EXPECT_NE(run("lines.gcode --scan absent --pixel 25").err.find("absent: the folder cannot be read: "), std::string::npos);
   const test::Outcome outcome = run("lines.gcode --scan same --pixel 25 --dark --window 3,3,0.6");

@@ -145,7 +145,7 @@ TEST(PoreAnalysis, FilesWithoutALayerAreRefused) {
   test::write_text(directory / "flat.gcode", "M83\nG1 X10 E1\nG1 X0 Y3 E1\n");
   const auto flat = analyse_print(directory / "flat.gcode", 0);
   ASSERT_FALSE(flat.ok());
-  EXPECT_NE(flat.error().message.find("no layer lies above z = 0"), std::string::npos);
+  EXPECT_NE(flat.error().message.find("no layer is above z = 0"), std::string::npos);
   EXPECT_TRUE(names_toolpaths("a/Part.GCODE"));
   EXPECT_FALSE(names_toolpaths("a.gcode/part.stl"));
 }

@@ -129,7 +129,7 @@ TEST(PoresOfJobs, AWrongJobIsALine) {
       {"permeability filament.toml --set segment.thin_mm=30", 2, "segment.thin_mm"},
       {"permeability filament.toml --length 5", 2, "--length is for tables of measurements"},
       {"permeability filament.toml --periodic z", 2, "--periodic is for folders of images"},
-      {"permeability powder.toml --beads told", 2, "--beads is for toolpaths"},
+      {"permeability powder.toml --beads stated", 2, "--beads is for toolpaths"},
       {"permeability walls.toml", 3, "walls.toml: no bead lies in the window of 2.000 x 2.000"},
       {"permeability part.gcode --set layers.thickness_mm=1", 2, "--set is for job files"},
   };

@@ -68,7 +68,7 @@ TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndReportWhatThatAdds) {
   }
   const test::Outcome reported = lamina(kBox + std::string("--dry-run"));
   EXPECT_NE(reported.err.find(
-                "2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
+                "2 over a position for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
                 "at 5.0 mm/s; that adds 2 sweeps, 2.5 s"),
             std::string::npos)
       << reported.err;
@@ -141,7 +141,7 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
     test::expect_refused(std::string("jet ") + format + " --dpi 254 --bed 5x5 -o none", 3, "drops of a pixel as grey", folder_);
   }
   test::expect_refused("jet box.stl --machine seven.toml --layer 0.1 --saturation 500 --format tiff-4 -o none", 2,
-                       "tells up to 15 drops of a pixel, the job has 25; choose tiff-8", folder_);
+                       "stores up to 15 drops per pixel, the job has 25; choose tiff-8", folder_);
   done("jet box.stl --machine seven.toml --layer 0.1 --saturation 500 --format tiff-8 -o many --quiet");
   done("verify many --quiet");
   EXPECT_EQ(records_of("many")[0].max_drops, 25u);

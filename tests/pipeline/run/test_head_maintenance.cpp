@@ -175,7 +175,7 @@ TEST_F(HeadMaintenance, JobsOfOnePowderAreFedByOneVat) {
   const auto report = verify(job.output, {});
   ASSERT_TRUE(report.ok());
   EXPECT_TRUE(std::ranges::any_of(report->faults, [](const std::string& fault) {
-    return fault.find("both vats feed, some layers or each, and the job is of one powder") != std::string::npos;
+    return fault.find("both vats feed, but the job uses one powder") != std::string::npos;
   }));
 }
 

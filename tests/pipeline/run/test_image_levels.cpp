@@ -194,8 +194,9 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
       for (const LayerRecord& record : shares.layers) {
         const auto full = static_cast<std::uint8_t>(std::stoi(levels) - 1);
         Runs set;
-        threshold_levels(this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
-                    static_cast<std::uint8_t>((full + 1) / 2), set);
+        threshold_levels(
+            this->levels("shares/" + layer_file_name(record.layer.index, format[0] == 't' ? ".tif" : ".png"), full),
+            static_cast<std::uint8_t>((full + 1) / 2), set);
         EXPECT_EQ(half.layers[record.layer.index].set_pixels, set_pixels(set));
       }
       forget({"shares", "half", "rounded"});
@@ -236,7 +237,7 @@ TEST_F(ImageLevels, ThatDoNotFitAreOneLineEach) {
   const auto refused = [&](const std::string& line, const std::string& words) {
     test::expect_refused(line + rest + " -o no", 2, words, folder_);
   };
-  refused("jet grey --levels 4 --set part.threshold=90", "part.threshold is of images of 1 bit");
+  refused("jet grey --levels 4 --set part.threshold=90", "part.threshold applies to 1-bit images");
   refused("jet grey --levels 4 --containment inside", "--containment");
 }
 
@@ -247,7 +248,7 @@ TEST_F(ImageLevels, TakeGreyOfOtherPrograms) {
   for (const int value : {0, 42, 85, 170, 213, 255}) pixels += static_cast<char>(value);
   test::write_text(folder_.path() / "grey/slice-001.PGM", pixels);
   const std::string rest = " --layer 0.1 --dpi 254 --bed 0.3x0.2 --levels 4 --format tiff-8 -o out";
-  test::expect_refused("jet grey" + rest, 3, "give it as part.dpi", folder_);
+  test::expect_refused("jet grey" + rest, 3, "add part.dpi", folder_);
   done("jet grey --set part.dpi=254" + rest);
   const Levels image = levels("out/" + layer_file_name(0, ".tif"), 3);
   EXPECT_EQ(std::vector<std::uint32_t>(image.change.begin(), image.change.end()),

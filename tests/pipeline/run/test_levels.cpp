@@ -152,7 +152,7 @@ TEST_F(LevelJobs, OfWhatHasNoSharesAreRefused) {
   test::expect_refused(job + "--fill raster", 2, "leave out walls, fillings", folder_);
   test::expect_refused(job + "--core 0.5", 2, "--core-saturation", folder_);
   test::expect_refused(job + "--heights cusp --thickness 0.05,0.1 --containment inside", 2, "--containment", folder_);
-  test::expect_refused(kTenthsOfBox + std::string("--levels 3 -o out"), 2, "none of off, 2, 4, 16", folder_);
+  test::expect_refused(kTenthsOfBox + std::string("--levels 3 -o out"), 2, "use one of off, 2, 4, 16", folder_);
   test::expect_refused(kTenthsOfBox + std::string("--no-dither -o out"), 2, "add --levels or --saturation", folder_);
 }
 

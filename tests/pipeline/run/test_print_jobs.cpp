@@ -305,8 +305,9 @@ TEST_F(PrintJobs, LayersThatEndBetweenStepsOfTheBuildVatAreReported) {
   ASSERT_TRUE(summary.ok()) << summary.error().message;
   ASSERT_EQ(summary->warnings.size(), 1u);
   EXPECT_EQ(summary->warnings[0].code, "build-steps");
-  EXPECT_NE(summary->warnings[0].text.find("first 0, end beside the 0.005 mm steps of nuferbj's build vat, by up to 0.002 mm"),
-            std::string::npos)
+  EXPECT_NE(
+      summary->warnings[0].text.find("first 0, end between the 0.005 mm steps of nuferbj's build vat, off by up to 0.002 mm"),
+      std::string::npos)
       << summary->warnings[0].text;
 }
 

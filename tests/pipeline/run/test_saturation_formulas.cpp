@@ -195,7 +195,7 @@ TEST_F(FormulaJobs, EvenOddConsidersPartsOfAllDoses) {
   zones.output = folder_ / "levels";
   const auto refused = run_job(zones);
   ASSERT_FALSE(refused.ok());
-  EXPECT_NE(refused.error().message.find("shares of voxels; choose nonzero"), std::string::npos) << refused.error().message;
+  EXPECT_NE(refused.error().message.find("grey levels; choose nonzero"), std::string::npos) << refused.error().message;
 }
 
 }  // namespace

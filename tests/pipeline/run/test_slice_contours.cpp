@@ -74,7 +74,7 @@ TEST(SliceContours, PolygonsAndShortCommandsHoldTheAreasOfTheOthers) {
       run_lamina({"slice", corpus_file("parameter_quality_nut.stl"), "--format", "svg-polygon", "--walls", "1", "-o", "filled"},
                  directory.path());
   EXPECT_EQ(filled.code, 2);
-  EXPECT_NE(filled.err.find("--format svg-polygon: holds contours only"), std::string::npos) << filled.err;
+  EXPECT_NE(filled.err.find("--format svg-polygon: contains contours only"), std::string::npos) << filled.err;
 }
 
 TEST(SliceContours, ManifestSaysWhereEveryLayerLiesInTheFile) {
@@ -198,7 +198,7 @@ TEST(SliceContours, ClosedGapsAreCountedWithTheLargest) {
   const auto summary = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(summary["gaps_closed"], 5);
   EXPECT_NEAR(summary["largest_gap_mm"].get<double>(), 36.203204, 1e-6);
-  EXPECT_NE(outcome.err.find("gaps      5 closed by straight stretches, the longest 36.203204 mm; 0 chains left open"),
+  EXPECT_NE(outcome.err.find("gaps      5 closed by straight segments, the longest 36.203204 mm; 0 chains left open"),
             std::string::npos)
       << outcome.err;
 }

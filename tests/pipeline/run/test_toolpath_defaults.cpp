@@ -118,7 +118,7 @@ TEST(ToolpathDefaults, ASkirtFillsTheNozzleThoughTheFirstLayerHoldsNoBead) {
   };
   EXPECT_NE(reported("head.stl --layers 1:3").find("--layers leaves the first layer out"), std::string::npos);
   write_box(directory / "bed.stl", {0, 0, 0}, {220, 220, 0.4f});
-  EXPECT_NE(reported("bed.stl").find("none: no room on the bed"), std::string::npos);
+  EXPECT_NE(reported("bed.stl").find("none: no space on the bed"), std::string::npos);
 }
 
 TEST(ToolpathDefaults, LeaveOutPointsUnlessRequestedAndTheSameInAJobFile) {
@@ -200,7 +200,7 @@ TEST(ToolpathDefaults, AJobFileIsGivenWhatItLeavesToThePrinter) {
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.err + outcome.out;
   };
-  const std::string walls = "job.toml names no fill.walls: 1 is laid",
+  const std::string walls = "job.toml names no fill.walls: the default is 1",
                     layers = "names no layers.thickness_mm: layers are 0.2 mm";
   EXPECT_NE(said("").find(walls), std::string::npos);
   EXPECT_NE(said("").find(layers), std::string::npos);

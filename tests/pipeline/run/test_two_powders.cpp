@@ -380,7 +380,8 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
     EXPECT_NE(summary.error().message.find(what), std::string::npos) << summary.error().message;
     EXPECT_EQ(summary.error().message.find('\n'), std::string::npos);
   };
-  refused({"bronze", "stel"}, named, "no vat of nuferbj holds it: 'stel' is none of bronze, steel; did you mean 'steel'?");
+  refused({"bronze", "stel"}, named,
+          "no vat of nuferbj holds it: unknown value 'stel'; use one of bronze, steel; did you mean 'steel'?");
   refused({"a", "b", "c"}, "nuferbj", "the parts are of 3 materials (a, b, c), nuferbj has 2 vats");
   refused({"a", "b"}, "hp45", "the parts are of 2 materials (a, b), hp45 has one vat");
   refused({"a", ""}, "nuferbj", "has none; name that of every part, or of none");
