@@ -53,10 +53,11 @@ function(lamina_unity target)
 endfunction()
 
 # Links a program with the libraries before its own objects. Of an inline function that several objects contain the linker keeps the
-# first: this way the one that the stages optimise, not that of a test at -O0 or of what runs once a job at -O1.
+# first: this way the one that the stages optimise, not that of a test at -O0 or of what runs once a job at -O1. Objects and not the
+# archives, in which what runs once a job comes first.
 function(lamina_libraries_first target)
-  target_link_options(${target} BEFORE PRIVATE -Wl,--whole-archive $<TARGET_FILE:lamina_stages> $<TARGET_FILE:lamina_pipeline>
-                                               -Wl,--no-whole-archive)
+  target_link_options(${target} BEFORE PRIVATE $<TARGET_OBJECTS:lamina_stages> $<TARGET_OBJECTS:lamina_pipeline>
+                                               $<TARGET_OBJECTS:lamina_stages_once_a_job> $<TARGET_OBJECTS:lamina_once_a_job>)
 endfunction()
 
 include(GNUInstallDirs)
@@ -64,11 +65,11 @@ include(GNUInstallDirs)
 # --- stages: what is done
 lamina_sources(stage_sources "stages/*.cpp")
 list(FILTER stage_sources EXCLUDE REGEX "/stages/(view/picture|calibration/scan)/")
-# What runs once a job or once a file is compiled to be compiled fast.
+# What runs once a job or once a file is compiled to be compiled fast; what does the work of facets or layers is optimised.
 set(stages_once_a_job ${stage_sources})
 list(FILTER stages_once_a_job INCLUDE REGEX "/stages/(calibration/chart/|formats/(chart|plot)/|formats/image_format|formats/images/stack_info|\
-load/(planned|source|threemf/(archive|extensions|placement|roles))|program/(bed|dialect|maintenance|vats)|support/(io|late)/|\
-support/text/(escape|json_|readable|toml|value)|view/)")
+load/(source|threemf/(archive|extensions|roles))|program/(dialect|maintenance|vats)|support/(io|late)/|\
+support/text/(escape|json_|readable|toml|value)|view/(cast|drawable_layers|pore_picture|report/page))")
 list(REMOVE_ITEM stage_sources ${stages_once_a_job})
 add_library(lamina_stages_once_a_job OBJECT ${stages_once_a_job})
 
@@ -147,7 +148,9 @@ endif()
 set(lamina_libraries lamina_stages lamina_stages_once_a_job lamina_once_a_job lamina_pipeline)
 if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
   # A library of nothing else: g++ 12 takes headers parsed at -O3 for sources at -O1, but not the other way round.
-  file(TOUCH ${PROJECT_BINARY_DIR}/precompiled.cpp)
+  if(NOT EXISTS ${PROJECT_BINARY_DIR}/precompiled.cpp)
+    file(TOUCH ${PROJECT_BINARY_DIR}/precompiled.cpp)
+  endif()
   add_library(lamina_precompiled OBJECT ${PROJECT_BINARY_DIR}/precompiled.cpp)
   target_link_libraries(lamina_precompiled PRIVATE TBB::tbb Eigen3::Eigen fmt::fmt)
   target_precompile_headers(lamina_precompiled PRIVATE cmake/precompiled.h)

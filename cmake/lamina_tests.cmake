@@ -15,7 +15,8 @@ target_link_libraries(lamina_test_support PUBLIC lamina::pipeline GTest::gtest n
 target_compile_definitions(lamina_test_support PUBLIC LAMINA_TEST_DIR="${PROJECT_SOURCE_DIR}/tests"
                            LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
 # Tests are compiled without optimisation, in two thirds of the time; what they call is optimised, and so is the slow reference of the bitmaps.
-target_compile_options(lamina_test_support PUBLIC -O0 -fno-sanitize=undefined)
+# A library's options come after the program's own: a program that is optimised says so by a property.
+target_compile_options(lamina_test_support PUBLIC $<IF:$<BOOL:$<TARGET_PROPERTY:LAMINA_OPTIMISED>>,-O1,-O0> -fno-sanitize=undefined)
 if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")  # as in lamina_targets.cmake
   target_precompile_headers(lamina_test_support PRIVATE tests/precompiled.h)
 endif()
@@ -64,7 +65,7 @@ foreach(folder run pores_of_jobs ${folders})
                         PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
   lamina_libraries_first(test_${folder})
   if(LAMINA_SANITIZE AND folder IN_LIST lamina_test_optimised)
-    target_compile_options(test_${folder} PRIVATE -O1)
+    set_target_properties(test_${folder} PROPERTIES LAMINA_OPTIMISED ON)
   elseif(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
     target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
   endif()

@@ -43,7 +43,7 @@ struct DesignedJob {
 /// The printer, if pores are designed for it. errors  kUsage, of --machine
 Result<ExtruderProfile> designable_extruder(const std::string& machine);
 
-/// Searches by slots (segment/design/slots.h), runs the plan forward, corrects the slots by what that says, and searches again
+/// Searches by slots (segment/design.h), runs the plan forward, corrects the slots by what that says, and searches again
 /// until every target is met, or the corrected slots show that none within the machine's limits meets them.
 /// returns  the best forward run, even if it misses the target
 /// advance  receives the progress, 0 .. 1; false stops

@@ -38,7 +38,7 @@ Status append_lines(const ContoursView& region, const FillContext& context, cons
   return {};
 }
 
-/// Closed curves from the edge of the region inwards, numbered as their places: all that fit, or `most` of them. Leaves in
+/// Closed curves from the edge of the region inwards, numbered as their places: all that fit, or `maximum` of them. Leaves in
 /// `region` what the place of the next one encloses.
 Status append_curves(Contours& region, const FillContext& context, const FillParameters& parameters, std::uint32_t maximum,
                      Toolpaths& out) {

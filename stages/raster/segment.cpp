@@ -17,6 +17,7 @@ constexpr double kNearNm = 1.5;
 std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes, Isa isa) {
   const std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes, isa);
   std::vector<ClusteredMesh> clustered;
+  clustered.reserve(meshes.size());
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     clustered.push_back({blocks[i], blocks[i]->bounds(), blocks[i]->first_cap(), meshes[i].closed});
   }

@@ -76,6 +76,7 @@ struct Slots {
   double throat_mm = 0;        // the largest ball that passes along z
 };
 
+/// Layers lie upon each other without a turn, so pores of all layers make one channel next to each thin segment, along z.
 /// Beads are stadia as high as their layer, with round ends; one narrower than its layer is high is round. They keep their
 /// widths where they overlap. At each position along the line the fluid flows along z through a gap that varies with height:
 /// its resistance is the mean over the layer of 12 / gap^3. What flows along the line and across it is left out, and that

@@ -24,6 +24,8 @@
 
 namespace lamina::segment {
 
+// --- the pores that thin segments leave
+
 /// Where the lines of one part in a layer lie, and how far each is from those numbered one less and one more.
 class LineNeighbours {
  public:
@@ -114,6 +116,8 @@ class PoreCounter {
 /// memory  12 bytes a thin stretch above. cost  O((thin + thin above) log (thin above)) and the lines that a stretch crosses
 void count_crossed(const ToolpathsView& paths, const LayerCut& cut, const ToolpathsView& above, const LayerCut& cut_above,
                    PoreCounts& counts);
+
+// --- moves
 
 /// What a machine does for each kind of stretch in a layer; made anew only where the stored width changes.
 class MoveTable {

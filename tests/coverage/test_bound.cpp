@@ -156,9 +156,11 @@ TEST(LayerBound, HoldsForRealPartsAndIsNear) {
     }
   }
   EXPECT_GT(sums.layers, 300u / kThinned);
-  EXPECT_LT(sums.reported_facets, 1.2 * sums.facets);
-  EXPECT_LT(sums.reported_runs, 12 * sums.runs);  // 3 where facets are some voxels large
-  EXPECT_LT(sums.reported_bytes, 5 * sums.bytes);
+  if (kThinned == 1) {  // how near, over all of the layers
+    EXPECT_LT(sums.reported_facets, 1.2 * sums.facets);
+    EXPECT_LT(sums.reported_runs, 12 * sums.runs);  // 3 where facets are some voxels large
+    EXPECT_LT(sums.reported_bytes, 5 * sums.bytes);
+  }
   std::cout << sums.layers << " layers: facets told " << sums.reported_facets / sums.facets << " times, runs "
             << sums.reported_runs / sums.runs << ", scratch " << sums.reported_bytes / sums.bytes << '\n';
 }

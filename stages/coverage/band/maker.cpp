@@ -17,7 +17,7 @@ using Rational = mpq_class;
 
 Rational rational(std::int64_t whole) { return Rational(static_cast<long>(whole)); }
 
-/// nm.
+/// A box of the second contract (coverage.h), nm.
 struct Voxel {
   std::int64_t x0, x1, y0, y1, z0, z1;
 };
@@ -440,4 +440,5 @@ void BandMaker::make(const BandSlab& slab, std::uint32_t first, std::uint32_t ro
   }
   std::erase_if(active_, [&](const Trapezoid& piece) { return piece.first_row >= first; });
 }
+
 }  // namespace lamina::coverage

@@ -37,7 +37,7 @@ struct alignas(64) BoxLanes {
 
 /// Facets with area, coordinate by coordinate, and four planes of each: its own, and through each edge the one that stands on
 /// it and faces away from the facet. A plane's value at p is normal . (p - corner 0), less `offset` where it does not hold
-/// corner 0; what rounding can change of it is below `room` x the sum of |p - corner 0| along the axes (and `reach` for that
+/// corner 0; what rounding can change of it is below `slack` x the sum of |p - corner 0| along the axes (and `reach` for that
 /// one).
 struct alignas(64) FacetGroup {
   Nm corner[3][3][kGroupSize];  // [corner][axis][lane]

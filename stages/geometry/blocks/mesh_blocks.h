@@ -85,7 +85,7 @@ class MeshBlocks {
   /// Of each cluster, nm.
   std::span<const Box> bounds() const { return bounds_; }
 
-  /// A cluster, where it is stored or expanded into `room`; the reference lives as long as both.
+  /// A cluster, where it is stored or expanded into `unpacked`; the reference lives as long as both.
   const Cluster& cluster(std::uint32_t index, Cluster& unpacked) const {
     const ClusterSlot position = slot_of(index);
     if (position.block.vertices == 0) return position.block.plain()[position.cluster];

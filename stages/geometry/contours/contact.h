@@ -64,6 +64,7 @@ inline std::int64_t doubled_area(Point2 a, Point2 b, Point2 p) {
 }
 
 inline int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
+/// 1: p lies left of the line from a to b, -1: right of it, 0: on it.
 inline int side_of(Point2 a, Point2 b, Point2 p) { return sign(doubled_area(a, b, p)); }
 
 /// Whether the boxes around stretches ab and cd share a point.

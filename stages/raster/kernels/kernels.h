@@ -151,7 +151,8 @@ struct Kernels {
   /// Fetches an indexed cluster's corners.
   void (*load_sides)(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
 
-  /// Slabs are 2^shift nm high and counted from `first`, and no more than 2^13.
+  /// Bounds what a plane can meet of each facet, slab by slab. Slabs are 2^shift nm high and counted from `first`, and no more
+  /// than 2^13.
   void (*raise_tents)(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
 };
 

@@ -1,4 +1,5 @@
-// stages/support/text/number_text.h: strict parsing of numbers in options and job files.
+// stages/support/text/number_text.h: numbers in text: read strictly from options and job files, written for people and for
+// G-code, and the cells of tables.
 //
 // The whole text must be one finite number: "12mm", "1e999", "nan" and "inf" are errors.
 // Every reader returns an empty string, or an error with the valid form, to follow the option's name.
