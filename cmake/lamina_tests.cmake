@@ -149,7 +149,7 @@ add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
 set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
 # The longest begin first, so that no core waits for the last of them.
 set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart Documentation.EveryExampleOfEveryCommandRuns
-                     Golden.EveryJobWritesTheBytesOfTheTable PROPERTIES COST 100)
+                     Documentation.EveryCommandOfTheGuidesPrintsWhatTheySay Golden.EveryJobWritesTheBytesOfTheTable PROPERTIES COST 100)
 if(LAMINA_PYTHON)
   add_test(NAME Python.ArraysAreTheDecodedFilesOfTheProgram
            COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/python/test_module.py $<TARGET_FILE:lamina>)

@@ -165,7 +165,7 @@ void check_shards(const std::vector<ShardRange>& shards, std::uint32_t layers, F
   for (const ShardRange& one : shards) {
     const auto [index, of] = one.shard;
     if (of != count)
-      return faults.add(fmt::format("{}: is a shard of another number of shards than {}", one.name, shards[0].name));
+      return faults.add(fmt::format("{}: divides the layers into another number of shards than {}", one.name, shards[0].name));
     missing(index, one.first_layer);
     next = std::max(next, index + 1);
     layer = one.last_layer;

@@ -290,7 +290,7 @@ void add_pores(const std::string& path, Summary& summary) {
                         : fmt::format("; along {} paths {:.3f} times as long, throat {:.3f} mm", "xyz"[a],
                                       analysis.tortuosities[a].mean, analysis.throat_mm[a]);
   }
-  summary.results.emplace_back("tortuosity", std::move(tortuosities));
+  summary.results.emplace_back("paths", std::move(tortuosities));
   const pores::PoreSizes& sizes = analysis.sections.sizes;
   if (!sizes.pores.empty()) {
     summary.results.emplace_back("widths", histogram_line(histogram(sizes, false)));

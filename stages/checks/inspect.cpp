@@ -335,10 +335,10 @@ void report(const Findings& findings, std::span<const std::string> part, double 
   };
   if (islands.count > 0) {
     warn("islands", islands.spot,
-         fmt::format(
-             "{} of {} with nothing below, the largest of {:.3g} mm2 {}: only powder supports them until they join a part; "
-             "turn the part, or spread the first layers above them carefully",
-             of(islands.count, "piece", "pieces"), of(islands.layers, "layer", "layers"), islands.largest, at(islands.spot)));
+         fmt::format("{} of {} with nothing below, the largest of {:.3g} mm2 {}: only powder supports them until they join a "
+                     "part; turn the part, or spread the first layers above them carefully",
+                     of(islands.count, "piece", "pieces"), of(islands.layers, "layer", "layers"), islands.largest,
+                     at(islands.spot)));
   }
   if (loose.count > 0) {
     warn("loose", loose.spot,
@@ -354,10 +354,9 @@ void report(const Findings& findings, std::span<const std::string> part, double 
   }
   if (thin.count > 0) {
     warn("thin", thin.spot,
-         fmt::format(
-             "{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may break; make them thicker, or set a "
-             "smaller --min-wall",
-             of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)));
+         fmt::format("{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may break; make them thicker, or "
+                     "set a smaller --min-wall",
+                     of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)));
   }
   for (const Findings::Touching& pair : touching) {
     const std::string parts = pair.part == pair.other

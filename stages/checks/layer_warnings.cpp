@@ -55,9 +55,8 @@ bool RowWarnings::note(Rows& reported, const Layer& layer, std::uint32_t rows, s
 void RowWarnings::report(const std::string& part, std::vector<Warning>& warnings) const {
   capped_.layers.warn(
       "rows-capped",
-      fmt::format(
-          "{}: {} rows in {} layers are closed only by the caps over its openings, first {}; check the part with `lamina info`",
-          part, capped_.rows, capped_.layers.count, capped_.position),
+      fmt::format("{}: {} rows in {} layers are closed only by the caps over its openings, first {}; see `lamina info`", part,
+                  capped_.rows, capped_.layers.count, capped_.position),
       warnings, part);
   open_.layers.warn("rows-open",
                     fmt::format("{} rows in {} layers stay open, first {}; each is drawn up to its last crossing; leave out "
@@ -108,7 +107,7 @@ void LayerRecords::add(const Layer& layer, std::uint64_t set_pixels, std::uint64
 Status LayerRecords::check(std::span<const PartSummary> parts, bool thins, bool allow_empty,
                            std::vector<Warning>& warnings) const {
   const bool nothing = std::ranges::find(filled_, 1) == filled_.end();
-  constexpr std::string_view kHint = "check the parts with `lamina info`, and the summary of a shard";
+  constexpr std::string_view kHint = "see `lamina info` of the parts, and the summary of a shard";
   if (nothing && !allow_empty) {
     return Error{Fault::kInput,
                  fmt::format("not one pixel in {} layer{}, so nothing is merged: {}; --allow-empty merges anyway",
@@ -129,9 +128,8 @@ void LayerRecords::report(std::span<const PartSummary> parts, std::vector<Warnin
   const std::string part = parts.size() == 1 ? one_line(parts.front().path) : std::string();
   capped_layers_.warn(
       "rows-capped",
-      fmt::format(
-          "{}{} rows in {} layers are closed only by the caps over openings, first in {}; check the parts with `lamina info`",
-          part.empty() ? "" : part + ": ", capped_, capped_layers_.count, capped_layers_.first),
+      fmt::format("{}{} rows in {} layers are closed only by the caps over openings, first in {}; see `lamina info`",
+                  part.empty() ? "" : part + ": ", capped_, capped_layers_.count, capped_layers_.first),
       warnings, part);
 }
 
@@ -157,13 +155,11 @@ void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings) {
   if (powder.pixels == 0) return;
   ReportedLayers first;
   first.add(powder.first);
-  first.warn(
-      "mixed-powders",
-      fmt::format(
-          "{} pixels of {} in {} layers are in another powder, whose vat feeds those layers, first in {}; --vat-rule sets "
-          "which vat feeds, and refuse ends such a job",
-          readable_count(powder.pixels), one_line(powder.name), powder.layers, first.first),
-      warnings);
+  first.warn("mixed-powders",
+             fmt::format("{} pixels of {} in {} layers are in another powder, whose vat feeds those layers, first in {}; "
+                         "--vat-rule sets which vat feeds, refuse ends such a job",
+                         readable_count(powder.pixels), one_line(powder.name), powder.layers, first.first),
+             warnings);
 }
 
 Status refuse_warnings(std::span<const Warning> warnings) {

@@ -151,8 +151,7 @@ Status check_volumes(const Tally& tally, const Sampling& sampling, std::vector<W
     const Group& group = groups[one.at];
     const double planned = tally.planned_mm3(one.at);
     std::string why = too_coarse(group.box, sampling);
-    if (why.empty())
-      why = "its walls are too thin, or its shells overlap, cancel or are inside out: check it with `lamina info`";
+    if (why.empty()) why = "its walls are too thin, or its shells overlap, cancel or are inside out: see `lamina info`";
     const double mesh = planned > group.max_mm3 ? group.max_mm3 : group.min_mm3;
     warnings.push_back({"volume",
                         fmt::format("{}: {} are planned where the mesh contains {} ({:.0f} %){}; {}", sampling.part[part],
@@ -195,7 +194,7 @@ void check_lost(const Tally& tally, const Sampling& sampling, std::vector<Warnin
   for_each_part(worst, [&](std::uint32_t part, const Worst& one) {
     std::string why = too_coarse(tally.solids()[one.at].box, sampling);
     if (why.empty() && sampling.offset_mm < 0) why = fmt::format("--offset {} leaves none", number_text(sampling.offset_mm));
-    if (why.empty()) why = "its walls are too thin, or its shells cancel each other: check it with `lamina info`";
+    if (why.empty()) why = "its walls are too thin, or its shells cancel each other: see `lamina info`";
     warnings.push_back({"part-lost",
                         fmt::format("{}: no layer has anything of it{}; {}", sampling.part[part], and_more(one), why),
                         sampling.part[part]});
@@ -370,7 +369,7 @@ Status check_anything(const Tally& tally, const Sampling& sampling) {
   }
   if (sampling.offset_mm < 0)
     return because(fmt::format("--offset {} leaves none of the parts", number_text(sampling.offset_mm)));
-  return because("the shells of the parts enclose nothing or cancel each other: check them with `lamina info`");
+  return because("the shells of the parts enclose nothing or cancel each other: see `lamina info`");
 }
 
 std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span<const Instance> instances,

@@ -205,11 +205,9 @@ Status Budget::check(bool allow_unbound, std::vector<Warning>& warnings) const {
   }
   if (!peaks_.where.empty()) {
     warnings.push_back(
-        {"saturation",
-         fmt::format(
-             "--saturation: the formula comes to {:.1f} % somewhere in the boxes of the parts, which needs more than the {} "
-             "drops a pixel that may be jetted; pixels there get {:.1f} %, in {}",
-             peaks_.requested, limit_, peaks_.gets, where(peaks_.where))});
+        {"saturation", fmt::format("--saturation: the formula comes to {:.1f} % somewhere in the boxes of the parts, which "
+                                   "needs more than the {} drops a pixel that may be jetted; pixels there get {:.1f} %, in {}",
+                                   peaks_.requested, limit_, peaks_.gets, where(peaks_.where))});
   }
   warn_of_none(warnings);
   if (no_formula_) return *no_formula_;

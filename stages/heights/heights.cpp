@@ -464,8 +464,8 @@ Result<std::string> check_build_steps(const Machine& machine, const LayerTable& 
   }
   if (off == 0) return std::string();
   return fmt::format(
-      "{} of {} layers, first {}, end between the {:g} mm steps of {}'s build vat, off by up to {:g} mm, which the machine "
-      "cannot reach; use thicknesses of whole steps",
+      "{} of {} layers, first {}, end between the {:g} mm steps of {}'s build vat, off by up to {:g} mm, which the "
+      "machine cannot reach; use thicknesses of whole steps",
       off, table.size(), first, mm(step), machine.name, mm(maximum));
 }
 

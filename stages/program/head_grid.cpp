@@ -278,12 +278,9 @@ Result<HeadGrid> make_head_grid(const Machine& machine) { return Builder(machine
 void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
   const std::uint32_t apart = grid.swath_lines() - grid.overlap;
   if (grid.joint_shift == 0 || grid.joint_shift % apart != 0) return;
-  warnings.push_back(
-      {"stitching",
-       fmt::format(
-           "{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so the stitch lines of all layers coincide; give "
-           "a number that repeats late, as {}",
-           machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});
+  warnings.push_back({"stitching", fmt::format("{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so the stitch "
+                                               "lines of all layers coincide; give a number that repeats late, as {}",
+                                               machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});
 }
 
 Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {

@@ -162,11 +162,9 @@ class Checker {
     if (Status status = check_reach(); !status) return status;
     const auto check = [&](std::string_view key, const Under& box) -> Status {
       if (!over_bed(machine_, grid_, box)) return {};
-      return wrong(
-          key,
-          fmt::format("nozzles are over the bed there, x {:.2f} to {:.2f} and y {:.2f} to {:.2f} mm of it; give the carriage a "
-                      "position outside of it",
-                      box.low[0], box.high[0], box.low[1], box.high[1]));
+      return wrong(key, fmt::format("nozzles are over the bed there, x {:.2f} to {:.2f} and y {:.2f} to {:.2f} mm of it; give "
+                                    "a carriage position outside of it",
+                                    box.low[0], box.high[0], box.low[1], box.high[1]));
     };
     for (const auto& [key, at] :
          {std::pair("maintenance.spit_mm", maintenance_.spit_mm), {"maintenance.cap_mm", maintenance_.cap_mm}}) {

@@ -321,10 +321,9 @@ Result<View> find_marks(const Photo& photo, const Chart& chart) {
     if (const Best found = search_fourth(photo, chart, guess); found.contrast > three.contrast) three = found;
   }
   if (three.contrast > kMinOfThree) return three.view;
-  return Error{
-      Fault::kInput,
-      "the chart is not found: the photograph has to show three of its ring and discs in full, must not be mirrored, and has "
-      "to be sharp enough to resolve the dashes"};
+  return Error{Fault::kInput,
+               "the chart is not found: the photograph must show three of its ring and discs in full, unmirrored, and "
+               "sharp enough to resolve its dashes"};
 }
 
 }  // namespace lamina::calibration

@@ -41,12 +41,9 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   if (!view) return view.error();
   const Spot m = middle_of({0, 0, chart.columns, chart.rows}, chart);
   if (const double pixels = view->pixels_a_mm(m.x, m.y); pixels * chart.between_mm < kClosest)
-    return Error{
-        Fault::kInput,
-        fmt::format(
-            "the photograph has {:.1f} pixels per mm; at least {:.0f} are needed to resolve the dashes: photograph the chart "
-            "from closer",
-            pixels, std::ceil(kClosest / chart.between_mm))};
+    return Error{Fault::kInput, fmt::format("the photograph has {:.1f} pixels per mm; at least {:.0f} are needed to resolve "
+                                            "the dashes: photograph the chart from closer",
+                                            pixels, std::ceil(kClosest / chart.between_mm))};
   ChartReading reading;
   reading.fit = {*view, std::vector<Spot>(chart.swaths), std::vector<Spot>(chart.nozzles)};
   const bool settled = settle(photo, chart, reading);
@@ -61,10 +58,9 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   reading.head = read_head(chart, reading.dashes, printed, reading.fit, there >= kEnoughForLens);
   reading.inks = read_inks(photo, chart, reading.fit, reading.head);
   if (reading.inks.bars_detected > 0 && reading.inks.full < kFaintBar * photo.ink)
-    return Error{
-        Fault::kInput,
-        "the chart is found, but its bars are not where they should be: photograph it with all four marks and nothing else "
-        "around it"};
+    return Error{Fault::kInput,
+                 "the chart is found, but its bars are not where they should be: photograph it with all four marks and "
+                 "nothing else around it"};
   reading.stitches = read_stitches(photo, chart, reading.fit, reading.head, reading.inks);
   return reading;
 }

@@ -224,8 +224,8 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
   const std::int64_t bottom = layer.layer.bottom, top = bottom + layer.layer.thickness;
   if (in_units(bottom, unit) == in_units(top, unit)) {
     return refuse(fmt::format(
-        "{} mm of thickness are lost in the unit of {} mm, which 16 bits need to reach all; give thicker layers, or move the "
-        "parts nearer to the bed's corner with --at",
+        "{} mm of thickness are lost in the unit of {} mm, which 16 bits need to reach all; give thicker layers, or move "
+        "the parts nearer to the bed's corner with --at",
         mm(layer.layer.thickness), mm(unit)));
   }
   const auto outside = [&](Point2 p) {

@@ -123,9 +123,8 @@ std::string other_layer(const std::string& description, const Layer& layer) {
     return {};
   const std::int64_t lies = layer.bottom, ends = lies + layer.thickness;
   if (number == std::uint64_t{layer.index} + 1 && nm_of(bottom) == lies && nm_of(top) == ends) return {};
-  return fmt::format("its description says {}, the manifest says layer {} from {} to {} mm",
-                     text.substr(0, static_cast<std::size_t>(end)), std::uint64_t{layer.index} + 1, number_text(mm(lies)),
-                     number_text(mm(ends)));
+  return fmt::format("describes {}, the manifest says layer {} from {} to {} mm", text.substr(0, static_cast<std::size_t>(end)),
+                     std::uint64_t{layer.index} + 1, number_text(mm(lies)), number_text(mm(ends)));
 }
 
 }  // namespace

@@ -153,8 +153,7 @@ Status measure_floor(const std::vector<std::string>& parts, const std::string& n
   if (floor.files > 0) {
     const Result<FileTarget> target = find_target(neighbour);
     if (!target) return target.error();
-    if (target->file.empty())
-      return Error{Fault::kOutput, neighbour + ": is not a file; the write limit is measured next to a file"};
+    if (target->file.empty()) return Error{Fault::kOutput, neighbour + ": is not a file; the limit is measured next to one"};
     const Names names(target->file);
     const Result<double> written = middle_seconds([&] { return write_files(names, cancel, block, floor); });
     if (!written) return written.error();

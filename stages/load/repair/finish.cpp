@@ -34,8 +34,7 @@ Status check_solid(const Mesh& mesh, const RepairReport& report) {
   if (held.nothing()) return hollow("its facets enclose nothing");
   const double before = std::fabs(report.volume_before_mm3);
   if (held.volume_mm3 >= before / 2) return {};
-  return hollow(
-      fmt::format("its facets are separated: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before));
+  return hollow(fmt::format("its facets are separate: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before));
 }
 
 /// By how much of itself the volume of a welded mesh may be off: 0.02 is 2 %. Corners that lie apart by chance lie as far from

@@ -360,10 +360,9 @@ void find_cavities(const ModelPackage& package, std::vector<Leaf>& leaves, std::
     search.item(leaves, begin, end);
   }
   if (search.gave_up())
-    notes.push_back(
-        {true,
-         "has too many nested objects to detect all voids: inside-out objects that are not reported as voids are planned as "
-         "solids"});
+    notes.push_back({true,
+                     "has too many nested objects to detect all voids: inside-out objects that are not reported as voids are "
+                     "planned as solids"});
 }
 
 }  // namespace
