@@ -202,11 +202,10 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
         {"segment", "continuous_lines", "--continuous", "N", "continuous lines between two segmented ones"}, {1, 1000}),
     field<&SegmentSettings::first>({"segment", "first_line", "", "N", "number of a segmented line"}, {-1000, 1000}),
     field<&SegmentSettings::spacing_sc_mm>(
-        {"segment", "spacing_sc_mm", "--spacing-sc", "MM",
-         "spacing of a segmented line and the adjacent continuous one, centre to centre; default: from the widths"},
+        {"segment", "spacing_sc_mm", "--spacing-sc", "MM", "spacing of a segmented and a continuous line; default: by widths"},
         kAny),
     field<&SegmentSettings::spacing_cc_mm>(
-        {"segment", "spacing_cc_mm", "--spacing-cc", "MM", "spacing of adjacent continuous lines, centre to centre"}, kAny),
+        {"segment", "spacing_cc_mm", "--spacing-cc", "MM", "spacing of adjacent continuous lines"}, kAny),
     field<&SegmentSettings::gap_mm>({"segment", "gap_mm", "--segment-gap", "MM",
                                      "wanted between thick beads and their neighbours, for spacings from the widths"},
                                     kAny),
@@ -223,17 +222,14 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
                                                "speeds of thin stretches, from one segmented line to the next: a test piece"},
                                               kAny),
     field<&SegmentSettings::thin_extrusion_sweep>(
-        {"segment", "thin_extrusion_sweep", "", "%,%,...", "extrusions of thin segments of the lines, in order, in percent"},
-        kAny),
+        {"segment", "thin_extrusion_sweep", "", "%,%,...", "extrusion of thin segments, line by line"}, kAny),
     field<&SegmentSettings::thick_width_mm>({"segment", "thick_width_mm", "--thick-width", "MM",
                                              "width that thick stretches will have; by the calibration if absent"},
                                             kAny),
-    field<&SegmentSettings::thin_width_mm>(
-        {"segment", "thin_width_mm", "--thin-width", "MM", "width of thin segments in mm; default: measured widths"}, kAny),
-    field<&SegmentSettings::continuous_width_mm>(
-        {"segment", "continuous_width_mm", "", "MM", "width of continuous lines in mm; default: measured widths"}, kAny),
-    field<&SegmentSettings::one_direction>(
-        {"segment", "one_direction", "", "", "extrude all segmented lines in the same direction"}),
+    field<&SegmentSettings::thin_width_mm>({"segment", "thin_width_mm", "--thin-width", "MM", "width of thin segments"}, kAny),
+    field<&SegmentSettings::continuous_width_mm>({"segment", "continuous_width_mm", "", "MM", "width of continuous lines"},
+                                                 kAny),
+    field<&SegmentSettings::one_direction>({"segment", "one_direction", "", "", "extrude all lines in one direction"}),
     field<&SegmentSettings::even_starts>(
         {"segment", "even_starts", "", "", "lines begin with the flow they keep, where the machine's material.lag_s is known"}),
     field<&SegmentSettings::shift_mm>({"segment", "shift_mm", "--pore-shift", "MM[,MM...]",

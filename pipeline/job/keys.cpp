@@ -106,9 +106,8 @@ constexpr auto kHeights = &Job::heights;
 constexpr Limits kLength{kMinMm, kMaxMm, " mm"}, kArea{0, 1e9, " mm2"};
 
 const JobKey kHeightsKeys[] = {
-    word<kModes, kHeights, &Request::mode>(
-        heights_key("mode", "--heights", "MODE",
-                    "how layers are decided: uniform, angle, cusp, stepwise, optimal; see docs/theory/heights.md")),
+    word<kModes, kHeights, &Request::mode>(heights_key(
+        "mode", "--heights", "MODE", "layer heights: uniform, angle, cusp, stepwise, optimal (docs/theory/heights.md)")),
     custom<Job, read_thickness_text, same_text, kHeights, &Request::thickness_mm>(
         heights_key(
             "thickness_mm", "--thickness", "SET|RANGE",
@@ -127,12 +126,10 @@ const JobKey kHeightsKeys[] = {
         heights_key("peak_angle_deg", "--peak-angle", "DEG", "facets at least this flat, and level, are horizontal faces"),
         {45, 90, " degrees"}),
     field<kHeights, &Request::normal_tolerance>(
-        heights_key("normal_tolerance", "", "",
-                    "tolerance of the vertical component of a facet's normal, in all comparisons of angles"),
-        {0, 0.1}),
+        heights_key("normal_tolerance", "", "", "tolerance of a facet's normal in comparisons of angles"), {0, 0.1}),
     word<kFacets, kHeights, &Request::facets>(
         heights_key("facets", "--facets", "range|plane",
-                    "facets that decide a layer: those within it, or only those that its bounding plane cuts (Lima 2009)")),
+                    "facets that decide a layer: all within it, or those that its plane cuts (Lima 2009)")),
     field<kHeights, &Request::min_facet_mm2>(
         heights_key("facet_mm2", "--facet-area", "MM2", "facets smaller than this do not affect layers"), kArea),
     word<kPeaks, kHeights, &Request::peaks>(
@@ -272,13 +269,11 @@ const JobKey kDoseKeys[] = {
                  "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it"),
         kBleedUm),
     field<&Job::dose, &DoseRequest::hole_bleed_um>(
-        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "bleed compensation at the edges of holes, if different"),
-        kBleedUm),
+        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "compensation at holes, if different"), kBleedUm),
     field<&Job::dose, &DoseRequest::first_bleed_um>(
-        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "bleed compensation of the first layers, if different"),
-        kBleedUm),
+        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "compensation of the first layers, if different"), kBleedUm),
     field<&Job::dose, &DoseRequest::first_layers>(
-        dose_key("first_layers", "--first-layers", "N", "number of layers that use --first-bleed"), {1, 1'000'000})
+        dose_key("first_layers", "--first-layers", "N", "layers that use --first-bleed"), {1, 1'000'000})
         .shown_if([](const Job& job) { return job.dose.first_layers != DoseRequest().first_layers; }),
     field<&Job::dose, &DoseRequest::shell_mm>(
         dose_key("shell_mm", "--shell", "MM",
@@ -286,23 +281,21 @@ const JobKey kDoseKeys[] = {
         {0, 1000, " mm"}),
     field<&Job::dose, &DoseRequest::core>(
         dose_key("core", "--core", "SHARE", "share of the pixels inside the shell that is jetted, 0 to 1"), {0, 1}),
-    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(dose_key(
-        "saturation_percent", "--saturation", "PERCENT|FORMULA",
-        "binder as a percentage of the powder's voids, by several drops per pixel if needed; a formula of x, y, z in mm")),
+    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(
+        dose_key("saturation_percent", "--saturation", "PERCENT|FORMULA",
+                 "binder in percent of the powder's voids, or a formula of x, y, z in mm")),
     structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::core_saturation_percent>(
         dose_key("core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
                  "saturation inside the shell (with --saturation and --shell)")),
     structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
         dose_key("saturation_range", "", "[{...}]", "other saturations between two heights above the bed")),
-    word<kLevels, &Job::levels>(dose_key("levels", "--levels", "2|4|16|off",
-                                         "grey levels by the exact fill fraction of each voxel, instead of by its centre"))
+    word<kLevels, &Job::levels>(dose_key("levels", "--levels", "2|4|16|off", "grey levels by the fill fraction of each voxel"))
         .with_form(Form::kBare)
         .shown_if([](const Job& job) { return job.levels > 0; }),
     field<&Job::dose, &DoseRequest::dithered>(
         dose_key("dithered", "--no-dither", "", "round drops to whole ones (with --levels or --saturation)", "false")),
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
-        dose_key("bead_ends", "--bead-ends", "round|square",
-                 "shape of both ends of the beads that fill a part, and of their thick and thin segments"))
+        dose_key("bead_ends", "--bead-ends", "round|square", "ends of beads and of their thick and thin segments"))
         .shown_if([](const Job& job) { return job.dose.bead_ends != BeadEnds::kRound; }),
 };
 
@@ -362,18 +355,15 @@ JobKey number(std::string_view name, std::string_view flag, std::string_view uni
 
 const JobKey kExtrudeKeys[] = {
     number<&ExtrudeRequest::flow>("flow", "--flow", "FACTOR", 0.01, 10, "factor on all that is extruded"),
-    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600,
-                                         "temperature of the nozzle in all layers"),
-    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "temperature of the bed in all layers"),
+    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600, "nozzle temperature"),
+    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "bed temperature"),
     number<&ExtrudeRequest::print_mm_s>("print_mm_s", "--print-speed", "MM/S", 0.1, 2000,
                                         "speed of filling lines; 100 % of segmented lines"),
     number<&ExtrudeRequest::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "speed of walls"),
     number<&ExtrudeRequest::first_layer_mm_s>("first_layer_mm_s", "--first-layer-speed", "MM/S", 0.1, 2000,
-                                              "speed limit of the first layer; thin segments are faster by their percentage"),
-    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000,
-                                         "speed of moves without extrusion"),
-    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50,
-                                           "retraction of filament before long travel moves"),
+                                              "speed limit of the first layer"),
+    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000, "travel speed"),
+    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50, "retraction before long travel moves"),
     number<&ExtrudeRequest::fan_percent>("fan_percent", "--fan", "%", 0, 100, "speed of the part cooling fan"),
     field<&Job::extrude, &ExtrudeRequest::relative_extrusion>({"extrude", "relative_extrusion", "--relative-extrusion",
                                                                "true|false", "count filament from move to move",
@@ -478,8 +468,7 @@ const JobKey kRunKeys[] = {
         .with_words(isa_words),
     field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
-        {"run", "memory", "--memory", "SIZE", "memory of the layers in flight, in addition to the mesh: 256M, 1G"},
-        Form::kString),
+        {"run", "memory", "--memory", "SIZE", "memory of layers in flight, without the mesh: 256M, 1G"}, Form::kString),
     word<kSyncs, &Job::sync>(
         {"run", "sync", "--sync", "WHEN",
          "data that survives a power cut: job, all of it once it has ended, for some 0.1 s; layer, all but the "
