@@ -58,7 +58,7 @@ Status check_together(std::string_view choice, const Arguments& arguments, const
   for (const JobKey& key : job_keys()) {
     if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;
     if (has(choice, key) && arguments.has(key.flag))
-      return at_option(key.flag, "is of segmented lines, and nothing is segmented; add --fill segmented");
+      return at_option(key.flag, "applies to segmented lines, and nothing is segmented; add --fill segmented");
   }
   return {};
 }
@@ -122,12 +122,14 @@ struct Need {
   std::string_view unmet;
   bool (*in_study)(Product, const Job&) = nullptr;  // of layers alone; nullptr: it affects any study
 };
-constexpr std::string_view kUniform = "is of layers that fit the part, and these are uniform; add --heights and --thickness",
-                           kSteps = "is of --heights cusp, stepwise and optimal; add one of them",
-                           kSlopes = "is of --heights angle, cusp and stepwise; add one of them",
-                           kAngle = "is of --heights angle; add it", kOptimal = "is of --heights optimal; add it",
-                           kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
-                           kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
+constexpr std::string_view kUniform =
+                               "applies to layers that fit the part, and these are uniform; add --heights and --thickness",
+                           kSteps = "applies to --heights cusp, stepwise and optimal; add one of them",
+                           kSlopes = "applies to --heights angle, cusp and stepwise; add one of them",
+                           kAngle = "applies to --heights angle; add it", kOptimal = "applies to --heights optimal; add it",
+                           kCovered = "applies to --heights angle and optimal, the others reach the top; add one of them",
+                           kShrinks =
+                               "applies to steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "applies to beads, but there are none; add --fill, --pattern or --walls",
                            kLines = "applies to lines, but there is no pattern; add --fill or --pattern";
 constexpr Need kNeeds[] = {
@@ -154,14 +156,14 @@ constexpr Need kNeeds[] = {
     {"--angle-step", deposits_lines, kLines},
     {"--stagger", deposits_lines, kLines},
     {"--print-speed", deposits_lines, "applies to filling lines, but there is no pattern; add --fill, or use --wall-speed"},
-    {"--segment-rule", cuts_lines, "is of lines; closed curves are cut by their length under every rule, leave it out"},
+    {"--segment-rule", cuts_lines, "applies to lines; closed curves are cut by their length under every rule, leave it out"},
     {"--spacing-cc", lies_in_pairs,
      "is between continuous lines, and one lies alone between segmented ones; add --continuous 2"},
-    {"--bridge", leaves_open, "is of open meshes, and repair closes them; add --no-repair"},
-    {"--title", writes_tiff, "is of TIFF, other images have no place for it; leave it out, or add --format tiff-g4"},
-    {"--weld", repairs, "is of repair, which is off; leave out one of the two"},
+    {"--bridge", leaves_open, "applies to open meshes, and repair closes them; add --no-repair"},
+    {"--title", writes_tiff, "applies to TIFF, other images have no place for it; leave it out, or add --format tiff-g4"},
+    {"--weld", repairs, "applies to repair, which is off; leave out one of the two"},
     {"--gap", arranges, "is between parts that are arranged, and --at places this one; leave out one of the two"},
-    {"--empty-first-layer", writes_cli, "is of CLI files; add --format cli or cli-binary"},
+    {"--empty-first-layer", writes_cli, "applies to CLI files; add --format cli or cli-binary"},
 };
 
 /// Options of what a printer that reads SML decides by itself: its files carry no heat, fans and speeds.

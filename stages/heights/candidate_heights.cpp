@@ -53,7 +53,7 @@ Result<ThicknessSet> read_range(std::string_view text, std::size_t dots) {
 }  // namespace
 
 Result<ThicknessSet> read_thicknesses(std::string_view text) {
-  if (text.empty()) return refused("holds no thickness; give a set as 0.178,0.254 or a range as 0.05..0.3:0.01");
+  if (text.empty()) return refused("contains no thickness; give a set as 0.178,0.254 or a range as 0.05..0.3:0.01");
   if (const std::size_t dots = text.find(".."); dots != std::string_view::npos) return read_range(text, dots);
   ThicknessSet set;
   for (const std::string_view piece : split(text, ",")) {

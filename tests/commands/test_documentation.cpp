@@ -48,7 +48,7 @@ TEST(Documentation, PagesOfCommandsAreThoseOfTheirDefinitions) {
     EXPECT_EQ(read_text(kRoot / "docs/reference/commands" / name), pipeline::markdown_page(pipeline::spec_of(*command)))
         << name;
     const std::string readme = read_text(kRoot / "README.md");
-    EXPECT_NE(readme.find("lamina " + std::string(command->name)), std::string::npos) << command->name;
+    EXPECT_NE(readme.find("commands/" + std::string(command->name) + ".md"), std::string::npos) << command->name;
   }
   EXPECT_TRUE(pages.empty()) << "docs/reference/commands/" << *pages.begin() << " is of no command";
 }

@@ -32,7 +32,7 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
     const std::string flag = std::string(row.flag).substr(0, std::string(row.flag).find(' '));
     EXPECT_EQ(refused.code, 2) << line << "\n" << refused.err;
     EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
-    EXPECT_NE(refused.err.find(flag + ": is "), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find(flag + ": applies to "), std::string::npos) << refused.err;
     const Outcome done = run(line + " " + row.remedy);
     EXPECT_EQ(done.code, 0) << line << " " << row.remedy << "\n" << done.err;
   }

@@ -141,10 +141,10 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
   const struct {
     const char *line, *words;
   } rows[] = {
-      {"jet part.stl --dry-run --no-repair --weld 5", "--weld: is of repair"},
+      {"jet part.stl --dry-run --no-repair --weld 5", "--weld: applies to repair"},
       {"jet part.stl --dry-run --no-repair --repair winding", "--no-repair and --repair exclude each other"},
       {"jet part.stl --dry-run --at 1,1 --gap 3", "--gap: is between parts"},
-      {"slice part.stl --dry-run --layer 1 --empty-first-layer", "--empty-first-layer: is of CLI files"},
+      {"slice part.stl --dry-run --layer 1 --empty-first-layer", "--empty-first-layer: applies to CLI files"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --fan 50", "--fan: is not in SML"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --nozzle-temperature 200",
        "--nozzle-temperature: is not in SML"},
@@ -154,17 +154,18 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --travel-speed 9", "--travel-speed: is not in SML"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --first-layer-speed 9",
        "--first-layer-speed: is not in SML"},
-      {"slice part.stl --dry-run --heights optimal --thickness 0.5,1 --facets plane", "--facets: is of --heights angle, cusp"},
-      {"heights part.stl --heights optimal --thickness 0.5,1 --facets plane", "--facets: is of --heights angle, cusp"},
-      {"slice part.stl --dry-run --layer 1 --bridge 0.5", "--bridge: is of open meshes"},
-      {"extrude part.stl --dry-run --walls 3 --print-speed 50", "--print-speed: is of lines that fill"},
+      {"slice part.stl --dry-run --heights optimal --thickness 0.5,1 --facets plane",
+       "--facets: applies to --heights angle, cusp"},
+      {"heights part.stl --heights optimal --thickness 0.5,1 --facets plane", "--facets: applies to --heights angle, cusp"},
+      {"slice part.stl --dry-run --layer 1 --bridge 0.5", "--bridge: applies to open meshes"},
+      {"extrude part.stl --dry-run --walls 3 --print-speed 50", "--print-speed: applies to filling lines"},
       {"extrude part.stl --dry-run --machine anet-a8 --layer 0.3 --fill segmented --spacing-cc 0.5",
        "--spacing-cc: is between continuous lines"},
       {"extrude part.stl --dry-run --machine anet-a8 --fill segmented --pattern contour --segment-rule fukuda",
        "--segment-rule: is of lines"},
       {"jet part.stl --dry-run --layer 1 --format png --title order", "--title: is of TIFF"},
-      {"heights part.stl --layer 1 --adapt-angle 30", "--adapt-angle: is of --heights angle"},
-      {"heights part.stl --layer 1 --time-model 3", "--time-model: is of --heights optimal"},
+      {"heights part.stl --layer 1 --adapt-angle 30", "--adapt-angle: applies to --heights angle"},
+      {"heights part.stl --layer 1 --time-model 3", "--time-model: applies to --heights optimal"},
       {"calibrate --machine anet-a8 --gap 0.1 -o pieces", "--gap: is of the profile"},
       {"calibrate --machine anet-a8 --exact-spacing -o pieces", "--exact-spacing: is of the profile"},
       {"preview out --step 3 -o a.png", "--step: needs a swath"},
@@ -193,8 +194,8 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"design --porosity 20 --machine fdm-2000", "--machine: fdm-2000 writes sml"},
       {"design --porosity 20 --machine ender", "--machine: no extrusion printer 'ender'"},
       {"design part.stl --porosity 20 --machine anet-a8", "'part.stl': not expected here"},
-      {"info part.stl --repair off --weld 3", "--weld: is of repair"},
-      {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: is of repair"},
+      {"info part.stl --repair off --weld 3", "--weld: applies to repair"},
+      {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: applies to repair"},
       {"export part.stl --at 1,1 --gap 3 -o x.stl", "--gap: is between parts"},
       {"report beads.gcode --parts part.stl -o a.html", "--parts: is of jobs of images"},
       {"preview beads.gcode --layer 2 --width 500 -o a.svg", "--width: applies to pictures of pixels"},
@@ -235,7 +236,7 @@ TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsReported) {
   EXPECT_EQ(done("extrude part.stl --dry-run --set fill.walls=2 --set run.threads=1").err.find("note:"), std::string::npos);
   EXPECT_EQ(done("jet part.stl --layer 1 --dry-run --fill raster --set fill.loops=2").err.find("note:"), std::string::npos);
   write_text(folder / "walls.toml", "[layers]\nthickness_mm = 1\n[fill]\nwalls = 2\n[[part]]\npath = 'part.stl'\n");
-  EXPECT_NE(done("jet --job walls.toml --dry-run").err.find("note: inside of the walls"), std::string::npos);
+  EXPECT_NE(done("jet --job walls.toml --dry-run").err.find("note: nothing is filled inside"), std::string::npos);
   EXPECT_EQ(done("jet --job walls.toml --dry-run --set fill.pattern=none").err.find("note:"), std::string::npos);
   const std::string slices = "slice part.stl --layer 1 --walls 1 --overwrite -o out --format ";
   const Outcome dropped = done(slices + "3mf"), drawn = done(slices + "svg");

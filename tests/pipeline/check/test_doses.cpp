@@ -114,7 +114,7 @@ TEST_F(DosesOnRecord, ShellsAndCoresLieBetweenTheirTargets) {
   make(job);
   EXPECT_EQ(faults(job), "");
   const std::uint64_t dosed = number(job, "dosed_pixels");
-  expect_found(with(job, {{"requested_drops", 6 * dosed}}), "with 1.5");
+  expect_found(with(job, {{"requested_drops", 6 * dosed}}), "with a target of 1.5");
   expect_found(with(job, {{"requested_drops", dosed}}), "to 5.2");
   expect_found(with(job, {{"dosed_pixels", dosed + 1}}), "each pixel gets a drop");
 }

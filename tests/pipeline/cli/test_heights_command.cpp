@@ -99,10 +99,10 @@ TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreReported) {
   const auto layers = nlohmann::json::parse(read_text(directory / "out/manifest.json"))["layers"];
   ASSERT_EQ(layers.size(), 20u);
   EXPECT_EQ(layers[19]["set_pixels"], layers[0]["set_pixels"]) << "the last layer is printed";
-  expect_refused("jet box.stl --cover-top -o no", 2, "--cover-top: is of --heights angle and optimal", directory);
+  expect_refused("jet box.stl --cover-top -o no", 2, "--cover-top: applies to --heights angle and optimal", directory);
   expect_refused("jet box.stl --heights cusp --thickness 0.1,0.2 --cusp-of nominal -o no", 2, "add --shrink", directory);
-  expect_refused("jet box.stl --heights optimal --thickness 0.1,0.2 --peaks facets -o no", 2, "--peaks: is of --heights angle",
-                 directory);
+  expect_refused("jet box.stl --heights optimal --thickness 0.1,0.2 --peaks facets -o no", 2,
+                 "--peaks: applies to --heights angle", directory);
 }
 
 // Pictures are drawn by lamina-preview.
@@ -171,9 +171,9 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
   const std::pair<std::vector<std::string>, const char*> calls[] = {
       {{"--heights", "cusp"}, "--thickness"},
       {{"--heights", "cups"}, "did you mean 'cusp'?"},
-      {{"--cover-top"}, "--cover-top: is of --heights angle and optimal"},
-      {{"--heights", "cusp", "--thickness", "0.1,0.2", "--cover-top"}, "--cover-top: is of --heights angle and optimal"},
-      {{"--cusp-of", "nominal"}, "--cusp-of: is of steps on parts that shrink"},
+      {{"--cover-top"}, "--cover-top: applies to --heights angle and optimal"},
+      {{"--heights", "cusp", "--thickness", "0.1,0.2", "--cover-top"}, "--cover-top: applies to --heights angle and optimal"},
+      {{"--cusp-of", "nominal"}, "--cusp-of: applies to steps on parts that shrink"},
       {{"--heights", "optimal", "--thickness", ""}, "--thickness: contains no thickness"},
       {{"--heights", "optimal", "--thickness", "0.3..0.1"}, "--thickness: the least thickness"},
       {{"--heights", "optimal", "--thickness", "0.05..0.3:0.1"}, "end at 0.25 mm and miss 0.3 mm"},
@@ -181,7 +181,7 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
       {{"--heights", "optimal", "--thickness", "0.1,0.2", "--cusp", "0"}, "--cusp: 0"},
       {{"--heights", "optimal", "--thickness", "0.1,0.2", "--time-model", "-1"}, "--time-model: -1"},
       {{"--thickness", "0.1,0.2"}, "uniform layers have one thickness"},
-      {{"--format", "xml"}, "--format: 'xml'"},
+      {{"--format", "xml"}, "--format: unknown value 'xml'"},
       {{"--plot", "plot.gif"}, "--plot plot.gif"},
       {{"--thickness", "0.1..0.3", "--compare", "--format", "rp3"},
        "--format rp3: holds one table, and --compare makes several"},

@@ -132,7 +132,7 @@ TEST(DesignedGradient, WrongEndsAndRegionsAreALine) {
       {"--porosity 20:24 --tops 3,high", "--tops: 'high'"},
       {"--porosity 20:24 --tops 3,9 --height 9", "--tops says all regions"},
       {"--porosity 20 --height 9", "--height: needs a gradient"},
-      {"--porosity 20 --tops 3,9", "--tops: is of a gradient"},
+      {"--porosity 20 --tops 3,9", "--tops: needs a gradient"},
       {"--porosity 20:24 --permeability 9:90 --pore 0.1x1 --height 9", "leave one out"},
   };
   for (const auto& row : rows) expect_refused("design --machine anet-a8 " + std::string(row.options), 2, row.words, folder);

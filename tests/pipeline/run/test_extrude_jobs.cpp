@@ -438,8 +438,8 @@ TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
             std::string::npos);
   EXPECT_NE(message("--machine anet-a9").find("no extrusion printer 'anet-a9'; did you mean 'anet-a8'?"), std::string::npos);
   EXPECT_NE(message("--fill segmentd").find("segmented"), std::string::npos);
-  EXPECT_NE(message("--fill raster --thin 2").find("--thin: is of segmented lines"), std::string::npos);
-  EXPECT_NE(message("--fill segmented --bead-gap 2 --spacing-sc 0.6").find("segment.spacing_sc_mm: fill.gap_mm says"),
+  EXPECT_NE(message("--fill raster --thin 2").find("--thin: applies to segmented lines"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --bead-gap 2 --spacing-sc 0.6").find("segment.spacing_sc_mm: fill.gap_mm sets"),
             std::string::npos);
   EXPECT_NE(message("--fill raster --shard 1/2").find("--shard: shards are of images"), std::string::npos);
   EXPECT_NE(message("--fill raster --set run.shard=1/2").find("run.shard: shards are of images"), std::string::npos);

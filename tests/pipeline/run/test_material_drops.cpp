@@ -261,7 +261,7 @@ TEST_F(MaterialDrops, AreGreyImagesToo) {
   }
   test::expect_refused(
       "jet low.stl high.stl --material a,b --dpi 254 --bed 20x20 --layer 0.1 --levels 4 --format tiff-8 -o none", 2,
-      "of one material as grey", folder_);
+      "need one material as grey", folder_);
 }
 
 // A file that is another one, and one whose manifest was made to agree.

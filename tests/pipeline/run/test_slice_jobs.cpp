@@ -163,7 +163,7 @@ TEST(SliceProgram, WrongFillingsAreOneClearLineAndLeaveNothing) {
       {{"--pattern", "quatrefoil"}, "kept apart"},
       {{"--pattern", "raster", "--bead", "0"}, "--bead: 0 is out of range"},
       {{"--format", "3mf", "--file-a-layer"}, "--file-a-layer"},
-      {{"--format", "stl"}, "--format: 'stl'"}};
+      {{"--format", "stl"}, "--format: unknown value 'stl'"}};
   for (const auto& [more, expected] : cases) {
     std::vector<std::string> arguments = {"slice", corpus_file("parameter_quality_nut.stl"), "--layer", "1", "--quiet", "-o",
                                           "out"};
