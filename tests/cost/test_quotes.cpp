@@ -146,7 +146,7 @@ TEST_F(Quotes, SharesThatContradictTheJobAreFaults) {
 }
 
 TEST_F(Quotes, AreRefusedWhereNothingIsKnown) {
-  EXPECT_NE(run("jet a.stl --layer 1 --quote q.csv -o out").err.find("--quote: tells what a machine uses up"),
+  EXPECT_NE(run("jet a.stl --layer 1 --quote q.csv -o out").err.find("--quote: reports the material of a machine"),
             std::string::npos);
   EXPECT_EQ(run("jet a.stl --machine free.toml --layer 1 --quote no/q.csv -o out").code, 4);
   test::write_text(directory_ / "mine.csv", "part;mine\n");
@@ -184,7 +184,7 @@ TEST_F(Quotes, NeverReplaceFilesOfTheJob) {
   test::expect_refused("verify out/ --quote out/program/new.csv", 2, "is among the files of the job", directory_);
   EXPECT_EQ(run("verify out --quote out/quote.csv").code, 0);
   test::expect_refused("verify out out --quote q.csv", 2, "is of one directory; verify them one by one", directory_);
-  test::expect_refused("verify out --quick --quote q.csv", 2, "leave --quick out", directory_);
+  test::expect_refused("verify out --quick --quote q.csv", 2, "remove --quick", directory_);
 }
 
 TEST_F(Quotes, PartsAreNamedAlikeAndApart) {
