@@ -68,7 +68,7 @@ list(FILTER stage_sources EXCLUDE REGEX "/stages/(view/picture|calibration/scan)
 # What runs once a job or once a file is compiled to be compiled fast; what does the work of facets or layers is optimised.
 set(stages_once_a_job ${stage_sources})
 list(FILTER stages_once_a_job INCLUDE REGEX "/stages/(calibration/chart/|formats/(chart|plot)/|formats/image_format|formats/images/stack_info|\
-load/(source|threemf/(archive|extensions|roles))|program/(dialect|maintenance|vats)|support/(io|late)/|\
+load/(source|threemf/(archive|extensions|roles))|program/(dialect|maintenance|vats)|support/late/|\
 support/text/(escape|json_|readable|toml|value)|view/(cast|drawable_layers|pore_picture|report/page))")
 list(REMOVE_ITEM stage_sources ${stages_once_a_job})
 add_library(lamina_stages_once_a_job OBJECT ${stages_once_a_job})
