@@ -77,7 +77,7 @@ std::string unknown_command(std::string_view name) {
   std::vector<std::string_view> names;
   for (const Command* command : kCommands) names.push_back(command->name);
   const std::string near = suggest(name, names);
-  return fmt::format("'{}' is no command{}", name.substr(0, 80), near.empty() ? "; lamina --help lists them" : near);
+  return fmt::format("unknown command '{}'{}", name.substr(0, 80), near.empty() ? "; lamina --help lists them" : near);
 }
 
 CommandSpec spec_of(const Command& command) {
@@ -129,6 +129,8 @@ Outcome run_lamina(const std::vector<std::string>& words, Console& console) {
     return static_cast<int>(Fault::kUsage);
   }
   const std::string& name = words.front();
+  if (name == "help" && words.size() > 2)
+    return usage("{}: not expected here; lamina help explains one command", one_line(words[2]));
   if (name == "help" && words.size() == 2) {
     if (const Command* about = find_command(words[1])) return run_command(*about, {"--help"}, console);
     return Error{Fault::kUsage, unknown_command(words[1])};

@@ -92,7 +92,7 @@ const Command* find_command(std::string_view name);
 CommandSpec spec_of(const Command& command);
 std::vector<CommandSpec> all_specs();
 
-/// "'jett' is no command, did you mean 'jet'? ..."
+/// "unknown command 'jett'; did you mean 'jet'?"
 std::string unknown_command(std::string_view name);
 
 /// Runs a command; exceptions become errors.

@@ -66,9 +66,10 @@ struct Arguments {
   }
 };
 
-/// The help of a command, in lines of `columns`; notes and examples stay as they are. Short: the basic options and the first
-/// examples, if the command has basic options.
+/// Short: the basic options and the first examples, if the command has basic options.
 enum class HelpLength { kShort, kAll };
+
+/// The help of a command, in lines of `columns`; notes and examples stay as they are.
 std::string help_text(const CommandSpec& spec, int columns, HelpLength length);
 
 /// Parses the arguments after the command's name.

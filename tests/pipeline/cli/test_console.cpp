@@ -78,6 +78,7 @@ TEST(Help, EveryCommandTeachesWithExamplesAndNamesEveryOption) {
     EXPECT_EQ(run_lamina({"help", command}, directory.path()).out, help.out);
   }
   EXPECT_EQ(run_lamina({"help", "jett"}, directory.path()).code, 2);
+  EXPECT_EQ(run_lamina({"help", "jet", "slice"}, directory.path()).code, 2);
   const std::string jet = run_lamina({"jet", "--help-all"}, directory.path()).out;
   for (const char* flag :
        {"--job",    "--save-job", "--set",       "--bed",      "--dpi",    "--layer",  "--copies",    "--at",
