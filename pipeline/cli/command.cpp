@@ -1,6 +1,4 @@
 #include "pipeline/cli/command.h"
-#include "stages/support/text/readable.h"
-#include "stages/support/text/version.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -17,6 +15,8 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -129,11 +129,10 @@ Outcome run_lamina(const std::vector<std::string>& words, Console& console) {
     return static_cast<int>(Fault::kUsage);
   }
   const std::string& name = words.front();
-  if (name == "help" && words.size() > 2)
-    return usage("{}: not expected here; lamina help explains one command", one_line(words[2]));
+  if (name == "help" && words.size() > 2) return usage("help: name one command");
   if (name == "help" && words.size() == 2) {
-    if (const Command* about = find_command(words[1])) return run_command(*about, {"--help"}, console);
-    return Error{Fault::kUsage, unknown_command(words[1])};
+    const Command* about = find_command(words[1]);
+    return about != nullptr ? run_command(*about, {"--help"}, console) : Error{Fault::kUsage, unknown_command(words[1])};
   }
   if (name == "-h" || name == "--help" || name == "help") return console.print(program_help());
   if (name == "--version" || name == "version") return console.print(fmt::format("lamina {}\n", version()));

@@ -306,7 +306,7 @@ TEST_F(OneMeaning, WordsThatAreWrongAreAnsweredByWhatIsRight) {
       {"extrude part.stl --machine powder.toml --dry-run", 2, "powder.toml: is the profile of a powder printer"},
       {"machines --check wrong.toml", 2, "wrong.toml:2:14: material.nozzle_mmm: no such key; did you mean 'nozzle_mm'?"},
       {"manual jet slice", 2, "name one command"},
-      {"jett part.stl", 2, "'jett' is no command; did you mean 'jet'?\n"},
+      {"jett part.stl", 2, "unknown command 'jett'; did you mean 'jet'?\n"},
   };
   write_text(folder / "filament.toml", done("machines --show marlin").out);
   write_text(folder / "powder.toml", done("machines --show nuferbj").out);
