@@ -92,7 +92,7 @@ class Against:
         return started(self.command(case, which, more) + ["-o", out])
 
     def turns(self, case):
-        """Runs of all kinds by turns, name to a list of (wall, processor, peak bytes), and the sizes of their layers."""
+        """Alternating runs of all kinds: name to a list of (wall, processor, peak bytes), and the sizes of their layers."""
         kinds = kinds_of(case)
         answers, runs = {}, {name: [] for name in kinds}
         for name, (which, more) in kinds.items():
@@ -156,7 +156,7 @@ class Against:
         return found
 
     def info(self, case):
-        """`info` beside a dry run of the job, by turns."""
+        """`info` against a dry run of the job, in alternating runs."""
         part = os.path.join(self.parts, CASES[case][0])
         runs = {"info": [], "dry run": []}
         for _ in range(self.options.runs + 1):
@@ -206,7 +206,7 @@ def png_lines(cases):
     png = [(case, runs, sizes) for case, (runs, sizes, _) in cases.items() if "png" in runs]
     if not png:
         return
-    yield from figures.table(["job", "PNG, ms", "beside G4", "times as fast as the old PNG", "size beside the old PNG"], [
+    yield from figures.table(["job", "PNG, ms", "ratio to G4", "times as fast as the old PNG", "ratio of sizes, new to old PNG"], [
         [f"`{case}`", f"{1e3 * wall(runs['png']):.0f}", not_above(wall(runs["png"]) / wall(runs["default"]), 2.5),
          f"{wall(runs['old png']) / wall(runs['png']):.1f}", f"{sizes['png'] / sizes['old png']:.2f}"] for case, runs, sizes in png])
     both = sum(sizes["png"] for *_, sizes in png) / sum(sizes["old png"] for *_, sizes in png)
@@ -230,8 +230,8 @@ def index_lines(bench):
     """What the rays' tree costs, and the bound of what layers need."""
     if not bench["tree"]:
         return
-    yield ("The tree of the rays, and the bound of what layers need beside what they take (clusters, segments, crossings, changes "
-           "and rows, each written once; every 16th layer):")
+    yield ("The tree of the rays, and the bound of a layer's memory (claimed) compared with its use (needed): clusters, segments, "
+           "crossings, changes and rows, each written once; every 16th layer.")
     yield ""
     rows = []
     for case, tree in bench["tree"].items():
@@ -245,15 +245,15 @@ def index_lines(bench):
 
 def page(options, found, bench):
     machine = figures.machine(options.cache)
-    yield "# This build beside an older one, and beside the limit of the machine"
+    yield "# This build compared with an older one and with the limit of the machine"
     yield ""
-    yield (f"Written by `scripts/bench against`, {time.strftime('%Y-%m-%d')}, commit {figures.commit(ROOT)} beside {options.name}: "
+    yield (f"Written by `scripts/bench against`, {time.strftime('%Y-%m-%d')}, commit {figures.commit(ROOT)} compared with {options.name}: "
            f"{machine['cores']} cores of {machine['processor']}, {machine['memory_gib']} GiB, {machine['system']}; widest "
            f"instructions: {instruction_sets()[-1]}; part files in the page cache, outputs in memory. Other programs used "
            f"{100 * found['others']:.0f} % of the processors.")
     yield ""
-    yield ("Medians of wall milliseconds by turns. The limit: read the part, write files of the same sizes, touch each crossing "
-           "once, one thread. The layers of all kinds of runs are the same bytes.")
+    yield ("Medians of wall milliseconds of alternating runs. The limit is the time to read the part, write files of the same sizes "
+           "and touch each crossing once on one thread. The layers of all kinds of runs are the same bytes.")
     yield ""
     rows = []
     for case, (runs, _, limit) in found["cases"].items():
@@ -262,7 +262,7 @@ def page(options, found, bench):
     yield from figures.table(["job", "engine", "old, ms", "new, ms", "times as fast", "processor time", "times the limit", "old MiB",
                               "new MiB"], rows)
     yield from limit_lines(found["cases"], bench)
-    yield "Without wide instructions (`--isa plain`), with AVX2 only, and the two engines beside each other:"
+    yield "Without wide instructions (`--isa plain`), with AVX2 only, and the two engines compared:"
     yield ""
     yield from figures.table(["job", "plain, times as fast", "the same, contours", "avx2, times as fast",
                               "default engine, part of contours' time"],

@@ -3,8 +3,8 @@
 Of a run on n threads each phase has its wall time w and its processor time p. If s seconds of it are one thread's alone and
 all threads share the rest evenly, n w - p = (n - 1) s (G. M. Amdahl, "Validity of the single processor approach", 1967).
 A run on m cores then takes at least the sum of s + (p - s) / m over the phases. Memory and files that all cores share make it
-longer: it is a bound, not a forecast. Hyper-threads are no cores. What other programs take looks like waiting, so the least
-serial seconds of several runs count.
+longer: it is a bound, not a forecast. Hyper-threads are no cores. Processor time of other programs appears as waiting time, so the
+minimum of serial seconds over several runs counts.
 """
 import json
 import os
@@ -30,8 +30,8 @@ def share_of(timings):
     phases = {}
     for name in timings[0]["phases"]:
         spans = [timing["phases"][name] for timing in timings]
-        wall, processor = (min(span[key] for span in spans) for key in ("wall", "processor"))
-        serial = min(span["serial_share"] * span["wall"] for span in spans)
+        wall, processor = (min(span[key] for span in spans) for key in ("wall_seconds", "processor_seconds"))
+        serial = min(span["serial_share"] * span["wall_seconds"] for span in spans)
         phases[name] = {"wall": wall, "processor": processor, "serial": min(serial, processor)}
     return phases
 

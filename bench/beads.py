@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""bench/beads.py: forms of the model of a bead beside what Di Nisio 2022 measured. scripts/bench beads
+"""bench/beads.py: forms of the bead model compared with measurements of Di Nisio 2022. scripts/bench beads
 
     scripts/bench beads     writes bench/beads.md; five minutes
 
-The form that lamina has (docs/theory/bead.md) and others that were tried, computed here by steps of 0.005 mm, apart from stages/bead.
+The form that lamina has (docs/theory/bead.md) and others that were tried, computed here in steps of 0.005 mm, independently of stages/bead.
 Each takes its lag from the distances of Table 11 alone; no width is read for any number.
 """
 import csv
 import math
 import os
 
+import figures
 from tables import table
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -81,7 +82,7 @@ def deposit(form, parts, flow):
 
 
 def share(kind, u):
-    """Of what is laid around a place, what lies before u; u in bead widths, or for "bore" and "behind" in radii of the bore."""
+    """The fraction of the material deposited around a position that is below u, in bead widths (bore, behind: in radii of the bore)."""
     if kind == "finger":  # what would lie further behind than a bead's width, 1.4 %, lies nearer
         return 0.0 if u <= -1 else 1 - math.acos(min(math.exp(math.pi * u) / 2, 1)) / math.acos(math.exp(-math.pi) / 2)
     if kind == "behind":
@@ -200,9 +201,9 @@ FORMS = (Form("**500 mm/s2, spread as a finger: lamina's**", 500, spread="finger
 
 
 def page():
-    yield "# Forms of the model of a bead, beside what was measured"
+    yield "# Forms of the bead model, compared with measurements"
     yield ""
-    yield ("`scripts/bench beads`: the forms computed by steps of 0.005 mm, apart from lamina's code. Root mean square of widths in mm "
+    yield (f"`scripts/bench beads` at commit {figures.commit(ROOT)}: the forms computed by steps of 0.005 mm, apart from lamina's code. Root mean square of widths in mm "
            "against Di Nisio 2022; 100 % is 0.1007 mm2. Each form takes its lag from the stabilisation distances of Table 11; rows: how far "
            "those from 175 % on scatter about it. Pores: width x length in mm, of Table 16 0.10 x 0.86, 0.12 x 0.91, 0.14 x 0.98.")
     yield ""

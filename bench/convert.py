@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""bench/convert.py: lamina convert, G4 to G4, beside raw reading and writing of the same files. scripts/bench convert
+"""bench/convert.py: lamina convert, G4 to G4, compared with raw reading and writing of the same files. scripts/bench convert
 
     scripts/bench convert [--runs N] [--cache DIR] [--out DIR]     writes bench/convert.md
 
@@ -68,7 +68,7 @@ def main(words):
         verdict = f" (at least {minimum}: {'met' if rate >= minimum else 'MISSED'})" if minimum else ""
         lines.append(f"| `{case}` | {files} | {size / 1e6:.1f} | {' | '.join(cells)} | {rate:.0f}{verdict} |")
         print(lines[-1], flush=True)
-    lines[4] = (f"G4 to G4, the same bytes. {machine['processor']}, {machine['cores']} cores, kernel {machine['kernel']}, files on "
+    lines[4] = (f"Commit {figures.commit(ROOT)}. G4 to G4, the same bytes. {machine['processor']}, {machine['cores']} cores, kernel {machine['kernel']}, files on "
                 f"{machine['files_on']}. Whole processes: medians of {options.runs} turns, and the fastest. Other programs used at "
                 f"most {100 * others:.0f} % of the processors.")
     with open(options.page, "w", encoding="utf-8") as file:

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""bench/coverage.py: what shares of voxels cost beside pixels of 1 bit. scripts/bench coverage
+"""bench/coverage.py: cost of fill fractions of voxels compared with 1-bit pixels. scripts/bench coverage
 
     scripts/bench coverage [--runs N] [--cache DIR]     writes bench/coverage.md
 
-Images alone: layers on one thread, both kinds in one run of lamina_bench, which checks that they tell the same of what is far
-from any surface. Jobs: whole processes with and without --levels 4, in turn, where lamina jet has that option.
+Images alone: layers on one thread, both kinds in one run of lamina_bench, which checks that they agree far from
+any surface. Jobs: whole processes with and without --levels 4, in turn, where lamina jet has that option.
 """
 import argparse
 import json
@@ -63,8 +63,8 @@ def main(words):
     parser.add_argument("--cases", default=",".join(CASES))
     options = parser.parse_args(words)
     parts, machine = os.path.join(options.cache, "parts"), figures.machine(options.cache)
-    lines = ["# Shares of voxels beside pixels", "", "Written by `scripts/bench coverage`; edits are lost.", "",
-             f"{machine['processor']}, {machine['cores']} cores, kernel {machine['kernel']}. 4 levels, 1200 dpi. Images alone: ms a "
+    lines = ["# Fill fractions of voxels compared with pixels", "", "Written by `scripts/bench coverage`; edits are lost.", "",
+             f"Commit {figures.commit(ROOT)}. {machine['processor']}, {machine['cores']} cores, kernel {machine['kernel']}. 4 levels, 1200 dpi. Images alone: ms a "
              f"layer, one thread. Jobs: medians of {options.runs} turns, s; - where lamina jet has no --levels.", "",
              "| job | voxels with facets a layer | 1 bit | 4 levels | times | job of 1 bit | of 4 levels | times |",
              "|---|---|---|---|---|---|---|---|"]

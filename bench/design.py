@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""bench/design.py: jobs that lamina designs from wishes, beside what the solver says of them. scripts/bench design
+"""bench/design.py: jobs that lamina designs for target properties, compared with the solver. scripts/bench design
 
     scripts/bench design [--voxel UM]     writes bench/design.md
 
-Ten wishes within what the configurations of Di Nisio 2022 span as lamina predicts them (bench/pores.md), five outside, and two
+Ten targets within what the configurations of Di Nisio 2022 span as lamina predicts them (bench/pores.md), five outside, and two
 gradients over a height of 25.4 mm. Each job that is written is planned again by `lamina extrude` for a cylinder of 25.4 mm: it has
 to end without a warning of its segments.
 """
@@ -111,10 +111,10 @@ def page(voxel):
             outside.append([f"`{target}`", "yes" if refused else "no", *reported(found).split(" | "), str(found["runs"]), f"{seconds[0]:.0f}, {seconds[1]:.0f}"])
         regions, ends = gradients(voxel, folder)
     machine = figures.machine(ROOT)
-    yield "# Fillings from wishes: what is asked for, and what the solver says of it"
+    yield "# Fillings designed for target properties, compared with the solver"
     yield ""
     yield (f"`scripts/bench design`, commit {figures.commit(ROOT)}, {machine['processor']}, {machine['cores']} cores. "
-           f"`lamina design WISH --machine anet-a8 --voxel {voxel:g}`; all seconds are of the whole command.")
+           f"`lamina design TARGET --machine anet-a8 --voxel {voxel:g}`; all seconds are of the whole command.")
     yield ""
     yield "## Within what the tables span"
     yield ""
@@ -122,9 +122,9 @@ def page(voxel):
                              "miss, %", "k1 again, 10 um, D", "forward runs", "k1 / slots", "seconds, of processors"], inside)
     yield ""
     yield (f"{within} of {len(INSIDE)} within 5 %, the longest took {longest[0]:.0f} s, {longest[1]:.0f} s of processors "
-           f"(load of the machine in the end: {os.getloadavg()[0]:.1f}). {warned} of the jobs are warned of by `lamina extrude`. "
+           f"(load of the machine in the end: {os.getloadavg()[0]:.1f}). `lamina extrude` warns of {warned} of the jobs. "
            "k1 again: `lamina permeability` of the job planned for a cylinder of 25.4 mm, cubes of 10 um; - where the period is longer "
-           "than the 3.6 mm that it looks for.")
+           "than the maximum of 3.6 mm.")
     yield ""
     yield "## Outside"
     yield ""

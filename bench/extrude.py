@@ -3,12 +3,12 @@
 
     scripts/bench extrude [--runs N] [--case cura|slow|memory] [--models DIR] [--cache DIR] [--programs DIR]
 
-0.1 mm layers, two walls, 30 % lines, no solid layers, no supports; mesh on disk to G-code on disk. Whatever the job does not name
-is left to each program's defaults: lamina's tolerance and its skirt, CuraEngine's resolution. Before the clock starts every program
+0.1 mm layers, two walls, 30 % lines, no solid layers, no supports; mesh on disk to G-code on disk. All other settings
+are defaults of each program: lamina's tolerance and its skirt, CuraEngine's resolution. Before the clock starts every program
 runs once and the answers are compared: the number of layers; the filament, within a fifth of CuraEngine's; lamina's moves, at most 1.3
-times CuraEngine's; lamina's file against its manifest. Then lamina and CuraEngine run by turns (case cura); the slow peers once (slow). Then
-the peak memory of segmented jobs beside that of the same ones without segmentation (memory). Writes bench/results/extrude.json and
-bench/extrude.md, unless only some cases are asked for.
+times CuraEngine's; lamina's file against its manifest. Then lamina and CuraEngine run alternately (case cura); the slow peers once (slow).
+Case memory compares the peak memory of jobs with and without segmentation. Writes bench/results/extrude.json and
+bench/extrude.md, unless only some cases are requested.
 """
 import json
 import math
@@ -56,7 +56,7 @@ def commands(lamina, part, work, definitions):
 
 
 def answer(path):
-    """Heights at which beads are laid, filament in mm, moves and short beads of a G-code file, by its text alone."""
+    """Heights at which beads are deposited, filament in mm, moves and short beads of a G-code file, by its text alone."""
     levels, moves, short, filament, e, relative = set(), 0, 0, 0.0, 0.0, False
     x = y = z = 0.0
     with open(path, encoding="utf-8", errors="replace") as file:
@@ -98,7 +98,7 @@ def compare_answers(lamina, answers, out):
     own = answers["lamina"]
     for name in answers:
         if abs(answers[name]["layers"] - own["layers"]) > 1:
-            sys.exit(f"bench: {name} laid {answers[name]['layers']} layers, lamina {own['layers']}")
+            sys.exit(f"bench: {name} deposited {answers[name]['layers']} layers, lamina {own['layers']}")
     share = own["filament_mm"] / answers["cura"]["filament_mm"]
     if abs(share - 1) > 0.2:
         sys.exit(f"bench: lamina's filament is {share:.2f} of CuraEngine's: not the same job")
@@ -197,7 +197,7 @@ def memory_of_segments(lamina, work):
 
 def memory_lines(rows):
     lines = ["## Memory with and without segmentation", "",
-             "The same job with `--fill raster` and `--fill segmented`, in turn; medians of 15 peaks. Asked: no more than 2 % above.", "",
+             "The same job with `--fill raster` and `--fill segmented`, in alternating runs; medians of 15 peaks. Limit: 2 % above.", "",
              "| job | threads | points of stretches | plain file MB | segmented file MB | plain peak MiB | segmented peak MiB | difference |",
              "|---|---|---|---|---|---|---|---|"]
     for r in rows:
@@ -220,22 +220,22 @@ def speed_lines(programs):
     met = min(min(of.values()) for of in ratios.values()) >= TIMES
     return lines + [
         "", f"Deviation from the full contours: lamina {own['tolerance_um']:g} um at most; CuraEngine {1000 * cura['deviation_mm']:g} um, where segments "
-        f"are shorter than {cura['resolution_mm']:g} mm. Moves: {own['moves'] / cura['moves']:.2f} times CuraEngine's; asked: at most {MOVES}.",
+        f"are shorter than {cura['resolution_mm']:g} mm. Moves: {own['moves'] / cura['moves']:.2f} times CuraEngine's, at most {MOVES}.",
         "Times as fast, by wall time: " + ", ".join(f"{NAMES[n]} {v:.1f}" for n, v in ratios["wall"].items()) + ". By processor seconds: " +
         ", ".join(f"{NAMES[n]} {v:.1f}" for n, v in ratios["processor"].items()) +
-        f". Asked: {TIMES} times the fastest, by both: {'met' if met else 'not met'}.",
+        f". Target: {TIMES} times as fast as the fastest, by both: {'met' if met else 'not met'}.",
         f"Peak memory {own['peak_mib']:.0f} MiB, the least of the others {min(programs[n]['peak_mib'] for n in peers):.0f} MiB. "
         f"{own['points'] / own['wall'] / 1e6:.2f} million toolpath points a second.", ""]
 
 
 def page(result):
     machine = result["machine"]
-    lines = ["# Toolpaths of 3DBenchy beside other slicers", "",
+    lines = ["# Toolpaths of 3DBenchy compared with other slicers", "",
              f"`scripts/bench extrude` on {result['date']} at {result['commit']}: {machine['processor']}, {machine['cores']} cores, "
              f"{machine['memory_gib']} GiB, {machine['system']}.", "",
              "225,154 triangles, 0.1 mm layers, two walls, 30 % lines, no solid layers, no supports; all else by each program's defaults; mesh "
-             f"on disk to G-code on disk. Answers compared first; medians of {result['programs']['lamina']['runs']} runs by turns; the slow peers "
-             "run once.", "", *speed_lines(result["programs"]), *memory_lines(result["memory"])]
+             f"on disk to G-code on disk. Answers compared first; medians of {result['programs']['lamina']['runs']} alternating runs; the slow "
+             "peers run once.", "", *speed_lines(result["programs"]), *memory_lines(result["memory"])]
     with open(os.path.join(ROOT, "bench/extrude.md"), "w", encoding="utf-8") as file:
         file.write("\n".join(lines))
     print("\n".join(lines))

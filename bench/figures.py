@@ -76,7 +76,7 @@ def touched_jobs(root):
 
 
 def times_the_limit(touched, name, result, wall):
-    """Wall seconds beside reading, writing and touching each crossing once; - where one of them was not measured."""
+    """Ratio of wall seconds to reading, writing and touching each crossing once; - where one of them was not measured."""
     if name not in touched:
         return "-"
     limit = result["limits"]
@@ -134,7 +134,7 @@ def limit_rows(root, results):
 
 
 def mslicer_text(root, results):
-    """mslicer beside ours, where it was run: wrong pixels beside the time."""
+    """mslicer compared with ours, where it was run: wrong pixels next to the time."""
     touched, rows = touched_jobs(root), []
     for name, result in results:
         if "mslicer" not in result:
@@ -150,8 +150,8 @@ def mslicer_text(root, results):
            else "The jobs of its published benchmark: `scripts/bench race`.")
     yield ""
     if rows:
-        yield ("mslicer (`bench/mslicer.py`) writes one `.goo` of grey runs, ours 1-bit TIFF files; by turns, the part files in the "
-               "page cache. Wrong are pixels whose centre lies on the other side of the surface.")
+        yield ("mslicer (`bench/mslicer.py`) writes one `.goo` of grey runs, ours 1-bit TIFF files; runs alternate, the part files "
+               "are in the page cache. Pixels whose centre is on the other side of the surface count as wrong.")
         yield ""
         yield from table(["job", "mslicer", "processor time", "times the limit", "peak memory", "wrong pixels", "lamina, rays",
                           "processor time", "times the limit", "times as fast"], rows)
@@ -259,7 +259,7 @@ def lines(root, cases):
     yield "    scripts/bench             # an hour on two slow cores; nearly all of it is the peer's"
     yield "    scripts/bench --large     # and the 811 MB plate"
     yield "    scripts/bench --alone     # ours only, a few minutes"
-    yield "    scripts/bench --mslicer PROGRAM    # and mslicer's command line by turns"
+    yield "    scripts/bench --mslicer PROGRAM    # and mslicer's command line in alternating runs"
     yield ""
     yield ("The parts are made by `bench/make_parts.py` from the models folder (`LAMINA_MODELS`). Single stages are timed by "
            "Google Benchmark: `LAMINA_MODELS=... build/release/lamina_bench`.")

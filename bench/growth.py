@@ -3,12 +3,12 @@
     scripts/bench growth                writes bench/growth.md and the slopes in bench/README.md; about four minutes on two cores
     scripts/bench growth --only NAME    this series only (can be repeated); no page is written
     --program FILE                      a lamina; else build/release/lamina, built first
-    --runs N                            runs of a job, of which the least counts (default 3)
+    --runs N                            runs of a job; the minimum counts (default 3)
     --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
 
 Parts are made by formula (bench/shapes.py); in a series all is equal but one thing. The slope is that of least squares in
 log-log over the upper two decades, of what a job takes beyond the smallest of its series against what it has beyond that one:
-1 is linear, whatever a job costs from the start. Jobs count that take twice the smallest at least, where there are three of them;
+1 is linear, regardless of the fixed cost of a job. Jobs count that take twice the smallest at least, where there are three of them;
 else those that take a tenth more; what never does is flat.
 Exit 1 if a slope of processor time or memory is above 1.1: a term is worse than linear.
 """
@@ -151,7 +151,7 @@ def measure_series(name, options, work):
 
 
 def too_steep(series):
-    """What is worse than linear, as sentences. Wall time follows processor time and whoever else is on the machine."""
+    """Growth worse than linear, as sentences. Wall time also depends on other programs on the machine, so it is not checked."""
     return [f"{measure} of {name}: slope {found['slopes'][measure]:.2f}" for name, found in series.items()
             for measure in ("processor", "peak") if (found["slopes"].get(measure) or 0) > STEEPEST]
 

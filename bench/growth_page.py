@@ -52,9 +52,9 @@ def bounds(found):
         minimum = {int(n): min_seconds for n, min_seconds in share["bounds"].items()}
         rows.append([f"`{case}`", f"{1e3 * wall:.0f}", f"{1e3 * serial:.0f}", f"{longest}, {1e3 * phases[longest]['serial']:.0f}",
                      *(f"{1e3 * minimum[n]:.0f} ({wall / minimum[n]:.1f} x)" for n in (16, 64)), f"{1e3 * share['limit']:.0f}"])
-    yield (f"At least so many milliseconds on more cores, from the processor time and the seconds of one thread alone in each "
-           f"phase of runs on {threads} threads (`--timing`, `bench/amdahl.py`): the bound of Amdahl, which memory and files "
-           "that cores share make longer. Beside it the limit of one thread: reading, writing, touching each crossing once.")
+    yield (f"Minimum wall milliseconds on more cores: Amdahl's bound, from the processor time and the serial seconds of each phase of "
+           f"runs on {threads} threads (`--timing`, `bench/amdahl.py`). Memory and files that cores share make runs longer. The last "
+           "column is the limit of one thread: reading, writing and touching each crossing once.")
     yield ""
     yield from table(["job", f"{threads} threads, ms", "of it one thread alone", "most of that", "16 cores", "64 cores",
                       "limit, ms"], rows)

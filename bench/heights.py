@@ -1,10 +1,10 @@
-"""scripts/bench heights: layer tables of real parts beside Debian's Slic3r 1.3 and CuraEngine 4.13; writes bench/heights.md.
+"""scripts/bench heights: layer tables of real parts compared with Debian's Slic3r 1.3 and CuraEngine 4.13; writes bench/heights.md.
 
     scripts/bench heights [--models DIR] [--cache DIR] [--lamina PROGRAM] [--part NAME]... [--no-times]
 
 Every table, the peers' too, is measured by the same code (`lamina heights --measure`): the highest step that any sloped
 facet gets, the mean step over the surface, flats of at least 5 mm2 that no layer ends on, and where the last layer ends.
-Each peer is asked for layers of 0.05 to 0.3 mm; then ours are asked for the step that the peer left. Only Python's standard
+Each peer makes layers of 0.05 to 0.3 mm; the target of our tables is the step that the peer left. Only Python's standard
 library. CuraEngine's settings are defined in Debian's package `cura`, which is downloaded and unpacked, not installed. The peers' layers are kept in the cache;
 remove it to have them sliced again.
 """
@@ -183,7 +183,7 @@ def part_section(name, part, ours, folder, definitions):
         best = ours.table(part, "optimal", cusp)
         goal, fewer = GOALS.get(name, {}).get(peer), 100 * (1 - best["layers"] / theirs["layers"])
         if goal is not None:
-            verdict.append(f"{peer} with a first layer of {first} mm: {fewer:.1f} % fewer layers, {goal} % asked, "
+            verdict.append(f"{peer} with a first layer of {first} mm: {fewer:.1f} % fewer layers, target {goal} %, "
                           + ("met" if fewer >= goal else "not met"))
         lines.append(row(f"`optimal`, step {cusp:.4f}", best, theirs))
         for way in ("cusp", "stepwise"):
@@ -192,7 +192,7 @@ def part_section(name, part, ours, folder, definitions):
     for peer, layers, cusp in EARLIER.get(name, ()):
         for way in ("optimal", "cusp"):
             table = ours.table(part, way, cusp)
-            lines.append(row(f"`{way}`, step {cusp}, beside {layers} layers of {peer} that were measured with other settings",
+            lines.append(row(f"`{way}`, step {cusp}, compared with {layers} layers of {peer} that were measured with other settings",
                              table, {"layers": layers}))
     for table in ours.tables(part, "--thickness", f"{MINIMUM}..{MAXIMUM}", "--cusp", "0.1", "--compare"):
         lines.append(row(f"`{table['name']}`, step 0.1", table))
@@ -200,7 +200,7 @@ def part_section(name, part, ours, folder, definitions):
 
 
 def times(ours, part, *options, turns=7):
-    """The least wall seconds that runs tell: load, surface, layers."""
+    """The minimum wall seconds that runs report: load, surface, layers."""
     found = []
     for _ in range(turns):
         done = subprocess.run([ours.program, "heights", part, "--format", "csv", *options], check=True,

@@ -4,7 +4,7 @@
     scripts/bench                 all jobs but the largest (an hour on two slow cores, nearly all of it PrusaSlicer's)
     scripts/bench --large         and 72 Benchies in one STL of 811 MB
     scripts/bench --case NAME     this one only (can be repeated); --runs N turns (default 3); --alone without PrusaSlicer
-    scripts/bench --mslicer PROGRAM    and mslicer's command line by turns, its pixels compared with ours (bench/mslicer.py)
+    scripts/bench --mslicer PROGRAM    and mslicer's command line in alternating runs, its pixels compared with ours (bench/mslicer.py)
     scripts/bench --memory        the runs that measure memory only
     scripts/bench --report        only writes bench/README.md again from bench/results/*.json
 

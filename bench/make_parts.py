@@ -86,7 +86,7 @@ def placed(axes, factors):
 
 
 def write_stl(path, axes, offsets=((0.0, 0.0),), reported=True):
-    """One binary STL with a copy of the part at every (x, y) of `offsets`; `told` says so."""
+    """One binary STL with a copy of the part at every (x, y) of `offsets`; `reported` prints its size."""
     facets = len(axes[0]) // 3
     records = bytearray(RECORD * facets)  # normals and attributes stay zero
 

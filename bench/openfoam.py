@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""bench/openfoam.py: creeping flow through two printed cells beside OpenFOAM, an independent program. scripts/bench openfoam
+"""bench/openfoam.py: creeping flow through two printed cells, compared with OpenFOAM. scripts/bench openfoam
 
     scripts/bench openfoam [--voxels UM ...]     writes bench/openfoam.md
 
@@ -73,7 +73,7 @@ def faces_between(void):
 
 
 def points_of(axis, corner, backwards):
-    """Four points a face, as places; counterclockwise seen from where its normal leads to: away from the owner."""
+    """Four points a face, as positions; counterclockwise as viewed from the side to which the normal points, away from the owner."""
     import numpy
     a, b = numpy.zeros(3, int), numpy.zeros(3, int)
     a[(axis + 1) % 3] = b[(axis + 2) % 3] = 1
@@ -204,14 +204,14 @@ def page(voxels, folder):
     machine = figures.machine(ROOT)
     version = subprocess.run(["dpkg-query", "-W", "-f", "${Version}", "openfoam"], check=False, stdout=subprocess.PIPE,
                              stderr=subprocess.DEVNULL, text=True).stdout or "of another source"
-    yield "# Creeping flow: beside OpenFOAM"
+    yield "# Creeping flow compared with OpenFOAM"
     yield ""
     yield (f"`scripts/bench openfoam`, commit {figures.commit(ROOT)}, openfoam {version}, {machine['processor']}, {machine['cores']} "
-           f"cores, {os.getloadavg()[0]:.0f} processes at work when it began. Periods of two configurations of Di Nisio 2022, as "
-           "lamina lays their beads; k1 along z in darcy.")
+           f"cores, {os.getloadavg()[0]:.0f} processes running at the start. Periods of two configurations of Di Nisio 2022, as "
+           "lamina deposits their beads; k1 along z in darcy.")
     yield ""
     yield ("OpenFOAM's mesh has a hexahedron for each voxel of void that lamina wrote (`--void`): walls are steps, and the void of "
-           "whole voxels is off to either side; so it is not extrapolated, and its error is told by the step from the size before. "
+           "whole voxels deviates in both directions. So its result is not extrapolated; its error is the change from the previous size. "
            "simpleFoam (SIMPLEC, linear differences, Reynolds number about 1e-5) runs on one core, for z alone. lamina cuts voxels "
            "three times finer for walls; its k1 is extrapolated from these voxels and twice as large ones. Its time and memory include "
            "reading the toolpaths, cutting voxels, pores, throats and the flow along all of x, y and z at both sizes.")

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""bench/patterns.py: what patterns of lines do to permeability, beside the effects that others published. scripts/bench patterns
+"""bench/patterns.py: effects of line patterns on permeability, compared with published ones. scripts/bench patterns
 
     scripts/bench patterns [--voxel UM]     writes bench/patterns.md
 
-Plans a cylinder with lamina's own filling and asks `lamina permeability` of the written toolpaths. Nothing is fitted.
+Plans a cylinder with lamina's own filling and runs `lamina permeability` on the written toolpaths. Nothing is fitted.
 """
 import argparse
 import json
@@ -68,7 +68,7 @@ def effects(reported):
                 "-57 % (Entezari 2019), -18.4 % (Walejewska 2019)")
     yield cells("groups of 2", groups, base, "+160 % (Shigueoka 2019)")
     yield cells("groups of 2, stagger of 0.8 mm, against groups of 2", largest, groups,
-                "to -76 % (Shigueoka 2019); against what is not told")
+                "to -76 % (Shigueoka 2019); the reference is not stated")
     yield cells("the same, against lines", largest, base, "")
 
 
@@ -80,7 +80,7 @@ def gaps(reported):
 
 
 def waves(reported):
-    """Quatrefoils beside lines of their porosity, in the same window."""
+    """Quatrefoils compared with lines of the same porosity in the same window."""
     window = ["--window", "4.8,4.8,1.2"]
     bead = (WIDTH + GAP) * (1 - reported.of(raster(GAP))["porosity"])  # cross-section / thickness
     for cell, apart in CELLS:
@@ -97,12 +97,12 @@ HEAD = ["pattern", "porosity, %", "k1 along z, D", "along x", "k1 along z agains
 def page(voxel, folder):
     machine = figures.machine(ROOT)
     reported = Predictions(folder, voxel)
-    yield "# Permeability of patterns: beside published effects"
+    yield "# Permeability of patterns compared with published effects"
     yield ""
     yield (f"`scripts/bench patterns --voxel {voxel:g}`, commit {figures.commit(ROOT)}, {machine['processor']}. Beads 0.4 mm wide, "
-           "layers of 0.3 mm at 0 and 90 degrees in turn, as lamina plans them for Anet A8 and `lamina permeability` lays them; one "
-           "period, or a window where that is said. Effects as Di Nisio 2022, section 2.5, reports them: materials, gaps, widths and, "
-           "mostly, directions of the flow are not told there, so signs and order are what can be compared.")
+           "layers of 0.3 mm alternating between 0 and 90 degrees, as lamina plans them for Anet A8 and `lamina permeability` deposits "
+           "them; one period, or a window where stated. Effects are those that Di Nisio 2022, section 2.5, reports. It does not state "
+           "materials, gaps, widths or, mostly, directions of the flow, so only signs and order can be compared.")
     yield ""
     yield "## Stagger and groups"
     yield ""
@@ -113,8 +113,9 @@ def page(voxel, folder):
     yield "## Quatrefoil"
     yield ""
     yield ("The source draws curves like honeycombs that are kept apart and does not define them; lamina's are cosines "
-           "([filling.md](../docs/reference/filling.md#patterns)), which do not repeat along x and y at 0 and 90 degrees in turn. So a window of "
-           "4.8 x 4.8 x 1.2 mm with closed sides and voxels twice as large, beside lines of about the same porosity there.")
+           "([filling.md](../docs/reference/filling.md#patterns)), which do not repeat along x and y in layers that alternate between "
+           "0 and 90 degrees. So a window of 4.8 x 4.8 x 1.2 mm with closed sides and voxels twice as large is compared with lines of "
+           "about the same porosity.")
     yield ""
     yield from tables.table(HEAD, waves(reported))
 

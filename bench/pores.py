@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""bench/pores.py: permeability and porosity as lamina predicts them beside what Di Nisio 2022 measured. scripts/bench pores
+"""bench/pores.py: predicted permeability and porosity compared with measurements of Di Nisio 2022. scripts/bench pores
 
     scripts/bench pores [--voxel UM]     writes bench/pores.md
     scripts/bench pores --keep-inertia   the same, but the last table, which takes most of the time, stays as it is
 
-Plans the seven configurations of that document's Table 8 (docs/examples/dinisio2022) for a cylinder of 25.4 mm and asks
-`lamina permeability` of the written G-code. Nothing is fitted.
+Plans the seven configurations of Table 8 of Di Nisio 2022 (docs/examples/dinisio2022) for a cylinder of 25.4 mm and runs
+`lamina permeability` on the written G-code. Nothing is fitted.
 """
 import argparse
 import csv
@@ -120,7 +120,7 @@ def first_table(folder, voxel, flow, porosity):
 
 def second_table(folder, voxel, flow):
     rows = []
-    for name, options in (("widths as the file tells them, by the calibration's tables", ["--beads", "stated"]),
+    for name, options in (("widths stated in the file, from the calibration's tables", ["--beads", "stated"]),
                           ("lag 0.047 s, 500 mm/s2: the profile", []),
                           ("the same, not spread along the lines", ["--beads", "deposited"]),
                           ("lag 0.046 s, 400 mm/s2", (0.046, 400)), ("lag 0.053 s, 500 mm/s2", (0.053, 500)),
@@ -157,7 +157,7 @@ def page(voxel, kept):
            "`lamina permeability` of the G-code of a cylinder of 25.4 mm: one period of each plan, voxels of "
            f"{voxel} um, beads by the model of [docs/theory/bead.md](../docs/theory/bead.md) with the profile anet-a8. Measured: Di Nisio 2022, "
            "Tables 25 and 17. The model's only numbers are what 100 % feeds, the melt's lag by the stabilisation distances of "
-           "Table 11, and the profile's acceleration; nothing is fitted on Tables 12 to 25.")
+           "Table 11, and the profile's acceleration; nothing is fitted on Tables 13 to 25.")
     yield ""
     with tempfile.TemporaryDirectory() as folder:
         write_cylinder(os.path.join(folder, "part.stl"), 25.4, 3)

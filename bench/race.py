@@ -1,9 +1,9 @@
 """bench/race.py: the jobs of mslicer's published benchmark, as near as they can be stated, and mslicer itself. scripts/bench race
 
-    scripts/bench race                      ours beside the published figures; writes bench/race.md; a minute
-    scripts/bench race --mslicer PROGRAM    and mslicer's command line (`slicer`) by turns, its pixels compared with ours
+    scripts/bench race                      ours compared with the published figures; writes bench/race.md; a minute
+    scripts/bench race --mslicer PROGRAM    and mslicer's command line (`slicer`) in alternating runs, its pixels compared with ours
     --program FILE                          a lamina; else build/release/lamina, built first
-    --runs N                                counted runs of a kind (default 5), by turns; --cache DIR: where parts are made
+    --runs N                                counted runs of a kind (default 5), alternating; --cache DIR: where parts are made
 
 Published: three models at 50 um on 11520 x 5120 pixels, with the number of faces and of layers. The models are not to be had
 under these names, so parts by formula (bench/shapes.py) of the same class stand for them: as many faces, layers and pixels.
@@ -170,8 +170,8 @@ def page(found, others, options):
 
 
 def both(found, options):
-    yield (f"By turns on this machine, the same part files: {mslicer.version(options.mslicer)} to one `.goo`, and ours. Its parts are "
-           "lowered by half a layer, so that it cuts in the middle too; pixels of five layers are compared (`bench/mslicer.py`).")
+    yield (f"Alternating runs on this machine, with the same part files: {mslicer.version(options.mslicer)} to one `.goo`, and ours. Its "
+           "parts are lowered by half a layer, so that it cuts in the middle too; pixels of five layers are compared (`bench/mslicer.py`).")
     yield ""
     rows = []
     for name, one in found.items():

@@ -1,4 +1,4 @@
-"""bench/rebuilt.py: how near the surface that drops stand for lies to the true one. scripts/bench rebuilt
+"""bench/rebuilt.py: distance of the surface that drops represent from the true one. scripts/bench rebuilt
 
     scripts/bench rebuilt               writes bench/rebuilt.md; some twenty seconds
     --tests DIR                         with test_dose; else build/release, built first
@@ -7,12 +7,14 @@ A sphere of 5 mm and wedges of 3, 5, 10 and 20 degrees become drops (tests/dose/
 of a voxel that they fill. The surface is rebuilt from the drops in two ways. Filled: each voxel is filled from the side of its
 fullest neighbour. Blurred: drops are Gaussians of sigma a pixel in the plane and a third of a layer in height, and the surface is
 where the saturation is half of that of a solid. From 1,500 points of the true surface the nearest change from solid to empty along
-the normal is looked for, up to 0.4 mm away. Exit 1 if, filled, 16 levels of 0.30 mm are farther than pixels of 0.05 mm.
+the normal is found, up to 0.4 mm away. Exit 1 if, filled, 16 levels of 0.30 mm are farther than pixels of 0.05 mm.
 """
 import argparse
 import os
 import subprocess
 import sys
+
+import figures
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
@@ -32,7 +34,7 @@ def way_of(row):
 
 def page(rows):
     """The page, and whether every shape holds."""
-    lines = ["# Surfaces rebuilt from drops", "", "<!-- Made by scripts/bench rebuilt -->", "", *__doc__.splitlines()[5:], ""]
+    lines = ["# Surfaces rebuilt from drops", "", f"<!-- Made by scripts/bench rebuilt at commit {figures.commit(ROOT)} -->", "", *__doc__.splitlines()[5:], ""]
     fine = True
     for dpi in sorted({row[1] for row in rows}, key=int):
         here = [row for row in rows if row[1] == dpi]

@@ -7,7 +7,7 @@ Each job is planned (22.3 million pixels a layer), its page is written, and open
 just started with an empty profile (tests/report/browser.py). The page's own clock (performance.now, from the begin of the
 navigation) says when it was parsed, when the first layer and the views were drawn, and when that was on the screen.
 The answer is checked in every run: layer 500 as the page decodes it is the TIFF of layer 500 as libtiff decodes it, the
-console is empty, nothing was asked from a network, and the page has less than 20 MB. LAMINA_PROGRAM names another program.
+console is empty, no network request was made, and the page has less than 20 MB. LAMINA_PROGRAM names another program.
 """
 import argparse
 import ctypes
@@ -134,7 +134,7 @@ def page_text(entries, options, about, busy):
            "larger than 19 MB, every second one is left out (`--max-bytes`).")
     yield ""
     yield (f"In every one of these runs layer {LAYER} as the page decodes it was the TIFF of layer {LAYER} as libtiff decodes it, run for "
-           "run, the console stayed empty, and nothing was asked from a network.")
+           "run; the console stayed empty, and no network request was made.")
     yield ""
     rows = [[e["name"], f"{e['runs']:,}", figures.seconds(e["plan"]), figures.seconds(e["write"]), f"{e['bytes'] / 1e6:.2f}",
              f"{e['held']:,}", figures.seconds(e["parsed"]), figures.seconds(e["loaded"]),

@@ -88,7 +88,7 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
       if (until == Until::kChain) continue;
       tidy(closed);
       if (!find_contacts(closed, contact, group)) group.clear();
-      if (!nest(closed, FillRule::kNonzero, group)) return state.SkipWithError("contours could not be united");
+      if (!nest(closed, FillRule::kNonzero, group)) return state.SkipWithError("the union of the contours failed");
     }
   }
   const double amount = until == Until::kIndex ? static_cast<double>(triangles.size()) : static_cast<double>(stack.cuts);

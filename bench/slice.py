@@ -6,7 +6,7 @@
 Whole programs run in turn on the same binary STL: Slic3r's --export-svg and lamina slice to SVG; admesh's load and check,
 and lamina slice on one thread with nothing written but its manifest. Before a figure is kept, the answers are compared:
 the number of layers, and the area of all contours of every layer. Stages are timed by lamina_bench (bench/slice.cpp),
-which checks its own answers. Writes bench/results/slice.json and bench/slice.md, unless only some cases are asked for.
+which checks its own answers. Writes bench/results/slice.json and bench/slice.md, unless only some cases are requested.
 """
 import json
 import os
@@ -137,9 +137,9 @@ def page(result):
              f"{result['load']:.1f}.", "",
              "## Whole programs", "",
              "Binary STL on disk to files on disk, medians. Slic3r 1.3 `--export-svg` against `lamina slice` to SVG, both with all "
-             "cores; admesh's load and check against `lamina slice --format null --threads 1`, which loads, checks, indexes, cuts, "
-             "chains, unites and nests every layer and writes none. admesh cuts no layers: what it needs does not grow with their "
-             "number, what we need does.", "",
+             "cores; admesh's load and check against `lamina slice --format null --threads 1`, which loads, checks and indexes the mesh, "
+             "cuts, chains, merges and nests the contours of every layer and writes none. admesh cuts no layers, so only our time grows "
+             "with their number.", "",
              "| part | triangles | layers | Slic3r, s (cpu) | lamina, s (cpu) | times as fast, wall (cpu) | meant | areas differ by |",
              "|---|---|---|---|---|---|---|---|"]
     for case in result["cases"].values():
@@ -164,7 +164,7 @@ def page(result):
                                               f"{case['svg']['peak_mib']:.0f} MiB" for case in result["cases"].values()) + ".", "",
               "## Stages, one core", "",
               "Layers of 0.1 mm. *cut*: find the facets of each plane and their crossings; *cut+chain*: and assemble them to closed "
-              "chains; *contours*: and drop straight points, find contacts, unite and nest.", "",
+              "chains; *contours*: and drop collinear points, find contacts, merge and nest.", "",
               "| part | stage | ms | million segments a second | meant |", "|---|---|---|---|---|"]
     for name, entry in result["stages"].items():
         part, stage = name.split("/")

@@ -83,7 +83,7 @@ def page(side):
            "published one. Touching and SC: Zick and Homsy 1982; loose BCC and FCC: the series of Hasimoto 1959.")
     yield ""
     yield from tables.table(["array, share of solid", "published", "at 48, %", "at 64, %", "at 96, %", "extrapolated", "differs, %",
-                              "error told, +- %", "contains it", "steps at 96"], spheres())
+                              "reported error, +- %", "contains it", "steps at 96"], spheres())
     yield "## A cell of random spheres"
     yield ""
     yield ("A tenth of the side in radius, overlapping. A step of a cell reads and writes 264 bytes at least; copying is measured in "
