@@ -137,6 +137,8 @@ add_test(NAME Documentation.EveryExampleOfEveryCommandRuns
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/examples $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
 add_test(NAME Documentation.EveryCommandOfTheGuidesPrintsWhatTheySay
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/guides $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
+add_test(NAME Documentation.EveryKeyOfJsonOutputIsOnItsPage
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/json_keys $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
 add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/scripts/threemf_outcomes ${PROJECT_SOURCE_DIR}/tests/corpus/3mf
                  --program $<TARGET_FILE:lamina>)
@@ -158,5 +160,7 @@ if(LAMINA_PYTHON)
 endif()
 add_test(NAME Documentation.EveryQuestionHasItsAnswerNearTheIndex
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/questions ${PROJECT_SOURCE_DIR})
+add_test(NAME Documentation.EveryFigureOfTheReadmeIsInAPageOfItsCommit
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/figures ${PROJECT_SOURCE_DIR})
 add_test(NAME House.EveryRuleFindsThePlantedFault COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/house/test_check_house)
 add_test(NAME Landing.FilesOfThreeCommitsAreFound COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/landing/three_commits ${PROJECT_SOURCE_DIR})
