@@ -129,7 +129,7 @@ void define_part(py::module_& module) {
             return view(reinterpret_cast<const std::int32_t*>(triangles.data()),
                         {static_cast<py::ssize_t>(triangles.size()), 3, 3}, self);
           },
-          "int32, n x 3 corners x (x, y, z), nm in the frame of the file; counter-clockwise seen from outside. A view of the "
+          "int32, n x 3 corners x (x, y, z), nm in the frame of the file; counter-clockwise as viewed from outside. A view of the "
           "mesh, read-only.")
       .def_property_readonly(
           "bounds", [](const Mesh& mesh) { return bounds_array(mesh.bounds); }, "int32, lowest and highest corner, nm.")

@@ -250,7 +250,7 @@ void define_layer(py::module_& module) {
         return self.of.at(self.next++);
       });
   py::class_<PlanSlice>(module, "PlanSlice",
-                        "Some layers of a plan, as plan[10:20]: a sequence whose layers are planned when they are asked for.")
+                        "Some layers of a plan, as plan[10:20]: a sequence whose layers are planned on access.")
       .def("__len__", [](const PlanSlice& self) { return self.count; })
       .def("__getitem__", &PlanSlice::at)
       .def("__getitem__", &PlanSlice::part)
@@ -276,8 +276,8 @@ std::string described(const Plan& plan) {
 void define_plan(py::module_& module) {
   py::class_<Plan, std::shared_ptr<Plan>>(
       module, "Plan",
-      "A job with its parts loaded: a sequence of layers that are planned when they are asked "
-      "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
+      "A job with its parts loaded: a sequence of layers that are planned on access. Several threads "
+      "may read it at the same time; planning releases the interpreter's lock.")
       .def("__len__", [](const Plan& plan) { return plan.of().layer_count(); })
       .def("__getitem__", [](const Plan& plan, std::int64_t requested) { return plan.layer(plan.index(requested)); })
       .def(
@@ -285,7 +285,7 @@ void define_plan(py::module_& module) {
           [](const std::shared_ptr<Plan>& plan, const py::slice& requested) {
             return PlanSlice{plan, 0, 1, plan->of().layer_count()}.part(requested);
           },
-          "A layer, or with plan[10:20] a sequence of layers, each planned when it is asked for.")
+          "A layer, or with plan[10:20] a sequence of layers, each planned on access.")
       .def("__repr__", &described)
       .def("__iter__", [](const std::shared_ptr<Plan>& plan) { return iterate(plan, 0, plan->of().layer_count()); })
       .def(
@@ -295,7 +295,7 @@ void define_plan(py::module_& module) {
             return iterate(plan, first, std::min(end.value_or(count), count));
           },
           "first"_a = 0, "end"_a = py::none(),
-          "Layers first to end, each planned when it is asked for and kept by nobody else.")
+          "Iterator over layers first to end. Each is planned on access, and the plan does not keep it.")
       .def(
           "contours", [](Plan& plan, std::int64_t requested) { return plan.contours(plan.index(requested)); }, "index"_a,
           "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
@@ -335,7 +335,7 @@ PYBIND11_MODULE(lamina, module) {
   using namespace lamina;
   using namespace lamina::python;
   module.doc() =
-      "Plans additive-manufacturing jobs: meshes in, the exact 1-bit image of every layer out.\n\n"
+      "Slices parts for powder and filament printers: exact bitmaps, print programs, toolpaths.\n\n"
       "Settings are the keys of a job file (docs/reference/job.md), as {'bed.dpi': 600, 'layers.thickness_mm': 0.1}; lamina.keys() lists\n"
       "them. Lengths in settings are mm, as in job files; in arrays they are whole nanometres. What fails raises lamina.Error\n"
       "with one line that says where, what is wrong and what to do.";
@@ -386,7 +386,7 @@ PYBIND11_MODULE(lamina, module) {
   def_product(
       "jet", &plan_into<Product::kImages>,
       "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
-      "resume=True goes on.");
+      "resume=True continues it.");
   def_product("slice", &plan_into<Product::kContours>,
               "Contours and fillings of all layers into a directory, as lamina slice does; returns its summary.");
   def_product(

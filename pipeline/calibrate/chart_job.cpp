@@ -176,7 +176,7 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
   }
   std::vector<std::string> lines;
   lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's position",
-                              json.at("pixels_a_mm").get<double>(), json.at("scatter_um").get<double>()));
+                              json.at("pixels_per_mm").get<double>(), json.at("scatter_um").get<double>()));
   const auto read_along = read_nozzles(nozzles, "along_detected_um", "along_error_um"),
              read_across = read_nozzles(nozzles, "across_detected_um", "across_error_um");
   lines.push_back(positions_line(read_along, read_across));

@@ -33,7 +33,6 @@ std::string lines_of(const GroupFit& fit, std::size_t points) {
 Json coefficients(const Permeability& fit) {
   return {{"k1_darcy", fit.k1_m2 / kDarcy},
           {"k1_error_darcy", fit.k1_error_m2 / kDarcy},
-          {"k1_m2", fit.k1_m2},
           {"k2_m", fit.k2_m},
           {"k2_error_m", fit.k2_error_m},
           {"r_squared", fit.r_squared},

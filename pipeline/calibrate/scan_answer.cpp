@@ -25,7 +25,7 @@ Json reading_json(const calibration::ChartReading& reading) {
     return json;
   };
   const calibration::HeadReading& head = reading.head;
-  Json json = {{"pixels_a_mm", reading.pixels_a_mm},
+  Json json = {{"pixels_per_mm", reading.pixels_a_mm},
                {"scatter_um", reading.scatter_um},
                {"blocked", head.blocked},
                {"weak", head.weak},

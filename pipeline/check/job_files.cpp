@@ -44,7 +44,7 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
   program::DropSweeps sweeps{std::max(1u, manifest.head.max_drops)};
   for (const LayerRecord& record : manifest.layers) {
     sweeps.added += record.program.added_sweeps;
-    sweeps.added_seconds += 1e-6 * static_cast<double>(record.program.added_microseconds);
+    sweeps.added_seconds += static_cast<double>(record.program.added_microseconds) / 1e6;
   }
   return program::sweeps_text(machine->profile(), *grid, sweeps);
 }

@@ -29,7 +29,7 @@ constexpr const Command* kCommands[] = {&jet_command,     &slice_command,       
 
 std::string program_help() {
   std::string text =
-      "lamina plans additive-manufacturing jobs: meshes in, what a machine needs for every layer out.\n\n"
+      "lamina slices parts for powder printers (exact bitmaps, print programs) and filament printers (toolpaths).\n\n"
       "Usage: lamina COMMAND [OPTIONS] ...\n\nCommands:\n";
   for (const Command* command : kCommands) text += fmt::format("  {:<14}{}\n", command->name, command->summary);
   text +=
@@ -58,6 +58,12 @@ void bound_retained_memory() {
 
 }  // namespace
 
+Json with_schema(const Json& value) {
+  Json whole{{"schema", kJsonSchema}};
+  whole.update(value);
+  return whole;
+}
+
 void Context::say(std::string_view line) { say_text(one_line(line) + "\n"); }
 
 void Answer::say(std::string_view line) {
@@ -84,8 +90,8 @@ CommandSpec spec_of(const Command& command) {
   CommandSpec spec = command.spec();
   spec.name = command.name;
   spec.brief = command.summary;
-  // Each heading once, in order of first occurrence; options without one come first.
-  std::map<std::string, std::size_t> positions{{"", 0}};
+  // Each heading once, in order of first occurrence; options without one come first, those of research last.
+  std::map<std::string, std::size_t> positions{{"", 0}, {"Research", spec.options.size() + 1}};
   for (const OptionSpec& option : spec.options) positions.try_emplace(option.group, positions.size());
   std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return positions[option.group]; });
   return spec;

@@ -16,6 +16,12 @@
 
 namespace lamina::pipeline {
 
+/// Of all JSON objects that commands print; it grows when a key is removed or redefined (docs/reference/json.md).
+inline constexpr std::int64_t kJsonSchema = 1;
+
+/// The object after its first member, "schema".
+Json with_schema(const Json& value);
+
 /// Receives a command's messages and results, and can cancel it. Implemented by the console and by a batch job.
 class Context {
  public:
@@ -34,7 +40,7 @@ class Context {
 
   // --- for scripts; errors  kOutput if writing fails; a closed pipe is not an error
   virtual Status print(std::string_view text) = 0;
-  /// Prints a value as one line of JSON.
+  /// Prints an object, with its schema, as one line of JSON.
   virtual Status give(const Json& value) = 0;
 
   // --- while it runs

@@ -125,7 +125,7 @@ Status Console::print(std::string_view text) {
   return failure(Fault::kOutput, "standard output: {}", std::strerror(reason));
 }
 
-Status Console::give(const Json& value) { return print(json_line(value)); }
+Status Console::give(const Json& value) { return print(json_line(with_schema(value))); }
 
 void Console::progress(const ProgressEvent& event) {
   using Stage = ProgressEvent::Stage;

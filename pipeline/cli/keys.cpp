@@ -18,12 +18,23 @@ constexpr Word<std::string_view> kHeadings[] = {{"part", "Parts"},
                                                 {"placement", "Parts"},
                                                 {"slice", "Contours and files"},
                                                 {"fill", "Filling"},
-                                                {"segment", "Segmented lines"},
                                                 {"extrude", "Extrusion"},
                                                 {"machine", "Machine and binder"},
                                                 {"dose", "Machine and binder"},
                                                 {"load", "Repair"},
                                                 {"run", "Run"}};
+
+/// Options of the cited theses: layers by angle (Lima 2009), and segmented lines (Di Nisio 2022).
+constexpr std::string_view kResearchFlags = "--adapt-angle --peaks --cover-top";
+
+std::string_view heading_of(const KeyName& key) {
+  const auto research = split(kResearchFlags, " ");
+  if ((key.section == "segment" && key.flag != "--fill") || std::ranges::find(research, key.flag) != research.end())
+    return "Research";
+  std::string_view heading = key.flag == "--fill" ? "Filling" : "Bed and layers";
+  read_word(kHeadings, key.section, heading);
+  return heading;
+}
 
 bool has(std::string_view choice, const KeyName& key) {
   const auto names = split(choice, " ");
@@ -40,10 +51,8 @@ void add_options(std::span<const Key<Target>> keys, std::string_view choice, con
     const auto words = key.words == nullptr ? std::vector<std::string_view>() : key.words();
     // Files may keep an older word for the default.
     if (!preset.empty() && !words.empty() && std::ranges::find(words, preset) == words.end()) preset = words.front();
-    std::string_view heading = "Bed and layers";
-    read_word(kHeadings, key.section, heading);
     spec.options.push_back(
-        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading), words});
+        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading_of(key)), words});
   }
 }
 
@@ -156,7 +165,8 @@ constexpr Need kNeeds[] = {
     {"--angle-step", deposits_lines, kLines},
     {"--stagger", deposits_lines, kLines},
     {"--print-speed", deposits_lines, "applies to filling lines, but there is no pattern; add --fill, or use --wall-speed"},
-    {"--segment-rule", cuts_lines, "applies to lines; closed curves are cut by their length under every rule; remove the option"},
+    {"--segment-rule", cuts_lines,
+     "applies to lines; closed curves are cut by their length under every rule; remove the option"},
     {"--spacing-cc", lies_in_pairs,
      "is between continuous lines, and one lies alone between segmented ones; add --continuous 2"},
     {"--bridge", leaves_open, "applies to open meshes, and repair closes them; add --no-repair"},
@@ -180,11 +190,10 @@ bool decides_in(Product product, const JobKey& key, const Job& job) {
 }  // namespace
 
 void add_key_options(std::string_view choice, CommandSpec& spec) {
-  spec.options.insert(
-      spec.options.end(),
-      {{"--job", "FILE", "a TOML job; options override what it says", "", "Job"},
-       {"--save-job", "FILE", "write the job as resolved, to be run again with --job", "", "Job"},
-       {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "", "Job"}});
+  spec.options.insert(spec.options.end(),
+                      {{"--job", "FILE", "job file in TOML; options override its keys", "", "Job"},
+                       {"--save-job", "FILE", "write the resolved job, for use with --job", "", "Job"},
+                       {"--set", "KEY=VALUE", "set a job key, as in bed.dpi=600 or part.2.copies=3", "", "Job"}});
   add_options<Job>(job_keys(), choice, Job(), spec);
   add_options<PartRequest>(part_keys(), choice, PartRequest(), spec);
 }

@@ -47,7 +47,7 @@ constexpr std::string_view kPicture("Software\0lamina", 15), kDrawing = "<!-- dr
 constexpr OwnFile kOwnFiles[] = {
     {"", "--save-job", false, {"^# A job of lamina."}},
     {"", "--quote", false, {"^part,copies,volume_mm3,pixels,drops,"}},
-    {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\":", "^Portugu"}},
+    {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"schema\":1,\"height_mm\":", "^Portugu"}},
     {"heights", "--plot", false, {kDrawing, kPicture}},
     {"permeability", "--plot", false, {kDrawing, kPicture}},
     {"permeability", "--solid", false, {formats::voxels::kMark}},

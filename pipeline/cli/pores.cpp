@@ -252,21 +252,19 @@ Error nothing_deposited(const std::string& path, const Box& box) {
 }  // namespace
 
 std::vector<OptionSpec> window_file_options() {
-  return {{"--solid", "FILE", "what is solid in the window, as voxels .nrrd, .mha, .vti, or as a closed surface .stl", "",
-           "Result"},
-          {"--void", "FILE", "the same of its void", "", "Result"},
-          {"--no-flow", "", "report pores and write files, but compute no flow", "", "Result"}};
+  return {{"--solid", "FILE", "write the solid as voxels (.nrrd, .mha, .vti) or surface (.stl)", "", "Result"},
+          {"--void", "FILE", "write the void as voxels (.nrrd, .mha, .vti) or surface (.stl)", "", "Result"},
+          {"--no-flow", "", "analyse pores and write files without computing the flow", "", "Result"}};
 }
 
 std::vector<OptionSpec> stack_options() {
-  return {
-      {"--pixel", "UM", "of images without a manifest: edge of a pixel, micrometres", "", "Images"},
-      {"--layer-um", "UM", "of images without a manifest: distance of layers; default: a pixel", "", "Images"},
-      {"--threshold", "N", "of images without a manifest: from which grey on a pixel is bright, of 255", "128", "Images"},
-      {"--dark", "", "dark pixels of images without a manifest are the solid, not the bright ones", "", "Images"},
-      {"--periodic", "AXES", "along which the window repeats, as in xy; else walls close its sides", "", "Images"},
-      {"--scan", "DIR", "of a print of these toolpaths: images to be found in the plan, and compared with it", "", "Images"},
-      {"--range", "N", "voxels each way that the scan may be shifted by, in eights", "16", "Images"}};
+  return {{"--pixel", "UM", "images without a manifest: pixel size in micrometres", "", "Images"},
+          {"--layer-um", "UM", "images without a manifest: layer thickness in micrometres; default: --pixel", "", "Images"},
+          {"--threshold", "N", "images without a manifest: min grey of bright pixels, 1 to 255", "128", "Images"},
+          {"--dark", "", "images without a manifest: dark pixels are solid", "", "Images"},
+          {"--periodic", "AXES", "axes with periodic boundaries, as in xy; default: walls", "", "Images"},
+          {"--scan", "DIR", "images of a scan of the print, compared with the toolpaths", "", "Images"},
+          {"--range", "N", "max shift of the scan in voxels, rounded up to a multiple of 8", "16", "Images"}};
 }
 
 Outcome predict_stack(const Arguments& arguments, Context& context) {
@@ -357,6 +355,8 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
   });
   if (!files) return files.error();
   if (empty) context.say("note: " + nothing_deposited(path, choice->window.box).message);
+  if (!choice->window.periodic[0] || !choice->window.periodic[1])
+    context.say("note: no period along x or y: walls close the window, and k1 is not that of the filling; use a wider part");
   print_warnings(*pile, *report, context);
   context.say(beads->reported);
   if (!arguments.has("--json"))

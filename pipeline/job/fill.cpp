@@ -46,33 +46,32 @@ std::string gaps_by_height_text(const std::vector<std::array<double, 2>>& gaps) 
 }
 
 constexpr Key<FillSettings> kFillKeys[] = {
-    word<kPatterns, &FillSettings::pattern>(
-        {"fill", "pattern", "--pattern", "PATTERN", "none, raster, contour, contour+raster, honeycomb or quatrefoil"}),
-    field<&FillSettings::width_mm>({"fill", "width_mm", "--bead", "MM", "width of a bead"}, kWidth),
+    word<kPatterns, &FillSettings::pattern>({"fill", "pattern", "--pattern", "PATTERN",
+                                             "fill pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil"}),
+    field<&FillSettings::width_mm>({"fill", "width_mm", "--bead", "MM", "bead width in mm"}, kWidth),
     field<&FillSettings::wall_width_mm>({"fill", "wall_width_mm", "", "MM", "width of a wall's bead; 0 for that of the others"},
                                         {0, 100, " mm"}),
-    field<&FillSettings::walls>({"fill", "walls", "--walls", "N", "number of beads along the surface"}, kCount),
+    field<&FillSettings::walls>({"fill", "walls", "--walls", "N", "number of wall beads along the surface"}, kCount),
     field<&FillSettings::loops>({"fill", "loops", "", "N", "contour+raster: closed curves before the raster"}, kCount),
-    field<&FillSettings::angle_deg>({"fill", "angle_deg", "--angle", "DEG", "direction of the lines of the first layer"},
-                                    kAngle),
+    field<&FillSettings::angle_deg>(
+        {"fill", "angle_deg", "--angle", "DEG", "line direction of the first layer in degrees from x"}, kAngle),
     field<&FillSettings::angle_step_deg>(
-        {"fill", "angle_step_deg", "--angle-step", "DEG", "how much the direction turns from layer to layer"}, kAngle),
+        {"fill", "angle_step_deg", "--angle-step", "DEG", "rotation of lines between layers in degrees"}, kAngle),
     field<&FillSettings::build_layers>({"fill", "build_layers", "", "M", "layers in a row with one direction"}, kOneAndMore),
-    field<&FillSettings::gap_mm>({"fill", "gap_mm", "--bead-gap", "MM[,MM...]",
-                                  "from edge to edge of neighbouring beads, may be negative; several in turn"},
-                                 list_of(-100, 1000)),
+    field<&FillSettings::gap_mm>(
+        {"fill", "gap_mm", "--bead-gap", "MM[,MM...]", "gaps between bead edges in mm, cyclic; negative: overlap"},
+        list_of(-100, 1000)),
     field<&FillSettings::distance_mm>({"fill", "distance_mm", "--line-distance", "MM[,MM...]",
-                                       "from centre to centre of neighbouring lines, in place of gaps"},
+                                       "spacing of line centres in mm, cyclic; instead of --bead-gap"},
                                       list_of(kMinMm, 1000, 0)),
     field<&FillSettings::group>({"fill", "group", "", "N", "beads in contact before each gap"}, kOneAndMore),
     structure<read_gaps_by_height, gaps_by_height_text, &FillSettings::gap_by_height>(
         {"fill", "gap_by_height", "", "[[Z,MM],...]", "gaps at heights above the part's bottom, in proportion between them"}),
-    text<check_nothing, &FillSettings::gap_formula>(
-        {"fill", "gap_formula", "--gap-formula", "FORMULA",
-         "gap in mm by z, h (height in mm, 0..1), n (layer), i (line), s, u (place across in mm, 0..1), a (degrees)"}),
-    field<&FillSettings::stagger_mm>({"fill", "stagger_mm", "--stagger", "MM[,MM...]",
-                                      "lines are moved sideways by these in turn, layer by layer of one direction"},
-                                     list_of(-1000, 1000)),
+    text<check_nothing, &FillSettings::gap_formula>({"fill", "gap_formula", "--gap-formula", "FORMULA",
+                                                     "gap in mm, formula of z, h, n, i, s, u, a (docs/reference/filling.md)"}),
+    field<&FillSettings::stagger_mm>(
+        {"fill", "stagger_mm", "--stagger", "MM[,MM...]", "sideways shifts of lines in mm, cyclic over layers"},
+        list_of(-1000, 1000)),
     word<kTurns, &FillSettings::stagger_every_layer>(
         {"fill", "stagger_by", "", "angle|layer", "the stagger continues when the direction comes back, or with every layer"}),
     field<&FillSettings::first_line_mm>(
@@ -192,52 +191,51 @@ constexpr Limits kAny{-1e6, 1e6};
 constexpr Key<SegmentSettings> kSegmentKeys[] = {
     field<&SegmentSettings::on>({"segment", "on", "", "", "lines are segmented"}),
     word<kRules, &SegmentSettings::rule>(
-        {"segment", "rule", "--segment-rule", "RULE",
-         "aligned: a grid fixed to the part, ends thick; fukuda: the grid as it falls; thick-ends: each line on its own"}),
-    field<&SegmentSettings::thick_mm>({"segment", "thick_mm", "--thick", "MM", "length of a thick stretch"}, kAny),
-    field<&SegmentSettings::thin_mm>({"segment", "thin_mm", "--thin", "MM", "length of a thin stretch"}, kAny),
+        {"segment", "rule", "--segment-rule", "RULE", "division of lines into segments: aligned, fukuda or thick-ends"}),
+    field<&SegmentSettings::thick_mm>({"segment", "thick_mm", "--thick", "MM", "length of thick segments in mm"}, kAny),
+    field<&SegmentSettings::thin_mm>({"segment", "thin_mm", "--thin", "MM", "length of thin segments in mm"}, kAny),
     field<&SegmentSettings::min_end_mm>(
         {"segment", "min_end_mm", "", "MM", "thick ends are at least so long; half of thick_mm if absent"}, kAny),
     field<&SegmentSettings::continuous>(
-        {"segment", "continuous_lines", "--continuous", "N", "continuous lines between two segmented ones"}, {1, 1000}),
+        {"segment", "continuous_lines", "--continuous", "N", "number of continuous lines between segmented lines"}, {1, 1000}),
     field<&SegmentSettings::first>({"segment", "first_line", "", "N", "number of a segmented line"}, {-1000, 1000}),
     field<&SegmentSettings::spacing_sc_mm>(
-        {"segment", "spacing_sc_mm", "--spacing-sc", "MM", "spacing of a segmented and a continuous line; default: by widths"},
+        {"segment", "spacing_sc_mm", "--spacing-sc", "MM", "segmented to continuous line spacing in mm; default: from widths"},
         kAny),
     field<&SegmentSettings::spacing_cc_mm>(
-        {"segment", "spacing_cc_mm", "--spacing-cc", "MM", "spacing of adjacent continuous lines"}, kAny),
-    field<&SegmentSettings::gap_mm>({"segment", "gap_mm", "--segment-gap", "MM",
-                                     "wanted between thick beads and their neighbours, for spacings from the widths"},
-                                    kAny),
+        {"segment", "spacing_cc_mm", "--spacing-cc", "MM", "spacing of adjacent continuous lines in mm"}, kAny),
+    field<&SegmentSettings::gap_mm>(
+        {"segment", "gap_mm", "--segment-gap", "MM", "target gap in mm between thick segments and adjacent lines"}, kAny),
     field<&SegmentSettings::thick_extrusion>({"segment", "thick_extrusion_percent", "--extrusion", "%",
-                                              "extrusion of thick stretches, and of thin ones if theirs is absent"},
+                                              "extrusion of thick segments in %, and of thin ones by default"},
                                              kAny),
-    field<&SegmentSettings::thin_extrusion>({"segment", "thin_extrusion_percent", "", "%", "extrusion of thin stretches"},
-                                            kAny),
+    field<&SegmentSettings::thin_extrusion>({"segment", "thin_extrusion_percent", "", "%", "extrusion of thin segments"}, kAny),
     field<&SegmentSettings::thick_speed>(
-        {"segment", "thick_speed_percent", "--thick-speed", "%", "speed of thick stretches; by the extrusion if absent"}, kAny),
-    field<&SegmentSettings::thin_speed>({"segment", "thin_speed_percent", "--thin-speed", "%", "speed of thin stretches"},
+        {"segment", "thick_speed_percent", "--thick-speed", "%", "speed of thick segments in %; default: from the extrusion"},
+        kAny),
+    field<&SegmentSettings::thin_speed>({"segment", "thin_speed_percent", "--thin-speed", "%", "speed of thin segments in %"},
                                         kAny),
     field<&SegmentSettings::thin_speed_sweep>({"segment", "thin_speed_sweep", "", "%,%,...",
-                                               "speeds of thin stretches, from one segmented line to the next: a test piece"},
+                                               "speeds of thin segments, from one segmented line to the next: a test piece"},
                                               kAny),
     field<&SegmentSettings::thin_extrusion_sweep>(
         {"segment", "thin_extrusion_sweep", "", "%,%,...", "extrusion of thin segments, line by line"}, kAny),
-    field<&SegmentSettings::thick_width_mm>({"segment", "thick_width_mm", "--thick-width", "MM",
-                                             "width that thick stretches will have; by the calibration if absent"},
-                                            kAny),
-    field<&SegmentSettings::thin_width_mm>({"segment", "thin_width_mm", "--thin-width", "MM", "width of thin segments"}, kAny),
+    field<&SegmentSettings::thick_width_mm>(
+        {"segment", "thick_width_mm", "--thick-width", "MM", "width of thick segments in mm; default: from the calibration"},
+        kAny),
+    field<&SegmentSettings::thin_width_mm>({"segment", "thin_width_mm", "--thin-width", "MM", "width of thin segments in mm"},
+                                           kAny),
     field<&SegmentSettings::continuous_width_mm>({"segment", "continuous_width_mm", "", "MM", "width of continuous lines"},
                                                  kAny),
     field<&SegmentSettings::one_direction>({"segment", "one_direction", "", "", "extrude all lines in one direction"}),
     field<&SegmentSettings::even_starts>(
         {"segment", "even_starts", "", "", "lines begin with the flow they keep, where the machine's material.lag_s is known"}),
-    field<&SegmentSettings::shift_mm>({"segment", "shift_mm", "--pore-shift", "MM[,MM...]",
-                                       "pores are moved along the lines by these, layer by layer in turn"},
-                                      {-1000, 1000, " mm", false, 1}),
+    field<&SegmentSettings::shift_mm>(
+        {"segment", "shift_mm", "--pore-shift", "MM[,MM...]", "pore shifts along lines in mm, cyclic over layers"},
+        {-1000, 1000, " mm", false, 1}),
     field<&SegmentSettings::across>(
         {"segment", "across", "", "",
-         "thin stretches have their middles on the segmented lines of the turned layer (thick_mm + thin_mm a multiple of their distance)"}),
+         "thin segments have their middles on the segmented lines of the turned layer (thick_mm + thin_mm a multiple of their distance)"}),
 };
 
 std::string read_segment_ranges(const TomlValue& list, std::vector<Range<SegmentSettings>>& ranges, TextPosition& at) {
@@ -255,6 +253,10 @@ std::string read_filling(std::string_view word, Job& job) {
   }
   if (FillRule rule{}; read_fill_rule(word, rule).empty()) {
     return fmt::format("'{}' is a rule for shells that overlap; give --fill-rule {} (image.fill in a file)", word, word);
+  }
+  if (!word.empty() && word.front() >= '0' && word.front() <= '9') {
+    return fmt::format("'{}' is no pattern; a density is the bead over the line distance: 20 % of 0.4 mm is --line-distance 2",
+                       word);
   }
   const std::string wrong = fill_settings_keys().front().read(word, job.fill.all);
   if (wrong.empty()) job.segment.all.on = false;  // a pattern instead of the segmented lines of a file
@@ -281,7 +283,7 @@ std::span<const JobKey> segment_keys() {
          decides::moves}));
     all.push_back(custom<Job, read_filling, write_no_filling>(
                       {"segment", "fill", "--fill", "FILLING",
-                       "filling: segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil"},
+                       "filling: segmented, none, raster, contour, contour+raster, honeycomb, quatrefoil"},
                       Form::kString)
                       .with_words(fillings));
     return all;

@@ -55,16 +55,16 @@ JobKey of_bed(const KeyName& name, const Limits& limits) {
 
 const JobKey kBedKeys[] = {
     of_bed<&Job::bed_mm, kBareBedMm>({"bed", "size_mm", "--bed", "WIDTHxDEPTH",
-                                      "size of the bed in mm; the image covers all of it", decides::images | decides::contours},
+                                      "bed size in mm; layer images cover the whole bed", decides::images | decides::contours},
                                      kSize),
     of_bed<&Job::dpi, kBareDpi>(
-        {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", decides::images}, kDpi),
-    field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", decides::all}, kSize),
+        {"bed", "dpi", "--dpi", "DPI|XxY", "resolution in pixels per inch along x and y, 1 to 25400", decides::images}, kDpi),
+    field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "layer thickness in mm", decides::all}, kSize),
 };
 
 const JobKey kPlacementKeys[] = {
     field<&Job::gap_mm>(
-        {"placement", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
+        {"placement", "gap_mm", "--gap", "MM", "distance between arranged parts and copies in mm", decides::all},
         {0, kMaxMm, " mm"}),
 };
 
@@ -109,51 +109,44 @@ const JobKey kHeightsKeys[] = {
     word<kModes, kHeights, &Request::mode>(heights_key(
         "mode", "--heights", "MODE", "layer heights: uniform, angle, cusp, stepwise, optimal (docs/theory/heights.md)")),
     custom<Job, read_thickness_text, same_text, kHeights, &Request::thickness_mm>(
-        heights_key(
-            "thickness_mm", "--thickness", "SET|RANGE",
-            "thicknesses in mm: a set as 0.178,0.254, or a range as 0.05..0.3:0.01 (step 0.001 if left out); --layer if absent"),
+        heights_key("thickness_mm", "--thickness", "SET|RANGE",
+                    "thicknesses in mm: set 0.1,0.2 or range 0.05..0.3[:0.001]; default: --layer"),
         Form::kString),
     field<kHeights, &Request::cusp_mm>(
-        heights_key("cusp_mm", "--cusp", "MM", "highest step on a slope, for cusp, stepwise and optimal"), kLength),
-    word<kCuspsOf, kHeights, &Request::cusp_of>(
-        heights_key("cusp_of", "--cusp-of", "printed|nominal",
-                    "with --shrink: the steps that are printed, or those of the part once it has shrunk")),
+        heights_key("cusp_mm", "--cusp", "MM", "max step on slopes in mm, for cusp, stepwise and optimal"), kLength),
+    word<kCuspsOf, kHeights, &Request::cusp_of>(heights_key("cusp_of", "--cusp-of", "printed|nominal",
+                                                            "with --shrink: steps as printed, or nominal (after shrinkage)")),
     field<kHeights, &Request::adapt_angle_deg>(
         heights_key("adapt_angle_deg", "--adapt-angle", "DEG",
-                    "angle: slopes at least this flat, before --shrink, get thinner layers; 0 is a wall, 90 a horizontal face"),
+                    "angle: min slope in degrees for thinner layers; 0: wall, 90: horizontal"),
         {0, 90, " degrees"}),
     field<kHeights, &Request::peak_angle_deg>(
-        heights_key("peak_angle_deg", "--peak-angle", "DEG", "facets at least this flat, and level, are horizontal faces"),
+        heights_key("peak_angle_deg", "--peak-angle", "DEG", "min angle in degrees of facets that count as horizontal faces"),
         {45, 90, " degrees"}),
     field<kHeights, &Request::normal_tolerance>(
         heights_key("normal_tolerance", "", "", "tolerance of a facet's normal in comparisons of angles"), {0, 0.1}),
     word<kFacets, kHeights, &Request::facets>(
-        heights_key("facets", "--facets", "range|plane",
-                    "facets that decide a layer: all within it, or those that its plane cuts (Lima 2009)")),
+        heights_key("facets", "--facets", "range|plane", "facets that decide a layer: reaching into it, or cut by its planes")),
     field<kHeights, &Request::min_facet_mm2>(
-        heights_key("facet_mm2", "--facet-area", "MM2", "facets smaller than this do not affect layers"), kArea),
+        heights_key("facet_mm2", "--facet-area", "MM2", "min area in mm2 of facets that affect layers"), kArea),
     word<kPeaks, kHeights, &Request::peaks>(
-        heights_key("peaks", "--peaks", "flats|facets",
-                    "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)")),
+        heights_key("peaks", "--peaks", "flats|facets", "angle: peaks from horizontal faces, or from all horizontal facets")),
     field<kHeights, &Request::cover_top>(
-        heights_key("cover_top", "--cover-top", "", "angle and optimal: the last layer ends at the top or above it", "true")),
-    field<kHeights, &Request::flats>(heights_key(
-        "flats", "--no-flats", "", "optimal: do not aim at horizontal faces and tops, only keep the step", "false")),
+        heights_key("cover_top", "--cover-top", "", "angle, optimal: end the last layer at or above the top", "true")),
+    field<kHeights, &Request::flats>(
+        heights_key("flats", "--no-flats", "", "optimal: ignore horizontal faces and tops, only limit the step", "false")),
     field<kHeights, &Request::min_flat_mm2>(
-        heights_key("flat_mm2", "--flat-area", "MM2", "horizontal faces smaller than this are not aimed at"), kArea),
+        heights_key("flat_mm2", "--flat-area", "MM2", "min area in mm2 of horizontal faces; smaller ones are ignored"), kArea),
     field<kHeights, &Request::flat_tolerance_um>(
-        heights_key("flat_tolerance_um", "--flat-tolerance", "UM",
-                    "horizontal faces that near are one, and a layer that ends that near hits it, in micrometres"),
+        heights_key("flat_tolerance_um", "--flat-tolerance", "UM", "height tolerance of horizontal faces in micrometres"),
         {0, 1000, " um"}),
     custom<Job, read_time_model, write_time_model, kHeights, &Request::time_model>(
-        heights_key("time_model", "--time-model", "S[,S]",
-                    "optimal: the least time instead of the fewest layers; seconds a layer, and a mm2 of its section"),
+        heights_key("time_model", "--time-model", "S[,S]", "optimal: minimise time; seconds per layer and per mm2 of section"),
         Form::kList),
-    word<kContainments, kHeights, &Request::containment>(
-        heights_key("containment", "--containment", "across|inside|outside",
-                    "whether steps lie across the true surface, inside or outside of it")),
-    field<kHeights, &Request::per_part>(heights_key(
-        "per_part", "--per-part", "", "each part gets its own layers within common slabs (material extrusion)", "true")),
+    word<kContainments, kHeights, &Request::containment>(heights_key("containment", "--containment", "across|inside|outside",
+                                                                     "layer steps across, inside or outside the true surface")),
+    field<kHeights, &Request::per_part>(
+        heights_key("per_part", "--per-part", "", "separate layers for each part within common slabs (extrusion)", "true")),
 };
 
 // --- [image]
@@ -176,15 +169,14 @@ std::string check_image_format(std::string_view text) {
 std::string check_title(std::string_view) { return {}; }
 
 const JobKey kImageKeys[] = {
-    text<check_image_format, &Job::format>(image_key("format", "--format", "FORMAT", "file format of layers"))
+    text<check_image_format, &Job::format>(image_key("format", "--format", "FORMAT", "file format of layer images"))
         .with_words(image_formats),
-    word<kFillRules, &Job::fill_rule>(
-        {"image", "fill", "--fill-rule", "RULE",
-         "solid regions of overlapping shells: nonzero (any), positive (without inverted shells), evenodd", decides::all}),
+    word<kFillRules, &Job::fill_rule>({"image", "fill", "--fill-rule", "RULE",
+                                       "solid regions of overlapping shells: nonzero, positive or evenodd", decides::all}),
     word<kMirrors, &Job::mirror>(
-        image_key("mirror", "--mirror", "x|y|xy|none", "turn the image over: x swaps left and right, y back and front")),
+        image_key("mirror", "--mirror", "x|y|xy|none", "mirror images: x swaps left and right, y front and back")),
     text<check_title, &Job::title>(
-        image_key("title", "--title", "NAME", "title of the job; TIFF tags then contain it, the layer and z")),
+        image_key("title", "--title", "NAME", "job title, written to TIFF tags with layer and height")),
 };
 
 // --- [machine], [dose]
@@ -242,60 +234,57 @@ constexpr Word<std::uint32_t> kLevels[] = {{"off", 0}, {"2", 2}, {"4", 4}, {"16"
 constexpr Word<BeadEnds> kBeadEnds[] = {{"round", BeadEnds::kRound}, {"square", BeadEnds::kSquare}};
 
 const JobKey kMachineKeys[] = {
-    text<check_path, &Job::machine, &MachineRequest::profile>(
-        {"machine", "profile", "--machine", "NAME|FILE",
-         "write the print program of this machine, and take bed and dpi from it; lamina machines lists them",
-         decides::images | decides::moves}),
+    text<check_path, &Job::machine, &MachineRequest::profile>({"machine", "profile", "--machine", "NAME|FILE",
+                                                               "printer: print program, bed and dpi; see lamina machines",
+                                                               decides::images | decides::moves}),
     custom<Job, read_presets, presets_text, &Job::machine, &MachineRequest::presets>(
-        printer_key("presets", "--preset", "NAME|FILE,...",
-                    "powder, binder and process that change the machine's profile, in their order; lamina machines lists them"),
+        printer_key("presets", "--preset", "NAME|FILE,...", "powder, binder and process presets in order; see lamina machines"),
         Form::kStrings),
     field<&Job::machine, &MachineRequest::scan_speed_mm_s>(
-        printer_key("scan_speed_mm_s", "--scan-speed", "MM/S", "speed of the head over the bed; default: the machine's"),
+        printer_key("scan_speed_mm_s", "--scan-speed", "MM/S", "scan speed of the head in mm/s; default: the machine's"),
         {1e-3, 1e6, " mm/s"}),
     field<&Job::machine, &MachineRequest::blocked>(
-        printer_key("blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's"),
+        printer_key("blocked", "--blocked", "N,N,...", "blocked nozzles, counted from 0; replaces the machine's list"),
         {0, 65'534}),
     custom<Job, read_rule, rule_text, &Job::machine, &MachineRequest::vat_rule>(
-        printer_key("vat_rule", "--vat-rule", "RULE",
-                    "vat that feeds a layer of two powders, instead of the machine's; refuse: there must be none"),
+        printer_key("vat_rule", "--vat-rule", "RULE", "vat for layers of two powders: first, second, majority, both or refuse"),
         Form::kString)
         .with_words(vat_rule_words),
 };
 
 const JobKey kDoseKeys[] = {
     field<&Job::dose, &DoseRequest::bleed_um>(
-        dose_key("bleed_um", "--bleed", "UM|XxY",
-                 "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it"),
-        kBleedUm),
+        dose_key("bleed_um", "--bleed", "UM|XxY", "bleed compensation in micrometres along x and y; negative: grow"), kBleedUm),
     field<&Job::dose, &DoseRequest::hole_bleed_um>(
-        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "compensation at holes, if different"), kBleedUm),
+        dose_key("hole_bleed_um", "--hole-bleed", "UM|XxY", "bleed compensation of holes in micrometres; default: --bleed"),
+        kBleedUm),
     field<&Job::dose, &DoseRequest::first_bleed_um>(
-        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "compensation of the first layers, if different"), kBleedUm),
+        dose_key("first_bleed_um", "--first-bleed", "UM|XxY", "bleed compensation of the first layers in micrometres"),
+        kBleedUm),
     field<&Job::dose, &DoseRequest::first_layers>(
-        dose_key("first_layers", "--first-layers", "N", "layers that use --first-bleed"), {1, 1'000'000})
+        dose_key("first_layers", "--first-layers", "N", "number of first layers that use --first-bleed"), {1, 1'000'000})
         .shown_if([](const Job& job) { return job.dose.first_layers != DoseRequest().first_layers; }),
     field<&Job::dose, &DoseRequest::shell_mm>(
-        dose_key("shell_mm", "--shell", "MM",
-                 "depth below the edge of a layer that gets all its binder (with --core or --fill)"),
+        dose_key("shell_mm", "--shell", "MM", "thickness of the fully set shell in mm (with a core or filling)"),
         {0, 1000, " mm"}),
     field<&Job::dose, &DoseRequest::core>(
-        dose_key("core", "--core", "SHARE", "share of the pixels inside the shell that is jetted, 0 to 1"), {0, 1}),
+        dose_key("core", "--core", "SHARE", "fraction of pixels that is jetted inside the shell, 0 to 1"), {0, 1}),
     structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(
         dose_key("saturation_percent", "--saturation", "PERCENT|FORMULA",
-                 "binder in percent of the powder's voids, or a formula of x, y, z in mm")),
+                 "binder in % of the void volume, or a formula of x, y, z in mm")),
     structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::core_saturation_percent>(
         dose_key("core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
-                 "saturation inside the shell (with --saturation and --shell)")),
+                 "saturation in % inside the shell (with --saturation and --shell)")),
     structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
         dose_key("saturation_range", "", "[{...}]", "other saturations between two heights above the bed")),
-    word<kLevels, &Job::levels>(dose_key("levels", "--levels", "2|4|16|off", "grey levels by the fill fraction of each voxel"))
+    word<kLevels, &Job::levels>(
+        dose_key("levels", "--levels", "2|4|16|off", "number of grey levels for the fill fraction of voxels"))
         .with_form(Form::kBare)
         .shown_if([](const Job& job) { return job.levels > 0; }),
     field<&Job::dose, &DoseRequest::dithered>(
-        dose_key("dithered", "--no-dither", "", "round drops to whole ones (with --levels or --saturation)", "false")),
+        dose_key("dithered", "--no-dither", "", "round drops instead of dithering (with --levels or --saturation)", "false")),
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
-        dose_key("bead_ends", "--bead-ends", "round|square", "ends of beads and of their thick and thin segments"))
+        dose_key("bead_ends", "--bead-ends", "round|square", "shape of the ends of beads and segments"))
         .shown_if([](const Job& job) { return job.dose.bead_ends != BeadEnds::kRound; }),
 };
 
@@ -313,24 +302,21 @@ std::string check_slice_format(std::string_view text) {
 
 const JobKey kSliceKeys[] = {
     text<check_slice_format, &Job::slice, &SliceRequest::format>(
-        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none",
+        {"slice", "format", "--format", "FORMAT", "file format: svg, svg-polygon, cli, cli-binary, cli-16, 3mf, null (no file)",
          decides::contours})
         .with_words(slice_format_words),
     field<&Job::slice, &SliceRequest::file_a_layer>({"slice", "file_a_layer", "--file-a-layer", "",
-                                                     "one file for each layer, layers/000000.svg and up", decides::contours,
+                                                     "write one file per layer, from layers/000000.svg", decides::contours,
                                                      "true"}),
-    field<&Job::slice, &SliceRequest::empty_first_layer>(
-        {"slice", "empty_first_layer", "--empty-first-layer", "",
-         "CLI: begin with an empty layer at the bottom, from which readers infer the thickness", decides::contours, "true"}),
+    field<&Job::slice, &SliceRequest::empty_first_layer>({"slice", "empty_first_layer", "--empty-first-layer", "",
+                                                          "CLI: start with an empty layer, for readers that infer thickness",
+                                                          decides::contours, "true"}),
     field<&Job::slice, &SliceRequest::tolerance_um>(
-        slice_key("tolerance_um", "--tolerance", "UM", "points are left out if the contour moves by no more, in micrometres"),
-        {0, 1e6, " um"}),
+        slice_key("tolerance_um", "--tolerance", "UM", "max deviation of simplified contours in micrometres"), {0, 1e6, " um"}),
     field<&Job::slice, &SliceRequest::bridge_mm>(
-        slice_key("bridge_mm", "--bridge", "MM", "longest gap of an open mesh (--no-repair) that is closed, in mm"),
-        {0, 1000, " mm"}),
+        slice_key("bridge_mm", "--bridge", "MM", "max gap in mm to close in open meshes (with --no-repair)"), {0, 1000, " mm"}),
     field<&Job::slice, &SliceRequest::offset_mm>(
-        slice_key("offset_mm", "--offset", "MM", "contours are moved outwards by this, inwards if negative"),
-        {-1000, 1000, " mm"}),
+        slice_key("offset_mm", "--offset", "MM", "contour offset in mm, positive outwards"), {-1000, 1000, " mm"}),
 };
 
 // --- [extrude]
@@ -341,7 +327,7 @@ std::string read_machine_changes(const TomlValue& tree, ProfileChanges& changes,
 
 JobKey machine_key() {
   JobKey key = structure<read_machine_changes, changes_text, &Job::extrude, &ExtrudeRequest::machine>(
-      {"extrude", "machine", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in fan.from_layer=2",
+      {"extrude", "machine", "--machine-set", "KEY=VALUE;...", "override keys of the machine's profile, as in fan.from_layer=2",
        decides::moves});
   key.read_text = [](const JobKey&, std::string_view text, Job& job) { return read_changes(text, job.extrude.machine); };
   return key;
@@ -354,25 +340,26 @@ JobKey number(std::string_view name, std::string_view flag, std::string_view uni
 }
 
 const JobKey kExtrudeKeys[] = {
-    number<&ExtrudeRequest::flow>("flow", "--flow", "FACTOR", 0.01, 10, "factor on all that is extruded"),
-    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600, "nozzle temperature"),
-    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "bed temperature"),
+    number<&ExtrudeRequest::flow>("flow", "--flow", "FACTOR", 0.01, 10, "extrusion multiplier"),
+    number<&ExtrudeRequest::nozzle_degc>("nozzle_degc", "--nozzle-temperature", "DEGC", 0, 600,
+                                         "nozzle temperature in degrees Celsius"),
+    number<&ExtrudeRequest::bed_degc>("bed_degc", "--bed-temperature", "DEGC", 0, 300, "bed temperature in degrees Celsius"),
     number<&ExtrudeRequest::print_mm_s>("print_mm_s", "--print-speed", "MM/S", 0.1, 2000,
-                                        "speed of filling lines; 100 % of segmented lines"),
-    number<&ExtrudeRequest::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "speed of walls"),
+                                        "speed of filling lines in mm/s; 100 % of segmented lines"),
+    number<&ExtrudeRequest::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "speed of walls in mm/s"),
     number<&ExtrudeRequest::first_layer_mm_s>("first_layer_mm_s", "--first-layer-speed", "MM/S", 0.1, 2000,
-                                              "speed limit of the first layer"),
-    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000, "travel speed"),
-    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50, "retraction before long travel moves"),
-    number<&ExtrudeRequest::fan_percent>("fan_percent", "--fan", "%", 0, 100, "speed of the part cooling fan"),
-    field<&Job::extrude, &ExtrudeRequest::relative_extrusion>({"extrude", "relative_extrusion", "--relative-extrusion",
-                                                               "true|false", "count filament from move to move",
-                                                               decides::moves})
+                                              "speed limit of the first layer in mm/s"),
+    number<&ExtrudeRequest::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000, "travel speed in mm/s"),
+    number<&ExtrudeRequest::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50,
+                                           "retraction of filament in mm before long travel moves"),
+    number<&ExtrudeRequest::fan_percent>("fan_percent", "--fan", "%", 0, 100, "speed of the part cooling fan in %"),
+    field<&Job::extrude, &ExtrudeRequest::relative_extrusion>(
+        {"extrude", "relative_extrusion", "--relative-extrusion", "true|false", "relative E coordinates", decides::moves})
         .with_words([] {
           return std::vector<std::string_view>{"true", "false"};
         }),
     field<&Job::extrude, &ExtrudeRequest::skirt_loops>(
-        {"extrude", "skirt_loops", "--skirt", "N", "loops around all parts before the first bead; 0: none", decides::moves},
+        {"extrude", "skirt_loops", "--skirt", "N", "number of skirt loops around all parts; 0: none", decides::moves},
         {0, 100}),
     machine_key()};
 
@@ -441,56 +428,50 @@ JobKey repair_key(const KeyName& name) {
 }
 
 const JobKey kLoadKeys[] = {
-    repair_key({"load", "repair", "--repair", "MODE",
-                "how open meshes are closed: auto, winding (by winding number, approximate) or off", decides::all})
+    repair_key(
+        {"load", "repair", "--repair", "MODE", "repair of open meshes: auto, winding (approximate) or off", decides::all})
         .with_words([] {
           return std::vector<std::string_view>{"auto", "winding", "off"};
         }),
     // The row above decides; this one is an option only.
-    repair_key({"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", 0, "false"})
-        .shown_if([](const Job&) { return false; }),
-    field<&Job::drop_bad>({"load", "drop_bad", "--drop-bad", "",
-                           "drop facets with coordinates that are no numbers instead of refusing the file", decides::all,
-                           "true"}),
-    field<&Job::weld_um>({"load", "weld_um", "--weld", "UM",
-                          "repair joins open edges this far apart, in micrometres; 5 grows by itself", decides::all},
-                         {0, 1e6, " um"}),
+    repair_key({"load", "repair", "--no-repair", "", "do not repair open meshes", 0, "false"}).shown_if([](const Job&) {
+      return false;
+    }),
+    field<&Job::drop_bad>(
+        {"load", "drop_bad", "--drop-bad", "", "drop facets with NaN or infinite coordinates", decides::all, "true"}),
+    field<&Job::weld_um>(
+        {"load", "weld_um", "--weld", "UM", "max gap to weld in micrometres; 5 is doubled as needed", decides::all},
+        {0, 1e6, " um"}),
 };
 
 const JobKey kRunKeys[] = {
-    text<check_path, &Job::output>({"run", "output", "-o,--output", "DIR", "directory for the layers and the manifest"}),
+    text<check_path, &Job::output>({"run", "output", "-o,--output", "DIR", "output directory for layers and manifest"}),
     word<kEngines, &Job::engine>(
-        {"run", "engine", "--engine", "ENGINE", "rays, contours, or both to compare them; all give the same bytes"}),
+        {"run", "engine", "--engine", "ENGINE", "slicing engine: rays, contours or both (compared); same output"}),
     custom<Job, read_isa, write_isa, &Job::isa>(
-        {"run", "isa", "--isa", "SET",
-         "instructions of the inner loops: auto for the processor's widest, plain, avx2 or avx512; all give the same bytes"},
-        Form::kString)
+        {"run", "isa", "--isa", "SET", "instruction set: auto (widest), plain, avx2 or avx512; same output"}, Form::kString)
         .with_words(isa_words),
-    field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
+    field<&Job::threads>({"run", "threads", "--threads", "N", "number of threads; 0: all processors"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
-        {"run", "memory", "--memory", "SIZE", "memory of layers in flight, without the mesh: 256M, 1G"}, Form::kString),
+        {"run", "memory", "--memory", "SIZE", "memory limit for layers in flight, without meshes: 256M, 1G"}, Form::kString),
     word<kSyncs, &Job::sync>(
-        {"run", "sync", "--sync", "WHEN",
-         "data that survives a power cut: job, all of it once it has ended, for some 0.1 s; layer, all but the "
-         "layers in flight while it runs too, for some ms a layer; off, nothing for certain"}),
+        {"run", "sync", "--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off"}),
     custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
-        {"run", "layers", "--layers", "A:B", "only layers A to B - 1, counted from 0 at the bottom; A: and :B are open"},
+        {"run", "layers", "--layers", "A:B", "plan layers A to B - 1 only, from 0 at the bottom; also A: and :B"},
         Form::kString),
-    field<&Job::strict>({"run", "strict", "--strict", "", "warnings are errors: exit 5, and nothing is written", 0, "true"}),
-    field<&Job::allow_empty>({"run", "allow_empty", "--allow-empty", "",
-                              "finish a whole job without a single pixel, contour or bead instead of refusing it", 0, "true"}),
+    field<&Job::strict>({"run", "strict", "--strict", "", "treat warnings as errors: exit code 5, no output", 0, "true"}),
+    field<&Job::allow_empty>(
+        {"run", "allow_empty", "--allow-empty", "", "accept a job without any pixel, contour or bead", 0, "true"}),
     field<&Job::inspect>(
         {"run", "inspect", "--inspect", "", "detect islands, trapped powder, thin walls and touching parts", 0, "true"}),
-    field<&Job::min_wall_mm>({"run", "min_wall_mm", "--min-wall", "MM",
-                              "walls thinner than this are reported by --inspect; default: two pixels, or a drop"},
-                             {0, 1000, " mm"}),
+    field<&Job::min_wall_mm>(
+        {"run", "min_wall_mm", "--min-wall", "MM", "min wall thickness in mm for --inspect; default: two pixels or a drop"},
+        {0, 1000, " mm"}),
     field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
-                                "plan a job although layers get less binder than the machine's powder needs to hold", 0,
-                                "true"})
+                                "accept layers with less binder than the machine's powder needs", 0, "true"})
         .shown_if([](const Job& job) { return job.allow_unbound; }),
     custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
-        {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
-        Form::kString),
+        {"run", "shard", "--shard", "I/N", "plan shard I of N only, I from 1; see lamina merge"}, Form::kString),
 };
 
 // --- [[part]]
@@ -526,7 +507,7 @@ bool may_be_images(const PartRequest& part) {
 
 PartKey bottom_key() {
   PartKey key = field<&PartRequest::bottom_mm>(
-      part_key("bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed, in mm"), {0, kMaxMm, " mm"});
+      part_key("bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed in mm"), {0, kMaxMm, " mm"});
   key.write_text = [](const PartKey&, const PartRequest& part) { return value_text(part.bottom_mm.value_or(0)); };
   return key.shown_if([](const PartRequest& part) { return part.bottom_mm || !may_be_images(part); });
 }
@@ -535,20 +516,21 @@ const PartKey kPartKeys[] = {
     text<check_path, &PartRequest::path>(part_key(
         "path", "", "FILE", "STL, OBJ or 3MF file, or a folder of layer images; in a job file, relative to that file")),
     text<check_unit, &PartRequest::unit>(
-        part_key("unit", "--unit", "UNIT", "unit of STL and OBJ files, which state none: mm, cm, m, um, inch, foot"))
+        part_key("unit", "--unit", "UNIT", "unit of STL and OBJ files: mm, cm, m, um, inch or foot"))
         .with_words([] { return std::vector<std::string_view>(std::begin(kUnits), std::end(kUnits)); }),
-    field<&PartRequest::copies>(part_key("copies", "--copies", "N", "copies of each part, 1 to 1000000"), {1, 1'000'000}),
+    field<&PartRequest::copies>(part_key("copies", "--copies", "N", "number of copies of each part, 1 to 1000000"),
+                                {1, 1'000'000}),
     field<&PartRequest::at_mm>(
-        part_key("at_mm", "--at", "X,Y", "where the part's box starts, in mm from the bed's front left; else arranged"),
+        part_key("at_mm", "--at", "X,Y", "position of the part's front left corner in mm; default: arranged"),
         {0, kMaxMm, " mm"}),
     bottom_key(),
     custom<PartRequest, read_factors<kMinScale, true>, write_factors, &PartRequest::scale>(
-        part_key("scale", "--scale", "S|X,Y,Z", "factors per axis of the file; a negative one mirrors"), Form::kList),
+        part_key("scale", "--scale", "S|X,Y,Z", "scale factor, or one per axis of the file; negative: mirrored"), Form::kList),
     field<&PartRequest::rotate_deg>(
-        part_key("rotate_deg", "--rotate", "X,Y,Z", "degrees about x, then y, then z, after scaling"),
+        part_key("rotate_deg", "--rotate", "X,Y,Z", "rotation in degrees about x, then y, then z, after scaling"),
         {-36000, 36000, " degrees"}),
     custom<PartRequest, read_factors<kMinShrink, false>, write_factors, &PartRequest::shrink>(
-        part_key("shrink", "--shrink", "S|X,Y,Z", "factors per axis of the bed that make up for shrinkage, applied last"),
+        part_key("shrink", "--shrink", "S|X,Y,Z", "shrinkage compensation factor, or one per bed axis, applied last"),
         Form::kList),
     structure<read_fill_changes, fill_changes_text, &PartRequest::fill>(
         part_key("fill", "", "{...}", "keys of the job's filling that differ for this part")),

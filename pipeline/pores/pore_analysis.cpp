@@ -198,7 +198,7 @@ std::string as_text(const PoreAnalysis& analysis) {
   for (std::size_t a = 0; a < 3; ++a) {
     const pores::Tortuosity& way = analysis.tortuosities[a];
     text += way.reached == 0
-                ? fmt::format("paths     along {}: none leads through\n", "xyz"[a])
+                ? fmt::format("paths     along {}: not connected\n", "xyz"[a])
                 : fmt::format("paths     along {}: {:.3f} times as long as the window, {:.3f} to {:.3f}; throat {:.3f} mm\n",
                               "xyz"[a], way.mean, way.minimum, way.maximum, analysis.throat_mm[a]);
   }

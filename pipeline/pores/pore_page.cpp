@@ -34,7 +34,7 @@ std::string title_of(const std::string& source, const PoreReport& report, std::s
   const std::string name = one_line((path.has_filename() ? path : path.parent_path()).filename().string());
   if (!report.section) {
     const bool requested = std::ranges::any_of(report.flow, [](const auto& darcy) { return darcy.has_value(); });
-    return requested ? name + ": no void leads through" : name;
+    return requested ? name + ": no connected void" : name;
   }
   const Darcy& darcy = *report.flow[axis];
   return fmt::format("{}: k1 {:.4g} +- {:.2g} D along {} ({:.3e} m2)", name, darcy.k_m2[axis] / segment::kDarcy,
@@ -45,7 +45,7 @@ std::string repeats_of(const std::array<bool, 3>& periodic) {
   std::string axes;
   for (std::size_t a = 0; a < 3; ++a)
     if (periodic[a]) axes += fmt::format("{}{}", axes.empty() ? "" : ", ", "xyz"[a]);
-  return axes.empty() ? "repeats along no axis" : "repeats along " + axes;
+  return axes.empty() ? "repeats along no axis: walls close its sides" : "repeats along " + axes;
 }
 
 /// Tops of layers, and the middles of beads of the one that is cut.
@@ -73,17 +73,13 @@ Status add_beads(const formats::GcodeFile& file, const Pile& pile, const WindowC
 std::string as_text(const WindowChoice& choice, const PoreReport& report) {
   const Box& box = choice.window.box;
   const auto& repeats = choice.window.periodic;
-  std::string axes;
-  for (std::size_t a = 0; a < 3; ++a)
-    if (repeats[a]) axes += axes.empty() ? std::string(1, "xyz"[a]) : fmt::format(", {}", "xyz"[a]);
-  std::string text =
-      fmt::format("window    {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, {} from layer {} on; repeats along {}\n",
-                  mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y),
-                  choice.layers == 1 ? "one layer" : fmt::format("{} layers", choice.layers), choice.first_layer,
-                  axes.empty() ? "no axis: walls close its sides" : axes);
+  std::string text = fmt::format("window    {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, {} from layer {} on; {}\n",
+                                 mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y),
+                                 choice.layers == 1 ? "one layer" : fmt::format("{} layers", choice.layers), choice.first_layer,
+                                 repeats_of(repeats));
   const auto& count = choice.window.count;
   text += fmt::format("voxels    {} x {} x {}, {} of void\n", count[0], count[1], count[2], readable_count(report.empty));
-  text += fmt::format("porosity  {:.2f} %, {:.2f} % leads through along z\n", 100 * report.porosity.total(),
+  text += fmt::format("porosity  {:.2f} %, {:.2f} % connected along z\n", 100 * report.porosity.total(),
                       100 * report.porosity.percolating(2));
   text += fmt::format("surface   {:.2f} mm2 a mm3\n", report.surface_per_mm);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -91,7 +87,7 @@ std::string as_text(const WindowChoice& choice, const PoreReport& report) {
     const Darcy& darcy = *report.flow[a];
     const double k = darcy.k_m2[a] / segment::kDarcy, error = darcy.error_m2[a] / segment::kDarcy;
     if (darcy.steps == 0) {
-      text += fmt::format("along {}   k1 0 D: no void leads through\n", "xyz"[a]);
+      text += fmt::format("along {}   k1 0 D: no connected void\n", "xyz"[a]);
       continue;
     }
     text += fmt::format("along {}   k1 {:.4g} +- {:.2g} D ({:.4e} m2), tortuosity {:.3f}, throat {:.3f} mm\n", "xyz"[a], k,
@@ -101,6 +97,10 @@ std::string as_text(const WindowChoice& choice, const PoreReport& report) {
 }
 
 Json as_json(const WindowChoice& choice, const PoreReport& report) {
+  const auto column_darcy = [](std::array<double, 3> column) {
+    for (double& k : column) k /= segment::kDarcy;
+    return column;
+  };
   const Box& box = choice.window.box;
   Json json = {
       {"command", "permeability"},
@@ -117,8 +117,8 @@ Json as_json(const WindowChoice& choice, const PoreReport& report) {
     if (!report.flow[a]) continue;
     const Darcy& darcy = *report.flow[a];
     json["flow"].push_back({{"along", std::string(1, "xyz"[a])},
-                            {"k1_m2", darcy.k_m2},
-                            {"k1_error_m2", darcy.error_m2},
+                            {"k1_column_darcy", column_darcy(darcy.k_m2)},
+                            {"k1_column_error_darcy", column_darcy(darcy.error_m2)},
                             {"k1_darcy", darcy.k_m2[a] / segment::kDarcy},
                             {"k1_error_darcy", darcy.error_m2[a] / segment::kDarcy},
                             {"tortuosity", darcy.tortuosity},
@@ -143,8 +143,8 @@ Json as_json(const Forchheimer& inertia) {
   Json json = {{"along", "z"},
                {"k2_m", inertia.fit.k2_m},
                {"k2_error_m", inertia.fit.k2_error_m},
-               {"k1_m2", inertia.fit.k1_m2},
-               {"k1_error_m2", inertia.fit.k1_error_m2},
+               {"k1_darcy", inertia.fit.k1_m2 / segment::kDarcy},
+               {"k1_error_darcy", inertia.fit.k1_error_m2 / segment::kDarcy},
                {"weak_up_to_reynolds", inertia.weak_reynolds},
                {"settled", inertia.settled},
                {"points", Json::array()}};
@@ -183,12 +183,12 @@ Result<Plot> draw_window(const std::string& source, const WindowChoice& choice, 
   picture.title = title_of(source, report, static_cast<std::size_t>(axis));
   const auto& count = choice.window.count;
   picture.captions = {fmt::format(
-      "window {:.3f} x {:.3f} x {:.3f} mm of {} x {} x {} voxels, {}; porosity {:.2f} %, {:.2f} % leads through along {}",
+      "window {:.3f} x {:.3f} x {:.3f} mm of {} x {} x {} voxels, {}; porosity {:.2f} %, {:.2f} % connected along {}",
       mm(box.width()), mm(box.depth()), mm(box.height()), count[0], count[1], count[2], repeats_of(choice.window.periodic),
       100 * report.porosity.total(), 100 * report.porosity.percolating(axis), "xyz"[axis])};
   if (report.section)
     picture.captions.push_back(
-        "creeping flow; mean: what flows / the whole cross-section, solid too (Darcy's velocity); ticks: where the sections cut each other");
+        "creeping flow; mean: flow rate / whole cross-section (Darcy velocity); ticks: intersection of the two sections");
   return view::draw_pores(picture);
 }
 

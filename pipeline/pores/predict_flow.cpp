@@ -189,7 +189,7 @@ Result<PoreReport> analyse_pores(const PoreRasters& rasters, const FlowRequest& 
 
 Result<Forchheimer> analyse_inertia(const PoreRasters& rasters, const PoreReport& report,
                                     const std::function<bool(double)>& advance) {
-  if (report.porosity.percolating(2) == 0) return Error{Fault::kInput, "no void leads through along z: there is no k2"};
+  if (report.porosity.percolating(2) == 0) return Error{Fault::kInput, "no void is connected along z: there is no k2"};
   Result<Forchheimer> result = sweep_through(rasters.fine, report.surface_per_mm, advance);
   if (!result) return result.error();
   const Result<Forchheimer> rough = sweep_through(rasters.coarse, report.surface_per_mm, advance);

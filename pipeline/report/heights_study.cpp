@@ -158,7 +158,7 @@ void draw_flats(const Study& study, double top_nm, Plot& plot) {
     if (last_label - y < 15) continue;
     last_label = y;
     plot.texts.push_back({kWidth - kRight + 6.0, y + 5, 13, Plot::Anchor::kStart, colour,
-                          missed ? fmt::format("{:.3f}: off {:.3f}", mm(hit.flat.height), mm(hit.miss))
+                          missed ? fmt::format("{:.3f}: missed by {:.3f}", mm(hit.flat.height), mm(hit.miss))
                                  : fmt::format("{:.3f}", mm(hit.flat.height))});
   }
 }
@@ -170,17 +170,18 @@ void draw_words(const std::string& title, const Study& study, Plot& plot) {
   const Evaluation& e = study.evaluation;
   put(kLeft, 34, 20, Plot::Anchor::kStart, fmt::format("{}: {} layers, {}", title, study.layers(), study.name));
   put(kLeft, 60, 15, Plot::Anchor::kStart,
-      fmt::format("step up to {:.4f} mm, {:.4f} mm on average; {} of {} flats hit; top {:+.4f} mm", mm(e.largest_cusp),
-                  e.mean_cusp * 1e-6, e.flats.size() - e.flats_missed, e.flats.size(), mm(e.top_miss)));
+      fmt::format("step up to {:.4f} mm, {:.4f} mm on average; {} of {} horizontal faces hit; top {:+.4f} mm",
+                  mm(e.largest_cusp), e.mean_cusp * 1e-6, e.flats.size() - e.flats_missed, e.flats.size(), mm(e.top_miss)));
   double legend = kPlotLeft;
-  for (const auto& [reason, name] :
-       {std::pair{LayerReason::kUniform, "thickest"}, {LayerReason::kCusp, "slope"}, {LayerReason::kFlat, "to meet a flat"}}) {
+  for (const auto& [reason, name] : {std::pair{LayerReason::kUniform, "thickest"},
+                                     {LayerReason::kCusp, "slope"},
+                                     {LayerReason::kFlat, "to reach a horizontal face"}}) {
     plot.boxes.push_back({legend, kTop - 20.0, 12, 12, colour_of(reason)});
     put(legend + 17, kTop - 9.0, 14, Plot::Anchor::kStart, name);
     legend += 40 + 8.0 * static_cast<double>(std::string_view(name).size());
   }
-  put(kPlotLeft + kHalf / 2, kHeight - 18.0, 15, Plot::Anchor::kMiddle, "thickness of the layer, mm");
-  put(kMiddle, kHeight - 18.0, 15, Plot::Anchor::kMiddle, "outline from the front; height, mm");
+  put(kPlotLeft + kHalf / 2, kHeight - 18.0, 15, Plot::Anchor::kMiddle, "layer thickness, mm");
+  put(kMiddle, kHeight - 18.0, 15, Plot::Anchor::kMiddle, "front view; height, mm");
 }
 
 }  // namespace

@@ -203,7 +203,7 @@ class SweepObserver : public ImageObserver {
   void report(Summary& summary) const override {
     const HeadGrid& grid = plan_.images->machine->grid;
     const program::DropSweeps sweeps{std::max(1u, plan_.images->dose.max_drops()), added_,
-                                     static_cast<double>(added_microseconds_) * 1e-6};
+                                     static_cast<double>(added_microseconds_) / 1e6};
     summary.results.emplace_back("sweeps", program::sweeps_text(plan_.images->machine->machine, grid, sweeps));
     summary.facts["jetting"] = {{"head_drops", grid.head_drops},   {"sweep_drops", grid.sweep_drops},
                                 {"pixel_drops", sweeps.max_drops}, {"sweeps_per_position", grid.sweeps_for(sweeps.max_drops)},
@@ -227,7 +227,7 @@ class PrintObserver : public ImageObserver {
     cost_.add(record, record.program.drops + record.program.spat, record.program.microseconds);
   }
   void report(Summary& summary) const override {
-    const double seconds = timed_ ? static_cast<double>(microseconds_) * 1e-6 : 0;
+    const double seconds = timed_ ? static_cast<double>(microseconds_) / 1e6 : 0;
     if (seconds > 0) summary.results.emplace_back("printing", replay::time_text(seconds, machine_.name));
     if (!refills_.empty()) summary.results.emplace_back("vats", refills_text(refills_));
     if (timed_) {

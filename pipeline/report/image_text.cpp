@@ -44,7 +44,7 @@ Json powder_json(const PowderDrops& powder, double drop_pl) {
   Json fact = {{"name", powder.name}, {"set_pixels", powder.pixels}};
   if (drop_pl <= 0) return fact;
   fact["drops"] = powder.drops;
-  fact["binder_ml"] = ml_of(powder.drops, drop_pl);
+  fact["binder_mm3"] = 1000 * ml_of(powder.drops, drop_pl);
   return fact;
 }
 
@@ -74,7 +74,7 @@ Json binder_json(const dose::Budget& budget, const dose::BinderCount& count) {
           {"drops", count.drops()},
           {"max_drops", budget.max_drops()},
           {"max_jetted_drops", count.max_drops()},
-          {"binder_ml", count.binder_ml(budget)}};
+          {"binder_mm3", 1000 * count.binder_ml(budget)}};
 }
 
 std::string voxels_text(const dose::ShareCount& count, std::uint32_t levels, std::string_view as) {

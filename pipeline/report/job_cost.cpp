@@ -15,21 +15,21 @@ namespace lamina::cost {
 namespace {
 
 double ml(std::int64_t nl) { return static_cast<double>(nl) * 1e-6; }
-double litres(std::int64_t nl) { return static_cast<double>(nl) * 1e-9; }
+double mm3(std::int64_t nl) { return static_cast<double>(nl) / 1e3; }
 double hours(const Use& use) { return static_cast<double>(use.microseconds) / 3.6e9; }
 std::string money(std::int64_t cents) { return fmt::format("{}.{:02}", cents / 100, cents % 100); }
 
 Json use_json(const Use& use, const Machine::Cost& cost) {
   Json json = {{"set_pixels", use.pixels},
                {"drops", use.drops},
-               {"hours", hours(use)},
-               {"binder_l", litres(use.binder_nl)},
-               {"powder_fed_l", litres(use.fed_nl)},
-               {"powder_bound_l", litres(use.bound_nl)},
-               {"powder_left_l", litres(use.left_nl())}};
+               {"print_seconds", static_cast<double>(use.microseconds) / 1e6},
+               {"binder_mm3", mm3(use.binder_nl)},
+               {"powder_fed_mm3", mm3(use.fed_nl)},
+               {"powder_bound_mm3", mm3(use.bound_nl)},
+               {"powder_left_mm3", mm3(use.left_nl())}};
   if (!has_prices(cost)) return json;
   json["cost"] = static_cast<double>(use.cents()) / 100;
-  json["cost_hours"] = static_cast<double>(use.hour_cents) / 100;
+  json["cost_time"] = static_cast<double>(use.hour_cents) / 100;
   json["cost_binder"] = static_cast<double>(use.binder_cents) / 100;
   json["cost_powder"] = static_cast<double>(use.powder_cents) / 100;
   return json;

@@ -61,7 +61,7 @@ Json pores_json(const DepositedRange& range) {
           {"length_mm", mean(p.length_mm, p.closed)},
           {"width_mm", mean(p.width_mm, p.closed)},
           {"aspect", p.length_mm > 0 ? p.width_mm / p.length_mm : 0},
-          {"density_mm2", range.area_mm2 > 0 ? static_cast<double>(p.closed) / range.area_mm2 : 0}};
+          {"closed_per_mm2", range.area_mm2 > 0 ? static_cast<double>(p.closed) / range.area_mm2 : 0}};
 }
 
 std::string short_text(const ShortIntervals& shorts, const Extruder& machine) {
@@ -125,7 +125,7 @@ void report_bead(const Extruder& machine, std::uint32_t left_out, std::string_vi
                                         left_out == 1 ? " is" : "s are", cut_at));
 }
 
-/// "612 stretches are too short for 400 mm/s2: ..." if most of the speed is missed; else "".
+/// "612 segments are too short for 400 mm/s2: ..." if most of the speed is missed; else "".
 std::string speed_warning(const ShortIntervals& shorts, const Extruder& machine) {
   return shorts.reached_mm_s < kNearStated * shorts.commanded_mm_s ? short_text(shorts, machine) : std::string();
 }

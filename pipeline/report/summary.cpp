@@ -73,7 +73,7 @@ Json part_json(const PartSummary& part) {
   return {{"path", part.path},
           {"copies", part.copies},
           {"triangles", part.triangles},
-          {"bounds_mm", {point_json(part.bounds.lo), point_json(part.bounds.hi)}},
+          {"bounds_mm", Json{{"lo", point_json(part.bounds.lo)}, {"hi", point_json(part.bounds.hi)}}},
           {"notes", notes}};
 }
 

@@ -47,11 +47,12 @@ Lines timing_lines(const Timing& timing) {
 Json timing_json(const Timing& timing) {
   Json phases = Json::object(), nodes = Json::object();
   for (const auto& [name, span] : timing.phases) {
-    phases[std::string(name)] = {
-        {"wall", span.wall}, {"processor", span.processor}, {"serial_share", serial_share(span, timing.threads)}};
+    phases[std::string(name)] = {{"wall_seconds", span.wall},
+                                 {"processor_seconds", span.processor},
+                                 {"serial_share", serial_share(span, timing.threads)}};
   }
   for (const auto& [name, busy] : timing.nodes) {
-    nodes[std::string(name)] = {{"busy", busy.wall}, {"processor", busy.processor}};
+    nodes[std::string(name)] = {{"busy_seconds", busy.wall}, {"processor_seconds", busy.processor}};
   }
   const formats::Floor& floor = timing.floor;
   Json limit = {{"read_bytes", floor.bytes_read}, {"read_seconds", floor.read},   {"write_bytes", floor.bytes_written},

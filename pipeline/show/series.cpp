@@ -61,8 +61,9 @@ Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
   shapes.box = job.plan.sections->bounds();
   if (Status status = view::add_paths(work.paths, shapes); !status) return status.error();
   shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", job.name(), index, count, mm(shapes.z));
-  shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
-  if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
+  shapes.caption =
+      fmt::format("{} contour{}, {:.2f} mm2", shapes.contours.size(), shapes.contours.size() == 1 ? "" : "s", area);
+  if (work.paths.size() > 0) shapes.caption += fmt::format(", {} path{}", work.paths.size(), work.paths.size() == 1 ? "" : "s");
   return shapes;
 }
 

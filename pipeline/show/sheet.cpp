@@ -141,8 +141,8 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   view.nozzles = jetting->nozzles;
   view.title = fmt::format("{}, layer {}, swath {} ({} of {} that fire), step {}", head.machine, choice.layer, jetting->swath,
                            jetting->position, jetting->sweeps, jetting->step);
-  view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", jetting->fired, jetting->drops,
-                             jetting->firing, jetting->nozzles.size());
+  view.caption = fmt::format("{} of {} drops fired (dark); {} of {} nozzles fire at this step (red)", jetting->fired,
+                             jetting->drops, jetting->firing, jetting->nozzles.size());
   if (view.maximum > 1) view.caption += fmt::format("; darkest {} drops", view.maximum);
   return view::picture::swath_picture(view);
 }

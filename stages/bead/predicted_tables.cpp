@@ -79,7 +79,7 @@ class Gather {
 
 Calibration predicted_tables(const BeadMachine& machine, double width_mm, double height_mm, double speed_mm_s) {
   Calibration tables;
-  tables.source = "predicted from what 100 % lays, the lag of the melt and the acceleration (stages/bead)";
+  tables.source = "predicted from the cross-section at 100 %, the lag of the melt and the acceleration (stages/bead)";
   tables.width_mm = width_mm;
   tables.height_mm = height_mm;
   tables.speed_mm_s = speed_mm_s;

@@ -102,11 +102,11 @@ constexpr std::uint64_t max_grey_png(std::uint64_t columns, std::uint64_t rows, 
 }
 
 constexpr std::array<LevelFormat, 3> kLevelFormats = {{
-    {"tiff-4", ".tif", "TIFF, 4-bit grey, PackBits: shares of voxels, or a machine's drops", tiff::make_4_bit_encoder,
+    {"tiff-4", ".tif", "TIFF, 4-bit grey, PackBits: fill fractions of voxels, or a machine's drops", tiff::make_4_bit_encoder,
      max_grey_packbits},
-    {"tiff-8", ".tif", "TIFF, 8-bit grey, PackBits: shares of voxels, or a machine's drops", tiff::make_8_bit_encoder,
+    {"tiff-8", ".tif", "TIFF, 8-bit grey, PackBits: fill fractions of voxels, or a machine's drops", tiff::make_8_bit_encoder,
      max_grey_packbits},
-    {"png-8", ".png", "PNG, 8-bit grey: shares of voxels, or a machine's drops", png::make_8_bit_encoder, max_grey_png},
+    {"png-8", ".png", "PNG, 8-bit grey: fill fractions of voxels, or a machine's drops", png::make_8_bit_encoder, max_grey_png},
 }};
 
 }  // namespace

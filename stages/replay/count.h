@@ -25,7 +25,7 @@ struct Count {
   bool moves = false;                                    // whether the program moves vats and roller
   double build_mm = 0;                                   // final position of the build vat
   double farthest_along_um = 0, farthest_across_um = 0;  // greatest distance of a drop from its pixel's centre
-  double seconds() const { return static_cast<double>(microseconds) * 1e-6; }
+  double seconds() const { return static_cast<double>(microseconds) / 1e6; }
   void add(const Count& other);
 };
 

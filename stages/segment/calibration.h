@@ -23,10 +23,10 @@ struct Reading {
   bool inside = true;  // of what was measured
 };
 
-/// Least width of a thin stretch, and the longest thin stretch that keeps its pore open, at a speed of 100 % and above.
+/// Least width of a thin segment, and the longest thin segment that keeps its pore open, at a speed of 100 % and above.
 Reading thin_width_at_speed(const Calibration& calibration, double percent);
 Reading stable_distance(const Calibration& calibration, double percent);
-/// Least width of a thin stretch at that extrusion (100 % and below) and the reference speed.
+/// Least width of a thin segment at that extrusion (100 % and below) and the reference speed.
 Reading thin_width_at_extrusion(const Calibration& calibration, double percent);
 
 /// Thick speed and widths for an extrusion that holds along the whole segmented line.
@@ -42,7 +42,7 @@ struct Spacing {
 /// Spacings settled on, in proportion between the extrusions; absent where the calibration holds none.
 std::optional<Spacing> settled_spacing(const Calibration& calibration, double extrusion_percent);
 
-/// Centre to centre, mm, so that a thick stretch and a continuous line (two continuous lines) are `gap` apart.
+/// Centre to centre, mm, so that a thick segment and a continuous line (two continuous lines) are `gap` apart.
 /// Di Nisio 2022, Appendix A, step 5.
 Spacing spacing_for(double thick_mm, double continuous_mm, double gap_mm);
 /// The same as the document rounds it in its Tables 7 and 8: thick width to 0.01 mm, the set width for the continuous

@@ -65,7 +65,7 @@ Status check_interval_count(const Segmentation& plan, const LayerCut& cut, const
   }
   if (2 * length / static_cast<double>(kNmPerMm) <= kMaxIntervals * (plan.thick_mm + plan.thin_mm)) return {};
   return Error{Fault::kUsage,
-               fmt::format("layer {}: lines of {:.0f} mm come to more than 10000000 thick and thin stretches; give a "
+               fmt::format("layer {}: lines of {:.0f} mm come to more than 10000000 thick and thin segments; give a "
                            "longer segment.thick_mm or thin_mm",
                            layer, length * 1e-6)};
 }

@@ -1,6 +1,6 @@
-// stages/segment/cut.h: the lines of a layer -> thick and thin stretches, one at a time, while they are written or drawn.
+// stages/segment/cut.h: the lines of a layer -> thick and thin segments, one at a time, while they are written or drawn.
 //
-// A thick stretch is wide enough to touch the neighbouring lines; a thin one leaves a pore. Where a line is cut follows
+// A thick segment is wide enough to touch the neighbouring lines; a thin one leaves a pore. Where a line is cut follows
 // Fukuda, Volpato and Di Nisio, "Algoritmo para preenchimento poroso em impressão 3D através de deposição segmentada"
 // (2020), and Di Nisio, "Estratégia de deposição com variação de largura do filamento para geração de estruturas porosas
 // com manufatura aditiva por extrusão de material" (2022), section 3.1.1. The two rules differ; both are here, and a
@@ -31,8 +31,8 @@ namespace lamina::segment {
 struct LineCut {
   CutRule rule = CutRule::kAligned;
   std::int64_t thin = 1'500'000, thick = 1'500'000;  // > 0
-  std::int64_t origin = 0;                           // where a thin stretch of the grid begins; any of them
-  std::int64_t min_end = 0;                          // no thin stretch is nearer to the end of a line; not used by kGrid
+  std::int64_t origin = 0;                           // where a thin segment of the grid begins; any of them
+  std::int64_t min_end = 0;                          // no thin segment is nearer to the end of a line; not used by kGrid
 
   /// The same cuts for lines that are walked the other way, in coordinates with the sign changed.
   LineCut mirrored() const {
@@ -42,10 +42,10 @@ struct LineCut {
   }
 };
 
-/// Calls visit(begin, end, Thickness) for the stretches of the line [from, to], in order; they cover it without a gap
-/// and none is empty. Neighbouring stretches differ. A line without a thin stretch is one stretch: reference where
+/// Calls visit(begin, end, Thickness) for the segments of the line [from, to], in order; they cover it without a gap
+/// and none is empty. Neighbouring stretches differ. A line without a thin segment is one stretch: reference where
 /// the grid does not divide it (as published), thick under the other rules, so that it still touches its neighbours,
-/// which are spaced for thick stretches.
+/// which are spaced for thick segments.
 /// cost  O(stretches), no memory
 template <class Visit>
 void cut_line(const LineCut& cut, std::int64_t from, std::int64_t to, Visit&& visit) {
@@ -69,7 +69,7 @@ void cut_line(const LineCut& cut, std::int64_t from, std::int64_t to, Visit&& vi
     return visit(begin, to, thin ? Thickness::kThin : Thickness::kThick);
   }
   const std::int64_t end = std::max<std::int64_t>(cut.min_end, 1);
-  std::int64_t next;  // where the first thin stretch begins
+  std::int64_t next;  // where the first thin segment begins
   std::int64_t last;  // where it may begin at the latest
   if (cut.rule == CutRule::kThickEnds) {
     const std::int64_t available = to - from - 2 * end + cut.thick;
@@ -130,7 +130,7 @@ inline double distance(Point2 a, Point2 b) {
 ///
 /// Straight lines are cut by their position along `along`, so that pores of all lines and layers are on one grid. Lines of
 /// several points and closed curves are cut by their length. A closed curve comes to whole periods under every rule: its
-/// thick stretches are made as much longer as that needs, and it begins and ends in the middle of one.
+/// thick segments are made as much longer as that needs, and it begins and ends in the middle of one.
 /// cost  O(points + stretches), no memory
 template <class Visit>
 class Expander {
@@ -280,7 +280,7 @@ struct CutPosition {
   MicroDegrees angle = 0;            // of the lines of the layer
   double shift_mm = 0;               // of the layer's pores along its lines
   std::optional<double> first_line;  // nm along across(angle + a quarter turn): a segmented line of the layers turned by 90
-                                     // degrees; thin stretches have their middles on it. Absent: the grid begins where the
+                                     // degrees; thin segments have their middles on it. Absent: the grid begins where the
                                      // part does
 };
 

@@ -13,7 +13,7 @@
 namespace lamina::segment {
 namespace {
 
-constexpr double kThinSpeed = 200;  // %: that of repeated stretches
+constexpr double kThinSpeed = 200;  // %: that of repeated segments
 constexpr double kReached = 0.77;   // of a speed; a stretch that reaches less than 0.75 is warned of
 constexpr double kMinPoreLength = 0.3, kMinPore = 0.03;
 constexpr Interval kThick{1.0, 2.4}, kGap{-0.02, 0.0195};
@@ -25,10 +25,10 @@ constexpr Interval kMeasuredThick{1.5, 1.5}, kMeasuredThin{1.5, 2.0}, kMeasuredG
 
 Result<DesignLimits> DesignLimits::of(const Extruder& machine, const Calibration& calibration) {
   if (calibration.repeated.empty())
-    return Error{Fault::kUsage, "its calibration has no widths of repeated stretches; measure them with lamina calibrate"};
+    return Error{Fault::kUsage, "its calibration has no widths of repeated segments; measure them with lamina calibrate"};
   for (const Calibration::Repeated& row : calibration.repeated) {
     if (std::abs(row.thin_speed_percent - kThinSpeed) > 0.5)
-      return Error{Fault::kUsage, "its calibration has widths of repeated stretches at other speeds than 200 %"};
+      return Error{Fault::kUsage, "its calibration has widths of repeated segments at other speeds than 200 %"};
   }
   DesignLimits limits;
   limits.calibration_ = &calibration;
@@ -43,7 +43,7 @@ Result<DesignLimits> DesignLimits::of(const Extruder& machine, const Calibration
   for (const double extrusion : {limits.extrusion_.minimum, limits.extrusion_.maximum}) {
     const Choice minimum = limits.nearest({1, extrusion, kThick.minimum, 0, 0});
     if (minimum.thin_mm > limits.max_thin_)
-      return Error{Fault::kUsage, "it accelerates too slowly: thin stretches end before they have reached their speed"};
+      return Error{Fault::kUsage, "it accelerates too slowly: thin segments end before they have reached their speed"};
   }
   return limits;
 }
@@ -102,7 +102,7 @@ std::array<double, 4> DesignLimits::beyond(const Choice& choice) const {
 namespace {
 
 constexpr std::size_t kHeights = 32;    // of the upper half of a layer
-constexpr std::size_t kPositions = 48;  // of half a thin stretch
+constexpr std::size_t kPositions = 48;  // of half a thin segment
 
 /// Half of a bead's width at a height above the middle of its layer, mm.
 double half_width(double width, double layer, double above) {

@@ -34,7 +34,7 @@ struct Interval {
 class DesignLimits {
  public:
   /// calibration  has to outlive it
-  /// errors       kUsage: no widths of repeated stretches, or at other speeds than 200 %; no thin stretch reaches its speed
+  /// errors       kUsage: no widths of repeated segments, or at other speeds than 200 %; no thin segment reaches its speed
   static Result<DesignLimits> of(const Extruder& machine, const Calibration& calibration);
 
   /// Lines between two segmented ones: those of Di Nisio 2022, Table 8.

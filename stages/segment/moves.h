@@ -95,7 +95,7 @@ class PoreCounter {
   const Segmentation& plan_;
   PoreCounts& counts_;
   LineNeighbours neighbours_;
-  // --- the stretch before
+  // --- the segment before
   std::uint32_t run_ = UINT32_MAX;
   Point2 at_{};
   Thickness before_ = Thickness::kReference;
@@ -107,13 +107,13 @@ class PoreCounter {
   double length_mm_ = 0, thin_mm_ = 0;
 };
 
-// --- thin stretches of a layer that lie under thin ones of the next, whose lines are turned by a
+// --- thin segments of a layer that lie under thin ones of the next, whose lines are turned by a
 // quarter.
 
-/// Counts the thin stretches of straight lines of a part in a layer, and those whose centre line meets that of a thin stretch
+/// Counts the thin segments of straight lines of a part in a layer, and those whose centre line meets that of a thin segment
 /// of the same part in the layer above. Layers that are not turned by 90 degrees have none.
 /// counts  receives crossing and crossed
-/// memory  12 bytes a thin stretch above. cost  O((thin + thin above) log (thin above)) and the lines that a stretch crosses
+/// memory  12 bytes a thin segment above. cost  O((thin + thin above) log (thin above)) and the lines that a stretch crosses
 void count_crossed(const ToolpathsView& paths, const LayerCut& cut, const ToolpathsView& above, const LayerCut& cut_above,
                    PoreCounts& counts);
 
@@ -186,7 +186,7 @@ class SegmentCounter {
   Thickness before_ = Thickness::kReference;
 };
 
-/// Counts thick and thin stretches that end before the machine has reached their speed. A planner makes the change of speed
+/// Counts thick and thin segments that end before the machine has reached their speed. A planner makes the change of speed
 /// from one stretch of a line to the next within the faster of the two; at the ends of a line it begins and ends with half of
 /// the speed that the machine changes at once. Lines that are not divided do not count.
 class SpeedCounter {

@@ -32,7 +32,7 @@ TestPiece lines_to_measure(std::string name, std::string task, std::array<double
   return piece;
 }
 
-/// Such lines of one thin stretch between two thick ones.
+/// Such lines of one thin segment between two thick ones.
 TestPiece thin_intervals(std::string name, std::string task, std::array<double, 3> size_mm) {
   TestPiece piece = lines_to_measure(std::move(name), std::move(task), size_mm);
   piece.thick_mm = 10;
@@ -64,7 +64,7 @@ void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
       "4-speed",
       fmt::format(
           "{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
-          "the thin stretch (thin_mm), the widest one after it (thick_mm), and how far from the start of the thin stretch the bead is as wide as "
+          "the thin segment (thin_mm), the widest one after it (thick_mm), and how far from the start of the thin segment the bead is as wide as "
           "before (stable_mm)",
           speeds.size(), number_text(speeds.front()), number_text(speeds.back())),
       {width_for(speeds.size(), request.width_mm), 50, request.height_mm}));
@@ -81,7 +81,7 @@ void add_lines(const PieceRequest& request, std::vector<TestPiece>& pieces) {
     pieces.push_back(lines_to_measure(
         fmt::format("4-repeated-{}", number_text(percent)),
         fmt::format(
-            "short stretches at {} % extrusion; measure thick, thin and continuous lines in the initial, the central and the final region. If they differ by "
+            "short segments at {} % extrusion; measure thick, thin and continuous lines in the initial, the central and the final region. If they differ by "
             "more than {} mm, plan it again with `lamina extrude --job FILE --thick-speed PERCENT`, lower, and add rows for that speed",
             number_text(percent), kAcceptedDeviation),
         {50, 28, request.height_mm}));
@@ -211,20 +211,20 @@ Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const Measu
         break;
       case Measured::Test::kSpeed:
         if (!row.thin && !row.stable && !row.thick) break;  // not measured
-        if (!row.thin) return at_row(row, "thin_mm is empty; measure the narrowest point of the thin stretch");
+        if (!row.thin) return at_row(row, "thin_mm is empty; measure the narrowest point of the thin segment");
         if (!row.stable)
           return at_row(
-              row, "stable_mm is empty; measure from the start of the thin stretch to where the bead is as wide as before");
-        if (!row.thick) return at_row(row, "thick_mm is empty; measure the widest point after the thin stretch");
+              row, "stable_mm is empty; measure from the start of the thin segment to where the bead is as wide as before");
+        if (!row.thick) return at_row(row, "thick_mm is empty; measure the widest point after the thin segment");
         if (row.percent <= 100)
-          return at_row(row, fmt::format("percent is {:g}; speeds of thin stretches are above 100", row.percent));
+          return at_row(row, fmt::format("percent is {:g}; speeds of thin segments are above 100", row.percent));
         if (!speeds.emplace(row.percent, &row).second)
           return at_row(row, fmt::format("{} is duplicated", percent_text(row.percent)));
         break;
       case Measured::Test::kExtrusion:
         if (!row.thin) break;
         if (row.percent <= 0 || row.percent >= 100)
-          return at_row(row, fmt::format("percent is {:g}; extrusions of thin stretches are between 0 and 100", row.percent));
+          return at_row(row, fmt::format("percent is {:g}; extrusions of thin segments are between 0 and 100", row.percent));
         if (!extrusions.emplace(row.percent, &row).second)
           return at_row(row, fmt::format("{} is duplicated", percent_text(row.percent)));
         break;
@@ -272,8 +272,8 @@ Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const Measu
     }
     machine.settled.push_back(settled);
   }
-  if (speeds.empty()) machine.advice.push_back("no widths by speed: the maximum length of a thin stretch is unknown");
-  if (repeated.empty()) machine.advice.push_back("no widths of repeated stretches: spacings cannot follow from them");
+  if (speeds.empty()) machine.advice.push_back("no widths by speed: the maximum length of a thin segment is unknown");
+  if (repeated.empty()) machine.advice.push_back("no widths of repeated segments: spacings cannot follow from them");
   return machine;
 }
 

@@ -76,9 +76,9 @@ Status check(const Segmentation& s, double bead_width_mm) {
     return Error{Fault::kUsage, fmt::format("segment.{}: {}", key, what)};
   };
   const auto positive = [](double value) { return std::isfinite(value) && value > 0; };
-  if (!positive(s.thin_mm)) return wrong("thin_mm", fmt::format("{} mm; a thin stretch has to be longer than 0", s.thin_mm));
+  if (!positive(s.thin_mm)) return wrong("thin_mm", fmt::format("{} mm; a thin segment has to be longer than 0", s.thin_mm));
   if (!positive(s.thick_mm))
-    return wrong("thick_mm", fmt::format("{} mm; a thick stretch has to be longer than 0", s.thick_mm));
+    return wrong("thick_mm", fmt::format("{} mm; a thick segment has to be longer than 0", s.thick_mm));
   for (const auto& [key, value] : {std::pair{"thick_speed_percent", s.thick_speed}, {"thin_speed_percent", s.thin_speed}}) {
     if (!positive(value)) return wrong(key, fmt::format("{} %; a speed has to be above 0", value));
   }
@@ -99,7 +99,7 @@ Status check(const Segmentation& s, double bead_width_mm) {
   const double minimum = (s.thin_width_mm + s.continuous_width_mm) / 2;
   if (!positive(s.spacing_sc_mm) || s.spacing_sc_mm < minimum - 1e-9) {
     return wrong("spacing_sc_mm",
-                 fmt::format("{} mm is below the {:.3f} mm at which even thin stretches touch their neighbours and "
+                 fmt::format("{} mm is below the {:.3f} mm at which even thin segments touch their neighbours and "
                              "no pore is left; give more",
                              s.spacing_sc_mm, minimum));
   }
@@ -114,7 +114,7 @@ std::vector<Warning> warnings(const Segmentation& s, const Calibration& calibrat
   std::vector<Warning> found;
   const auto warn = [&](std::string text) { found.push_back({"pores", std::move(text)}); };
   if (!s.sweep.empty())
-    return {{"pores", fmt::format("segment: thin stretches differ from line to line ({} kinds): a test piece to be measured",
+    return {{"pores", fmt::format("segment: thin segments differ from line to line ({} kinds): a test piece to be measured",
                                   s.sweep.size())}};
   if (s.thin_speed > 100 && !calibration.by_speed.empty()) {
     const Reading stable = stable_distance(calibration, s.thin_speed);
@@ -132,7 +132,7 @@ std::vector<Warning> warnings(const Segmentation& s, const Calibration& calibrat
     }
   }
   if (s.thin_speed <= 100 && s.thin_extrusion >= 100) {
-    warn("segment.thin_speed_percent: not above 100 % and no less extrusion: thin stretches will not be thin");
+    warn("segment.thin_speed_percent: not above 100 % and no less extrusion: thin segments will not be thin");
   }
   if (s.thick_extrusion != s.thin_extrusion) {
     warn(
@@ -155,7 +155,7 @@ std::vector<Warning> warnings(const Segmentation& s, const Calibration& calibrat
   const double gap = pore.gap_mm;
   if (gap > kBondGap) {
     warn(
-        fmt::format("segment.spacing_sc_mm: thick stretches and continuous lines will be {:.3f} mm apart and not bond; "
+        fmt::format("segment.spacing_sc_mm: thick segments and continuous lines will be {:.3f} mm apart and not bond; "
                     "give {:.3f} mm",
                     gap, s.spacing_sc_mm - gap));
   }

@@ -15,7 +15,7 @@ namespace lamina::segment {
 enum class CutRule : std::uint8_t {
   kGrid,       // Fukuda: on a grid fixed to the part, thin first; a line between two marks is not divided
   kThickEnds,  // Di Nisio: both ends thick; what the pattern leaves over is shared by them
-  kAligned     // on the grid, but a thin stretch that the line does not hold whole, and clear of its ends, is thick
+  kAligned     // on the grid, but a thin segment that the line does not hold whole, and clear of its ends, is thick
 };
 
 /// One segmentation as people describe it, lengths in mm; resolve() decides what is absent by a calibration.
@@ -104,11 +104,11 @@ inline PoreSize pore_geometry(const PoreBeads& beads, double length, double dist
   return {length - beads.thick, distance - (beads.thin + beads.other) / 2, distance - (beads.thick + beads.other) / 2};
 }
 
-/// A pore between a thin stretch and the continuous line next to it.
+/// A pore between a thin segment and the continuous line next to it.
 struct Pores {
   double length_mm, width_mm;
   double aspect;       // width / length
-  double density_mm2;  // pores in a mm2 of a layer: two at each thin stretch
+  double density_mm2;  // pores in a mm2 of a layer: two at each thin segment
 };
 Pores predict_pores(const Segmentation& segmentation);
 

@@ -247,8 +247,8 @@ void add_legend(const PorePicture& picture, int top, Plot& plot) {
   };
   entry(kDarkGrey, fmt::format("{} {:.2f} %{}", picture.solid_name, percent(solid, picture.solid),
                                layers ? ", layers in two alternating greys, lines at their centres" : ""));
-  entry(kThrough, fmt::format("void that leads through along {} {:.2f} %", "xyz"[picture.axis], percent(leads, picture.solid)));
-  entry(kClosed, fmt::format("void that does not {:.2f} %", percent(rest, picture.solid)));
+  entry(kThrough, fmt::format("void connected along {} {:.2f} %", "xyz"[picture.axis], percent(leads, picture.solid)));
+  entry(kClosed, fmt::format("other void {:.2f} %", percent(rest, picture.solid)));
 }
 
 /// Of linear light 0 .. 1, as sRGB has it (IEC 61966-2-1).

@@ -33,7 +33,7 @@ TEST(GroupUnion, CopiesCostAsMuchAsOne) {
   Plate plate;
   for (Nm i = 0; i < 1000; ++i) plate.add(static_cast<std::uint32_t>(i), 0, {i * 10, i, 0});
   GroupUnion merged(plate.meshes, plate.instances, plate.solids, plate.counted(), plate.reread(plate.meshes));
-  EXPECT_EQ(plate.loads, 0) << "nothing was asked";
+  EXPECT_EQ(plate.loads, 0) << "nothing was requested";
   for (std::uint32_t group = 0; group < 1000; ++group) EXPECT_EQ(*merged.mm3(group), 100);
   EXPECT_EQ(plate.volumes, 1);
   EXPECT_EQ(plate.loads, 1);

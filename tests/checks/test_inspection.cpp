@@ -73,7 +73,7 @@ TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
     const Findings found = inspect(may);
     EXPECT_LE(*std::ranges::max_element(held_), may + may / 16) << "buffers of an earlier layer may be larger";
     EXPECT_LE(inspected_, 2 * may) << "buffers grow by halves";
-    EXPECT_GE(found.layers, last) << "more memory, no less is seen";
+    EXPECT_GE(found.layers, last) << "more memory never detects less";
     last = found.layers;
     ASSERT_EQ(found.stop.has_value(), found.layers < kLayers);
     if (!found.stop) continue;

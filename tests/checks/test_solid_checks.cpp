@@ -58,7 +58,7 @@ TEST(LaneResolver, WhatShellsHoldTogetherCounts) {
   int requested = 0;
   sampling.union_mm3 = [&](std::uint32_t) { return ++requested, 400.0; };  // of 1000 by the signed sum
   EXPECT_EQ(codes(checked(950, sampling)), Codes());
-  EXPECT_EQ(requested, 0) << "only where there is doubt";
+  EXPECT_EQ(requested, 0) << "only if the volumes differ";
   EXPECT_EQ(codes(checked(400, sampling)), Codes());
   EXPECT_EQ(requested, 1);
   EXPECT_EQ(codes(checked(100, sampling)), Codes{"volume"});
@@ -78,7 +78,7 @@ TEST(LaneResolver, EmptyLayersAmidASolidOnly) {
   const std::vector<Solid> whole = {{box(5, 5, 0, 6)}}, apart = {{box(5, 5, 0, 2)}, {box(5, 5, 4, 6)}};
   EXPECT_TRUE(reported(whole, {1, 1, 1, 1, 1, 1}).empty());
   EXPECT_TRUE(reported(whole, {0, 1, 1, 1, 1, 0}).empty()) << "both ends";
-  EXPECT_TRUE(reported(whole, {0, 0, 0, 0, 0, 0}).empty()) << "told as an empty job";
+  EXPECT_TRUE(reported(whole, {0, 0, 0, 0, 0, 0}).empty()) << "reported as an empty job";
   EXPECT_TRUE(reported(apart, {1, 1, 0, 0, 1, 1}).empty()) << "nothing is there";
   const auto gap = reported(whole, {1, 1, 0, 0, 1, 1});
   ASSERT_EQ(gap.size(), 1u);
@@ -109,7 +109,7 @@ TEST(LaneResolver, PartsInTheAir) {
   EXPECT_EQ(reported({{box(5, 5, 0, 5)}}), 0u);
   EXPECT_EQ(reported({{box(5, 5, 5, 9)}}), 1u);
   EXPECT_EQ(reported({{box(5, 5, 0, 5), 0}, {box(5, 5, 5, 9), 1}}), 0u) << "one stands on the other";
-  EXPECT_EQ(reported({{box(5, 5, 0, 5), 0}, {box(5, 5, 5, 9, 20), 1}}), 1u) << "beside it";
+  EXPECT_EQ(reported({{box(5, 5, 0, 5), 0}, {box(5, 5, 5, 9, 20), 1}}), 1u) << "next to it";
   EXPECT_EQ(reported({{box(5, 5, 0, 5), 0}, {box(5, 5, 7, 9), 0}}), 0u) << "one part";
 }
 

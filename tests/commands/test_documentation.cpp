@@ -66,8 +66,9 @@ TEST(Documentation, PreviewTakesTheOptionsOfItsDefinition) {
 TEST(Documentation, EveryOptionThatItNamesExists) {
   std::set<std::string> known = {"--help", "--help-all", "--version"};
   for (const pipeline::Command* command : pipeline::commands()) known.merge(long_flags(pipeline::spec_of(*command)));
-  const std::set<std::string> others = {"--install", "--export-sla", "--export-svg", "--sanitize",
-                                        "--models",  "--bench",      "--develop"};
+  const std::set<std::string> others = {"--install",    "--export-sla", "--export-svg",     "--sanitize",
+                                        "--models",     "--bench",      "--develop",        "--infill",
+                                        "--perimeters", "--wall-loops", "--wall-line-count"};
   const std::regex quoted("`[^`\n]*`"), flag("(?:^|[ `(])(--[a-z][a-z0-9-]*)");
   std::size_t checked = 0;
   for (const fs::path& page : pages()) {

@@ -148,7 +148,7 @@ TEST_F(HostileManifests, OfContoursAndToolpathsAreRefused) {
         {"a file of another root", [](Manifest& m) { m.head.file = "/etc/passwd"; }},
         {"the folder itself", [](Manifest& m) { m.head.file = "."; }},
         {"no file", [](Manifest& m) { m.head.file = ""; }},
-        {"an extension beside a file", [](Manifest& m) { m.head.extension = "/../../x.svg"; }},
+        {"both an extension and a file", [](Manifest& m) { m.head.extension = "/../../x.svg"; }},
         {"a format that is none", [](Manifest& m) { m.head.format = "dxf"; }},
         {"a part above", [](Manifest& m) { m.head.parts[0].path = "a/.."; }},
     };

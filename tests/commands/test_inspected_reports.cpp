@@ -113,7 +113,7 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
   EXPECT_EQ(read_text(directory_ / "out/inspection.json"), found) << "the same job";
   ASSERT_EQ(lamina(job({"--overwrite"})).code, 0);
   EXPECT_EQ(read_text(directory_ / "out/manifest.json"), manifest);
-  EXPECT_EQ(read_text(directory_ / "out/inspection.json"), found) << "its layers are the same, looked at or not";
+  EXPECT_EQ(read_text(directory_ / "out/inspection.json"), found) << "its layers are the same, inspected or not";
   EXPECT_FALSE(head()["locations"].empty());
   ASSERT_EQ(lamina(job({"--overwrite", "--layer", "0.2"})).code, 0);
   EXPECT_FALSE(fs::exists(directory_ / "out/inspection.json")) << "another job";

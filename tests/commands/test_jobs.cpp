@@ -215,7 +215,7 @@ TEST_F(Jobs, AMergeThatWasCutShortGoesOn) {
   EXPECT_EQ(lamina({"merge", "own1", "own2", "-o", "joined"}).code, 5) << "and again";
   const std::string before = tree("own1");
   EXPECT_EQ(lamina({"merge", "own1", "own2", "-o", "own1"}).code, 5);
-  EXPECT_FALSE(fs::exists(directory_ / "own1/manifest.json.part")) << "the shard can go on";
+  EXPECT_FALSE(fs::exists(directory_ / "own1/manifest.json.part")) << "the shard can continue";
   EXPECT_NE(tree("own1"), before);
   fs::rename(kept, lost);
   for (const std::string output : {"joined", "own1"}) {

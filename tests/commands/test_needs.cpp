@@ -36,7 +36,7 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
     const Outcome done = run(line + " " + row.remedy);
     EXPECT_EQ(done.code, 0) << line << " " << row.remedy << "\n" << done.err;
   }
-  EXPECT_EQ(run("extrude part.stl --bead 0.5 --dry-run").code, 0) << "a wall is laid anyway";
+  EXPECT_EQ(run("extrude part.stl --bead 0.5 --dry-run").code, 0) << "a wall is deposited anyway";
 }
 
 }  // namespace

@@ -269,7 +269,7 @@ TEST_F(OneMeaning, WhatWasRequestedIsAnsweredOnStdout) {
   EXPECT_EQ(done("report out -o page.html --quiet --overwrite").out, "");
   const Outcome json = done("verify out --json");
   EXPECT_TRUE(nlohmann::json::parse(json.out)["ok"]);
-  EXPECT_NE(json.err.find("out: 4 layers"), std::string::npos) << "beside the object";
+  EXPECT_NE(json.err.find("out: 4 layers"), std::string::npos) << "next to the object";
 }
 
 TEST_F(OneMeaning, OutputsHaveTheNamesAndFoldersThatTheirReadersExpect) {
@@ -293,7 +293,8 @@ TEST_F(OneMeaning, WordsThatAreWrongAreAnsweredByWhatIsRight) {
     const char* words;
   } rows[] = {
       {"jet part.stl --machine nuferb --dry-run", 2, "did you mean 'nuferbj'?"},
-      {"jet part.stl --layer-height 0.1 --dry-run", 2, "did you mean '--layer'?"},
+      {"extrude part.stl --infill-pattern raster --dry-run", 2, "did you mean '--pattern'?"},
+      {"extrude part.stl --infill 20% --dry-run", 2, "20 % of 0.4 mm is --line-distance 2"},
       {"jet part.stl --set part.3.copies=2 --dry-run", 2, "there is one part"},
       {"jet part.stl part.stl --set part.3.copies=2 --dry-run", 2, "there are 2 parts"},
       {"jet - --dry-run", 3, "parts are not read from standard input"},

@@ -161,7 +161,7 @@ TEST(LayerBound, HoldsForRealPartsAndIsNear) {
     EXPECT_LT(sums.reported_runs, 12 * sums.runs);  // 3 where facets are some voxels large
     EXPECT_LT(sums.reported_bytes, 5 * sums.bytes);
   }
-  std::cout << sums.layers << " layers: facets told " << sums.reported_facets / sums.facets << " times, runs "
+  std::cout << sums.layers << " layers: facets reported " << sums.reported_facets / sums.facets << " times, runs "
             << sums.reported_runs / sums.runs << ", scratch " << sums.reported_bytes / sums.bytes << '\n';
 }
 

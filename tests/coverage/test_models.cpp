@@ -132,7 +132,7 @@ TEST(CoverageModels, RealPartsHaveTheLevelsOfTheContract) {
     }
     ++parts;
     std::cout << file.filename().string() << ": " << model.facets.size() << " facets, built in " << built.count()
-              << " s; voxels with facets " << held << ", looked at " << inspected << ", sampled " << sampled
+              << " s; voxels with facets " << held << ", inspected " << inspected << ", sampled " << sampled
               << ", by rationals " << exact << '\n';
     EXPECT_EQ(sum.wrong, 0u);
     if (HasFailure()) return;

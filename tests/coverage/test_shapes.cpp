@@ -335,7 +335,7 @@ TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyNextToItsBoundary) {
   EXPECT_EQ(far, 0u);
   EXPECT_GT(differ, 0u);
   EXPECT_LT(static_cast<double>(differ), 0.01 * static_cast<double>(solid));
-  std::cout << differ << " of " << solid << " pixels differ, all beside the boundary\n";
+  std::cout << differ << " of " << solid << " pixels differ, all next to the boundary\n";
 }
 
 TEST(CoverageShapes, AnOpenMeshIsRefused) {

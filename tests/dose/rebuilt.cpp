@@ -128,8 +128,8 @@ SurfaceDistance distance(const std::vector<SurfacePoint>& points, Solid&& solid)
   double sum = 0;
   for (const SurfacePoint& point : points) {
     const auto is_solid = [&](double by) {
-      return solid(Position{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1],
-                               point.at[2] + by * point.normal[2]});
+      return solid(
+          Position{point.at[0] + by * point.normal[0], point.at[1] + by * point.normal[1], point.at[2] + by * point.normal[2]});
     };
     const bool here = is_solid(0);
     bool outwards = here, inwards = here, lost = true;

@@ -51,7 +51,7 @@ TEST(Rebuilt, FollowsItsTwoRulesByHand) {
   EXPECT_FALSE(stack.filled({0.75, 1.5, 0.534}));
 }
 
-// The table of docs/theory/coverage.md: bench/rebuilt.py sets the variable.
+// The table of bench/rebuilt.md: bench/rebuilt.py sets the variable.
 TEST(Rebuilt, Table) {
   if (std::getenv("LAMINA_REBUILT") == nullptr) GTEST_SKIP() << "LAMINA_REBUILT is not set: the table was NOT made";
   const DropWay paths[] = {{300, 300'000, 0}, {300, 100'000, 0},  {300, 50'000, 0},         {300, 300'000, 2},

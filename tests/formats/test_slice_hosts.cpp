@@ -319,7 +319,7 @@ TEST(Cli16, IsReadBackByTheSpecificationInItsUnit) {
   const Slices slices;
   const std::string file = slices.file(*make_cli_16_encoder({}));
   EXPECT_NE(file.find("$$UNITS/0.001000\n"), std::string::npos) << "60 mm reach up to 60,000 of them";
-  EXPECT_NE(file.find("$$DIMENSION/30,40,0,56,60,0.3\n"), std::string::npos) << "in mm whatever the unit";
+  EXPECT_NE(file.find("$$DIMENSION/30,40,0,56,60,0.3\n"), std::string::npos) << "in mm regardless of the unit";
   const ShortCli read(file);
   EXPECT_EQ(read.z.size(), 2u);
   EXPECT_NEAR(read.z[0], 0.15, 1e-9);

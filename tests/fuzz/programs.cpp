@@ -58,7 +58,7 @@ bool replay_program(std::string_view dialect, std::string_view text) {
   const Bench& bench = bench_of(dialect);
   std::uint64_t drops = 0;
   const auto run = bench.machine->run(text, kLayer.index, [&](const replay::VirtualMachine::Drop& drop) {
-    law(drop.column < bench.image.columns && drop.row < bench.image.view().rows(), "a drop beside the image");
+    law(drop.column < bench.image.columns && drop.row < bench.image.view().rows(), "a drop outside of the image");
     law(drop.nozzle < bench.resolved.machine.head.nozzles, "a drop of no nozzle");
     ++drops;
   });

@@ -38,7 +38,7 @@ bool read_heights(std::string_view text) {
   law(study->layers() > 0 && study->boundaries.front() == 0, "no layer");
   law(std::ranges::adjacent_find(study->boundaries, std::greater_equal{}) == study->boundaries.end(), "tops do not rise");
   law(study->boundaries.back() <= 2'147'000'000, "beyond reach");
-  law(study->evaluation.layers.size() == study->layers(), "layers that were not looked at");
+  law(study->evaluation.layers.size() == study->layers(), "layers that were not evaluated");
   return true;
 }
 

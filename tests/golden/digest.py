@@ -1,6 +1,6 @@
 """What a job leaves, as one hash: names and bytes of layers, programs, toolpaths and tables.
 
-Left out is what tells about the job instead of being its product: manifests and other JSON, job files, locks.
+Files about the job that are no product of it are left out: manifests and other JSON, job files, locks.
 """
 import hashlib
 import os

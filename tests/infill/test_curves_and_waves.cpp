@@ -104,7 +104,7 @@ TEST(CurvesAndWaves, StaggerAndFirstLineMoveThem) {
   const auto first = depths_of(parameters, 0), inwards = depths_of(parameters, 1), outwards = depths_of(parameters, 2);
   EXPECT_EQ(first[0], 600'000);
   EXPECT_EQ(inwards[0], 900'000);
-  EXPECT_EQ(outwards[0], 1'200'000) << "nothing is laid into the wall";
+  EXPECT_EQ(outwards[0], 1'200'000) << "nothing is deposited into the wall";
   EXPECT_EQ(distances_of(outwards)[0], 800'000);
   parameters.first_line = 2'000'000;
   EXPECT_EQ(depths_of(parameters, 0)[0], 2'000'000);

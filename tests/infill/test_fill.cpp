@@ -71,7 +71,7 @@ TEST(Fill, NoBeadCentreLeavesItsRegionForAnyOutlinePatternAngleAndGap) {
     }
   }
   EXPECT_GT(intervals, 20'000u);
-  std::cout << intervals << " stretches looked at\n";
+  std::cout << intervals << " intervals checked\n";
 }
 
 TEST(Fill, LengthTimesDistanceTendsToTheArea) {

@@ -133,8 +133,8 @@ void add_shells(std::vector<BrokenFile>& files) {
   Random random(11);
   add("inverted twins.stl", joined(box, inside_out(box)), {}, Ends::kRefused);
   add("inverted twins, jitter 4 um.stl", jittered(joined(fine, inside_out(fine)), random, 4), fine, Ends::kReportedOr);
-  add("a body, and inverted twins beside it.stl", joined(moved(fine, 50, 0, 0), joined(box, inside_out(box))),
-      moved(fine, 50, 0, 0), Ends::kNamed);
+  add("a body next to inverted twins.stl", joined(moved(fine, 50, 0, 0), joined(box, inside_out(box))), moved(fine, 50, 0, 0),
+      Ends::kNamed);
   add("inside out.stl", inside_out(fine), fine, Ends::kSolid);
   add("inside out, jitter 20 um.stl", jittered(inside_out(fine), random, 20), fine, Ends::kSolid);
   add("two, one inside out.stl", joined(box, moved(inside_out(fine), 40, 0, 0)), joined(box, moved(fine, 40, 0, 0)),

@@ -44,7 +44,7 @@ TEST(Gzip, HoldsWhatItHolds) {
   EXPECT_EQ(placed(loaded(write_file("box.stl.gz", gzip(binary_stl(unit_box()))))), expected);
   EXPECT_EQ(placed(loaded(write_file("box.stl.gz", gzip(ascii_stl(unit_box()))))), expected);
   EXPECT_EQ(loaded(write_file("box.obj.gz", gzip(box_obj()))).meshes[0].triangles.size(), 12u);
-  EXPECT_EQ(placed(loaded(write_file("box.stl", gzip(binary_stl(unit_box()))))), expected) << "whatever its name";
+  EXPECT_EQ(placed(loaded(write_file("box.stl", gzip(binary_stl(unit_box()))))), expected) << "regardless of its name";
 }
 
 TEST(Gzip, MembersFollowEachOtherAndPaddingIsIgnored) {

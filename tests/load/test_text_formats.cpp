@@ -29,7 +29,7 @@ TEST(ReadAsciiStl, EveryDialectIsTheSameBox) {
   EXPECT_EQ(placed(loaded(write_file("a.stl", replaced(text, " ", "\t")))), box());
   EXPECT_EQ(placed(loaded(write_file("a.stl", replaced(text, "vertex ", "vertex +")))), box());
   EXPECT_EQ(placed(loaded(write_file("a.stl", replaced(text, "10 ", "1.0e+01 ")))), box());
-  EXPECT_EQ(placed(loaded(write_file("a.stl", "\n\n  " + text + "; by nobody\n\n"))), box());
+  EXPECT_EQ(placed(loaded(write_file("a.stl", "\n\n  " + text + "; by a test\n\n"))), box());
   EXPECT_EQ(placed(loaded(write_file("a.stl", text + std::string(10, '\0')))), box()) << "padded with zeros";
   EXPECT_EQ(placed(loaded(write_file("a.stl", replaced(text, "normal 0 0 0", "normal nan -nan(ind) 1.#QNAN")))), box());
   EXPECT_EQ(placed(loaded(write_file("a.txt", text))), box());
@@ -134,7 +134,7 @@ TEST(ReadObj, EveryDialectIsTheSameSurface) {
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "\n", "\r\n")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "\n", "\r")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", "\xef\xbb\xbf# box\nmtllib a.mtl\no box\ng all\ns off\n" + text))), clean);
-  EXPECT_EQ(placed(loaded(write_file("b.obj", "# C:\\parts\\\n" + text))), clean) << "a remark does not go on";
+  EXPECT_EQ(placed(loaded(write_file("b.obj", "# C:\\parts\\\n" + text))), clean) << "a comment ends with its line";
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1 4 \\\n 3 2")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1 4 \\\r\n 3 2")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1/1 4/2 3/3 2/4 # bottom")))), clean);

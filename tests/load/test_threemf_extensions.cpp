@@ -62,8 +62,7 @@ TEST(Read3mfExtensions, BeamsAreRefusedWhereRequiredAndReportedWhereNot) {
 TEST(Read3mfExtensions, SlicesAreNeverReplacedInSilence) {
   const std::string stack = "<s:slicestack id=\"5\"><s:slice ztop=\"1\"/></s:slicestack>";
   for (const char* attributes : {"s:slicestackid=\"5\" s:meshresolution=\"lowres\"", "s:slicestackid=\"5\""}) {
-    EXPECT_CONTAINS(refusal(written(with("", stack + box_with("", attributes), item(1)))),
-                    "object 1 is defined by slices");
+    EXPECT_CONTAINS(refusal(written(with("", stack + box_with("", attributes), item(1)))), "object 1 is defined by slices");
   }
   // Of full resolution, and more than the box around it.
   const std::string solid =

@@ -31,7 +31,7 @@ TEST(Read3mfRules, SoundPropertiesAreWithoutANote) {
   const Part part = loaded(
       zipped_model(box_among(multi_of("1 3") + kComposites + kTexture + kGroup + kBase + kColors, "pid=\"1\" pindex=\"0\"")));
   EXPECT_EQ(placed(part).size(), 12u);
-  EXPECT_EQ(notes_of(part), "") << "whatever the order";
+  EXPECT_EQ(notes_of(part), "") << "regardless of the order";
 }
 
 TEST(Read3mfRules, PropertiesThatLackSomethingAreRefusedWithLineAndSection) {

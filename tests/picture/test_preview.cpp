@@ -142,7 +142,8 @@ TEST_F(Preview, ADirectoryThatIsNotWholeIsExitCodeFive) {
   fs::remove(folder_ / "layers/000003.tif");
   EXPECT_EQ(preview(directory() + " -o " + sheet() + " --every 1").code, 5);
   const Runs other = formats::testing::image_of(301, std::vector<formats::testing::Row>(75));
-  formats::testing::save(folder_ / "layers/000003.tif", formats::testing::encoded(*formats::find_image_format("tiff-g4"), other));
+  formats::testing::save(folder_ / "layers/000003.tif",
+                         formats::testing::encoded(*formats::find_image_format("tiff-g4"), other));
   outcome = preview(directory() + " -o " + sheet() + " --layer 3");
   EXPECT_EQ(outcome.code, 5);
   EXPECT_NE(outcome.output.find("301"), std::string::npos) << outcome.output;

@@ -157,7 +157,7 @@ TEST(Brundlefab, PlantedFaultsAreFound) {
       {"the next band's X before the way back", band, "T0\nG1 X204.0854\nT1 P0\nG0 Y0\n", 0, true},
       {"X of another band", "G1 X200.9104", "G1 X201.1750", 0, true},
       {"inches", "G21\n", "G20\n", 0, true},
-      {"relative moves go on", "G1 E-2.0000 Z2.0000 F300\nG90\n", "G1 E-2.0000 Z2.0000 F300\n", 0, true},
+      {"relative moves continue", "G1 E-2.0000 Z2.0000 F300\nG90\n", "G1 E-2.0000 Z2.0000 F300\n", 0, true},
       {"U is no axis", "G1 X400.0000", "G1 U400.0000", 0, false},
       {"no powder is fed", "G1 E0.1100 Z0.1000", "G1 Z0.1000", 0, false},
       {"the part bin does not go down", "G1 E0.1100 Z0.1000", "G1 E0.1100", 0, false},

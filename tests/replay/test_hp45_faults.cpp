@@ -100,7 +100,7 @@ TEST(Hp45, PlantedFaultsAreFound) {
        [&](Lines& l) {
          std::reverse(l.begin() + static_cast<std::ptrdiff_t>(first), l.begin() + static_cast<std::ptrdiff_t>(sweep_1));
        }},
-      {"a swath is a line beside its place",
+      {"a swath is one line off its position",
        [&](Lines& l) {
          auto& g = l[first - 4];
          g.replace(g.find('Y'), g.find(" F") - g.find('Y'), "Y40.0365");

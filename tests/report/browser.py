@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""tests/report/browser.py PAGE LAYER: opens a report in headless Chromium, uses it as a person does, and says what it saw.
+"""tests/report/browser.py PAGE LAYER: opens a report in headless Chromium, uses it as a person does, and reports the results.
 
 Speaks the DevTools protocol over pipes (--remote-debugging-pipe: JSON, each message ended by a zero byte), so that only
 Python's own library is needed. Prints one JSON object: seconds until the page was loaded and drawn, messages of the
 console, the runs of layer LAYER as the page decodes them, and what each interaction changed. Exit code 77: no Chromium.
 
   --open              only opens the page and decodes the layer, for scripts/bench report
-  --screenshot NAME   writes NAME-light.png, NAME-dark.png, NAME-views.png and NAME-phone.png to be looked at
+  --screenshot NAME   writes NAME-light.png, NAME-dark.png, NAME-views.png and NAME-phone.png for inspection
 """
 import base64
 import json
@@ -102,12 +102,12 @@ CLOCK = """new MutationObserver((_, self) => {
   window.clock = {ready: performance.now()};
   requestAnimationFrame(() => requestAnimationFrame(() => { window.clock.drawn = performance.now(); }));
 }).observe(document, {subtree: true, childList: true, attributes: true, attributeFilter: ['data-ready']});"""
-CLOCK_READ = """new Promise(done => { const look = () => {
-  if (!window.clock || !window.clock.drawn) { setTimeout(look, 5); return; }
+CLOCK_READ = """new Promise(done => { const poll = () => {
+  if (!window.clock || !window.clock.drawn) { setTimeout(poll, 5); return; }
   const at = performance.getEntriesByType('navigation')[0];
   done({...window.clock, read: at.responseEnd, parsed: at.domContentLoadedEventEnd, loaded: at.loadEventEnd, start: at.startTime,
         layer: +document.documentElement.dataset.layer});
-}; look(); })"""
+}; poll(); })"""
 STATE = "(() => { const s = laminaReport.state; return {layer: +document.documentElement.dataset.layer, scale: s.scale, x: s.x, y: s.y}; })()"
 
 
@@ -198,7 +198,7 @@ def inspection(browser, page, layer, shots, only_open):
     browser.value(f"laminaReport.showLayer({layer})")
     browser.click("#fit")
     said["ink"] = browser.value("(() => { const v = document.getElementById('view'), d = v.getContext('2d').getImageData(0, 0, v.width, v.height).data;"
-                                " const seen = new Set(); for (let i = 0; i < d.length; i += 4) seen.add(d[i]); return seen.size; })()")
+                                " const reds = new Set(); for (let i = 0; i < d.length; i += 4) reds.add(d[i]); return reds.size; })()")
     said["console"] = messages(browser)
     said["requests"] = requests(browser)
     return said

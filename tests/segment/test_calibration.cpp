@@ -126,8 +126,8 @@ TEST(Prediction, WrongParametersAreNamedInOneLine) {
     return status.ok() ? std::string() : status.error().message;
   };
   EXPECT_EQ(message([](Segmentation&) {}), "");
-  EXPECT_EQ(message([](Segmentation& s) { s.thin_mm = 0; }), "segment.thin_mm: 0 mm; a thin stretch has to be longer than 0");
-  EXPECT_EQ(message([](Segmentation& s) { s.thin_mm = -1; }), "segment.thin_mm: -1 mm; a thin stretch has to be longer than 0");
+  EXPECT_EQ(message([](Segmentation& s) { s.thin_mm = 0; }), "segment.thin_mm: 0 mm; a thin segment has to be longer than 0");
+  EXPECT_EQ(message([](Segmentation& s) { s.thin_mm = -1; }), "segment.thin_mm: -1 mm; a thin segment has to be longer than 0");
   EXPECT_EQ(message([](Segmentation& s) { s.thin_speed = 0; }), "segment.thin_speed_percent: 0 %; a speed has to be above 0");
   EXPECT_TRUE(message([](Segmentation& s) { s.spacing_sc_mm = 0.3; }).starts_with("segment.spacing_sc_mm: 0.3 mm is below"));
   EXPECT_TRUE(message([](Segmentation& s) { s.continuous = 0; }).starts_with("segment.continuous_lines: 0"));

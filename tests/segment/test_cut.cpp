@@ -193,7 +193,7 @@ TEST(ExpandToolpaths, SegmentedLinesAreAllDepositedOneDirectionRegardlessOfWhatI
         ASSERT_EQ(s.line % static_cast<std::int32_t>(continuous + 1), 0);
         if (s.line != last_line) ++segmented;
         last_line = s.line;
-        ASSERT_GT((s.to.x - s.from.x) * cut.along_x + (s.to.y - s.from.y) * cut.along_y, 0) << "laid against the others";
+        ASSERT_GT((s.to.x - s.from.x) * cut.along_x + (s.to.y - s.from.y) * cut.along_y, 0) << "deposited against the others";
       });
       EXPECT_NEAR(length, 20 * 20e6, 100);
       std::uint32_t expected = 0;

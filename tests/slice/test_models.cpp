@@ -128,7 +128,7 @@ void check_folder(const fs::path& folder, std::int64_t layers, std::uint32_t min
   Checked checked;
   for (const fs::path& file : part_files(folder)) check_part(file, layers, checked);
   EXPECT_GE(checked.parts, min_parts);
-  std::cout << checked.parts << " parts, " << checked.layers << " layers (" << checked.merged << " united): of "
+  std::cout << checked.parts << " parts, " << checked.layers << " layers (" << checked.merged << " merged): of "
             << checked.pixels << " set pixels " << checked.differing << " differ, all within " << kNearNm
             << " nm of a contour\n";
 }

@@ -52,7 +52,7 @@ void compare_contour(std::span<const Point2> full, std::span<const Point2> less,
   for (std::size_t i = 0; i < full.size() && position.size() < less.size(); ++i) {
     if (full[i] == less[position.size()]) position.push_back(i);
   }
-  ASSERT_EQ(position.size(), less.size()) << "a point that is none of the full contour's, or out of order";
+  ASSERT_EQ(position.size(), less.size()) << "a point that is not in the full contour, or out of order";
   const std::size_t n = full.size(), count = position.size();
   const auto replaces = [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from + 1; i < (to > from ? to : to + n); ++i) {

@@ -183,7 +183,7 @@ TEST(Inertia, WeakInertiaGoesWithTheCubeOfVelocity) {
   EXPECT_NEAR((there + back) / 2, 0.01, 5e-4);
   EXPECT_NEAR(loss(weak / 2), 0.0025, 6e-5);
   EXPECT_LT(std::abs(there - back), 1e-3);
-  EXPECT_GT(std::abs(loss(12 * weak) - loss(-12 * weak)), 5e-3) << "strong inertia tells the ways apart";
+  EXPECT_GT(std::abs(loss(12 * weak) - loss(-12 * weak)), 5e-3) << "strong inertia distinguishes the directions";
 }
 
 TEST(Inertia, IsTheSameForAnyThreads) {

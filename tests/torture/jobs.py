@@ -1,4 +1,4 @@
-"""Jobs of every command that writes: how each begins, how it goes on after a kill, and what it leaves."""
+"""Jobs of every command that writes: how each begins, how it continues after a kill, and what it leaves."""
 import dataclasses
 import hashlib
 import json
@@ -38,7 +38,7 @@ def jet(name, arguments, other_part=NUT):
 
 
 def over_another(name, old, new, out="out"):
-    """A run that replaces another job; killed, it goes on with --resume."""
+    """A run that replaces another job; after a kill it continues with --resume."""
     new = [*new, "-o", out, "--json"]
     return Job(name, [*new, "--overwrite"], [*new, "--resume"], before=[[*old, "-o", out, "--quiet"]], over=True)
 
@@ -147,7 +147,7 @@ def tree(folder):
 
 
 def outputs(folder, job):
-    """What the job wrote: `out`, `out.*` and whatever else lies there that none of its predecessors wrote."""
+    """What the job wrote: `out`, `out.*` and all other files that none of its predecessors wrote."""
     made = {word for words in (*job.before, *job.cut_short) for word in words} - {"out", "out.gcode"}
     return {name: value for name, value in tree(folder).items()
             if name.split(os.sep)[0] not in made and os.path.basename(name) not in job.unlike}

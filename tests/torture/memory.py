@@ -10,7 +10,7 @@ SMALLEST_MB, LARGEST_MB = 60, 600
 
 
 def reading_jobs():
-    """Commands that write nothing, beside those that do."""
+    """Commands that write nothing, and some that do."""
     job = ["jet", jobs.NIST, "--dpi", "300", "--layer", "0.5", "-o", "job", "--quiet"]
     file = ["extrude", jobs.NUT, "--machine", "anet-a8", "--layer", "0.3", "-o", "job.gcode", "--quiet"]
     return [

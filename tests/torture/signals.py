@@ -12,7 +12,7 @@ IGNORED = [signal.SIGPIPE, signal.SIGXFSZ]  # come as errors of the call that ca
 
 
 def may_stay(name, job):
-    """Records and growing files that a later run goes on with."""
+    """Records and growing files that a later run continues."""
     return job.begin[0] in ("jet", "slice", "extrude", "batch") and (name.endswith(".part") or ".part." in name or "layers" in name)
 
 

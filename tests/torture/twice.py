@@ -1,4 +1,4 @@
-"""Two processes on one output: one result is there whole, and whoever ends with exit 0 may believe it."""
+"""Two processes on one output: one complete result remains, and a process that ends with exit 0 can rely on it."""
 import os
 import time
 
@@ -38,7 +38,7 @@ def one_trial(program, job, words, results, folder, seconds, tally, draw):
     second = program.start(words[1], folder)
     ran = [program.end(process, started) for process in (first, second)]
     codes = [one.code for one in ran]
-    shown = f"exits {codes}: {' '.join(words[0])} beside {' '.join(words[1])}"
+    shown = f"exits {codes}: {' '.join(words[0])} against {' '.join(words[1])}"
     tally.trial(job.name, refused=codes.count(4))
     if None in codes:
         tally.fault(job.name, "hangs", shown)

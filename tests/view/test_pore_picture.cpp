@@ -56,8 +56,8 @@ TEST(PorePicture, SolidVoidThatLeadsThroughAndCavitiesHaveTheirShares) {
   EXPECT_EQ(along_at(5, 3), 3) << "z upwards";
   EXPECT_EQ(along_at(5, 6), 0);
   EXPECT_TRUE(says(plot, "solid 59.95 %"));
-  EXPECT_TRUE(says(plot, "leads through along z 40.00 %"));
-  EXPECT_TRUE(says(plot, "does not 0.05 %"));
+  EXPECT_TRUE(says(plot, "connected along z 40.00 %"));
+  EXPECT_TRUE(says(plot, "other void 0.05 %"));
 }
 
 /// 2 mm on 540 pixels.

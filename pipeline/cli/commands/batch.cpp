@@ -33,26 +33,25 @@ CommandSpec batch_spec() {
   CommandSpec spec;
   const auto sync = std::ranges::find(job_keys(), "--sync", &JobKey::flag);
   spec.summary =
-      "Runs many jobs in one queue that shares the processors and a memory budget. A job that fails does so alone; each\n"
-      "result and reason is in OUT/summary.json and OUT/summary.tsv. --resume continues a batch that was killed.";
+      "Runs many jobs in one queue that shares the processors and a memory budget. Results and errors are recorded in\n"
+      "DIR/summary.json and DIR/summary.tsv. A failed job does not stop the others; --resume continues a batch.";
   spec.operand = "LIST";
   spec.operand_meaning =
-      "lists with one command line a line (jet part.stl --dpi 600 -o part), directories of parts and job files, parts, "
+      "job lists (one command per line, as in jet part.stl --dpi 600 -o part), directories of parts and job files, parts, or "
       "TOML job files";
   spec.options = {
-      {"-o,--output", "DIR", "directory of the batch; jobs write below it", "", ""},
-      {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
-      {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
-      {"--memory", "SIZE", "memory of all running jobs together: 512M, 4G", "1G", "Run"},
-      {"--sync", "WHEN", "data of jobs and summary that survives a power cut, as in lamina jet: layer, job, off", "job", "Run",
-       sync->words()},
-      {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
-      {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
-      {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
-      {"--resume", "", "continue an earlier batch in DIR; finished jobs with valid files are kept", "", "Run"},
+      {"-o,--output", "DIR", "output directory of the batch; jobs write below it", "", ""},
+      {"--with", "WORDS", "command and options for parts, as in --with 'jet --dpi 600'", "jet", ""},
+      {"--jobs", "N", "max number of concurrent jobs; 0: one per processor", "0", "Run"},
+      {"--memory", "SIZE", "memory limit of all running jobs: 512M, 4G", "1G", "Run"},
+      {"--sync", "WHEN", "when files are flushed to disk: job (at its end), layer or off", "job", "Run", sync->words()},
+      {"--time-limit", "SECONDS", "time limit per job in seconds; slower jobs fail with exit code 3", "", "Run"},
+      {"--keep-going", "", "continue after a failed job (default)", "", "Run"},
+      {"--fail-fast", "", "stop the batch at the first failed job", "", "Run"},
+      {"--resume", "", "continue a batch in DIR; finished jobs with valid files are kept", "", "Run"},
       {"--overwrite", "", "replace an earlier batch in DIR", "", "Run"},
-      {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
-      {"--quiet", "", "say nothing but errors: a line for each job that fails", "", "Run"}};
+      {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
+      {"--quiet", "", "print errors only, one line per failed job", "", "Run"}};
   spec.closing =
       "A job is any command but batch and preview. -o of a job is below the batch's DIR; without one a job is called as its\n"
       "first file. Other paths are as on the command line. Jobs begin in order and must not need each other's results.\n\n"
@@ -279,7 +278,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   if (!summary) return summary.error();
   const Json json = batch_json(*jobs, *summary, options);
   const FileOptions how{.follow = false, .durable = *durable};
-  Status written = write_file(options.directory + "/summary.json", json_line(json, 2), how);
+  Status written = write_file(options.directory + "/summary.json", json_line(with_schema(json), 2), how);
   if (written) written = write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
@@ -298,7 +297,6 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command batch_command = {"batch", "many jobs in one queue, sharing processors and memory, with one summary", batch_spec,
-                               run_batch_command};
+const Command batch_command = {"batch", "run many jobs with shared processors and memory", batch_spec, run_batch_command};
 
 }  // namespace lamina::pipeline

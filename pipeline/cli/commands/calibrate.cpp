@@ -92,13 +92,12 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
 
 /// Options of powder printers alone.
 std::vector<OptionSpec> powder_calibration_options() {
-  return {{"--drops", "N", "powder printer: a job of so many drops, to be weighed", "", "Powder printers"},
-          {"--weighed-mg", "MG", "mass of those --drops: the volume of a drop for the profile", "", "Powder printers"},
-          {"--density", "G/ML", "density of the binder", "1", "Powder printers"},
-          {"--scan", "PHOTO", "photograph of a printed chart: blocked nozzles, offsets and dot gain for the profile", "",
-           "Powder printers"},
-          {"--chart", "DIR|FILE", "the chart that an earlier call wrote", "", "Powder printers"},
-          {"--overlay", "PNG", "picture of the detected marks, drawn over the photograph", "", "Powder printers"}};
+  return {{"--drops", "N", "write a job of N drops, to be weighed", "", "Powder printers"},
+          {"--weighed-mg", "MG", "mass of the --drops in mg, for the drop volume of the profile", "", "Powder printers"},
+          {"--density", "G/ML", "density of the binder in g/ml", "1", "Powder printers"},
+          {"--scan", "PHOTO", "photograph of the printed chart, to compute the profile", "", "Powder printers"},
+          {"--chart", "DIR|FILE", "chart written by an earlier call", "", "Powder printers"},
+          {"--overlay", "PNG", "image of the detected marks, drawn over the photograph", "", "Powder printers"}};
 }
 
 Outcome calibrate_powder(const Arguments& arguments, Context& context) {
@@ -138,20 +137,19 @@ std::vector<std::string_view> names_of_all() {
 CommandSpec calibrate_spec() {
   CommandSpec spec;
   spec.summary =
-      "Extrusion printers: test pieces for segmented lines, as job files and toolpaths with a table to be filled in; then, from\n"
-      "the measured widths, the printer's profile with its spacings and speeds. Powder printers: a chart of all nozzles as a\n"
-      "print job, or a job of a stated number of drops; then, from a photograph or a mass, the printer's profile.";
-  spec.options = {
-      {"--machine", "NAME|FILE", "printer; lamina machines lists them", "", "Machine", names_of_all()},
-      {"-o,--output", "DIR|FILE", "directory for the pieces; with --measured, the profile to be written", "", "Machine"},
-      {"--measured", "FILE", "the widths.csv of the pieces, filled in", "", "Measurements"},
-      {"--bead", "MM", "width of a bead at 100 %; the nozzle if absent", "", "Beads"},
-      {"--layer", "MM", "thickness of a layer; three quarters of the bead if absent", "", "Beads"},
-      {"--gap", "MM", "wanted between thick beads and their neighbours; slightly negative bonds better", "0", "Beads"},
-      {"--exact-spacing", "", "spacings from the mean widths, not rounded to 0.01 mm as in the document", "", "Measurements"},
-      {"--overwrite", "", "replace a profile that lamina did not write, or the pieces of an earlier call", "", "Result"},
-      {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
-      {"--quiet", "", "print errors only", "", "Result"}};
+      "Computes the profile of a printer from measurements. Extrusion printers: writes test pieces for segmented lines;\n"
+      "--measured then gives widths, spacings and speeds. Powder printers: writes a nozzle chart or a job of --drops; a\n"
+      "photograph (--scan) or a mass (--weighed-mg) then gives blocked nozzles, offsets, dot gain or the drop volume.";
+  spec.options = {{"--machine", "NAME|FILE", "printer; see lamina machines", "", "Machine", names_of_all()},
+                  {"-o,--output", "DIR|FILE", "output directory; with measurements: profile to write", "", "Machine"},
+                  {"--measured", "FILE", "completed widths.csv of the test pieces", "", "Measurements"},
+                  {"--bead", "MM", "bead width in mm at 100 % extrusion; default: the nozzle", "", "Beads"},
+                  {"--layer", "MM", "layer thickness in mm; default: 3/4 of the bead", "", "Beads"},
+                  {"--gap", "MM", "target gap in mm next to thick beads; slightly negative bonds better", "0", "Beads"},
+                  {"--exact-spacing", "", "exact spacings, not rounded to 0.01 mm as in Di Nisio (2022)", "", "Measurements"},
+                  {"--overwrite", "", "replace a file that lamina did not write, or earlier test pieces", "", "Result"},
+                  {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
+                  {"--quiet", "", "print errors only", "", "Result"}};
   for (OptionSpec& option : powder_calibration_options()) spec.options.push_back(std::move(option));
   spec.closing =
       "The steps of extrusion printers are those of Di Nisio (2022), Appendix A; docs/howto/calibrate.md describes them.\n\n"
@@ -243,8 +241,7 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command calibrate_command = {"calibrate",
-                                   "test pieces or charts of a printer, and its profile from what was measured on them",
+const Command calibrate_command = {"calibrate", "write test prints of a printer; make its profile from measurements",
                                    calibrate_spec, run_calibrate};
 
 }  // namespace lamina::pipeline

@@ -16,14 +16,15 @@ namespace {
 CommandSpec compare_spec() {
   CommandSpec spec;
   spec.summary =
-      "Finds a layer in a photograph of it, and reports stripes along the scan that were not printed and the area of each\n"
-      "connected part, expected and detected. Exit code 5 if a stripe is missing.";
+      "Locates a layer in its photograph. Reports missing stripes along the scan, and the expected and detected area of\n"
+      "each connected part. Exit code 5 if a stripe is missing.";
   spec.operand = "LAYER PHOTO";
-  spec.operand_meaning = "image of a layer, as lamina jet wrote it, and a photograph from above (PNG, JPEG, TIFF)";
-  spec.options = {{"--pixel", "UM", "size of a pixel of the photograph on the sheet, within 5 %", "100", ""},
-                  {"--machine", "NAME|FILE", "whose scan axis counts; without it x", "", "", names_of(shipped_machines())},
-                  {"--json", "", "print one JSON object on stdout", "", ""},
-                  {"--quiet", "", "print errors only", "", ""}};
+  spec.operand_meaning = "layer image of lamina jet, and its photograph from above (PNG, JPEG or TIFF)";
+  spec.options = {
+      {"--pixel", "UM", "pixel size of the photograph in micrometres, within 5 %", "100", ""},
+      {"--machine", "NAME|FILE", "printer that defines the scan axis; default: x", "", "", names_of(shipped_machines())},
+      {"--json", "", "print the result as one JSON object on stdout", "", ""},
+      {"--quiet", "", "print errors only", "", ""}};
   spec.closing = "Examples:\n  lamina compare out/layers/000002.tif photo.png --pixel 254";
   return spec;
 }

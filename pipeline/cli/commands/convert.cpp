@@ -28,29 +28,28 @@ namespace fs = std::filesystem;
 CommandSpec convert_spec() {
   CommandSpec spec;
   spec.summary =
-      "Writes layer images in another format, without a job: a folder of numbered images, a TIFF of several pages, or one\n"
-      "image; 1 bit, or grey of 4, 8 or 16 bits. Files are written side by side, one layer each in memory.";
+      "Converts layer images to another format, without a job. The input is a folder of numbered images, a multi-page TIFF\n"
+      "or one image, with 1, 4, 8 or 16 bits.";
   spec.operand = "STACK";
-  spec.operand_meaning = "a folder of images .tif, .png, .bmp, .pbm, .pgm, or one file";
-  spec.options = {{"-o,--output", "DIR", "directory for the images", "", "Output"},
-                  {"--format", "FORMAT", "file format", "tiff-g4", "Output"},
-                  {"--levels", "N", "grey levels of a grey --format: 2, 4, 16, or 256 with 8 bits; values are rounded",
-                   "all it has", "Output"},
-                  {"--threshold", "N", "grey below it becomes a set pixel, 1 to 255; of 1-bit formats", "128", "Images"},
-                  {"--dpi", "DPI|XxY", "resolution to write, if the images state none", "", "Images"},
-                  {"--invert", "", "bright pixels are set, not dark ones", "", "Images"},
-                  {"--mirror", "AXES", "turn the images over: x, y or xy", "", "Images"},
-                  {"--missing-empty", "", "missing numbers are empty images", "", "Images"},
-                  {"--threads", "N", "at most so many; 0: all of the host", "0", "Run"},
-                  {"--overwrite", "", "replace images that are there", "", "Run"},
-                  {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
+  spec.operand_meaning = "a folder of images (.tif, .png, .bmp, .pbm, .pgm), or one file";
+  spec.options = {{"-o,--output", "DIR", "output directory for images", "", "Output"},
+                  {"--format", "FORMAT", "file format of layer images", "tiff-g4", "Output"},
+                  {"--levels", "N", "grey levels of the output: 2, 4, 16, or 256 with 8 bits", "all of the format", "Output"},
+                  {"--threshold", "N", "1-bit formats: pixels with a grey below N are set, 1 to 255", "128", "Images"},
+                  {"--dpi", "DPI|XxY", "resolution in pixels per inch, if the images state none", "", "Images"},
+                  {"--invert", "", "set bright pixels instead of dark ones", "", "Images"},
+                  {"--mirror", "AXES", "mirror images: x swaps left and right, y front and back", "", "Images"},
+                  {"--missing-empty", "", "treat missing numbers as empty images", "", "Images"},
+                  {"--threads", "N", "number of threads; 0: all processors", "0", "Run"},
+                  {"--overwrite", "", "replace existing images", "", "Run"},
+                  {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
                   {"--quiet", "", "print errors only", "", "Run"}};
   spec.closing =
       "Examples:\n"
       "  lamina convert slices -o g4                              G4, as lamina jet writes it\n"
       "  lamina convert scan.tif -o bits --threshold 90 --invert   a page each, bright is solid\n"
       "  lamina convert out/layers -o bmp --format bmp --mirror x\n"
-      "  lamina convert grey -o shares --format tiff-4              shares of voxels, 16 levels\n";
+      "  lamina convert grey -o fractions --format tiff-4           fill fractions of voxels, 16 levels\n";
   return spec;
 }
 
@@ -237,6 +236,6 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command convert_command = {"convert", "layer images to layer images of another format", convert_spec, run_convert};
+const Command convert_command = {"convert", "convert layer images to another format", convert_spec, run_convert};
 
 }  // namespace lamina::pipeline

@@ -23,22 +23,20 @@ constexpr const char *kTargets = "Target: one or two of them", *kGradient = "Reg
 CommandSpec design_spec() {
   CommandSpec spec;
   spec.summary =
-      "Finds the segmented filling with the requested pores: lengths of thick and thin stretches, spacing, extrusion, speeds and\n"
-      "continuous lines, within what was measured of the machine. Plans it, solves the flow through it, reports what it\n"
-      "will be, and writes the job file. A target with two ends changes from the bottom to the top, in regions of their own\n"
-      "filling. A target that cannot be met ends with exit code 5 and the nearest that can.";
+      "Designs a segmented filling with the target porosity, permeability or pore size, within the printer's calibration.\n"
+      "Checks it with the flow solver, reports the result and writes a job file. A target that cannot be met gives exit\n"
+      "code 5 and the nearest feasible values.";
   spec.options = {
-      {"--porosity", "PERCENT", "void in the filling, as in 24; 20:26 from the bottom to the top", "", kTargets},
-      {"--permeability", "DARCY", "k1 along the height, as in 100; 60:150 from the bottom to the top", "", kTargets},
-      {"--pore", "WIDTHxLENGTH",
-       "width and length in mm of the pore next to a thin segment, as in 0.12x0.9; 0.1x0.9:0.14x0.9 upwards", "", kTargets},
-      {"--height", "MM", "height of the part, for targets with two ends", "", kGradient},
-      {"--steps", "N", "regions as high as each other", "5", kGradient},
-      {"--tops", "MM[,MM...]", "tops of the regions in place of them, the lowest first, the part's height last", "", kGradient},
-      {"--machine", "NAME|FILE", "extrusion printer; lamina machines lists them", "", "Machine", names_of(shipped_extruders())},
-      {"--voxel", "UM", "edge of a voxel across the lines, micrometres; twice as long, as high", "10", "Solver"},
-      {"-o,--output", "FILE", "job file to write, as in pores.toml; default: only report", "", "Result"},
-      {"--nearest", "", "write the nearest job if the target cannot be met, with exit code 0", "", "Result"},
+      {"--porosity", "PERCENT", "porosity of the filling in %: 24, or 20:26 from bottom to top", "", kTargets},
+      {"--permeability", "DARCY", "k1 along the height in darcy: 100, or 60:150 from bottom to top", "", kTargets},
+      {"--pore", "WIDTHxLENGTH", "pore width and length in mm: 0.12x0.9, or 0.1x0.9:0.14x0.9 upwards", "", kTargets},
+      {"--height", "MM", "height of the part in mm, for targets with two ends", "", kGradient},
+      {"--steps", "N", "number of regions of equal height", "5", kGradient},
+      {"--tops", "MM[,MM...]", "ascending tops of the regions in mm; the last is the part's height", "", kGradient},
+      {"--machine", "NAME|FILE", "extrusion printer; see lamina machines", "", "Machine", names_of(shipped_extruders())},
+      {"--voxel", "UM", "voxel width across lines in micrometres; length: twice, height: same", "10", "Solver"},
+      {"-o,--output", "FILE", "job file to write, as in pores.toml; default: report only", "", "Result"},
+      {"--nearest", "", "write the nearest job if the target cannot be met (exit code 0)", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
       {"--quiet", "", "print errors only", "", "Result"}};
@@ -201,7 +199,7 @@ Outcome run_design(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command design_command = {"design", "design a filling of a target porosity, permeability or pore, as a job file",
-                                design_spec, run_design};
+const Command design_command = {"design", "find a filling of a target porosity, permeability or pore size", design_spec,
+                                run_design};
 
 }  // namespace lamina::pipeline

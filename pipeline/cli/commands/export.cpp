@@ -25,19 +25,19 @@ constexpr std::string_view kExportKeys = "bed.size_mm placement load run.output 
 CommandSpec export_spec() {
   CommandSpec spec;
   spec.summary =
-      "Writes parts as they are planned: loaded, repaired, scaled, rotated, shrunk and placed on the bed, copies too.\n"
-      "3MF is exact to the nanometre and shares the mesh of copies; STL holds floats, and the summary says how far they\n"
-      "moved the worst coordinate.";
+      "Writes the parts of a job as they are planned: repaired, scaled, rotated, shrunk and placed on the bed, with all\n"
+      "copies. 3MF is exact to the nanometre and shares the mesh of copies. STL rounds coordinates to floats; the summary\n"
+      "reports the largest error.";
   spec.operand = "PART";
-  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  spec.operand_meaning = "STL, OBJ or 3MF files (STL and OBJ also gzipped); they replace the parts of --job";
   add_key_options(kExportKeys, spec);
   for (OptionSpec& option : spec.options) {
     if (option.flag != "-o,--output") continue;
     option.value = "FILE";
-    option.meaning = "STL, or 3MF by the ending .3mf; - streams STL to stdout";
+    option.meaning = "STL file, or 3MF if the name ends in .3mf; -: STL on stdout";
   }
-  spec.options.insert(spec.options.end(), {{"--overwrite", "", "replace a file that is there", "", "Run"},
-                                           {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
+  spec.options.insert(spec.options.end(), {{"--overwrite", "", "replace an existing file", "", "Run"},
+                                           {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
                                            {"--quiet", "", "print errors only", "", "Run"}});
   spec.closing =
       "Examples:\n"
@@ -161,6 +161,6 @@ std::string export_ending(const Arguments&) { return ".stl"; }
 }  // namespace
 
 const Command export_command = {
-    "export", "parts as loaded, repaired and placed: STL or 3MF", export_spec, run_export, false, export_ending};
+    "export", "write parts as loaded, repaired and placed: STL or 3MF", export_spec, run_export, false, export_ending};
 
 }  // namespace lamina::pipeline

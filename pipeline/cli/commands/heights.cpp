@@ -27,19 +27,20 @@ constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"j
 CommandSpec heights_spec() {
   CommandSpec spec;
   spec.summary =
-      "Decides the layers of parts and prints them: bottom, thickness, reason, steepest angle and the step that is left.\n"
-      "lamina jet and lamina slice decide with the same options in the same way.";
+      "Computes the layers of parts and prints a table: bottom, thickness, reason, steepest angle and remaining step.\n"
+      "lamina jet and lamina slice give the same layers for the same options.";
   spec.operand = "PART";
-  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  spec.operand_meaning = "STL, OBJ or 3MF files (STL and OBJ also gzipped); they replace the parts of --job";
   add_key_options(kHeightsCommandKeys, spec);
-  spec.options.insert(spec.options.end(),
-                      {{"--format", "FORMAT", "text, csv, json, or rp3 as in Lima (2009)", "", "Table", words_of(kForms)},
-                       {"-o,--output", "FILE", "write the table there instead of to stdout", "", "Table"},
-                       {"--compare", "", "all ways with these thicknesses and limits, one line each", "", "Table"},
-                       {"--measure", "FILE", "measure layers that somebody else decided: tops in mm, one a line", "", "Table"},
-                       {"--plot", "FILE", "draw thickness against height next to the part, as .svg or .png", "", "Table"},
-                       {"--overwrite", "", "replace a file that lamina did not write", "", "Table"},
-                       {"--quiet", "", "print only the table and errors", "", "Table"}});
+  spec.options.insert(
+      spec.options.end(),
+      {{"--format", "FORMAT", "format of the table: text, csv, json or rp3 (Lima 2009)", "", "Table", words_of(kForms)},
+       {"-o,--output", "FILE", "file for the table; default: stdout", "", "Table"},
+       {"--compare", "", "compare all modes with these thicknesses and limits", "", "Table"},
+       {"--measure", "FILE", "evaluate existing layers: a file with one top in mm per line", "", "Table"},
+       {"--plot", "FILE", "plot of thickness over height next to the part, .svg or .png", "", "Table"},
+       {"--overwrite", "", "replace a file that lamina did not write", "", "Table"},
+       {"--quiet", "", "print only the table and errors", "", "Table"}});
   spec.closing =
       "Examples:\n"
       "  lamina heights boat.3mf --heights optimal --thickness 0.05..0.3 --cusp 0.1\n"
@@ -101,7 +102,7 @@ std::string table_text(Form form, const Job& job, const Scene& scene, const std:
   StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
   for (const PartSummary& part : scene.parts) parts.paths.push_back(part.path);
   switch (form) {
-    case Form::kJson: return study_json(parts, studies);
+    case Form::kJson: return json_line(with_schema(parse_json(study_json(parts, studies))));
     case Form::kCsv: return study_csv(parts, studies);
     case Form::kRp3: return rp3_text(job, studies.back());
     case Form::kText: break;
@@ -179,7 +180,6 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command heights_command = {
-    "heights", "the layers of a part: thicknesses that fit its slopes and flats, compared, plotted", heights_spec, run_heights};
+const Command heights_command = {"heights", "adaptive layer heights: list, compare, plot", heights_spec, run_heights};
 
 }  // namespace lamina::pipeline

@@ -22,23 +22,21 @@ namespace {
 CommandSpec info_spec() {
   CommandSpec spec;
   spec.summary =
-      "Says what is in a part file: triangles, shells, size, volume, whether it is closed and where it is not, and what\n"
-      "lamina jet will do about that. Of G-code: what is fed, and the pores that its beads leave. Of layer images: their\n"
-      "size, resolution, numbers and gaps. Nothing is written.";
+      "Checks and describes part files, G-code and layer images: mesh size, volume, open edges and their repair by lamina\n"
+      "jet; extruded volume and pores of G-code; size, resolution, numbering and gaps of images. No file is written.";
   spec.operand = "PART|GCODE|STACK";
   spec.operand_meaning =
-      "STL, OBJ or 3MF file, also gzipped STL and OBJ, toolpaths, as in part.gcode, or layer images, a folder or a file; as many "
-      "as you like";
+      "STL, OBJ or 3MF files (STL and OBJ also gzipped), toolpaths as in part.gcode, or layer images (folders or files)";
   const std::vector<std::string_view> units = {"mm", "cm", "m", "um", "inch", "foot"}, modes = {"auto", "winding", "off"};
-  spec.options = {{"--unit", "UNIT", "unit of STL and OBJ files, which state none: mm, cm, m, um, inch, foot", "mm", "", units},
-                  {"--scale", "S|X,Y,Z", "factors per axis of the file", "1", ""},
-                  {"--rotate", "X,Y,Z", "degrees about x, then y, then z", "0,0,0", ""},
-                  {"--drop-bad", "", "drop facets with coordinates that are no numbers", "", ""},
-                  {"--repair", "MODE", "how open meshes are closed: auto, winding (approximate) or off", "auto", "", modes},
-                  {"--weld", "UM", "repair joins open edges this far apart, in micrometres; 5 grows by itself", "5", ""},
-                  {"--threshold", "N", "threshold of images: grey below it counts as set, 1 to 255", "128", ""},
-                  {"--density", "G/CM3", "density of the filament, if the toolpath file states none", "", ""},
-                  {"--json", "", "print one JSON object for each part on stdout", "", ""}};
+  spec.options = {{"--unit", "UNIT", "unit of STL and OBJ files: mm, cm, m, um, inch or foot", "mm", "", units},
+                  {"--scale", "S|X,Y,Z", "scale factor, or one per axis of the file; negative: mirrored", "1", ""},
+                  {"--rotate", "X,Y,Z", "rotation in degrees about x, then y, then z, after scaling", "0,0,0", ""},
+                  {"--drop-bad", "", "drop facets with NaN or infinite coordinates", "", ""},
+                  {"--repair", "MODE", "repair of open meshes: auto, winding (approximate) or off", "auto", "", modes},
+                  {"--weld", "UM", "max gap to weld in micrometres; 5 is doubled as needed", "5", ""},
+                  {"--threshold", "N", "images: pixels with a grey below N are set, 1 to 255", "128", ""},
+                  {"--density", "G/CM3", "filament density in g/cm3, if the toolpath file states none", "", ""},
+                  {"--json", "", "print one JSON object per part on stdout", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina info bracket.stl\n"
@@ -69,7 +67,7 @@ Status report_images(const std::string& path, int threshold, const Arguments& ar
   if (reported->thickness > 0) {
     text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers",
                         number_text(mm(reported->thickness)), number_text(mm(reported->bottom)),
-                        reported->levels > 0 ? fmt::format("; shares of voxels in {} levels", reported->levels) : "",
+                        reported->levels > 0 ? fmt::format("; fill fractions of voxels in {} levels", reported->levels) : "",
                         reported->mirror.empty() || reported->mirror == "none" ? "" : "; mirrored " + reported->mirror);
     json["layers"] = {
         {"thickness_mm", mm(reported->thickness)}, {"bottom_mm", mm(reported->bottom)}, {"levels", reported->levels}};

@@ -20,21 +20,20 @@ namespace {
 CommandSpec machines_spec() {
   CommandSpec spec;
   spec.summary =
-      "Lists the powder printers whose print programs lamina jet can write, and explains what follows from a profile: dpi\n"
-      "across and along the scan, lag from nozzle to nozzle, swaths, highest speed, time and bytes of a layer. And lists the\n"
-      "extrusion printers of lamina extrude.";
+      "Lists the powder printers of lamina jet and the extrusion printers of lamina extrude. Explains what follows from a\n"
+      "profile: dpi across and along the scan, nozzle lag, swaths, top speed, time and bytes per layer.";
   spec.operand = "NAME|FILE";
-  spec.operand_meaning = "machines to explain, the same as --check";
+  spec.operand_meaning = "machines to explain, as with --check";
   spec.operand_words = names_of(shipped_machines());
   for (const std::string_view name : names_of(shipped_extruders())) spec.operand_words.push_back(name);
   const auto& names = spec.operand_words;
-  spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", "", names},
-                  {"--show", "NAME|FILE", "print the whole profile, every key of it, to be changed and saved", "", "", names},
-                  {"--preset", "NAME|FILE", "change the machine by this preset of powder, binder and process; several times",
-                   "", "", names_of(shipped_presets())},
-                  {"--dialects", "", "list the dialects that programs can be written in", "", ""},
-                  {"--target", "STL", "write a part whose print shows which way x, y and up are", "", ""},
-                  {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
+  spec.options = {
+      {"--check", "NAME|FILE", "machine to explain: a name, or a profile in TOML", "", "", names},
+      {"--show", "NAME|FILE", "machine whose complete profile is printed, as a template", "", "", names},
+      {"--preset", "NAME|FILE", "powder, binder and process preset; repeatable", "", "", names_of(shipped_presets())},
+      {"--dialects", "", "list the dialects of print programs", "", ""},
+      {"--target", "STL", "write a test part that shows the directions of x, y and z", "", ""},
+      {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina machines\n"
@@ -206,7 +205,6 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command machines_command = {"machines", "the printers that lamina plans for, and what follows from a profile",
-                                  machines_spec, run_machines};
+const Command machines_command = {"machines", "list printers; show and check machine profiles", machines_spec, run_machines};
 
 }  // namespace lamina::pipeline

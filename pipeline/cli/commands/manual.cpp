@@ -19,8 +19,7 @@ namespace {
 
 CommandSpec completion_spec() {
   CommandSpec spec;
-  spec.summary =
-      "Prints what makes a shell complete the commands of lamina, their options and values; packages install it already.";
+  spec.summary = "Prints a shell script that completes commands, options and values of lamina. Packages install it already.";
   spec.operand = "SHELL";
   spec.operand_meaning = "bash, zsh or fish";
   spec.operand_words = {"bash", "zsh", "fish"};
@@ -42,12 +41,12 @@ Outcome run_completion(const Arguments& arguments, Context& context) {
 
 CommandSpec manual_spec() {
   CommandSpec spec;
-  spec.summary = "Prints the manual page of lamina, or of one of its commands, as man reads it.";
+  spec.summary = "Prints the manual page of lamina or of one of its commands, in the format of man.";
   spec.operand = "COMMAND";
-  spec.operand_meaning = "a command; none for the page of the program";
+  spec.operand_meaning = "a command; default: the page of lamina";
   for (const Command* command : commands()) spec.operand_words.push_back(command->name);
-  spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""},
-                  {"--markdown", "", "pages of commands as Markdown: docs/reference/commands is made by this", "", ""},
+  spec.options = {{"-o,--output", "DIR", "output directory for the pages of all commands", "", ""},
+                  {"--markdown", "", "write Markdown, as in docs/reference/commands", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
   spec.closing =
       "Examples:\n"
@@ -99,8 +98,7 @@ Outcome run_manual(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command completion_command = {"completion", "makes a shell complete commands and options", completion_spec,
-                                    run_completion};
-const Command manual_command = {"manual", "manual pages", manual_spec, run_manual};
+const Command completion_command = {"completion", "print the completion script of a shell", completion_spec, run_completion};
+const Command manual_command = {"manual", "print or write the manual pages", manual_spec, run_manual};
 
 }  // namespace lamina::pipeline

@@ -14,14 +14,14 @@ namespace {
 CommandSpec merge_spec() {
   CommandSpec spec;
   spec.summary =
-      "Joins the shards of a job, from one or several directories, into the directory of a job that was never divided:\n"
-      "its manifest.json is the same byte for byte. Layers are linked, or copied to another file system.";
+      "Merges the shards of a job, from one or several directories, into the directory of the whole job. Its manifest.json\n"
+      "is identical to that of an undivided job. Layers are linked, or copied to another file system.";
   spec.operand = "DIR";
-  spec.operand_meaning = "directories that lamina jet --shard or --layers wrote";
+  spec.operand_meaning = "directories written by lamina jet with --shard or --layers";
   spec.options = {{"-o,--output", "OUT", "directory of the whole job; may be one of DIR", "", ""},
-                  {"--strict", "", "warnings are errors: exit 5, and nothing is joined", "", ""},
-                  {"--allow-empty", "", "join a whole job without any pixel", "", ""},
-                  {"--json", "", "print one JSON object on stdout", "", ""},
+                  {"--strict", "", "treat warnings as errors: exit code 5, no output", "", ""},
+                  {"--allow-empty", "", "accept a job without any pixel", "", ""},
+                  {"--json", "", "print the result as one JSON object on stdout", "", ""},
                   {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
       "Examples:\n"
@@ -53,14 +53,14 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
   if (!arguments.has("--json")) return {};
   Json reported = {{"command", "merge"},       {"directory", report->output}, {"shards", report->shards},
                    {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
-  if (report->microseconds > 0) reported["print_seconds"] = 1e-6 * static_cast<double>(report->microseconds);
-  if (!sweeps.empty()) reported["sweeps"] = sweeps;
+  if (report->microseconds > 0) reported["print_seconds"] = static_cast<double>(report->microseconds) / 1e6;
+  if (!sweeps.empty()) reported["sweeps_text"] = sweeps;
   reported["warnings"] = warnings_json(report->warnings);
   return context.give(reported);
 }
 
 }  // namespace
 
-const Command merge_command = {"merge", "join the shards of a job that was divided", merge_spec, run_merge};
+const Command merge_command = {"merge", "join the shards of a divided job", merge_spec, run_merge};
 
 }  // namespace lamina::pipeline

@@ -17,6 +17,7 @@
 #include "pipeline/job/job_command.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/temporary_folder.h"
+#include "pipeline/plan/plan.h"
 #include "pipeline/pores/pore_analysis.h"
 #include "pipeline/run/run.h"
 #include "stages/support/io/file_reader.h"
@@ -38,40 +39,35 @@ std::string odd_about(const segment::Fluid& fluid) {
 CommandSpec permeability_spec() {
   CommandSpec spec;
   spec.summary =
-      "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
-      "their standard errors, the quality of the fit and how far samples differ. Of G-code, predicts Darcy's k1: cuts what\n"
-      "repeats of the beads, or a window, into voxels and computes how a fluid creeps through their pores. The same of layer\n"
-      "images: a window of what lamina jet wrote, or of a tomography.";
+      "Fits Darcy's k1 and Forchheimer's k2 to measured flows and pressure drops, dp / L = (mu / k1) v + (rho / k2) v^2,\n"
+      "with standard errors. Predicts k1 of G-code or layer images: a window of them is divided into voxels, and the\n"
+      "creeping flow through the pores is computed. Job files are planned first.";
   spec.operand = "FILE|DIR|JOB";
   spec.operand_meaning =
-      "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns;\n"
-      "rows may name their configuration and sample; without a column sample each of several drop columns is one;\n"
-      "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first;\n"
-      "or a job file, as in job.toml, that lamina extrude or lamina jet takes, and parts in place of its own: it is planned first";
+      "a table, a G-code file, a folder of images, or a job file with optional parts that replace its own. Table columns:\n"
+      "flow_l_min or velocity_m_s, one or more drop_mbar (or _pa, _kpa, _bar, _psi), optional configuration and sample\n"
+      "(without sample, each drop column is one). Folders: of lamina jet, or images (.png, .tif, .bmp, .pbm, .pgm), the lowest first";
   const std::vector<std::string_view> beads = {"deposited", "spread", "stated"};
   spec.options = {
-      {"--length", "MM", "length of the medium along the flow", "", "Medium"},
-      {"--diameter", "MM", "diameter of a round medium", "", "Medium"},
-      {"--area", "MM2", "cross-section, in place of a diameter", "", "Medium"},
-      {"--viscosity", "PA.S", "viscosity of the fluid", "1.81e-05", "Fluid"},
-      {"--density", "KG/M3", "density of the fluid", "1.204", "Fluid"},
-      {"--compressible", "", "a gas that expands on its way: (p_in^2 - p_out^2) / (2 p L) too", "", "Fluid"},
-      {"--outlet-pressure", "PA", "absolute, behind the medium", "101325", "Fluid"},
-      {"--flow-pressure", "PA", "reference pressure of flow and density; default: that of the outlet", "", "Fluid"},
-      {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
-      {"--window", "X,Y,Z", "window of the print in mm; default: the period, else 2,2 and eight layers; of images: 2,2,2", "",
+      {"--length", "MM", "length of the medium along the flow in mm", "", "Medium"},
+      {"--diameter", "MM", "diameter of a round medium in mm", "", "Medium"},
+      {"--area", "MM2", "cross-section of the medium in mm2, instead of --diameter", "", "Medium"},
+      {"--viscosity", "PA.S", "viscosity of the fluid in Pa s", "1.81e-05", "Fluid"},
+      {"--density", "KG/M3", "density of the fluid in kg/m3", "1.204", "Fluid"},
+      {"--compressible", "", "also fit as an expanding gas: (p_in^2 - p_out^2) / (2 p L)", "", "Fluid"},
+      {"--outlet-pressure", "PA", "absolute pressure at the outlet in Pa", "101325", "Fluid"},
+      {"--flow-pressure", "PA", "reference pressure of flow and density in Pa; default: outlet", "", "Fluid"},
+      {"--convention", "NAME", "dinisio2022: reproduces Table 25 of Di Nisio (2022)", "", "Fluid", {"dinisio2022"}},
+      {"--window", "X,Y,Z", "window in mm; default: the period, else 2,2 and 8 layers; images: 2,2,2", "",
        "Toolpaths and images"},
-      {"--voxel", "UM", "edge of a voxel, micrometres; of images: their pixels", "10", "Toolpaths and images"},
-      {"--memory", "SIZE", "memory of the flow solver, as in 2G", "1G", "Toolpaths and images"},
-      {"--beads", "WORD",
-       "spread: as the printer's melt lags and spreads; deposited: no spread along lines; stated: by the file; default: spread by known printers",
-       "", "Toolpaths", beads},
-      {"--machine", "NAME|FILE", "printer of the toolpaths or of the job; default: the one that the file names", "",
-       "Toolpaths"},
-      {"--set", "KEY=VALUE", "set any key of a job file, as in --set fill.width_mm=0.5", "", "Job"},
-      {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
-      {"--plot", "FILE", "draw points and parabola; of toolpaths and images sections of flow and pores; .svg or .png", "",
-       "Result"},
+      {"--voxel", "UM", "voxel size in micrometres; default for images: their pixels", "10", "Toolpaths and images"},
+      {"--memory", "SIZE", "memory limit of the flow solver: 512M, 2G", "1G", "Toolpaths and images"},
+      {"--beads", "WORD", "bead model: spread, deposited (no spread along lines), stated", "spread for known printers",
+       "Toolpaths", beads},
+      {"--machine", "NAME|FILE", "printer of the toolpaths or job; default: named by the file", "", "Toolpaths"},
+      {"--set", "KEY=VALUE", "set a job key, as in bed.dpi=600 or part.2.copies=3", "", "Job"},
+      {"--inertia", "", "also compute Forchheimer's k2 along z, from six air flows", "", "Toolpaths"},
+      {"--plot", "FILE", "plot of the fit, or sections of flow and pores, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
   const std::vector<OptionSpec> files = window_file_options(), images = stack_options();
@@ -373,8 +369,7 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command permeability_command = {"permeability",
-                                      "Darcy's and Forchheimer's coefficients, of measured drops or predicted from toolpaths",
+const Command permeability_command = {"permeability", "fit measured pressure drops; predict permeability from G-code or images",
                                       permeability_spec, run_permeability};
 
 }  // namespace lamina::pipeline

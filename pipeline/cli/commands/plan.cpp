@@ -54,7 +54,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   spec.summary = row.summary;
   spec.basic = split(row.basic, " ");
   spec.operand = "PART";
-  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  spec.operand_meaning = "STL, OBJ or 3MF files (STL and OBJ also gzipped); they replace the parts of --job";
   add_key_options(row.keys, spec);
   override_words(row.overrides, spec);
   if (const auto machine = std::ranges::find(spec.options, "--machine", &OptionSpec::flag); machine != spec.options.end()) {
@@ -64,7 +64,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
   spec.options.push_back({"--timing", "", "break down the run time and compare it with the hardware limit", "", "Run"});
-  spec.options.push_back({"--json", "", "print the summary as one JSON object on stdout", "", "Run"});
+  spec.options.push_back({"--json", "", "print the result as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "print errors only", "", "Run"});
   spec.more = row.closing;
   return spec;
@@ -156,19 +156,18 @@ constexpr std::string_view kJetBasic =
     "--saturation --inspect --job --resume --memory";
 
 const OptionSpec kJetSwitches[] = {
-    {"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two", "",
-     "Machine and binder"},
-    {"--quote", "CSV", "write what every part uses up and costs as a table (with --machine)", "", "Machine and binder"},
-    {"--resume", "", "continue an interrupted job; finished layers with a valid hash are kept", "", "Run"},
+    {"--material", "NAME|NAME,...", "powder of all parts, or one per part in order", "", "Machine and binder"},
+    {"--quote", "CSV", "write material and cost per part as CSV (with --machine)", "", "Machine and binder"},
+    {"--resume", "", "continue an interrupted job; layers with a valid hash are kept", "", "Run"},
     {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
-    {"--dry-run", "", "load, place and index, report material and printing time, write nothing", "", "Run"}};
+    {"--dry-run", "", "report material and printing time without writing output", "", "Run"}};
 
 std::string jet_closing() {
   std::string text = "Formats:\n";
   for (const auto& format : formats::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
   for (const auto& format : formats::level_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
   return text +
-         "\nLengths are mm, angles degrees. Part options hold for every part; a job file sets them for each.\n\n"
+         "\nLengths are mm, angles degrees. Part options apply to all parts; a job file sets them for each.\n\n"
          "Examples:\n"
          "  lamina jet bracket.stl -o out                                  a part in the middle of the bed\n"
          "  lamina jet a.stl b.3mf --bed 400x400 --dpi 600 --copies 12 -o out\n"
@@ -195,8 +194,8 @@ PlanCommand jet_row() {
   return {Product::kImages,
           kJetKeys,
           kJetBasic,
-          "Plans a binder-jet job: the exact 1-bit image of every layer of the bed, layers/000000.tif and up from the\n"
-          "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.",
+          "Plans a binder-jet job: an exact 1-bit image of every layer of the bed, from layers/000000.tif at the bottom,\n"
+          "and a manifest.json. The same parts and options give the same bytes on every computer.",
           kJetSwitches,
           {},
           jet_closing,
@@ -216,7 +215,7 @@ constexpr std::string_view kSliceBasic =
 
 const OptionSpec kSliceSwitches[] = {{"--resume", "", "continue an interrupted job; complete layers are kept", "", "Run"},
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
-                                     {"--dry-run", "", "load, place and index, write nothing", "", "Run"}};
+                                     {"--dry-run", "", "load and place the parts without writing output", "", "Run"}};
 
 const OptionSpec kSliceWords[] = {{"--tolerance", "", "", "0", ""}};
 
@@ -244,8 +243,8 @@ PlanCommand slice_row() {
   return {Product::kContours,
           kSliceKeys,
           kSliceBasic,
-          "Cuts parts into layers: closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise, as\n"
-          "SVG, CLI or 3MF slices, and fills them if a pattern or walls are requested.",
+          "Slices parts into closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise. Writes\n"
+          "SVG, CLI or 3MF slices, with a filling if a pattern or walls are requested.",
           kSliceSwitches,
           kSliceWords,
           slice_closing,
@@ -265,12 +264,12 @@ constexpr std::string_view kExtrudeBasic =
 
 const OptionSpec kExtrudeSwitches[] = {
     {"--resume", "", "continue an interrupted job; complete layers are kept", "", "Run"},
-    {"--overwrite", "", "replace an earlier file", "", "Run"},
-    {"--dry-run", "", "plan every layer, report material and printing time, write nothing", "", "Run"}};
+    {"--overwrite", "", "replace an existing file", "", "Run"},
+    {"--dry-run", "", "report material and printing time without writing output", "", "Run"}};
 
 const OptionSpec kExtrudeWords[] = {
-    {"-o,--output", "FILE", "file for the toolpaths, as in part.gcode or part.sml", "", ""},
-    {"--machine", "", "extrusion printer: one of those below, or a profile as TOML", "marlin", ""},
+    {"-o,--output", "FILE", "toolpath file, as in part.gcode or part.sml", "", ""},
+    {"--machine", "", "extrusion printer: a name listed below, or a profile in TOML", "marlin", ""},
     {"--layer", "", "", "half of the nozzle", ""},
     {"--tolerance", "", "", "10", ""},
     {"--walls", "", "", "1", ""}};
@@ -314,8 +313,8 @@ PlanCommand extrude_row() {
   return {Product::kMoves,
           kExtrudeKeys,
           kExtrudeBasic,
-          "Plans parts for a material extrusion printer: walls, filling and segmented lines as G-code or SML, with what the\n"
-          "pores will be. The same parts and options give the same bytes.",
+          "Plans toolpaths for a material extrusion printer: walls, filling and segmented lines as G-code or SML. Reports\n"
+          "the planned pores. The same parts and options give the same bytes.",
           kExtrudeSwitches,
           kExtrudeWords,
           extrude_closing,
@@ -335,12 +334,12 @@ Outcome plan_row(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command jet_command = {"jet", "binder jetting: exact 1-bit images of every layer of the bed, and a manifest",
-                             spec_of_row<jet_row>, plan_row<jet_row>};
-const Command slice_command = {"slice", "contours of every layer, and their filling: SVG, CLI, 3MF slices",
-                               spec_of_row<slice_row>, plan_row<slice_row>};
+const Command jet_command = {"jet", "binder jetting: exact layer bitmaps and print programs", spec_of_row<jet_row>,
+                             plan_row<jet_row>};
+const Command slice_command = {"slice", "contours of every layer, with fillings: SVG, CLI, 3MF slices", spec_of_row<slice_row>,
+                               plan_row<slice_row>};
 const Command extrude_command = {"extrude",
-                                 "material extrusion: toolpaths as G-code or SML, with segmented lines and their pores",
+                                 "material extrusion: toolpaths as G-code or SML, with porous fillings",
                                  spec_of_row<extrude_row>,
                                  plan_row<extrude_row>,
                                  false,

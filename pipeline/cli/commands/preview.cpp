@@ -7,25 +7,21 @@ namespace {
 CommandSpec preview_spec() {
   CommandSpec spec;
   spec.summary =
-      "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set, or as its share of\n"
-      "the most drops, or of a full voxel's levels; or one layer of a sliced job with its filling, or of a G-code file, bead\n"
-      "widths true (PNG or SVG), or several with --count or --every (PNG).";
+      "Draws layers of a job on one PNG image; the darkness of a pixel is its set fraction, drops or grey level. Layers of\n"
+      "sliced jobs and G-code are drawn with true bead widths: one layer as PNG or SVG, several as PNG.";
   spec.operand = "DIR|GCODE";
-  spec.operand_meaning =
-      "directory that lamina jet or lamina slice wrote, or a G-code file of lamina extrude or another slicer";
+  spec.operand_meaning = "directory of lamina jet or lamina slice, or a G-code file of lamina extrude or another slicer";
   spec.options = {
-      {"-o,--output", "PNG", "the picture", "", ""},
-      {"--count", "N", "so many layers, spread over the height", "12", ""},
-      {"--every", "N", "every N-th layer, from the first", "", ""},
-      {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
-      {"--swath", "N",
-       "layer --layer of a job with a machine while swath N of it is jetted, with the head; middle for the one in the middle",
-       "", ""},
-      {"--step", "N", "position of the swath; default: the middle one", "", ""},
-      {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
-      {"--filament", "MM", "diameter of the filament of G-code", "the file's, else 1.75", ""},
-      {"--layer-height", "MM", "cut G-code, as a spiral, every MM of height", "by tags, heights or turns", ""},
-      {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
+      {"-o,--output", "PNG", "image file, PNG or SVG", "", ""},
+      {"--count", "N", "number of layers, spread over the height", "12", ""},
+      {"--every", "N", "draw every N-th layer, from the first", "", ""},
+      {"--layer", "K", "draw only layer K, counted from 0 at the bottom", "", ""},
+      {"--swath", "N", "draw --layer during swath N, with the print head; or middle", "", ""},
+      {"--step", "N", "step of the swath to draw; default: the middle one", "", ""},
+      {"--width", "PIXELS", "image width in pixels, 200 to 20000", "2400", ""},
+      {"--filament", "MM", "filament diameter of G-code in mm", "the file's, else 1.75", ""},
+      {"--layer-height", "MM", "layer height in mm to divide G-code by, as for spirals", "by tags, heights or turns", ""},
+      {"--whole-bed", "", "show the whole bed, not only the printed area", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
@@ -41,6 +37,6 @@ Outcome run_preview(const Arguments& arguments, Context&) { return hand_over("la
 
 }  // namespace
 
-const Command preview_command = {"preview", "pictures of a job's layers for people", preview_spec, run_preview, true};
+const Command preview_command = {"preview", "draw layers of a job or a G-code file", preview_spec, run_preview, true};
 
 }  // namespace lamina::pipeline

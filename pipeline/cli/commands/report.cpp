@@ -15,16 +15,15 @@ namespace {
 CommandSpec report_spec() {
   CommandSpec spec;
   spec.summary =
-      "Writes one HTML page about a finished job: its layers to leaf, zoom and pan through, the parts from three sides,\n"
-      "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
+      "Writes one HTML page about a finished job: layers to browse, zoom and pan, the parts from three sides, area,\n"
+      "thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
   spec.operand = "DIR|GCODE";
   spec.operand_meaning = "finished directory of lamina jet, or G-code file of lamina extrude with its manifest";
-  spec.options = {
-      {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
-      {"--max-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
-      {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
-      {"--overwrite", "", "replace a file that lamina did not write", "", ""},
-      {"--quiet", "", "print errors only", "", ""}};
+  spec.options = {{"-o,--output", "HTML", "page to write, .html or .htm", "", ""},
+                  {"--max-bytes", "SIZE", "max size of the page; layers are omitted evenly to fit", "19M", ""},
+                  {"--parts", "DIR", "folder or file of the parts, for the three views; repeatable", "", ""},
+                  {"--overwrite", "", "replace a file that lamina did not write", "", ""},
+                  {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina report out -o report.html\n"
@@ -74,7 +73,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command report_command = {"report", "one page about a finished job: layers, plots, warnings, hashes", report_spec,
-                                run_report};
+const Command report_command = {"report", "write an HTML page about a finished job: layers, plots, warnings, hashes",
+                                report_spec, run_report};
 
 }  // namespace lamina::pipeline

@@ -18,18 +18,15 @@ namespace {
 CommandSpec verify_spec() {
   CommandSpec spec;
   spec.summary =
-      "Compares a job's directory with its manifest: every layer's file is there, of the recorded size and hash, and\n"
-      "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
-      "that image; nothing else lies in layers/ and program/. Contours: every layer's bytes have the recorded hash.\n"
-      "Exit code 5 if anything differs.";
+      "Checks a job: file sizes and hashes, decoded pixels, files that do not belong to it, and a replay of the print\n"
+      "program by the firmware's rules. Exit code 5 if anything differs.";
   spec.operand = "DIR|GCODE|SML";
-  spec.operand_meaning =
-      "directory that lamina jet or lamina slice wrote, or G-code or SML file of lamina extrude; several are verified in turn";
-  spec.options = {{"--quote", "CSV", "write what every part uses up and costs as a table, of one directory", "", ""},
+  spec.operand_meaning = "directories of lamina jet or lamina slice, or G-code or SML files of lamina extrude";
+  spec.options = {{"--quote", "CSV", "write material and cost per part as CSV (one directory)", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""},
-                  {"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
-                  {"--json", "", "print one JSON object for each directory on stdout", "", ""},
-                  {"--quiet", "", "say nothing but faults", "", ""}};
+                  {"--quick", "", "check sizes and hashes only, without decoding images", "", ""},
+                  {"--json", "", "print one JSON object per directory on stdout", "", ""},
+                  {"--quiet", "", "print faults only", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina verify out\n"
@@ -103,6 +100,6 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
-const Command verify_command = {"verify", "is a job's directory whole and true to its manifest", verify_spec, run_verify};
+const Command verify_command = {"verify", "check the files of a job and replay its print program", verify_spec, run_verify};
 
 }  // namespace lamina::pipeline

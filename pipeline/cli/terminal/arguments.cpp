@@ -76,19 +76,21 @@ std::string first_examples(std::string_view end) {
   return text;
 }
 
+/// Options of other slicers with the meaning and the values of one of lamina, which are accepted in its place.
+constexpr std::string_view kAcceptedAliases[][2] = {
+    {"--layer", "--layer-height"}, {"--fill", "--infill"}, {"--walls", "--perimeters --wall-loops --wall-line-count"}};
+
 /// An option of lamina, the options of other slicers that it is called there, and what differs.
 struct SlicerAlias {
   std::string_view ours, theirs, differs = {};
 };
 // Of two rows of a word, the first whose option the command has counts. Without an option of ours, lamina has nothing of it.
 constexpr SlicerAlias kSlicerAliases[] = {
-    {"--layer", "--layer-height"},
     {"--line-distance", "--fill-density --infill-density --infill-sparse-density",
      "it is the width of a bead over the density, as 2 for 0.4 mm and 20 %"},
     {"--line-distance", "--infill-line-distance"},
-    {"--pattern", "--fill-pattern --infill-pattern --infill"},
+    {"--pattern", "--fill-pattern --infill-pattern"},
     {"--angle", "--fill-angle --infill-angle --infill-angles"},
-    {"--walls", "--perimeters --wall-line-count --wall-loops"},
     {"--bead", "--extrusion-width --line-width"},
     {"--flow", "--extrusion-multiplier --material-flow"},
     {"--dpi", "--resolution", "pixels per inch"},
@@ -107,9 +109,7 @@ constexpr SlicerAlias kSlicerAliases[] = {
     {"--at", "--center", "the corner of the part's box, not its middle"},
     {"--at", "--align-xy"},
     {"--copies", "--duplicate"},
-    {"--rotate", "--rotate-x", "angles about x, y and z, as 90,0,0"},
-    {"--rotate", "--rotate-y", "angles about x, y and z, as 0,90,0"},
-    {"--rotate", "--rotate-z", "angles about x, y and z, as 0,0,90"},
+    {"--rotate", "--rotate-x --rotate-y --rotate-z", "three angles, about x, y and z: X,Y,Z"},
     {"--skirt", "--skirts --skirt-line-count"},
     {"--job", "--load"},
     {"--save-job", "--save"},
@@ -120,6 +120,16 @@ constexpr SlicerAlias kSlicerAliases[] = {
     {"", "--brim --brim-width --brim-line-count", "lamina makes no brim"},
     {"", "--raft --raft-layers", "lamina makes no raft"},
 };
+
+/// The option's names, and those of other slicers that no option of the command has.
+std::string with_aliases(const CommandSpec& spec, const std::string& flags) {
+  std::string names = flags;
+  for (const auto& [ours, theirs] : kAcceptedAliases) {
+    for (const std::string_view name : split(theirs, " "))
+      if (ours == flags && spec.find(name) == nullptr) names += fmt::format(",{}", name);
+  }
+  return names;
+}
 
 }  // namespace
 
@@ -155,6 +165,11 @@ std::string Arguments::text(std::string_view flag) const {
 std::string slicer_alias(std::string_view flag, const CommandSpec& spec) {
   std::string word(flag);
   std::ranges::replace(word, '_', '-');
+  for (const auto& [ours, theirs] : kAcceptedAliases) {
+    const auto words = split(theirs, " ");
+    if (std::ranges::find(words, word) != words.end() && spec.find(ours) != nullptr)
+      return fmt::format("; did you mean '{}'?", ours);
+  }
   for (const SlicerAlias& row : kSlicerAliases) {
     if (const auto words = split(row.theirs, " "); std::ranges::find(words, word) == words.end()) continue;
     if (row.ours.empty()) return fmt::format("; {}", row.differs);
@@ -179,14 +194,16 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   read.given = arguments;
   std::vector<std::string_view> known = {"--help", "--help-all"};
   std::deque<std::vector<std::string>> values;  // addresses must not change
+  std::deque<std::string> names;                // that `known` refers to
   std::vector<CLI::Option*> options;
   for (const OptionSpec& option : spec.options) {
     std::vector<std::string>& texts = values.emplace_back();
+    const std::string& flags = names.emplace_back(with_aliases(spec, option.flag));
     options.push_back(
         option.value.empty()
-            ? app.add_flag(option.flag)
-            : app.add_option(option.flag, texts)->type_name(option.value)->expected(1)->allow_extra_args(false)->take_all());
-    for (const std::string_view name : split(option.flag, ",")) known.push_back(name);
+            ? app.add_flag(flags)
+            : app.add_option(flags, texts)->type_name(option.value)->expected(1)->allow_extra_args(false)->take_all());
+    for (const std::string_view name : split(flags, ",")) known.push_back(name);
   }
   if (!spec.operand.empty()) {
     app.add_option(spec.operand, read.operands)->type_name("")->expected(0, 1 << 29);

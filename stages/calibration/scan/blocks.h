@@ -1,5 +1,6 @@
 // stages/calibration/scan/blocks.h: what a chart shows next to its dashes. Bars and wedges: the ink spread at edges, and the
-// darkness by the coverage of pixels. Verniers and blocks over stitch lines: offsets of swaths, in addition to those from dashes.
+// darkness by the coverage of pixels. Verniers and blocks over stitch lines: offsets of swaths, in addition to those from
+// dashes.
 #pragma once
 
 #include <cstdint>

@@ -18,7 +18,7 @@ void put_spit(const Machine& machine, ProgramBytes& out) {
   for (std::uint32_t drop = 0; drop < machine.maintenance.spit_drops; ++drop) put(out, "M578 S{}\n", all);
 }
 
-constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "; fill the vats, then go on\nM226\n", "G4 P", 1e-3, shot_s};
+constexpr MaintenanceWords kMaintenance{"G0", put_spit, "", "; fill the vats, then resume\nM226\n", "G4 P", 1e-3, shot_s};
 
 class M578Writer final : public ProgramWriter {
  public:

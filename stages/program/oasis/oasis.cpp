@@ -13,7 +13,7 @@ constexpr double kHysteresisMm = 1, kClearanceMm = 0.25;
 // Where homing leaves the gantry.
 constexpr MachinePoint kHomeMm = {5, 245};
 
-constexpr MaintenanceWords kMaintenance{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then go on\nM0\n", "G4 P",
+constexpr MaintenanceWords kMaintenance{"G1", hp45::Head::spit, hp45::Head::kWait, "; fill the vat, then resume\nM0\n", "G4 P",
                                         1};
 
 class OasisWriter final : public ProgramWriter {

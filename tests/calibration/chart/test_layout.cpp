@@ -217,7 +217,7 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   chart.pixel_x_nm = chart.pixel_y_nm = 100'000;
   chart.layer_mm = 0.1;
   const char* reading =
-      R"({"pixels_a_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"unreadable":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"along_within_um":2.25,"across_um":null,"across_within_um":80},null],)"
+      R"({"pixels_per_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"unreadable":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"along_within_um":2.25,"across_um":null,"across_within_um":80},null],)"
       R"("nozzles":[{"along_um":-5,"along_detected_um":-5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},)"
       R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},null,)"
       R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":1,"across_detected_um":1,"across_error_um":0.5},)"

@@ -35,8 +35,9 @@ TEST(CalibrateScan, APhotographBecomesAProfile) {
   std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
                                                            << picture.width << ' ' << picture.height << "\n255\n"
                                                            << std::string(picture.grey.begin(), picture.grey.end());
-  const Outcome detected = run_lamina(
-      words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay detected.png"), directory.path());
+  const Outcome detected =
+      run_lamina(words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay detected.png"),
+                 directory.path());
   ASSERT_EQ(detected.code, 0) << detected.err;
   EXPECT_TRUE(std::filesystem::exists(directory / "detected.png"));
   const auto mine = pipeline::find_machine(directory / "mine.toml");

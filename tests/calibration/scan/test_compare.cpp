@@ -136,7 +136,7 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
   }
   std::ranges::sort(area);
   printf(
-      "%d layers, %zu not read: %zu of %zu swaths missing by 0.3 mm found, %zu told wrongly; area of whole layers: half within %.1f %%, all within %.1f %%\n",
+      "%d layers, %zu not read: %zu of %zu swaths missing by 0.3 mm found, %zu reported wrongly; area of whole layers: half within %.1f %%, all within %.1f %%\n",
       layers, unread, found, missing, wrong, area.empty() ? 0 : 100 * area[area.size() / 2],
       area.empty() ? 0 : 100 * area.back());
   EXPECT_GE(static_cast<double>(found), 0.95 * static_cast<double>(missing));

@@ -276,7 +276,7 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
     if (requested != nullptr &&
         (worst > 0.08 || joint > 0.08 || missed > 0 || errors.accused > before.accused || unreadable + swaths > 0)) {
       printf(
-          "scan %d: nozzles within %.3f, swaths %.3f, missed %zu, accused %zu; not told %zu and %zu; blur %.2f, noise %.1f, %.1f pixels a mm\n",
+          "scan %d: nozzles within %.3f, swaths %.3f, missed %zu, accused %zu; not reported %zu and %zu; blur %.2f, noise %.1f, %.1f pixels a mm\n",
           i, worst, joint, missed, errors.accused - before.accused, unreadable, swaths, trial.camera.blur_pixels,
           trial.camera.noise, trial.camera.pixels_a_mm);
       std::fflush(stdout);
@@ -284,9 +284,9 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   }
   printf(
       "%zu scans, %zu not read: %zu of %zu blocked nozzles found, %zu accused wrongly\n"
-      "offsets of nozzles, in pixels of the layer: %zu told, %zu not; half within %.4f, 99.9 %% within %.4f, all within %.4f\n"
-      "offsets of swaths: %zu told, %zu not; half within %.4f, 99 %% within %.4f, all within %.4f\n"
-      "beyond what is told to hold 99 in 100: nozzles %.2f %% of %zu, swaths %.2f %% of %zu, rows %.2f %% of %zu\n"
+      "offsets of nozzles, in pixels of the layer: %zu reported, %zu not; half within %.4f, 99.9 %% within %.4f, all within %.4f\n"
+      "offsets of swaths: %zu reported, %zu not; half within %.4f, 99 %% within %.4f, all within %.4f\n"
+      "beyond the reported interval of 99 in 100: nozzles %.2f %% of %zu, swaths %.2f %% of %zu, rows %.2f %% of %zu\n"
       "rows against the first, in um: half within %.2f, 99 %% within %.2f, all within %.2f\n"
       "joints by verniers: %zu, half within %.4f, 99 %% within %.4f, all within %.4f; by blocks: %zu, half %.4f, 99 %% %.4f, all %.4f; "
       "%zu not read, %zu not as the dashes have them\n"

@@ -12,6 +12,7 @@ namespace lamina::pipeline {
 namespace {
 
 using segment::fit_drops;
+using segment::kDarcy;
 using test::Directory;
 using test::write_text;
 
@@ -73,8 +74,8 @@ TEST(Drops, BothFormsAreReportedForAGasAndOneThatFitsAloneIsAlone) {
   const auto gas = fit_drops(table, {kMedium, {2e-5, 1.2}, segment::GasPressures{1e5, 1e5}});
   ASSERT_TRUE(gas.ok()) << gas.error().message;
   ASSERT_EQ(gas->front().warnings.size(), 1);
-  EXPECT_FALSE(as_json(gas->front()).contains("k1_m2"));
-  EXPECT_NEAR(as_json(gas->front())["compressible"]["k1_m2"].get<double>(), 2e-12, 1e-16);
+  EXPECT_FALSE(as_json(gas->front()).contains("k1_darcy"));
+  EXPECT_NEAR(as_json(gas->front())["compressible"]["k1_darcy"].get<double>() * kDarcy, 2e-12, 1e-16);
   EXPECT_FALSE(draw(gas->front()).dots.empty());
 }
 

@@ -198,7 +198,7 @@ TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsNoMoreThan) {
     ASSERT_TRUE(flow_layers(200, steps, limits, cancel, report).ok());
     EXPECT_EQ(recorded, 200u);
     EXPECT_LE(furthest, limits.record_slots);
-    EXPECT_GE(furthest, 4u) << "others went on meanwhile";
+    EXPECT_GE(furthest, 4u) << "others continued meanwhile";
   }
 }
 

@@ -36,7 +36,7 @@ TEST(PrintProgramMemory, TextThatFiresAtEachStepStaysWithinTheBound) {
       ASSERT_TRUE(status.ok()) << status.error().message;
       EXPECT_GT(record.microseconds, 0);
       EXPECT_LE(work.bytes(), program.bytes_bound(image.change.size())) << name << (further ? ", a blocked nozzle" : "");
-      EXPECT_GT(work.timer->bytes(), 200'000u) << name << ": too little text to tell";
+      EXPECT_GT(work.timer->bytes(), 200'000u) << name << ": too little text for this check";
     }
   }
 }

@@ -113,7 +113,7 @@ TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
   }
   Sections::Work work;
   ASSERT_TRUE(plan->sections->layer(4, work).ok());  // z 2.25: both are solid
-  EXPECT_EQ(work.contours.contours.size(), 1u) << "contours are united";
+  EXPECT_EQ(work.contours.contours.size(), 1u) << "contours are merged";
   EXPECT_NEAR(square_mm(doubled_area(work.contours.contours)), 800, 1e-9);
   expect_within(work, 0, rectangle(20, 20, 40, 40), 400'000, PathKind::kRaster);
   expect_within(work, 1, rectangle(40, 20, 60, 40), 600'000, PathKind::kContour);

@@ -31,7 +31,7 @@ TEST(DesignedJob, TheForwardRunOfWhatIsWrittenMeetsTheTarget) {
   EXPECT_TRUE(found->met);
   EXPECT_NEAR(found->forward.porosity, 0.23, 0.05 * 0.23);
   EXPECT_NEAR(found->forward.permeability_m2 / kDarcy, 180, 0.05 * 180);
-  EXPECT_GT(found->model_ratio, 0.6) << "slots alone are told too permeable, by less than half";
+  EXPECT_GT(found->model_ratio, 0.6) << "the model of slots overestimates permeability, by less than half";
   EXPECT_LT(found->model_ratio, 1.05);
   // The same from the text that is written.
   pipeline::Job job;

@@ -51,7 +51,7 @@ TEST(DesignedGradient, ATargetThatRisesGivesPermeabilitiesThatRise) {
   EXPECT_EQ(job.segment.ranges[1].to_mm, 3);
   EXPECT_EQ(job.segment.ranges[1].changes.values.thin_mm, found->steps[1].found.design.settings.thin_mm);
   EXPECT_EQ(job.segment.all.thin_mm, found->steps[2].found.design.settings.thin_mm)
-      << "a part that is higher goes on as its top";
+      << "a higher part continues with the settings of the top";
 }
 
 TEST(DesignedGradient, ARegionOfTheOneFileIsAsTheSameFillingAlone) {

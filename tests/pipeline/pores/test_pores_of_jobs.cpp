@@ -125,7 +125,7 @@ TEST(PoresOfJobs, AWrongJobIsALine) {
       {"permeability filament.toml none.stl", 3, "none.stl: cannot be opened"},
       {"permeability filament.toml --machine ender", 2, "--machine: no machine 'ender'"},
       {"permeability filament.toml --machine fdm-2000", 2, "filament.toml: FDM 2000 writes sml"},
-      {"permeability filament.toml --set segment.thick_mm=0", 2, "segment.thick_mm: 0 mm; a thick stretch has to be longer"},
+      {"permeability filament.toml --set segment.thick_mm=0", 2, "segment.thick_mm: 0 mm; a thick segment has to be longer"},
       {"permeability filament.toml --set segment.thin_mm=30", 2, "segment.thin_mm"},
       {"permeability filament.toml --length 5", 2, "--length is for tables of measurements"},
       {"permeability filament.toml --periodic z", 2, "--periodic is for folders of images"},
@@ -138,7 +138,7 @@ TEST(PoresOfJobs, AWrongJobIsALine) {
   EXPECT_NE(empty.err.find("note: walls.toml: no bead"), std::string::npos) << empty.err << "and not the file that it became";
   const auto solid = reported("permeability solid.toml", folder);
   EXPECT_EQ(solid.code, 0) << solid.err;
-  EXPECT_NE(solid.out.find("no void leads through"), std::string::npos) << "what is solid is told as it is";
+  EXPECT_NE(solid.out.find("no connected void"), std::string::npos) << "a solid part is reported as solid";
 }
 
 }  // namespace

@@ -297,7 +297,7 @@ TEST_F(ExtrudeProgram, PoresAreCountedByRangeAlsoWherePartsAreAtDifferentHeights
     EXPECT_EQ(staggered[i]["heights"], alone[i]["heights"]);
     EXPECT_GT(alone[i]["closed"], 0);
     EXPECT_EQ(staggered[i]["closed"], 2 * alone[i]["closed"].get<int>()) << i;
-    EXPECT_NEAR(staggered[i]["density_mm2"].get<double>(), alone[i]["density_mm2"].get<double>(), 1e-9) << i;
+    EXPECT_NEAR(staggered[i]["closed_per_mm2"].get<double>(), alone[i]["closed_per_mm2"].get<double>(), 1e-9) << i;
   }
 }
 
@@ -429,7 +429,7 @@ TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
     EXPECT_FALSE(fs::exists(file("a.gcode")));
     return result.err;
   };
-  EXPECT_NE(message("--fill segmented --thin 0").find("segment.thin_mm: 0 mm; a thin stretch has to be longer than 0"),
+  EXPECT_NE(message("--fill segmented --thin 0").find("segment.thin_mm: 0 mm; a thin segment has to be longer than 0"),
             std::string::npos);
   EXPECT_NE(message("--fill segmented --thin -2").find("segment.thin_mm: -2 mm"), std::string::npos);
   EXPECT_NE(message("--fill segmented --thin-speed 0").find("segment.thin_speed_percent: 0 %"), std::string::npos);

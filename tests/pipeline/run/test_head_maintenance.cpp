@@ -93,16 +93,16 @@ TEST_F(HeadMaintenance, TimeBinderAndPowderByHand) {
   // Drops of 50 pl; layers of 3 mm and the base of 1, fed 1.25 times, of a bed of 98 mm across.
   const double drops = static_cast<double>(report.replay.drops) + 30 * 850 * 128.0;
   EXPECT_NEAR(report.material.binder_mm3, drops * 50e-6, 1e-9);
-  EXPECT_NEAR(done["use"]["binder_l"].get<double>(), drops * 50e-12, 1e-9);
+  EXPECT_NEAR(done["use"]["binder_mm3"].get<double>(), drops * 50e-6, 1e-3);
   EXPECT_NEAR(report.replay.fed_mm[0], 1.25 * 4, 1e-9);
-  EXPECT_NEAR(done["use"]["powder_fed_l"].get<double>(), 1.25 * 4 * 3.14159265358979 * 49 * 49 * 1e-6, 1e-7);
+  EXPECT_NEAR(done["use"]["powder_fed_mm3"].get<double>(), 1.25 * 4 * 3.14159265358979 * 49 * 49, 0.1);
 }
 
 // A vat of 1000 mm2 for a bed of 7543: the dose is 7.543 times as high for the same powder.
 TEST_F(HeadMaintenance, PowderIsCountedByTheAreaOfTheVats) {
   Job job = prism(1, profile("narrow", "vat_area_mm2 = 1000\n"), "narrow");
-  const auto fed = facts(job)["use"]["powder_fed_l"].get<double>();
-  EXPECT_NEAR(fed, 1.25 * 1000 * 1e-6, 1e-8);
+  const auto fed = facts(job)["use"]["powder_fed_mm3"].get<double>();
+  EXPECT_NEAR(fed, 1.25 * 1000, 0.01);
   EXPECT_NEAR(verified(job).material.powder_mm3, 1.25 * 1000 * 0.6, 1e-6);
 }
 

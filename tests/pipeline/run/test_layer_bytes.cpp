@@ -81,7 +81,7 @@ TEST(LayerBytes, OfLevelsAreNoMoreThanWhatIsReportedAndAFifthOfItNoLessThan) {
     }
   }
   EXPECT_LT(all.reported, 5 * all.used);
-  std::cout << "levels are told with " << all.reported / all.used << " times what they take\n";
+  std::cout << "reported bytes of levels: " << all.reported / all.used << " times their use\n";
 }
 
 TEST(LayerBytes, OfDropsAreNoMoreThanWhatIsReportedAndAFifthOfItNoLessThan) {
@@ -104,7 +104,7 @@ TEST(LayerBytes, OfDropsAreNoMoreThanWhatIsReportedAndAFifthOfItNoLessThan) {
     }
   }
   EXPECT_LT(all.reported, 5 * all.used);
-  std::cout << "drops are told with " << all.reported / all.used << " times what they take\n";
+  std::cout << "reported bytes of drops: " << all.reported / all.used << " times their use\n";
 }
 
 }  // namespace

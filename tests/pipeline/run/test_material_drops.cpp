@@ -174,7 +174,7 @@ TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsTarget) {
       const auto& material = json["materials"][m];
       EXPECT_EQ(material["set_pixels"].get<double>(), pixels[m]);
       EXPECT_NEAR(material["drops"].get<double>(), pixels[m] * goal[m], 0.001 * pixels[m] * goal[m]) << m;
-      EXPECT_NEAR(material["binder_ml"].get<double>(), material["drops"].get<double>() * 100e-9, 1e-12);
+      EXPECT_NEAR(material["binder_mm3"].get<double>(), material["drops"].get<double>() * 100e-6, 1e-9);
       drops += material["drops"].get<double>();
     }
     EXPECT_EQ(json["saturation"]["drops"].get<double>(), drops);
@@ -185,7 +185,7 @@ TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsTarget) {
   ASSERT_EQ(detected.size(), 2u);
   const auto reported = facts("jet --job target.toml --dry-run")["materials"];
   for (std::size_t m = 0; m < 2; ++m) {
-    for (const char* key : {"name", "set_pixels", "drops", "binder_ml"}) EXPECT_EQ(detected[m][key], reported[m][key]) << key;
+    for (const char* key : {"name", "set_pixels", "drops", "binder_mm3"}) EXPECT_EQ(detected[m][key], reported[m][key]) << key;
   }
   EXPECT_NE(lamina("jet --job target.toml --dry-run").err.find(" of steel: 19 200 drops, 0.002 ml of binder"),
             std::string::npos);

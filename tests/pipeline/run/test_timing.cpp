@@ -79,11 +79,11 @@ TEST(Timing, ARunReportsEachStepAndWhatTheLimitReadsAndWrites) {
   const nlohmann::json &timing = timed["timing"], &limit = timing["limit"];
   double steps = 0;
   for (const char* step : {"raster", "dose", "encode", "store", "record"}) {
-    EXPECT_GT(timing["nodes"][step]["processor"], 0) << step;
-    EXPECT_GT(timing["nodes"][step]["busy"], 0) << step;
-    steps += timing["nodes"][step]["processor"].get<double>();
+    EXPECT_GT(timing["nodes"][step]["processor_seconds"], 0) << step;
+    EXPECT_GT(timing["nodes"][step]["busy_seconds"], 0) << step;
+    steps += timing["nodes"][step]["processor_seconds"].get<double>();
   }
-  EXPECT_LE(steps, timing["phases"]["layers"]["processor"]) << "steps are parts of the phase";
+  EXPECT_LE(steps, timing["phases"]["layers"]["processor_seconds"]) << "steps are parts of the phase";
   EXPECT_EQ(limit["read_bytes"], std::filesystem::file_size(part));
   std::uint64_t bytes = 0;
   for (const auto& file : std::filesystem::directory_iterator(folder.path() / "timed" / "layers")) bytes += file.file_size();

@@ -37,7 +37,7 @@ TEST(PreviewGcode, BeadsCoverTheirLengthTimesTheirWidthAndRoundEnds) {
     EXPECT_NEAR(covered, 10 * widths[i] + std::numbers::pi * widths[i] * widths[i] / 4, 0.01);
     EXPECT_EQ(shapes->beads[i].name, names[i]);
   }
-  EXPECT_NE(shapes->beads[0].ink, shapes->beads[1].ink) << "thin and thick stretches can be told apart";
+  EXPECT_NE(shapes->beads[0].ink, shapes->beads[1].ink) << "thin and thick segments are distinguished";
   EXPECT_NE(shapes->beads[1].ink, shapes->beads[2].ink);
   EXPECT_FALSE(series->layer(1));
 }
