@@ -30,6 +30,17 @@ std::string quoted(std::string_view word) {
   return text + (word.size() > 24 ? "...'" : "'");
 }
 
+std::string not_a_number(std::string_view word) {
+  std::string with_point(word);
+  const std::size_t comma = with_point.find(',');
+  double ignored = 0;
+  const auto is_digit = [&](std::size_t at) { return at < word.size() && word[at] >= '0' && word[at] <= '9'; };
+  if (comma == with_point.npos || !is_digit(comma + 1)) return quoted(word) + " is not a number";
+  with_point[comma] = '.';
+  if (!parse_number(with_point, ignored)) return quoted(word) + " is not a number";
+  return quoted(word) + " has a decimal comma; export it again with decimal points";
+}
+
 std::string extension_label(std::string_view space) {
   const std::string_view name = extension_of(space).name;
   return name.empty() ? std::string(space) : fmt::format("{} ({})", name, space);

@@ -51,6 +51,9 @@ std::uint64_t line_of(const Source& source, std::uint64_t offset);
 /// A word of the file for messages: short, and without bytes that a terminal would act on.
 std::string quoted(std::string_view word);
 
+/// What is wrong with a word that is no number: "'1,5' has a decimal comma; ..." or "'x' is not a number".
+std::string not_a_number(std::string_view word);
+
 /// An extension of 3MF by its namespace: "beam lattice (http://...)", or the namespace alone where it has no known name.
 std::string extension_label(std::string_view space);
 

@@ -2,8 +2,9 @@
 //
 // OBJ: understood are v (colours or a weight behind the position are left out) and f with corners as v, v/t, v//n or v/t/n,
 // counted from 1 or backwards from -1; polygons become fans from their first corner; lines end with LF, CRLF or CR and
-// continue after a backslash. Groups, materials, normals, lines and points do not matter to a solid. Numbers are read in
-// double precision: other readers of this format keep floats.
+// continue after a backslash, in every statement; a note names the first vertex or face that this makes part of another line.
+// Vertices that no face uses may be anything. Groups, materials, normals, lines and points do not matter to a solid. Numbers
+// are read in double precision: other readers of this format keep floats.
 //
 // STL: tolerated, because programs write it: any case; LF, CRLF and CR, or all in one line; tabs; a byte order mark; the end of
 // file of DOS (^Z); several solids; solids with names of any kind, or none; lines of remarks between facets; colours
@@ -53,7 +54,7 @@ class ObjParser {
       } else if (kind == "f") {
         read = face();
       } else if (!kind.empty() && kind.front() == '#') {
-        while (at_ != end_ && !is_line_end(*at_)) ++at_;  // "# C:\\parts\\" does not continue in the next line
+        at_ = kind.data();
       } else if (!kind.empty()) {
         remark_on(kind);
       }
@@ -78,7 +79,8 @@ class ObjParser {
         facets.triangles[i] = {vertices_[a], vertices_[mirrors ? c : b], vertices_[mirrors ? b : c]};
       }
     });
-    if (!bad_.empty()) drop_bad_facets(facets);
+    if (!bad_.empty())
+      if (const Status dropped = drop_bad_facets(facets); !dropped) return dropped.error();
     for (const Triangle& t : facets.triangles) facets.bounds.add(t.a), facets.bounds.add(t.b), facets.bounds.add(t.c);
     if (count == 0) return source_.error("holds no faces");
     if (short_faces_ > 0)
@@ -86,6 +88,13 @@ class ObjParser {
     if (remarks_ > 0)
       facets.notes.push_back({false, fmt::format("{} lines are not understood and left out, the first is line {}", remarks_,
                                                  line_of(source_, remark_offset_))});
+    if (swallowed_ > 0)
+      facets.notes.push_back(
+          {true,
+           fmt::format("line {} begins as a vertex or a face but continues the line above, which ends in a backslash{}: not "
+                       "read; delete the backslash if the line is meant",
+                       line_of(source_, swallowed_offset_),
+                       swallowed_ > 1 ? fmt::format(", and so do {} more", swallowed_ - 1) : "")});
     return facets;
   }
 
@@ -94,9 +103,19 @@ class ObjParser {
     std::uint64_t index, offset;
   };
 
-  /// Whether the line continues after a backslash here, and how many bytes that is.
-  bool continues() const { return *at_ == '\\' && at_ + 1 != end_ && is_line_end(at_[1]); }
-  std::ptrdiff_t continuation() const { return at_[1] == '\r' && at_ + 2 != end_ && at_[2] == '\n' ? 3 : 2; }
+  /// A vertex without a position, and where it is in the file.
+  struct BadVertex {
+    std::uint32_t index;
+    Snapped how;
+    std::uint64_t offset;
+  };
+
+  /// Whether the line continues after a backslash here, and how many bytes that is. Windows end at lines, so that a backslash
+  /// at the end of one is the last byte of the file.
+  bool continues() const { return *at_ == '\\' && (at_ + 1 == end_ || is_line_end(at_[1])); }
+  std::ptrdiff_t continuation() const {
+    return at_ + 1 == end_ ? 1 : at_[1] == '\r' && at_ + 2 != end_ && at_[2] == '\n' ? 3 : 2;
+  }
 
   /// The next word of the line; empty at its end.
   std::string_view word() {
@@ -114,8 +133,22 @@ class ObjParser {
     return {begin, static_cast<std::size_t>(at_ - begin)};
   }
 
+  /// What a backslash joins to the line is part of it, even if it begins as a vertex or a face does; only comments, such as
+  /// "# C:\parts\", end with their line.
   void skip_line() {
-    while (at_ != end_ && !is_line_end(*at_)) at_ += continues() ? continuation() : 1;
+    for (bool comment = false; at_ != end_ && !is_line_end(*at_);) {
+      comment = comment || (*at_ == '#' && (at_ == begin_ || is_space(at_[-1])));
+      if (comment || !continues()) {
+        ++at_;
+        continue;
+      }
+      at_ += continuation();
+      const char* const begin = at_;
+      const std::string_view kind = word(), number = word();
+      const bool is_number = !number.empty() && std::string_view("0123456789+-.").find(number.front()) != number.npos;
+      if ((kind == "v" || kind == "f") && is_number && swallowed_++ == 0) swallowed_offset_ = offset_of(kind.data());
+      at_ = begin;
+    }
     if (at_ != end_) ++at_;
   }
 
@@ -131,17 +164,13 @@ class ObjParser {
     for (double& number : position) {
       const std::string_view found = word();
       if (found.empty()) return fail("a vertex has three numbers");
-      if (!parse_number(found, number)) return fail(fmt::format("{} is not a number", quoted(found)));
+      if (!parse_number(found, number)) return fail(not_a_number(found));
     }
     Point3 point{};
     const Snapped snapped = snapper_.snap(position[0], position[1], position[2], point);
-    if (snapped == Snapped::kNotFinite && options_.drop_bad) {
-      bad_.resize(vertices_.size(), 0);
-      bad_.push_back(1);
-    } else if (snapped != Snapped::kYes) {
-      return fail(what_is_wrong(snapped));
-    }
     if (vertices_.size() == UINT32_MAX) return fail("more than 4294967295 vertices");
+    if (snapped != Snapped::kYes)
+      bad_.push_back({static_cast<std::uint32_t>(vertices_.size()), snapped, offset_of(at_ == begin_ ? at_ : at_ - 1)});
     vertices_.push_back(point);
     return {};
   }
@@ -163,7 +192,11 @@ class ObjParser {
   Status face() {
     std::array<std::uint32_t, 3> fan{};
     std::size_t count = 0;
-    for (std::string_view found = word(); !found.empty() && found.front() != '#'; found = word()) {
+    for (std::string_view found = word(); !found.empty(); found = word()) {
+      if (found.front() == '#') {
+        at_ = found.data();
+        break;
+      }
       const Result<std::uint32_t> index = corner(found);
       if (!index) return index.error();
       if (count < 2) {
@@ -188,17 +221,26 @@ class ObjParser {
     if (remarks_++ == 0) remark_offset_ = offset_of(kind.data());
   }
 
-  void drop_bad_facets(Facets& facets) {
-    bad_.resize(vertices_.size(), 0);
+  /// Facets at vertices without a position. errors  kInput: the first such vertex that a face uses, unless it may be dropped
+  Status drop_bad_facets(Facets& facets) {
+    Buffer<std::uint8_t> used(vertices_.size(), std::uint8_t{0}), bad(vertices_.size(), std::uint8_t{0});
+    for (const auto& corners : corners_)
+      for (const std::uint32_t corner : corners) used[corner] = 1;
+    for (const BadVertex& vertex : bad_) {
+      if (used[vertex.index] != 0 && !(vertex.how == Snapped::kNotFinite && options_.drop_bad))
+        return fail(vertex.offset, what_is_wrong(vertex.how));
+      bad[vertex.index] = 1;
+    }
     std::size_t kept = 0;
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       const auto [a, b, c] = corners_[i];
-      if (!bad_[a] && !bad_[b] && !bad_[c]) facets.triangles[kept++] = facets.triangles[i];
+      if (!bad[a] && !bad[b] && !bad[c]) facets.triangles[kept++] = facets.triangles[i];
     }
     if (kept < corners_.size())
       facets.notes.push_back(
           {true, fmt::format("{} facets with coordinates that are not finite dropped", corners_.size() - kept)});
     facets.triangles.resize(kept);
+    return {};
   }
 
   const Source& source_;
@@ -208,9 +250,9 @@ class ObjParser {
   std::uint64_t offset_ = 0;
   Buffer<Point3> vertices_;
   Buffer<std::array<std::uint32_t, 3>> corners_;
-  std::vector<std::uint8_t> bad_;  // by vertex; empty if none is
-  std::vector<Forward> forward_;   // corners that came before their vertex
-  std::uint64_t short_faces_ = 0, remarks_ = 0, remark_offset_ = 0;
+  std::vector<BadVertex> bad_;    // rising
+  std::vector<Forward> forward_;  // corners that came before their vertex
+  std::uint64_t short_faces_ = 0, remarks_ = 0, remark_offset_ = 0, swallowed_ = 0, swallowed_offset_ = 0;
 };
 
 constexpr std::size_t kWindowBytes = std::size_t{32} << 20, kBlock = std::size_t{1} << 20;
@@ -321,7 +363,7 @@ class BlockParser {
     for (double& number : position) {
       found = word();
       if (!parse_number(found, number)) {
-        fail(found, fmt::format("{} is not a number", quoted(found)));
+        fail(found, not_a_number(found));
         return false;
       }
     }

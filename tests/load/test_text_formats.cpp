@@ -63,7 +63,7 @@ TEST(ReadAsciiStl, MistakesAreNamedByLine) {
     return refusal(write_file("bad.stl", replaced(changed, "\n", line_end)));
   };
   for (const char* line_end : {"\n", "\r\n", "\r"}) {
-    EXPECT_CONTAINS(broken("vertex 0 0 0", "vertex 0,5 0 0", line_end), "line 11: '0,5' is not a number");
+    EXPECT_CONTAINS(broken("vertex 0 0 0", "vertex 0,5 0 0", line_end), "line 11: '0,5' has a decimal comma");
     EXPECT_CONTAINS(broken("vertex 0 0 0", "vertex 0 0", line_end), "line 12: 'vertex' is not a number");
     EXPECT_CONTAINS(broken("vertex 0 0 0", "vertex nan 0 0", line_end), "line 11: a coordinate is not finite");
     EXPECT_CONTAINS(broken("vertex 0 0 0", "vertex 1e999 0 0", line_end), "line 11: a coordinate is not finite");
