@@ -131,7 +131,7 @@ TEST(Read3mfExtensions, WhatDoesNotFitTogetherIsRefusedWithItsLine) {
   EXPECT_CONTAINS(broken("v1=\"0\"", "v1=\"-1\""), "a triangle names vertex '-1'");
   EXPECT_CONTAINS(broken("v1=\"0\"", ""), "lacks v1, v2 or v3");
   EXPECT_CONTAINS(broken("x=\"1\"", ""), "lacks x, y or z");
-  EXPECT_CONTAINS(broken("x=\"1\"", "x=\"1,5\""), "the coordinate '1,5' is no number");
+  EXPECT_CONTAINS(broken("x=\"1\"", "x=\"1,5\""), "the coordinate '1,5' has a decimal comma");
   EXPECT_CONTAINS(broken("id=\"1\"", "id=\"x\""), "the id 'x' is no whole number");
   EXPECT_CONTAINS(broken("type=\"model\"", "type=\"thing\""), "the type 'thing' of an object");
   EXPECT_CONTAINS(broken("millimeter", "furlong"), "the unit 'furlong'");
@@ -155,7 +155,7 @@ TEST(Read3mfExtensions, ObjectsBehindTheirUseAreReadAndReported) {
       model(box_object(2, 1, 1, 1) + box_object(3, 9, 9, 9, "type=\"other\"") + components(1, component(2) + component(3)),
             item(1))));
   EXPECT_EQ(placed(other).size(), 12u);
-  EXPECT_CONTAINS(notes_of(other), "1 objects are of type \"other\"");
+  EXPECT_CONTAINS(notes_of(other), "1 object is not planned: type \"other\"");
 }
 
 TEST(Read3mfExtensions, AnObjectInsideOutIsTurnedOverAndNamed) {

@@ -99,7 +99,7 @@ TEST(Read3mfRoles, PartsOfBambuStudioHaveTheirKinds) {
   EXPECT_EQ(placed(loaded(roles_file(text, name, settings("modifier_part", "normal_part")))).size(), 24u);
   const Part part = loaded(roles_file(text, name, settings("support_enforcer", "support_blocker")));
   EXPECT_EQ(placed(part).size(), 12u);
-  EXPECT_CONTAINS(notes_of(part), "2 objects are modifiers or support blockers");
+  EXPECT_CONTAINS(notes_of(part), "2 objects are not planned: modifier or support blocker");
   EXPECT_CONTAINS(refusal(roles_file(text, name, settings("negative_part", "normal_part"))), "object 2 is a negative volume");
 }
 
@@ -120,8 +120,7 @@ TEST(Read3mfRoles, ModifiersOfCuraAreLeftOut) {
   for (const char* key : {"infill_mesh", "cutting_mesh", "anti_overhang_mesh", "support_mesh"})
     EXPECT_EQ(placed(with(now(key, "True"))).size(), 12u) << key;
   const Part part = with("<settings><setting key=\"infill_mesh\">True</setting></settings>");
-  EXPECT_CONTAINS(notes_of(part),
-                  "1 objects are modifiers or support blockers of the program that wrote them and are not planned");
+  EXPECT_CONTAINS(notes_of(part), "1 object is not planned: modifier or support blocker of the program that wrote the file");
 }
 
 /// Turns the facets of an object over.

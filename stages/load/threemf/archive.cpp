@@ -8,6 +8,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/load/text.h"
+#include "stages/load/threemf/model.h"
 #include "stages/support/late/zip.h"
 #include "stages/support/text/escape.h"
 
@@ -99,7 +100,6 @@ Status Archive::check_sizes(std::uint64_t packed, std::uint64_t expanded, std::u
 }
 
 Status Archive::list() {
-  std::uint64_t total = 0;
   const zip_int64_t count = zip_get_num_entries(archive_.get(), 0);
   for (zip_int64_t i = 0; i < count; ++i) {
     zip_stat_t entry;
@@ -107,13 +107,11 @@ Status Archive::list() {
     const zip_uint64_t needed = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE;
     if (zip_stat_index(archive_.get(), static_cast<zip_uint64_t>(i), 0, &entry) != 0 || (entry.valid & needed) != needed)
       return source_->error(fmt::format("zip entry {} is damaged; copy or export the file again", i + 1));
-    if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE)
-      return source_->error("is encrypted; save it without a password");
-    total += std::min<std::uint64_t>(entry.size, UINT64_MAX - total);
-    if (const Status fits = check_sizes(entry.comp_size, entry.size, total); !fits) return fits;
     const std::string_view name = entry.name;
     if (name.ends_with('/') || name.ends_with('\\')) continue;
-    if (!entries_.emplace(part_name(name), PackedFile{static_cast<std::uint64_t>(i), entry.comp_size}).second)
+    const bool encrypted = (entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE;
+    const PackedFile file{static_cast<std::uint64_t>(i), entry.comp_size, entry.size, encrypted};
+    if (!entries_.emplace(part_name(name), file).second)
       return source_->error(fmt::format("holds two entries of the name {}; export it again", quoted(name)));
   }
   return {};
@@ -124,6 +122,9 @@ Status Archive::read(const std::string& name, const std::function<Status(std::st
   const auto damaged = [&](const char* why) {
     return source_->error(fmt::format("zip entry {} is damaged ({}); copy or export the file again", entry.index + 1, why));
   };
+  if (entry.encrypted) return source_->error("is encrypted; save it without a password");
+  const std::uint64_t total = inflated_ + std::min(entry.expanded, UINT64_MAX - inflated_);
+  if (const Status fits = check_sizes(entry.packed, entry.expanded, total); !fits) return fits;
   const std::unique_ptr<zip_file_t, CloseEntry> file(zip_fopen_index(archive_.get(), entry.index, 0));
   if (file == nullptr) return damaged(zip_strerror(archive_.get()));
   Buffer<char> block(std::size_t{64} << 10);
@@ -222,7 +223,7 @@ Status check_model_relationships(const Source& source, Archive& archive, const s
 
 }  // namespace
 
-Result<std::string> find_start_part(const Source& source, Archive& archive) {
+Result<std::string> find_start_part(const Source& source, Archive& archive, ModelPackage& package) {
   const std::string root = "/_rels/.rels";
   if (!archive.has(root)) return source.error("is a zip file, but no 3MF: it has no _rels/.rels; unzip it, or export it again");
   const auto relationships = read_relationships(archive, root);
@@ -232,8 +233,9 @@ Result<std::string> find_start_part(const Source& source, Archive& archive) {
     const bool is_model = one.type == kModelRelationship;
     if (const Status inside = check_inside(source, root, one); !inside) return inside.error();
     const std::string target = part_name(one.target);
-    const bool needed = is_model || one.type == kThumbnailRelationship;  // what others lead to is not for lamina
-    if (needed && !archive.has(target))
+    if (one.type == kThumbnailRelationship && !archive.has(target))
+      package.depart("a thumbnail that is named and not contained (core 2.1.3)", one.target);
+    if (is_model && !archive.has(target))
       return source.error(fmt::format("_rels/.rels names {}, which the file does not contain; export it again",
                                       quoted(std::string_view(one.target))));
     if (is_model && !model.empty())

@@ -18,26 +18,29 @@ struct zip;
 
 namespace lamina::load {
 
+struct ModelPackage;
+
 class Archive {
  public:
-  /// What entries say of their sizes is checked, against options.expanded_limit and as expansion_is_absurd().
-  ///
   /// source  has to outlive the archive
-  /// errors  kInput: not a ZIP file, cut short, encrypted, two entries of one name, too large
+  /// errors  kInput: not a ZIP file, cut short, two entries of one name
   static Result<Archive> open(const Source& source, const LoadOptions& options);
 
   bool has(const std::string& name) const { return entries_.count(name) > 0; }
 
-  /// Gives an entry's bytes to `take` in pieces of 64 KiB. What was inflated so far is bounded as in open().
+  /// Gives an entry's bytes to `take` in pieces of 64 KiB. All that was inflated so far and what the entry says of its size are
+  /// bounded by options.expanded_limit and expansion_is_absurd(). Entries that are not read may be of any size and kind.
+  ///
   /// name    as part_name() gives it; has to be there
-  /// errors  those of `take`; kInput: damaged, too large
+  /// errors  those of `take`; kInput: damaged, encrypted, too large
   Status read(const std::string& name, const std::function<Status(std::string_view)>& take);
   /// Gives an entry to a reader. errors  kInput: damaged, too large, or what the reader refuses
   Status read_xml(const std::string& name, XmlReader& reader);
 
  private:
   struct PackedFile {
-    std::uint64_t index, packed;
+    std::uint64_t index, packed, expanded;
+    bool encrypted;
   };
   struct Discard {
     void operator()(zip* archive) const;
@@ -55,9 +58,10 @@ class Archive {
 
 /// The one part of a package that is its model, as part_name() gives it.
 ///
+/// package  receives thumbnails that are not there as departures
 /// errors  kInput: no relationships, none or more than one to a 3D model, one that leads out of the package or to nothing, more
 ///         than one print ticket
 /// source  3MF Consortium, Core Specification 1.3, section 2.1
-Result<std::string> find_start_part(const Source& source, Archive& archive);
+Result<std::string> find_start_part(const Source& source, Archive& archive, ModelPackage& package);
 
 }  // namespace lamina::load

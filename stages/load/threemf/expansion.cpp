@@ -97,8 +97,8 @@ Status check_content(const Source& source, const ModelPackage& package, const Mo
 struct Expansion {
   const Source& source;
   const ModelPackage& package;
-  std::vector<Leaf> leaves;
-  std::uint64_t supports = 0, others = 0, modifiers = 0;
+  std::vector<Leaf> leaves = {};
+  std::uint64_t supports = 0, surfaces = 0, others = 0, modifiers = 0, not_printable = 0;
   std::uint32_t item = 0;
   std::vector<bool> reported;  // of objects
 
@@ -112,7 +112,9 @@ struct Expansion {
     }
     const bool is_mesh = object.components.empty();  // the type of others is that of their components
     if (is_mesh && object.type != ModelObject::Type::kModel) {
-      ++(object.type == ModelObject::Type::kSupport ? supports : others);
+      ++(object.type == ModelObject::Type::kSupport   ? supports
+         : object.type == ModelObject::Type::kSurface ? surfaces
+                                                      : others);
       return {};
     }
     if (!reported[index]) {
@@ -394,8 +396,12 @@ Status resolve_references(const Source& source, ModelPackage& package, std::uint
 }
 
 Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage& package, std::vector<Note>& notes) {
-  Expansion expansion{source, package, {}, 0, 0, 0, 0, std::vector<bool>(package.objects.size())};
+  Expansion expansion{.source = source, .package = package, .reported = std::vector<bool>(package.objects.size())};
   for (const ObjectReference& item : package.items) {
+    if (!item.printable) {
+      ++expansion.not_printable, ++expansion.item;
+      continue;
+    }
     const ModelObject& object = package.objects[item.object];
     if (object.type == ModelObject::Type::kOther && object.components.empty())
       return source.error(fmt::format("the build names {}, which is of type \"other\", as 3MF forbids; export it again",
@@ -403,12 +409,20 @@ Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage&
     if (const Status added = expansion.add(item, item.transform, notes); !added) return added.error();
     ++expansion.item;
   }
-  const auto left_out = [&](std::uint64_t count, const char* what) {
-    if (count > 0) notes.push_back({false, fmt::format("{} objects are {} and are not planned", count, what)});
+  std::string all;  // that is left out
+  const auto left_out = [&](std::uint64_t count, const char* what, const char* kind) {
+    if (count == 0) return;
+    notes.push_back({false, fmt::format("{} {}{} not planned: {}", count, what, count == 1 ? " is" : "s are", kind)});
+    all += (all.empty() ? "" : "; ") + notes.back().text;
   };
-  left_out(expansion.supports, "supports or surfaces");
-  left_out(expansion.modifiers, "modifiers or support blockers of the program that wrote them");
-  left_out(expansion.others, "of type \"other\" (modifiers, say)");
+  left_out(expansion.supports, "object", "support");
+  left_out(expansion.surfaces, "object", "type \"surface\", which is no solid");
+  left_out(expansion.modifiers, "object", "modifier or support blocker of the program that wrote the file");
+  left_out(expansion.others, "object", "type \"other\" (modifiers, say)");
+  left_out(expansion.not_printable, "build item", "marked as not printable");
+  if (expansion.leaves.empty() && !all.empty())
+    return source.error(fmt::format("nothing to print ({}); export the part as a printable object of type \"model\"", all));
+  if (expansion.leaves.empty()) return source.error("its build items hold no triangles to print");
   find_cavities(package, expansion.leaves, notes);
   return std::move(expansion.leaves);
 }

@@ -29,9 +29,11 @@ struct Leaf {
 /// cost    linear in components
 Status resolve_references(const Source& source, ModelPackage& package, std::uint64_t triangle_limit);
 
-/// The meshes of the build in its order. Supports, surfaces, modifiers and objects of type "other" are left out, with a note.
+/// The meshes of the build in its order, at least one. Supports, surfaces, modifiers, objects of type "other" and items that
+/// are marked as not printable are left out, with a note.
 ///
-/// errors  kInput: a build item of type "other"; what only an extension could make a solid of; what takes material away
+/// errors  kInput: nothing is left, and why; a build item of type "other"; what only an extension could make a solid of; what
+/// takes material away
 Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage& package, std::vector<Note>& notes);
 
 }  // namespace lamina::load

@@ -38,10 +38,11 @@ struct ObjectReference {
   Transform transform;
   std::uint64_t line;  // where it stands, for errors
   Role role = Role::kPart;
+  bool printable = true;
 };
 
 struct ModelObject {
-  enum class Type { kModel, kSupport, kOther };  // kSupport: all kinds of supports and surfaces
+  enum class Type { kModel, kSupport, kSurface, kOther };  // kSupport: both kinds of supports
   std::uint32_t file = 0;
   std::uint64_t id = 0;
   std::string name;
@@ -74,7 +75,6 @@ struct ModelPackage {
   std::vector<ModelObject> objects;
   std::map<std::pair<std::uint32_t, std::uint64_t>, std::uint32_t> object_of_id;  // (file, id)
   std::vector<ObjectReference> items;                                             // of the build
-  std::uint64_t not_printable = 0;                                                // items that PrusaSlicer would leave out
   std::uint64_t triangles = 0;                                                    // of all objects, once each
   std::map<std::string, std::uint32_t> file_of_name;                              // index in files
   std::set<std::string> extensions;   // namespaces of elements that were passed over, where these may be geometry

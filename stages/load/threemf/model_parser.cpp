@@ -481,8 +481,10 @@ class ModelParser : public XmlHandler {
       } else if (attribute == "type") {
         if (value == "other")
           object.type = ModelObject::Type::kOther;
-        else if (value == "support" || value == "solidsupport" || value == "surface")
+        else if (value == "support" || value == "solidsupport")
           object.type = ModelObject::Type::kSupport;
+        else if (value == "surface")
+          object.type = ModelObject::Type::kSurface;
         else if (value != "model")
           refuse(fmt::format("the type {} of an object is unknown to 3MF; export it again", quoted(value)));
       } else if (const XmlName is = attribute_name(attributes[0]); extension_of(is.space).kind == Extension::kSlices) {
@@ -506,7 +508,7 @@ class ModelParser : public XmlHandler {
       if (name[0] < 'x' || name[0] > 'z' || name[1] != 0) continue;
       const auto axis = static_cast<unsigned>(name[0] - 'x');
       if (!parse_number(trimmed(attributes[1]), at[axis]))
-        return refuse(fmt::format("the coordinate {} is no number; export it again", quoted(attributes[1])));
+        return refuse(fmt::format("the coordinate {}", not_a_number(attributes[1])));
       found |= 1u << axis;
     }
     if (found != 7) return refuse("a vertex lacks x, y or z; export it again");
@@ -559,7 +561,7 @@ class ModelParser : public XmlHandler {
         if (!read_matrix(value, reference.transform))
           refuse(fmt::format("the transform {} is not of 12 numbers; export it again", quoted(value)));
       } else if (attribute == "printable") {
-        package_.not_printable += trimmed(value) == "0" ? 1 : 0;
+        reference.printable = trimmed(value) != "0" && trimmed(value) != "false";  // either way to write a boolean of XML
       } else if (const XmlName is = attribute_name(attributes[0]); is.space == kProductionNamespace && is.local == "path") {
         reference.file = package_.file_of(part_name(value));
       }

@@ -31,9 +31,6 @@ void report_of_model(const ModelPackage& model, std::vector<Note>& notes) {
   }
   if (model.has_forward_references)
     notes.push_back({false, "names objects before it holds them, against the specification; they are planned all the same"});
-  if (model.not_printable > 0)
-    notes.push_back({false, fmt::format("{} build item{} marked as not printable and planned all the same", model.not_printable,
-                                        model.not_printable == 1 ? " is" : "s are")});
 }
 
 }  // namespace
@@ -41,9 +38,9 @@ void report_of_model(const ModelPackage& model, std::vector<Note>& notes) {
 Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
   Result<Archive> archive = Archive::open(source, options);
   if (!archive) return archive.error();
-  const Result<std::string> start = find_start_part(source, *archive);
-  if (!start) return start.error();
   ModelPackage model;
+  const Result<std::string> start = find_start_part(source, *archive, model);
+  if (!start) return start.error();
   model.file_of(*start);
   // The parser adds the files that it finds named.
   for (std::uint32_t file = 0; file < model.files.size(); ++file) {
@@ -57,7 +54,6 @@ Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
   report_of_model(model, package.notes);
   const Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
   if (!leaves) return leaves.error();
-  if (leaves->empty()) return source.error("its build items hold no triangles to print");
   if (const Status placed = snap_leaves(source, model, *leaves, options, package); !placed) return placed.error();
   return package;
 }
