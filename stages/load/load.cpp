@@ -223,13 +223,42 @@ bool has_line_with(std::string_view head, std::initializer_list<std::string_view
   return false;
 }
 
-/// The size that a binary STL file's own count implies. In text, the count's bytes are characters and imply
-/// more than 7 GB, so the test decides regardless of the header.
+/// The size that a binary STL file's own count implies, of either byte order. In text, the count's bytes are characters and
+/// imply more than 7 GB, so the test decides regardless of the header.
 bool has_binary_stl_size(const Source& source, std::string_view head) {
   if (head.size() < 84) return false;
-  std::uint64_t count = 0;
-  for (std::size_t i = 4; i-- > 0;) count = count << 8 | static_cast<unsigned char>(head[80 + i]);
-  return source.size() == 84 + 50 * count;
+  std::uint64_t count = 0, swapped = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    count = count << 8 | static_cast<unsigned char>(head[83 - i]);
+    swapped = swapped << 8 | static_cast<unsigned char>(head[80 + i]);
+  }
+  return source.size() == 84 + 50 * count || (swapped > 0 && source.size() == 84 + 50 * swapped);
+}
+
+/// Whether facets of text STL are there, however the name of the solid is padded: "facet normal", in any case.
+bool has_text_facet(std::string_view head) {
+  for (std::size_t at = 0, end = 0; at < head.size(); at = end + 1) {
+    end = at;
+    while (end < head.size() && !is_space(head[end])) ++end;
+    if (!is_word(head.substr(at, end - at), "facet")) continue;
+    while (end < head.size() && is_space(head[end])) ++end;
+    if (is_word(head.substr(end, 6), "normal")) return true;
+    --end;
+  }
+  return false;
+}
+
+/// The first bytes of a file; where most of them are blank, those from its first byte on that is not.
+std::string_view head_behind_blanks(const Source& source, std::array<char, kHead>& bytes) {
+  std::string_view head = source.head(bytes);
+  for (std::uint64_t offset = 0; head.size() == kHead;) {
+    const auto blanks = static_cast<std::uint64_t>(std::find_if_not(head.begin(), head.end(), is_blank) - head.begin());
+    if (blanks == 0 || (blanks < kHead / 2 && offset == 0) || offset + blanks == source.size()) break;
+    offset += blanks;
+    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kHead, source.size() - offset));
+    head = source.read(offset, bytes.data(), count) ? std::string_view(bytes.data(), count) : std::string_view();
+  }
+  return head;
 }
 
 /// Detects the format from the content, and from the name where the content is text that could be anything.
@@ -237,7 +266,7 @@ bool has_binary_stl_size(const Source& source, std::string_view head) {
 Result<Format> detect(const Source& source) {
   if (source.size() == 0) return source.error("is empty; export the part again");
   std::array<char, kHead> bytes;
-  std::string_view head = source.head(bytes);
+  std::string_view head = head_behind_blanks(source, bytes);
   if (head.empty()) return source.changed_while_read();
   if (head.substr(0, 4) == "PK\x03\x04" || head.substr(0, 4) == std::string_view("PK\x05\x06", 4)) return Format::k3mf;
   if (head.substr(0, 2) == "\x1f\x8b") return Format::kGzip;
@@ -246,6 +275,7 @@ Result<Format> detect(const Source& source) {
   if (head.substr(0, 3) == "\xef\xbb\xbf") head.remove_prefix(3);
   std::string_view name = source.path();
   if (ends_with(name, ".gz")) name.remove_suffix(3);
+  if (has_text_facet(head) && !ends_with(name, ".obj")) return Format::kAsciiStl;
   if (is_text(head)) {
     if (has_line_with(head, {"solid", "facet", "endsolid"}) && !ends_with(name, ".obj")) return Format::kAsciiStl;
     if (has_line_with(head, {"v", "f"})) return Format::kObj;

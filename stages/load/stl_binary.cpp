@@ -193,6 +193,8 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     return source.error(fmt::format("is {} bytes long, too short for an STL file", source.size()));
   const std::uint64_t claimed = little_endian(bytes.data());
   const std::uint64_t body = source.size() - kHeaderBytes, held = body / kFacetBytes, stray = body % kFacetBytes;
+  if (held > 0 && stray == 0 && claimed != held && __builtin_bswap32(static_cast<std::uint32_t>(claimed)) == held)
+    return source.error("is binary STL in big-endian byte order, which STL does not have; export it again, or as ASCII STL");
   if (claimed > held && (held == 0 || stray > 0)) return source.error(cut_short(source, claimed, held));
   if (held == 0 || (claimed == 0 && stray > 0)) return source.error("holds no facets");
   if (claimed == 0) {
