@@ -12,13 +12,16 @@ using Entries = std::vector<std::pair<std::string, std::string>>;
 
 std::vector<Triangle> box() { return placed(loaded(write_file("box.stl", binary_stl(unit_box())))); }
 
+/// The same, with the diagonals of its faces as readers of OBJ draw them.
+std::vector<Triangle> obj_box() { return placed(loaded(write_file("box.obj", box_obj()))); }
+
 std::string write_3mf(const std::string& resources, const std::string& build) {
   return write_file("part.3mf", zip(package(model(resources, build))));
 }
 
 TEST(UnusualObj, EveryStatementContinuesBehindABackslash) {
   const std::string text = "mtllib a.mtl\no box\ng all parts\ns off\nvt 0 0\nvn 0 0 1\nusemtl red\n" + box_obj();
-  const std::vector<Triangle> clean = box();
+  const std::vector<Triangle> clean = obj_box();
   for (const char* line_end : {"\n", "\r\n", "\r"}) {
     for (const char* broken : {"\\", " \\", "\\ ", " \\ "}) {
       for (std::size_t at = 0; (at = text.find(' ', at)) != text.npos; ++at) {
@@ -57,12 +60,12 @@ TEST(UnusualObj, LinesThatABackslashTakesAreNamed) {
   for (const char* line : {"v 10 20 0\n", "f 1 4 3 2\n", "f 1 2 6 5\n"})
     commented.insert(commented.find(line) + std::string(line).size() - 1, " # C:\\parts\\");
   const Part part = loaded(write_file("comments.obj", commented + "g a # C:\\"));
-  EXPECT_EQ(placed(part), box());
+  EXPECT_EQ(placed(part), obj_box());
   EXPECT_TRUE(part.notes.empty()) << notes_of(part);
 }
 
 TEST(UnusualObj, VerticesThatNoFaceUsesMayBeAnything) {
-  const std::vector<Triangle> clean = box();
+  const std::vector<Triangle> clean = obj_box();
   for (const char* numbers : {"nan 0 0", "0 NaN 1", "inf 1 -inf", "1e9 2 3", "0 0 -1e999", "1.#QNAN 0 0", "-nan(ind) 0 0"}) {
     const std::string vertex = fmt::format("v {}\n", numbers), last = box_obj() + vertex;
     for (int before = 0; before < 4; ++before) {
@@ -154,7 +157,7 @@ TEST(UnusualStl, BlankLinesInFrontDoNotMatter) {
       std::string front;
       while (front.size() < count) front += blank;
       EXPECT_EQ(placed(loaded(write_file("late.stl", front + ascii_stl(unit_box())))), clean) << count;
-      EXPECT_EQ(placed(loaded(write_file("late.txt", front + box_obj()))), clean) << count;
+      EXPECT_EQ(placed(loaded(write_file("late.txt", front + box_obj()))), obj_box()) << count;
       EXPECT_CONTAINS(refusal(write_file("late.stl", front + "ISO-10303-21;\nHEADER;\n")), "is STEP");
       EXPECT_CONTAINS(refusal(write_file("blank.stl", front)), "is text, but neither STL nor OBJ");
     }
