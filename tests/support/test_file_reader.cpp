@@ -60,6 +60,34 @@ TEST_F(FileReaders, LinesAreThoseOfTheTextWhereverPiecesEnd) {
   }
 }
 
+TEST_F(FileReaders, LinesEndWithCrToo) {
+  const auto lines = [&](const std::string& text) {
+    test::write_text(directory_ / "file", text);
+    auto reader = FileReader::open(directory_ / "file", {.longest_line = 200'000, .cr_ends = true});
+    std::vector<std::string> read;
+    std::string ends;
+    for (std::string_view line; reader->next(line);) {
+      read.emplace_back(line);
+      ends += reader->ended_by_cr() ? 'c' : reader->ended_by_break() ? 'l' : '-';
+      auto other = FileReader::open(directory_ / "file", {.longest_line = 200'000, .cr_ends = true});
+      std::string_view next;
+      other->go_to(reader->offset(), reader->line_number());
+      EXPECT_TRUE(!other->next(next) || next == text.substr(reader->offset(), next.size()));
+    }
+    EXPECT_EQ(reader->offset(), text.size());
+    return read.push_back(ends), read;
+  };
+  using All = std::vector<std::string>;
+  EXPECT_EQ(lines("a\rb\r\nc\nd"), (All{"a", "b", "c", "d", "cll-"}));
+  EXPECT_EQ(lines("\r\r\n\n\r"), (All{"", "", "", "", "cllc"}));
+  EXPECT_EQ(lines("a\n\rb\r"), (All{"a", "", "b", "lcc"}));
+  for (const std::size_t length : {254, 255, 256, 257, 65'534, 65'535, 65'536, 131'071, 131'072}) {
+    const std::string line(length, 'x');
+    EXPECT_EQ(lines(line + "\r\ny\r" + line), (All{line, "y", line, "lc-"})) << length;
+    EXPECT_EQ(lines(line + "\r" + line + "\n"), (All{line, line, "cl"})) << length;
+  }
+}
+
 TEST_F(FileReaders, BoundsAreReportedWithTheLine) {
   EXPECT_EQ(read("a\n" + std::string(64, 'x'), {.longest_line = 64}).error, "");
   const Lines line = read("a\n" + std::string(65, 'x'), {.no_text = "is no list", .longest_line = 64});

@@ -36,6 +36,19 @@ std::string fault_of_kind(const struct stat& status, bool stream, const ReadRule
   return std::string(rules.device) + (rules.streams ? "; give what it holds to standard input and name it -" : "");
 }
 
+/// The first LF, or with cr the first CR or LF; null without one. cost  linear also in files that have only one of the two
+const char* find_end(const char* from, std::size_t size, bool cr) {
+  const std::size_t step = cr ? 256 : size;
+  for (; size > 0; from += std::min(step, size), size -= std::min(step, size)) {
+    const void* lf = std::memchr(from, '\n', std::min(step, size));
+    const std::size_t before =
+        lf != nullptr ? static_cast<std::size_t>(static_cast<const char*>(lf) - from) : std::min(step, size);
+    const void* end = cr ? std::memchr(from, '\r', before) : nullptr;
+    if (end != nullptr || lf != nullptr) return static_cast<const char*>(end != nullptr ? end : lf);
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 struct FileReader::State {
@@ -48,7 +61,7 @@ struct FileReader::State {
   std::string buffer;
   std::size_t begin = 0, end = 0;  // unread part of buffer
   std::uint64_t line = 0, offset = 0, taken = 0;
-  bool at_end = false, ended_by_break = true;
+  bool at_end = false, ended_by_break = true, ended_by_cr = false;
   Status status;
 
   ~State() {
@@ -132,6 +145,7 @@ const Status& FileReader::status() const { return state_->status; }
 std::uint64_t FileReader::line_number() const { return state_->line; }
 std::uint64_t FileReader::offset() const { return state_->offset; }
 bool FileReader::ended_by_break() const { return state_->ended_by_break; }
+bool FileReader::ended_by_cr() const { return state_->ended_by_cr; }
 
 Result<std::string> FileReader::text() {
   State& state = *state_;
@@ -156,20 +170,23 @@ bool FileReader::next(std::string_view& line) {
   while (true) {
     const char* from = state.buffer.data() + state.begin;
     const std::size_t held = state.end - state.begin;
-    const auto* found =
-        held > searched ? static_cast<const char*>(std::memchr(from + searched, '\n', held - searched)) : nullptr;
+    const char* found = held > searched ? find_end(from + searched, held - searched, state.rules.cr_ends) : nullptr;
     const std::size_t length = found != nullptr ? static_cast<std::size_t>(found - from) : held;
+    const bool cr = found != nullptr && *found == '\r';
     if (!state.rules.any_bytes && has_nul(state.begin + searched, state.begin + length))
       return state.stop(std::string(state.rules.no_text));
     if (length > state.rules.longest_line) {
       return state.stop(fmt::format("a line of more than {}; {}", size_text(state.rules.longest_line), state.rules.no_text));
     }
     searched = length;
-    if (found == nullptr && state.fill(kPiece)) continue;
+    const bool may_go_on = found == nullptr || (cr && length + 1 == held);  // a LF may follow
+    if (may_go_on && state.fill(kPiece)) continue;
     if (!state.status || (found == nullptr && held == 0)) return false;
     line = {state.buffer.data() + state.begin, length};
     state.ended_by_break = found != nullptr;
-    const std::size_t step = length + (state.ended_by_break ? 1 : 0);
+    const bool pair = cr && length + 1 < held && line.data()[length + 1] == '\n';
+    state.ended_by_cr = cr && !pair;
+    const std::size_t step = length + (state.ended_by_break ? 1 : 0) + (pair ? 1 : 0);
     state.begin += step;
     state.offset += step;
     ++state.line;

@@ -25,6 +25,7 @@ struct ReadRules {
   std::uint64_t max_bytes = UINT64_MAX;          // of the file
   std::size_t longest_line = 64 << 10;           // bytes
   bool any_bytes = false;                        // lines may hold NUL bytes
+  bool cr_ends = false;                          // lines end with CR, LF or CR LF instead of LF
   bool streams = false;                          // `-`, /dev/stdin and /dev/fd/N are read as well: pipes by request
 };
 
@@ -56,6 +57,7 @@ class FileReader {
   std::uint64_t line_number() const;  // of the line that next() gave, from 1
   std::uint64_t offset() const;       // bytes, behind that line and its end
   bool ended_by_break() const;        // the line that next() gave had an end
+  bool ended_by_cr() const;           // which was CR alone
   /// Continues reading there, after `lines` lines. Not of a stream.
   void go_to(std::uint64_t offset, std::uint64_t lines);
 
