@@ -15,6 +15,7 @@
 #include "stages/formats/extrusion_format.h"
 #include "stages/infill/skirt.h"
 #include "stages/segment/moves.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -343,7 +344,7 @@ class MoveMaker : public Maker {
   void let_go(std::uint32_t work) override { work_[work] = Sections::Work(); }
 
   bool times_dry_runs() const override { return true; }
-  bool keeps() const override { return !plan_.job.dry_run; }
+  bool keeps() const override { return !plan_.job.dry_run && !is_stream(plan_.job.output); }
   Status finish() override {
     const auto bytes = file_.finish(sums_.totals);
     if (!bytes) return bytes.error();

@@ -186,6 +186,16 @@ TEST_F(WrongUse, ReaderThatHasGoneAwayIsNoReasonToCrash) {
   EXPECT_TRUE(std::filesystem::exists(directory_ / "out/manifest.json"));
 }
 
+TEST_F(WrongUse, ToolpathsToAClosedPipeAreNotSaidToBeKept) {
+  const std::string command = "cd '" + directory_.path().string() +
+                              "' && { '" LAMINA_PROGRAM
+                              "' extrude part.stl --machine marlin --layer 0.02 --quiet -o - 2> err; "
+                              "echo $? > code; } | head -n 1 > head";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(read_text(directory_ / "code"), "4\n");
+  EXPECT_EQ(read_text(directory_ / "err"), "lamina: -: cannot write: Broken pipe\n");
+}
+
 TEST_F(WrongUse, DirectoriesOfOtherJobsAreLeftAlone) {
   const auto jet = [&](std::vector<std::string> more) {
     more.insert(more.begin(), {"jet", "part.stl", "-o", "out", "--layer", "0.5"});
