@@ -103,7 +103,7 @@ TEST(GcodeLayers, WithoutTagsLayersAreHeightsAtWhichSomethingIsDeposited) {
   const Directory directory;
   const auto file = file_of(directory,
                             "G20 ; inches\nM83\nG91\nG1 Z0.01\nG1 X1 E.1\nG0 Z0.1\nG1 X1\nG1 Z-0.1\nG1 Y1 E0.1\nG90\n"
-                            "N12 G1 Z0.02 E-1*71\nG01 X+2.5 Y0 E.1 (back)\nG1 Z1\n");
+                            "N12 G1 Z0.02 E-1*71\nG1 E1\nG01 X+2.5 Y0 E.1 (back)\nG1 Z1\n");
   ASSERT_TRUE(file) << file.error().message;
   ASSERT_EQ(file->count(), 2u);
   EXPECT_EQ(file->layer(0)->beads.size(), 2u);
@@ -123,7 +123,7 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePosition) {
       {"G1 X1 E1\nG18\nG2 X1 Y1 I1 E2\n", "line 3: an arc in the plane of G18"},
       {"M83\nG1 Xnan E1\n", "line 2: 'nan' is not a number"},
       {"G1 X1..2 E1\n", "line 1: '.2 E1' is no word of a move"},
-      {"G1 X1e9 E1\n", "line 1: a bead at 1e+09 mm; beds are at most 2000 mm wide"},
+      {"G1 X1000000000 E1\n", "line 1: a bead at 1e+09 mm; beds are at most 2000 mm wide"},
       {";WIDTH:wide\nG1 X1 E1\n", "line 1: 'wide' is not a length"},
   };
   for (const auto& [text, reported] : files) {

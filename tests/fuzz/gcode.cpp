@@ -43,6 +43,7 @@ std::vector<std::string> gcode_seeds() {
       "G17\nM83\nG1 X10 Y10 Z.2\nG2 X20 Y10 I5 J0 E.5\nG3 X10 Y10 R-6 E1\nG2 I5 E1\nG91\nG3 X0 Y0 Z.2 I-3 J1 E1\nG2 X1 Y1 P1 I2\n",
       ";FLAVOR:UltiGCode\nG1 Z.2\nG1 X1 Z.25 E1\nG1 Y1 Z.3 E2\nG1 X0 Z.35 E3\nG1 Y0 Z.4 E4\nG1 X1 Z.45 E5\nG1 Y1 Z.5 E6\n"
       "G2 X1 Y1\nG2 X5 R1 E9\nG3 X9 Y9 R1e30 E10\nG2 X0 Y0 I3 J1 E11\n",
+      "m83\rg1z.2\rG1X5Y+1.E1(a)f9\r\nM221 T1 S50\nT1\ng90 G1 X 7 E-1\nX9E3\nG3 X5 I-2 E2\nN3 G1 (b;*) Y5 E1*7 ; c\n",
       ";Filament used: 1.3m 9.1g\n;   extruderDiameter,0.4\nM200 D2.85\n; CHANGE_LAYER\n; LINE_WIDTH: 0.42\n; FEATURE: Outer wall\n"
       "G3 X9 Y9 I5 J5 E3\n;CURA_PROFILE_STRING:eJzLSaxMLYrPSM1MzyixNdAz5ChPzMmJL8nITM7OSy0uBgpZcOTll8SnZeYk5qbmlcSnZALpktQiW0sOTDEjPQtTTGEjWwOexBwgIy+xJLMsFQB98Sn4\n"};
 }

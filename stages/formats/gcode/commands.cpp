@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "stages/support/text/readable.h"
 
@@ -259,9 +261,11 @@ bool GcodeCommands::next(std::optional<RawBead>& bead) {
   while (!fault) {
     if (chord_ > 0) {
       if (next_chord(bead)) return true;
+    } else if (!commands_.empty()) {
+      if (run_command(bead)) return true;
     } else if (!read_line()) {
       return false;
-    } else if (text_.starts_with(';') ? read_tag() : run_command(bead)) {
+    } else if (text_.starts_with(';') && read_tag()) {
       return true;
     }
   }
@@ -273,10 +277,16 @@ bool GcodeCommands::read_line() {
   const bool read = file_.next(text_);
   position_.line += read || !file_.status() ? 1 : 0;
   position_.byte = file_.offset();
-  if (!file_.status()) return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
+  constexpr std::size_t kLongest = 64 << 10;  // of commands: firmwares take some 256 bytes
+  const bool comment = read && !text_.empty() && text_[std::min(text_.find_first_not_of(" \t"), text_.size() - 1)] == ';';
+  if (read && !comment) commands_ = strip_comments(text_, stripped_);
+  parentheses_ = commands_.data() == stripped_.data();
+  if (!file_.status() || commands_.size() > kLongest)
+    return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
   if (!read) return false;
-  while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t')) text_.remove_prefix(1);
-  if (text_.ends_with('\r')) text_.remove_suffix(1);
+  if (comment) text_.remove_prefix(text_.find(';'));
+  if (file_.ended_by_cr()) differ(Difference::kCr);
+  deposited_ = false;
   return true;
 }
 
@@ -318,33 +328,30 @@ bool GcodeCommands::read_tag() {
   return false;
 }
 
-/// The number behind a letter; moves behind it.
-bool GcodeCommands::read_number(std::string_view& left, double& value) {
-  const std::string_view all = left;
-  if (left.starts_with('+')) left.remove_prefix(1);
-  const auto [end, code] = std::from_chars(left.data(), left.data() + left.size(), value);
-  if (code != std::errc() || !std::isfinite(value)) {
-    fail(fmt::format("'{}' is not a number", one_line(all.substr(0, std::min<std::size_t>(all.find(' '), 20)))));
-    return false;
-  }
-  left.remove_prefix(static_cast<std::size_t>(end - left.data()));
-  return true;
-}
-
-bool GcodeCommands::read_words(std::string_view left, Words& words) {
-  while (!left.empty()) {
-    const char letter = left.front();
-    left.remove_prefix(1);
-    if (letter == ' ' || letter == '\t') continue;
-    if (letter < 'A' || letter > 'Z') {
-      fail(fmt::format("'{}{}' is no word of a move", letter, one_line(left.substr(0, 20))));
-      return false;
+/// Up to the next command of the line, which stays in commands_. any  what is no word ends the command instead of the file
+bool GcodeCommands::read_words(WordScanner& scanner, GcodeWords& words, bool any) {
+  while (scanner.next()) {
+    const char letter = scanner.letter();
+    if ((letter == 'G' || letter == 'M') && scanner.has_number()) {
+      commands_ = scanner.rest();
+      scanner.differences |= bit_of(Difference::kSeveral);
+      return true;
     }
-    if (left.empty() || left.front() == ' ') continue;  // a word without a number, as G92 X
-    if (!read_number(left, words.value[letter - 'A'])) return false;
-    words.given |= 1u << (letter - 'A');
+    if (!scanner.has_number()) continue;  // as in G92 X
+    const std::uint32_t bit = 1u << (letter - 'A');
+    if (words.given & bit) scanner.differences |= bit_of(Difference::kTwice);
+    words.given |= bit;
+    words.value[letter - 'A'] = scanner.value();
   }
-  return true;
+  if (!scanner.failed()) return true;
+  if (any) return scanner.differences = 0, true;
+  const std::string_view text = scanner.no_number() ? scanner.behind() : scanner.rest();
+  if (scanner.no_number()) {
+    fail(fmt::format("'{}' is not a number", one_line(text.substr(0, std::min<std::size_t>(text.find(' '), 20)))));
+  } else {
+    fail(fmt::format("'{}' is no word of a move", one_line(text.substr(0, 21))));
+  }
+  return false;
 }
 
 /// Marlin's G90 and G91 replace what M82 and M83 said (MarlinFirmware/Marlin, GcodeSuite::set_relative_mode()).
@@ -353,23 +360,31 @@ void GcodeCommands::set_relative(bool relative) {
   if (position_.firmware == GcodeFile::Firmware::kMarlin) position_.relative_feed = relative;
 }
 
+/// T names the tool in Marlin, D the drive in RepRapFirmware; Klipper has one percentage.
+void GcodeCommands::set_flow(const GcodeWords& words) {
+  if (!words.has('S')) return differ(Difference::kFlow);
+  const double percent = words['S'], tool = words.has('T') ? words['T'] : words.has('D') ? words['D'] : position_.tool;
+  if (!(percent >= 0 && percent <= 10'000)) return fail(fmt::format("M221 S{:g}: a flow is 0 to 10000 %", percent));
+  position_.flow[static_cast<std::size_t>(std::clamp<double>(tool, 0, GcodeFile::kTools - 1))] = static_cast<float>(percent);
+  if (percent != 100 && flows.count == 0) flow = percent;
+  if (percent != 100) flows.add(position_.line);
+}
+
 /// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
 /// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
 bool GcodeCommands::feeds_relative() const {
   return position_.relative_feed || (position_.relative && position_.firmware == GcodeFile::Firmware::kUnknown);
 }
 
-/// Whether the line is no move.
-bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
+void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) {
   if (letter == 'M') {
-    if (code == 82) position_.relative_feed = false;
-    if (code == 83) position_.relative_feed = true;
-    Words words;
-    if (code == 200 && read_words(left, words)) {  // Marlin: M200 D1.75 counts E in mm3, M200 D0 or S0 does not
+    if (code == 82 || code == 83) position_.m83 = position_.relative_feed = code == 83;
+    if (code == 200) {  // Marlin: M200 D1.75 counts E in mm3, M200 D0 or S0 does not
       if (words.has('D')) position_.volumetric = words['D'] > 0;
       if (words.has('S')) position_.volumetric = words['S'] != 0;
     }
-    return true;
+    if (code == 221) set_flow(words);
+    return;
   }
   if (code == 17 || code == 18 || code == 19) position_.plane = static_cast<std::uint8_t>(code);
   if (code == 20) position_.unit = 25.4;
@@ -377,21 +392,43 @@ bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
   if (code == 90 || code == 91) set_relative(code == 91);
   if (code == 90.1) fail("G90.1: firmwares of printers take centres of arcs from the start; export them so");
   if (code == 5) fail("splines (G5) are not drawn; export lines or arcs");
-  return code != 0 && code != 1 && code != 2 && code != 3 && code != 92;
 }
 
-/// Whether the line deposits a bead.
+/// Takes the next command of the line. returns  whether it deposits a bead
 bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
-  std::string_view left = text_.substr(0, text_.find_first_of(";(*"));
-  if (left.starts_with('N')) left.remove_prefix(std::min(left.find_first_of("GMT"), left.size()));  // a line's number
-  if (left.empty() || (left.front() != 'G' && left.front() != 'M')) return false;
-  const char letter = left.front();
-  if (left.size() < 2 || left[1] < '0' || left[1] > '9') return false;
-  left.remove_prefix(1);
-  double code = 0;
-  if (!read_number(left, code) || set_mode(letter, code, left)) return false;
-  Words words;
-  return read_words(left, words) && move(code, words, bead);
+  WordScanner scanner(std::exchange(commands_, {}));
+  bool found = scanner.next();
+  if (found && scanner.letter() == 'N') found = scanner.next();  // behind a line's number
+  if (!found) return false;
+  char letter = scanner.letter();
+  double code = scanner.value();
+  const bool repeats = letter == 'E' || (letter >= 'X' && letter <= 'Z');
+  if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) return false;
+  if (letter == 'T') {  // what another tool has drawn back is not fed by this one
+    if (code != position_.tool) position_.retracted = 0;
+    position_.tool = static_cast<std::uint8_t>(std::clamp<double>(code, 0, GcodeFile::kTools - 1));
+    return false;
+  }
+  if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 221) return false;  // may hold any text
+  if (repeats) {
+    if (position_.motion > 3) return false;
+    const std::uint32_t before = scanner.differences | bit_of(Difference::kRepeat);
+    scanner = WordScanner(scanner.rest());
+    scanner.differences = before;
+    letter = 'G';
+    code = position_.motion;
+  }
+  const bool moves = letter == 'G' && (code == 0 || code == 1 || code == 2 || code == 3),
+             sets = letter == 'G' ? code == 92 : code > 100;
+  GcodeWords words;
+  if (!read_words(scanner, words, !moves && !sets)) return false;
+  if (parentheses_) differ(Difference::kParentheses);
+  for (std::uint32_t left = scanner.differences; left != 0; left &= left - 1)
+    differ(static_cast<Difference>(std::countr_zero(left)));
+  if (moves) position_.motion = static_cast<std::uint8_t>(code);
+  if (moves || (letter == 'G' && code == 92)) return move(code, words, bead);
+  set_mode(letter, code, words);
+  return false;
 }
 
 bool GcodeCommands::within_reach(const RawBead& bead) {
@@ -403,7 +440,41 @@ bool GcodeCommands::within_reach(const RawBead& bead) {
   return true;
 }
 
-bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>& bead) {
+/// Moves whose E commands filament and that yet feed none, as where absolute and relative E were mistaken for each other.
+void GcodeCommands::count_unfed(const GcodeWords& words, double fed) {
+  ++moves_with_e;
+  if (fed == 0) unfed.add(position_.line);
+  if (position_.m83 && !position_.relative_feed && words['E'] > 0 && fed <= 0) unfed_after_g90.add(position_.line);
+}
+
+/// On the spot, or back.
+void GcodeCommands::feed(double fed) {
+  position_.primed += fed;
+  position_.retracted = std::max(position_.retracted - fed, 0.0);
+}
+
+/// A bead without the part of the move that feeds again what was drawn back; false if that is all of it.
+bool GcodeCommands::deposit(RawBead raw, std::optional<RawBead>& bead) {
+  constexpr double kRounding = 1e-3;  // of a move: E has five decimals, and retractions are several moves
+  const double again = std::min(raw.fed, position_.retracted), net = raw.fed - again;
+  raw.joined = std::exchange(position_.deposits, false);
+  if (again > 0) {
+    if (!(net > kRounding * raw.fed)) return feed(raw.fed), false;
+    position_.retracted = 0;
+    const double part = again / raw.fed;
+    for (std::size_t k = 0; k < 3 && part > kRounding; ++k) raw.from[k] += part * (raw.to[k] - raw.from[k]);
+    raw.joined = raw.joined && part <= kRounding;
+  }
+  raw.fed = net;
+  raw.primed = std::exchange(position_.primed, 0) + again;
+  raw.first = !std::exchange(deposited_, true);
+  if (!within_reach(raw)) return false;
+  position_.deposits = true;
+  bead = raw;
+  return true;
+}
+
+bool GcodeCommands::move(double code, const GcodeWords& words, std::optional<RawBead>& bead) {
   constexpr char kAxes[] = {'X', 'Y', 'Z', 'E'};
   double to[4];
   for (std::size_t k = 0; k < 4; ++k) {
@@ -411,38 +482,29 @@ bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>
     to[k] = position_.at[k];
     if (words.has(kAxes[k])) to[k] = (relative ? position_.at[k] : 0) + words[kAxes[k]] * position_.unit;
   }
-  const double fed = code != 92 ? to[3] - position_.at[3] : 0;
-  if (code != 92 && words.has('F')) position_.speed = std::max(words['F'] * position_.unit / 60, 0.0);
-  const bool joined = position_.deposits;
-  if (code != 92) position_.deposits = position_.deposits && std::equal(std::begin(to), std::end(to), position_.at);
-  if (code == 2 || code == 3) {
-    if (!begin_arc(code == 2, words, to, fed)) return false;
-    whole_.joined = joined;
-    whole_.primed = position_.primed;
-    position_.deposits = chord_ > 0;
-    position_.primed = chord_ > 0 ? 0 : position_.primed + fed;
-  } else if (fed > 0 && (to[0] != position_.at[0] || to[1] != position_.at[1])) {
-    const double* at = position_.at;
-    bead = RawBead{{at[0], at[1], at[2]},
-                   {to[0], to[1], to[2]},
-                   fed,
-                   position_.volumetric,
-                   position_.speed,
-                   joined,
-                   position_.primed,
-                   true};
-    if (!within_reach(*bead)) return false;
-    position_.deposits = true;
-    position_.primed = 0;
-  } else {
-    position_.primed += fed;
+  double(&at)[4] = position_.at;
+  if (code != 92) {
+    // RepRapFirmware leaves retractions on the spot as they are (GCodes::LoadExtrusionAndFeedrateFromGCode).
+    const bool spot = !words.has('X') && !words.has('Y') && !words.has('Z');
+    const bool scaled = !spot || position_.firmware != GcodeFile::Firmware::kRepRap;
+    const double fed = (to[3] - at[3]) * (scaled ? position_.flow[position_.tool] / 100.0 : 1);
+    if (words.has('F')) position_.speed = std::max(words['F'] * position_.unit / 60, 0.0);
+    if (words.has('E') && !spot) count_unfed(words, fed);
+    const bool arc = code == 2 || code == 3;
+    if (arc && !begin_arc(code == 2, words, to, fed)) return false;
+    if (!arc && fed > 0 && (to[0] != at[0] || to[1] != at[1])) {
+      deposit({{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, position_.volumetric, position_.speed, false, 0, true}, bead);
+    } else if (chord_ == 0) {
+      position_.deposits = position_.deposits && !arc && std::equal(std::begin(to), std::end(to), at);
+      feed(fed);
+    }
   }
-  std::copy(std::begin(to), std::end(to), position_.at);
+  std::copy(std::begin(to), std::end(to), at);
   return bead.has_value() || (chord_ > 0 && next_chord(bead));
 }
 
 /// False if the printer does not move.
-bool GcodeCommands::begin_arc(bool clockwise, const Words& words, const double (&to)[4], double fed) {
+bool GcodeCommands::begin_arc(bool clockwise, const GcodeWords& words, const double (&to)[4], double fed) {
   const double* at = position_.at;
   ArcWords given{clockwise, words['I'] * position_.unit, words['J'] * position_.unit, {}};
   if (words.has('R')) given.radius = words['R'] * position_.unit;
@@ -477,23 +539,16 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
   };
   const Arc::ArcPoint from = chord_ == 1 ? Arc::ArcPoint{whole_.from[0], whole_.from[1]} : arc_.end_of(chord_ - 1);
   const Arc::ArcPoint to = arc_.end_of(chord_);
-  const double fed = whole_.fed / static_cast<double>(arc_.chords());
   RawBead piece{{from.x, from.y, z_of(chord_ - 1)},
                 {to.x, to.y, z_of(chord_)},
-                fed,
+                whole_.fed / static_cast<double>(arc_.chords()),
                 whole_.volumetric,
                 whole_.speed,
-                whole_.joined,
-                whole_.primed,
-                whole_.first};
+                false,
+                0,
+                true};
   chord_ = chord_ < arc_.chords() ? chord_ + 1 : 0;
-  if (from.x == to.x && from.y == to.y) return false;
-  whole_.first = false;
-  whole_.joined = true;
-  whole_.primed = 0;
-  if (!within_reach(piece)) return false;
-  bead = piece;
-  return true;
+  return (from.x != to.x || from.y != to.y) && deposit(piece, bead);
 }
 
 }  // namespace lamina::formats

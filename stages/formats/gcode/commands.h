@@ -1,6 +1,7 @@
 // stages/formats/gcode/commands.h: carries out the commands of a G-code file one after another, as its printer would.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "stages/formats/gcode/read_gcode.h"
+#include "stages/formats/gcode/words.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::formats {
@@ -98,7 +100,7 @@ class Arc {
 /// A straight move, or a chord of an arc, that extrudes filament; mm.
 struct RawBead {
   double from[3], to[3];
-  double fed;             // mm of filament, or mm3
+  double fed;             // mm of filament, or mm3: what leaves the nozzle
   bool volumetric;        // fed is mm3
   double speed;           // mm/s
   bool joined;            // BeadFeed
@@ -107,8 +109,8 @@ struct RawBead {
   double length() const;  // over the bed
 };
 
-/// Arcs of a file that firmwares do not agree on: how many, and the line of the first.
-struct OddArcs {
+/// Lines of a file that firmwares do not agree on: how many, and the first.
+struct OddLines {
   std::uint64_t count = 0, line = 0;
   void add(std::uint64_t at) { line = count++ == 0 ? at : line; }
 };
@@ -123,44 +125,50 @@ class GcodeCommands {
     position_ = position;
     file_.go_to(position.byte, position.line);
     chord_ = 0;
+    commands_ = {};
   }
   const FilePosition& position() const { return position_; }  // behind the line that next() returned for
   const FilePosition& before() const { return before_; }      // in front of it
   std::optional<std::string> fault;
   bool layer_tag = false;  // the line begins a layer
   SlicerFacts facts;       // of the lines so far
-  OddArcs left_out, off_circle, short_radius;
+  OddLines left_out, off_circle, short_radius;
+  std::array<OddLines, static_cast<std::size_t>(Difference::kCount)> differences;
+  OddLines flows;                   // M221 with another percentage than 100
+  double flow = 100;                // that of the first
+  OddLines unfed, unfed_after_g90;  // moves with E that feed nothing; or less, after Marlin's G90 took back M83
+  std::uint64_t moves_with_e = 0;
 
   /// The next bead, or the tag of a layer; false at the end, or if there is a fault.
   bool next(std::optional<RawBead>& bead);
 
  private:
-  struct Words {
-    double value[26] = {};
-    std::uint32_t given = 0;  // a bit a letter
-    bool has(char letter) const { return given >> (letter - 'A') & 1; }
-    double operator[](char letter) const { return has(letter) ? value[letter - 'A'] : 0; }
-  };
   bool read_line();
   void fail(std::string_view what);
   bool read_tag();
   double tag_length(std::string_view text);
   void name_type(std::string_view name);
-  bool read_number(std::string_view& left, double& value);
-  bool read_words(std::string_view left, Words& words);
+  bool read_words(WordScanner& scanner, GcodeWords& words, bool any);
   bool run_command(std::optional<RawBead>& bead);
-  bool set_mode(char letter, double code, std::string_view left);
+  void set_mode(char letter, double code, const GcodeWords& words);
   void set_relative(bool relative);
+  void set_flow(const GcodeWords& words);
   bool feeds_relative() const;
-  bool move(double code, const Words& words, std::optional<RawBead>& bead);
-  bool begin_arc(bool clockwise, const Words& words, const double (&to)[4], double fed);
+  void differ(Difference difference) { differences[static_cast<std::size_t>(difference)].add(position_.line); }
+  bool move(double code, const GcodeWords& words, std::optional<RawBead>& bead);
+  void count_unfed(const GcodeWords& words, double fed);
+  void feed(double fed);
+  bool deposit(RawBead raw, std::optional<RawBead>& bead);
+  bool begin_arc(bool clockwise, const GcodeWords& words, const double (&to)[4], double fed);
   bool next_chord(std::optional<RawBead>& bead);
   bool within_reach(const RawBead& bead);
 
   const std::string& path_;
   std::vector<std::string>& types_;
   FileReader& file_;
-  std::string_view text_;
+  std::string_view text_, commands_;  // the line, and what of it is not run yet
+  std::string stripped_;
+  bool parentheses_ = false, deposited_ = false;  // of the line
   FilePosition position_, before_;
   Arc arc_;                  // under way
   std::uint64_t chord_ = 0;  // the last one that was given; 0 if no arc is under way

@@ -229,7 +229,25 @@ class LayerCutter {
 
 constexpr double kUsualNozzle = 0.4;  // mm
 
-constexpr ReadRules kRules{.fault = Fault::kUsage, .missing = "cannot be read; give a directory of a job or a G-code file"};
+constexpr ReadRules kRules{.fault = Fault::kUsage,
+                           .missing = "cannot be read; give a directory of a job or a G-code file",
+                           .longest_line = 16 << 20,  // pictures in comments
+                           .cr_ends = true};
+
+/// In the order of Difference.
+constexpr std::string_view kDifferenceTexts[] = {
+    "lower-case letters, which Marlin reads only if built with GCODE_CASE_INSENSITIVE",
+    "a blank in front of a number, which Marlin and Klipper skip, but RepRapFirmware may not",
+    "comments in parentheses, skipped; Klipper refuses them, Marlin skips them if built with PAREN_COMMENTS, RepRapFirmware in "
+    "CNC mode",
+    "E directly behind a digit begins a word, as in Marlin and Klipper; RepRapFirmware reads an exponent",
+    "a letter twice in a command; the last one is used, as in Klipper, and in RepRapFirmware the first",
+    "CR alone ends lines, as in Marlin; Klipper and RepRapFirmware need LF",
+    "words without a command repeat the last move, as in Marlin built with GCODE_MOTION_MODES and RepRapFirmware in CNC mode; "
+    "Klipper refuses them",
+    "several commands in a line are all run, as in RepRapFirmware; Marlin and Klipper run one",
+    "M221 without S changes nothing, as in Marlin and RepRapFirmware; Klipper returns to 100 %"};
+static_assert(std::size(kDifferenceTexts) == static_cast<std::size_t>(Difference::kCount));
 
 GcodeBead bead_of(const RawBead& raw, double width_mm, std::uint32_t type) {
   const auto nm = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
@@ -251,7 +269,7 @@ std::string_view binary_kind(const FileReader& reader) {
   return {};
 }
 
-std::string odd_arcs(const OddArcs& arcs, std::string_view what) {
+std::string odd_lines(const OddLines& arcs, std::string_view what) {
   const std::string others = arcs.count > 1 ? fmt::format(" and {} more", arcs.count - 1) : "";
   return fmt::format("line {}{}: {}", arcs.line, others, what);
 }
@@ -275,6 +293,7 @@ class GcodeSurvey {
   void note_widths();
   void note_climbs();
   void note_arcs();
+  void note_feeds();
   double mean_width() const;
 
   const GcodeOptions options_;
@@ -381,19 +400,38 @@ void GcodeSurvey::note_climbs() {
 
 void GcodeSurvey::note_arcs() {
   if (walk_.left_out.count > 0) {
-    file_.notes_.push_back(odd_arcs(walk_.left_out,
-                                    "an arc without a centre (I, J, R) or a way, left out as Marlin does; Klipper "
-                                    "and RepRapFirmware stop there"));
+    file_.notes_.push_back(odd_lines(walk_.left_out,
+                                     "an arc without a centre (I, J, R) or a way, left out as Marlin does; Klipper "
+                                     "and RepRapFirmware stop there"));
   }
   if (walk_.short_radius.count > 0) {
-    file_.notes_.push_back(odd_arcs(walk_.short_radius,
-                                    "an arc whose R does not reach its end, drawn as half a circle, as Marlin "
-                                    "does; RepRapFirmware stops there"));
+    file_.notes_.push_back(odd_lines(walk_.short_radius,
+                                     "an arc whose R does not reach its end, drawn as half a circle, as Marlin "
+                                     "does; RepRapFirmware stops there"));
   }
   if (walk_.off_circle.count > 0) {
     file_.notes_.push_back(
-        odd_arcs(walk_.off_circle, "an arc that ends off its circle, led to its end by a line, as Marlin does"));
+        odd_lines(walk_.off_circle, "an arc that ends off its circle, led to its end by a line, as Marlin does"));
   }
+}
+
+void GcodeSurvey::note_feeds() {
+  for (std::size_t k = 0; k < std::size(kDifferenceTexts); ++k) {
+    if (walk_.differences[k].count > 0) file_.notes_.push_back(odd_lines(walk_.differences[k], kDifferenceTexts[k]));
+  }
+  if (walk_.flows.count > 0) {
+    file_.notes_.push_back(
+        odd_lines(walk_.flows, fmt::format("M221 S{:g} is applied: volumes are that percentage of E{}", walk_.flow,
+                                           file_.states_widths_ ? "; widths of ;WIDTH: tags do not include it" : "")));
+  }
+  const bool by_g90 = walk_.unfed_after_g90.count > walk_.moves_with_e / 4;
+  if (!by_g90 && walk_.unfed.count <= walk_.moves_with_e / 2) return;
+  const OddLines& lines = by_g90 ? walk_.unfed_after_g90 : walk_.unfed;
+  file_.notes_.push_back(fmt::format(
+      "line {}: {} of {} moves with E feed nothing; {}", lines.line, lines.count, walk_.moves_with_e,
+      by_g90 ? "by ;FLAVOR:Marlin, G90 makes E absolute after M83: if the firmware is another, correct that line, or "
+               "write M83 behind G90"
+             : "check M82 and M83: E is read as absolute there"));
 }
 
 Result<GcodeFile> GcodeSurvey::run() {
@@ -404,6 +442,7 @@ Result<GcodeFile> GcodeSurvey::run() {
   note_widths();
   note_climbs();
   note_arcs();
+  note_feeds();
   return std::move(file_);
 }
 

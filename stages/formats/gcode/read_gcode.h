@@ -1,6 +1,7 @@
 // stages/formats/gcode/read_gcode.h: reads the beads of a G-code file layer by layer, as its printer would extrude them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -31,7 +32,7 @@ struct GcodeOptions {
   double filament_mm = 0;                // diameter; 0: the file's value, else 1.75
   double layer_height_mm = 0;            // begins layers at its multiples; 0: at tags, heights or turns
   std::uint32_t max_beads = 10'000'000;  // of a layer, 24 bytes each
-  std::uint32_t max_layers = 400'000;    // a bed's height in steps of 5 um, some 400 bytes each
+  std::uint32_t max_layers = 400'000;    // a bed's height in steps of 5 um, some 500 bytes each
 };
 
 /// A file of Marlin, Klipper or RepRapFirmware, by lamina or another slicer. Layers begin
@@ -39,7 +40,8 @@ struct GcodeOptions {
 /// - at the tags ;LAYER_CHANGE (lamina, PrusaSlicer, Orca), ;LAYER: (CuraEngine) or ; CHANGE_LAYER (BambuStudio);
 /// - in a file without them wherever a bead lies at another height than the one before; and where beads climb (spirals), after
 ///   each turn of their direction, or after 5 mm without one.
-/// Arcs (G2, G3) are chords within 5 um. Widths are those of ;WIDTH: tags; without them those of a rectangle with half circles
+/// Arcs (G2, G3) are chords within 5 um. Beads are net filament: E times the percentage of M221, and a bead begins where what
+/// was drawn back before is fed again. Widths are those of ;WIDTH: tags; without them those of a rectangle with half circles
 /// at its sides whose volume is the filament that is fed, in a layer as high as ;HEIGHT:, the climb of a turn, or the distance
 /// to the beads below. The filament's diameter is the given one, or the one that comments state
 /// (stages/formats/gcode/commands.h), or 1.75 mm.
@@ -61,7 +63,7 @@ class GcodeFile {
   double filament_mm() const { return filament_mm_; }  // diameter
   /// The printer's name, as lamina's files state it; "" of others.
   const std::string& machine() const { return machine_; }
-  /// Filament of all beads, mm3; without that of start code, and without priming on the spot.
+  /// Net filament of all beads, mm3: without that of start code, and without priming.
   double fed_mm3() const { return fed_mm3_; }
   double density_g_cm3() const { return density_g_cm3_; }  // of the filament, by comments; 0: not stated
   /// What a person should know of the drawing, one line each: thin beads, spirals, arcs on which firmwares differ.
@@ -72,8 +74,10 @@ class GcodeFile {
 
   /// Decides what G90 and G91 mean for E.
   enum class Firmware : std::uint8_t { kUnknown, kMarlin, kRepRap };
+  static constexpr std::uint8_t kTools = 16;  // those beyond share the flow of the last
   /// Where the printer stands in front of a line.
   struct FilePosition {
+    FilePosition() { std::ranges::fill(flow, 100.F); }
     std::uint64_t byte = 0, line = 0;
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
@@ -82,7 +86,12 @@ class GcodeFile {
     Firmware firmware = Firmware::kUnknown;        // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
     std::uint8_t plane = 17;                       // of arcs: G17, G18, G19
-    double width = 0, height = 0;                  // mm: tags, 0 without
+    std::uint8_t motion = UINT8_MAX;               // the last of G0 to G3
+    std::uint8_t tool = 0;
+    bool m83 = false;              // M83, and no M82 since then
+    float flow[kTools];            // M221: percent, by tool
+    double retracted = 0;          // mm, or mm3, that the tool draws back and has not fed again
+    double width = 0, height = 0;  // mm: tags, 0 without
     std::uint32_t type = 0;
     bool deposits = false;  // the last move deposited a bead
     double primed = 0;      // fed since then: mm, or mm3
