@@ -69,7 +69,7 @@ std::unique_ptr<ImageEncoder> make_encoder() { return std::make_unique<BmpEncode
 
 namespace lamina::formats {
 
-// 1-bit and 8-bit Windows bitmaps, uncompressed. Format: stages/formats/bmp/README.md.
+// Windows bitmaps of 1, 4 and 8 bits, uncompressed. Format: stages/formats/bmp/README.md.
 
 namespace {
 
@@ -91,25 +91,23 @@ Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink) {
   const std::uint64_t begin = number(head, 10), info = number(head, 14);
   const auto width = static_cast<std::int32_t>(number(head, 18)), height = static_cast<std::int32_t>(number(head, 22));
   const std::uint32_t bits = number(head, 28, 2), compression = number(head, 30);
-  const bool grey = bits == 8 && threshold > 0;
   if (info < 40 || info > 1024) return failure("its header is not one");
-  if (bits != 1 && !grey) return failure(threshold > 0 ? "neither of 1 bit nor of 8 bits" : "not a 1-bit image");
+  if (bits != 1 && (threshold == 0 || (bits != 4 && bits != 8)))
+    return failure(threshold > 0 ? "neither of 1 bit nor of 4 or 8 bits" : "not a 1-bit image");
   if (compression != 0) return failure("it is compressed");
   const std::int64_t tall = std::abs(std::int64_t{height});
   if (width <= 0 || tall == 0 || width > std::int64_t{kMaxPixelsASide} || tall > std::int64_t{kMaxPixelsASide})
     return failure(fmt::format("{} x {} pixels", width, tall));
   const auto columns = static_cast<std::uint32_t>(width), rows = static_cast<std::uint32_t>(tall);
-  const std::uint32_t named = number(head, 46), colours = named == 0 ? 1u << bits : named;
-  if (colours > 1u << bits || (bits == 1 && colours < 2)) return failure(fmt::format("{} colours", colours));
+  const std::uint32_t named = number(head, 46), count = named == 0 ? 1u << bits : named;
+  if (count > 1u << bits) return failure(fmt::format("{} colours", count));
   std::array<std::byte, 1024> palette{};
-  if (14 + info + 4 * colours > begin || !read_bytes_at(file, 14 + info, std::span(palette).first(4 * std::size_t{colours})))
+  if (14 + info + 4 * count > begin || !read_bytes_at(file, 14 + info, std::span(palette).first(4 * std::size_t{count})))
     return failure("its colours are not whole");
-  std::array<std::uint8_t, 256> light{};
-  for (std::size_t c = 0; c < colours; ++c) {
-    const std::uint32_t blue = number(palette, 4 * c, 1), green = number(palette, 4 * c + 1, 1),
-                        red = number(palette, 4 * c + 2, 1);
-    light[c] = static_cast<std::uint8_t>((299 * red + 587 * green + 114 * blue + 500) / 1000);
-  }
+  Colours colours;
+  for (std::size_t c = 0; c < count; ++c)  // blue, green, red
+    colours.add(number(palette, 4 * c + 2, 1), number(palette, 4 * c + 1, 1), number(palette, 4 * c, 1));
+  const bool grey = bits > 1 || (sink != nullptr && !colours.are_black_and_white());
   const std::uint64_t stride = (std::uint64_t{columns} * bits + 31) / 32 * 4;
   if (begin > bytes || bytes - begin < stride * rows)
     return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, begin + stride * rows));
@@ -117,23 +115,30 @@ Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink) {
   if (sink != nullptr && grey) sink->levels.start(columns);
   RunsBuilder builder(columns);
   const auto at_once = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(256 * 1024 / stride, 1, rows));
-  Buffer<std::byte> buffer(stride * at_once);
+  Buffer<std::byte> buffer(stride * at_once), wide(grey && bits < 8 ? columns : 0);
   const bool from_top = height < 0;
   for (std::uint32_t first = 0; first < rows; first += at_once) {
-    const std::uint32_t count = std::min(at_once, rows - first);
-    const std::span<std::byte> strip = std::span(buffer).first(stride * count);
-    if (!read_bytes_at(file, begin + stride * (from_top ? first : rows - first - count), strip)) return failure("cannot read");
-    for (std::uint32_t r = 0; r < count; ++r) {
-      const std::span<std::byte> row = strip.subspan(stride * (from_top ? r : count - 1 - r), stride);
+    const std::uint32_t rows_read = std::min(at_once, rows - first);
+    const std::span<std::byte> strip = std::span(buffer).first(stride * rows_read);
+    const std::uint64_t skipped = from_top ? first : rows - first - rows_read;
+    if (!read_bytes_at(file, begin + stride * skipped, strip)) return failure("cannot read");
+    for (std::uint32_t r = 0; r < rows_read; ++r) {
+      std::span<std::byte> row = strip.subspan(stride * (from_top ? r : rows_read - 1 - r), stride);
       if (grey) {
-        for (std::uint32_t i = 0; i < columns; ++i) row[i] = std::byte{light[std::to_integer<std::uint8_t>(row[i])]};
+        if (!wide.empty()) {
+          std::memcpy(wide.data(), row.data(), std::min<std::size_t>(stride, columns));
+          row = wide;
+        }
+        if (!widen_row(row, columns, bits, colours)) return failure(kNoColour);
         if (sink != nullptr) {
           if (!sink->add_row(row, columns, 8, false)) return failure("too many runs");
           continue;
         }
         bits_of_grey(row, columns, 1, false, threshold);
+        if (!builder.add_row(row.first(row_bytes(columns)), false)) return failure("too many runs");
+      } else if (!add_bits(row, columns, colours, threshold, builder)) {
+        return failure(colours.count < 2 ? kNoColour : "too many runs");
       }
-      if (!builder.add_row(row.first(row_bytes(columns)), !grey && light[1] >= light[0])) return failure("too many runs");
     }
   }
   return Image{builder.finish(), number(head, 38) * 0.0254, number(head, 42) * 0.0254};

@@ -30,7 +30,8 @@ Result<Image> read_by_magic(const FileReader& file, int threshold, std::uint64_t
   if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file.descriptor(), file.size(), path, threshold, sink);
   if (sink != nullptr && !sink->nearest)
     return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
-  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return read_pbm(file, threshold, sink);
+  const bool portable = magic[0] == 'P' && (magic[1] == '1' || magic[1] == '2' || magic[1] == '5');
+  if (begins("P4", 2) || (threshold > 0 && portable)) return read_pbm(file, threshold, sink);
   if (begins("BM", 2)) return read_bmp(file, threshold, sink);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
@@ -103,9 +104,7 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
   if (!file->read_at(0, magic)) return Error{Fault::kInput, path + ": is empty; use a complete image"};
   const bool is_tiff = (magic[0] == 'I' || magic[0] == 'M') && magic[1] == magic[0];
   if (!is_tiff) return std::vector<std::uint64_t>{0};
-  auto pages = tiff_pages(file->descriptor(), path);
-  if (pages && pages->size() == 1) pages->front() = 0;
-  return pages;
+  return tiff_pages(file->descriptor(), path);
 }
 
 namespace {
@@ -208,8 +207,58 @@ std::size_t first_other(std::span<const std::byte> row, std::size_t from, std::s
 
 }  // namespace
 
-bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low) {
-  const unsigned darkest = (1u << bits) - 1;
+Colours Colours::of_grey(unsigned maximum) {
+  Colours colours;
+  for (; colours.count <= maximum; ++colours.count)
+    colours.grey[colours.count] = static_cast<std::uint8_t>(255 * colours.count / maximum);
+  return colours;
+}
+
+void Colours::add(unsigned red, unsigned green, unsigned blue, unsigned opaque) {
+  const unsigned light = (299 * red + 587 * green + 114 * blue + 500) / 1000;
+  if (count < grey.size()) grey[count++] = static_cast<std::uint8_t>((light * opaque + 255 * (255 - opaque) + 127) / 255);
+}
+
+bool Colours::are_black_and_white() const {
+  return count > 0 && std::all_of(grey.begin(), grey.begin() + std::min(count, 2u),
+                                  [](std::uint8_t light) { return light == 0 || light == 255; });
+}
+
+bool widen_row(std::span<std::byte> row, std::uint32_t columns, unsigned bits, const Colours& colours) {
+  unsigned highest = 0;
+  if (bits == 8) {
+    for (std::byte& value : row.first(columns)) {
+      highest = std::max(highest, std::to_integer<unsigned>(value));
+      value = std::byte{colours.grey[std::to_integer<unsigned>(value)]};
+    }
+    return highest < colours.count;
+  }
+  for (std::size_t column = columns; column-- > 0;) {  // from the end, so that no value is overwritten before it is read
+    const std::size_t at = column * bits;
+    const unsigned value = std::to_integer<unsigned>(row[at / 8]) >> (8 - bits - at % 8) & ((1u << bits) - 1);
+    highest = std::max(highest, value);
+    row[column] = std::byte{colours.grey[value]};
+  }
+  return highest < colours.count;
+}
+
+bool add_bits(std::span<std::byte> row, std::uint32_t columns, const Colours& colours, int threshold, RunsBuilder& builder) {
+  const int below = threshold > 0 ? threshold : 128;
+  const bool first = colours.grey[0] < below, second = colours.grey[1] < below;
+  const std::span<std::byte> bits = row.first(row_bytes(columns));
+  if (colours.count < 2) {
+    const auto after_last = static_cast<unsigned>(8 * bits.size() - columns);
+    bits.back() = bits.back() >> after_last << after_last;
+    if (std::ranges::any_of(bits, [](std::byte byte) { return byte != std::byte{}; })) return false;
+  } else if (first == second) {
+    std::ranges::fill(bits, std::byte{});
+  }
+  return builder.add_row(bits, first);
+}
+
+bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low,
+                        unsigned maximum) {
+  const unsigned darkest = maximum > 0 ? maximum : (1u << bits) - 1;
   const auto value_at = [&](std::uint32_t column) -> unsigned {
     if (bits == 16) {
       return std::to_integer<unsigned>(row[2 * std::size_t{column}]) |

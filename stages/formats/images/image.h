@@ -30,15 +30,15 @@ struct Image {
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path, std::uint8_t full = 0);
 
-/// The same of images of others: of 1 bit, or grey of 4, 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark
-/// pixels: black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page of
-/// pages_of(); 0: the file has one image errors     kInput with the file's name: truncated, coloured, several images, not
-/// readable
+/// The same of images of others: of 1 to 16 bits of grey, or of a palette (TIFF, PNG, BMP, PBM, PGM). Set are the pixels below
+/// the threshold; transparent ones are white. threshold  1 .. 255 of 255; of 16 bits the upper eight count page       of
+/// pages_of(); 0: the file has one image that is no thumbnail errors     kInput with the file's name: truncated, with other
+/// colours, several images, not readable
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page = 0);
 
-/// Decodes levels of voxels as the formats of stages/formats/image_format.h have them (TIFF of 4 or 8 bits, PNG of 8), row
-/// by row. full    level of a full voxel: 1, 3 or 15 image   its runs are the pixels of any level above 0 levels  the levels
-/// errors  kVerification with the file's name: of image(); a value that is not one of the levels
+/// Decodes levels of voxels as the formats of stages/formats/image_format.h have them (TIFF of 4 or 8 bits, PNG of up to 8),
+/// row by row. full    level of a full voxel: 1, 3 or 15 image   its runs are the pixels of any level above 0 levels  the
+/// levels errors  kVerification with the file's name: of image(); a value that is not one of the levels
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels);
 
 /// An image of a job as levels: those that it carries, or 1 where one of 1 bit is set. full  as in image()
@@ -52,12 +52,12 @@ struct LevelsRequest {
   std::uint64_t page = 0;  // of pages_of(); 0: the file has one image
 };
 
-/// The levels of an image of others, of 1, 4, 8 or 16 bits: level = floor(darkness x full + 1/2), in integers, so that a value
+/// The levels of an image of others, of 1 to 16 bits: level = floor(darkness x full + 1/2), in integers, so that a value
 /// between two levels takes the nearest. Those of stages/formats/image_format.h come back as they are.
 /// returns  the image's resolution; its runs are empty. errors  kInput: of dark_pixels()
 Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels);
 
-/// The places of the images of a file, in their order: of a TIFF of several, else one 0.
+/// The places of the images of a file without thumbnails, in their order: of a TIFF of several, else one 0.
 /// errors  kInput: not readable, or more than 2^20 images
 Result<std::vector<std::uint64_t>> pages_of(const std::string& path);
 

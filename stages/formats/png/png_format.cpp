@@ -226,7 +226,13 @@ struct ReadState {
   Buffer<std::byte> row;
   std::optional<RunsBuilder> builder;
   LevelSink* sink = nullptr;
-  unsigned level_bits = 0;  // of a value for the sink; 0: the image is of 1 bit
+  int threshold = 0;
+  std::uint32_t columns = 0;
+  unsigned bits = 0;  // of a coded value
+  bool palette = false;
+  bool as_bits = false;  // the image is of 1 bit, and so are its rows; else they become bytes of grey or 16 bits
+  int transparent = -1;  // the value of grey that is paper; -1: none
+  Colours colours;       // of values of up to 8 bits
   double dpi_x = 0, dpi_y = 0;
 };
 
@@ -258,31 +264,60 @@ void read_bytes(png_structp png, png_bytep to, png_size_t count) {
   }
 }
 
-/// True if a set bit is a dark pixel.
-bool set_is_dark(png_structp png, png_infop info, int colour_type) {
-  if (colour_type == PNG_COLOR_TYPE_GRAY) return false;
+/// The brightness of the values of a palette or of grey; transparent ones are white paper.
+void read_colours(png_structp png, png_infop info, ReadState& source) {
+  png_bytep opaque = nullptr;
+  png_color_16p transparent = nullptr;
   png_colorp palette = nullptr;
-  int entries = 0;
-  png_get_PLTE(png, info, &palette, &entries);
-  if (entries < 2) png_error(png, "a palette of fewer than two colours");
-  const auto light = [](const png_color& c) { return int{c.red} + c.green + c.blue; };
-  return light(palette[1]) < light(palette[0]);
+  int entries = 0, opacities = 0;
+  const bool any = png_get_tRNS(png, info, &opaque, &opacities, &transparent) != 0;
+  if (source.palette) {
+    png_get_PLTE(png, info, &palette, &entries);
+    if (entries < 1) png_error(png, "a palette without colours");
+    for (int c = 0; c < entries; ++c)
+      source.colours.add(palette[c].red, palette[c].green, palette[c].blue, any && c < opacities ? opaque[c] : 255);
+    return;
+  }
+  if (any && transparent != nullptr) source.transparent = transparent->gray & ((1 << source.bits) - 1);
+  if (source.bits > 8) return;
+  source.colours = Colours::of_grey((1u << source.bits) - 1);
+  if (source.transparent >= 0) source.colours.grey[static_cast<std::size_t>(source.transparent)] = 255;
 }
 
-bool add_row(ReadState& source, std::size_t bytes, bool invert) {
+/// Of 16 bits, in either order of bytes.
+void whiten_transparent(std::span<std::byte> row, int transparent, bool low_byte_first) {
+  const auto high = static_cast<std::byte>(transparent >> 8), low = static_cast<std::byte>(transparent);
+  const std::byte first = low_byte_first ? low : high, second = low_byte_first ? high : low;
+  for (std::size_t i = 0; i + 1 < row.size(); i += 2)
+    if (row[i] == first && row[i + 1] == second) row[i] = row[i + 1] = std::byte{255};
+}
+
+/// A row as it is coded. returns  why not, or nullptr
+const char* add_row(ReadState& source) {
+  const std::uint32_t columns = source.columns;
   try {
-    if (source.level_bits > 0) return source.sink->add_row(source.row, source.sink->levels.columns, source.level_bits, false);
-    return source.builder->add_row(std::span(source.row).first(bytes), invert);
+    constexpr const char* kTooMany = "too many runs for the memory";
+    if (source.as_bits) {
+      if (add_bits(source.row, columns, source.colours, source.threshold, *source.builder)) return nullptr;
+      return source.colours.count < 2 ? kNoColour.data() : kTooMany;
+    }
+    const bool wide = source.bits == 16, changed = source.bits < 8 || source.palette || source.transparent >= 0;
+    if (wide && changed) whiten_transparent(source.row, source.transparent, source.sink != nullptr);
+    if (!wide && changed && !widen_row(source.row, columns, source.bits, source.colours)) return kNoColour.data();
+    if (source.sink != nullptr)
+      return source.sink->add_row(source.row, columns, wide ? 16 : 8, false) ? nullptr : "a value is no level";
+    bits_of_grey(source.row, columns, wide ? 2 : 1, false, source.threshold);
+    return source.builder->add_row(std::span(source.row).first(row_bytes(columns)), false) ? nullptr : kTooMany;
   } catch (...) {
-    return false;
+    return "out of memory";
   }
 }
 
-bool prepare(ReadState& source, std::uint32_t columns, std::size_t stride) {
+bool prepare(ReadState& source, std::size_t stride) {
   try {
     source.row.resize(stride);
-    source.builder.emplace(columns);
-    if (source.level_bits > 0) source.sink->levels.start(columns);
+    source.builder.emplace(source.columns);
+    if (source.sink != nullptr && !source.as_bits) source.sink->levels.start(source.columns);
     return true;
   } catch (...) {
     return false;
@@ -290,7 +325,7 @@ bool prepare(ReadState& source, std::uint32_t columns, std::size_t stride) {
 }
 
 /// No object of this frame needs its destructor run when libpng jumps out.
-bool read_rows(png_structp png, png_infop info, ReadState& source, int threshold) {
+bool read_rows(png_structp png, png_infop info, ReadState& source) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_user_limits(png, kMaxPixelsASide, kMaxPixelsASide);
   png_set_chunk_malloc_max(png, 1 << 20);
@@ -302,35 +337,33 @@ bool read_rows(png_structp png, png_infop info, ReadState& source, int threshold
   png_read_info(png, info);
   const std::uint32_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const int colour_type = png_get_color_type(png, info);
-  const int coded = png_get_bit_depth(png, info);
-  const bool exact = source.sink != nullptr && !source.sink->nearest;
-  const bool grey = (exact ? coded == 8 : threshold > 0 && coded > 1) && colour_type == PNG_COLOR_TYPE_GRAY;
-  const bool levels = source.sink != nullptr && grey;
-  if (exact && !grey) png_error(png, "not 8 bits of grey");
-  if (grey && coded < 8) png_set_expand_gray_1_2_4_to_8(png);
-  if (levels && coded == 16) png_set_swap(png);  // low byte first
-  const int depth = grey && coded < 8 ? 8 : coded;
-  source.level_bits = levels ? static_cast<unsigned>(depth) : 0;
-  if (depth != 1 && !grey) png_error(png, threshold > 0 ? "neither 1-bit nor grey" : "not a 1-bit image");
+  const bool exact = source.sink != nullptr && !source.sink->nearest, any = source.threshold > 0;
+  source.columns = columns;
+  source.bits = png_get_bit_depth(png, info);
+  source.palette = colour_type == PNG_COLOR_TYPE_PALETTE;
+  if (any && (colour_type & PNG_COLOR_MASK_ALPHA) != 0) png_error(png, "has an alpha channel; flatten it onto white");
+  const bool grey = source.palette || colour_type == PNG_COLOR_TYPE_GRAY;
+  if (exact && (!grey || source.bits > 8)) png_error(png, "not 8 bits of grey");
+  if (!grey || (source.bits > 1 && !any && !exact)) png_error(png, any ? "neither 1-bit nor grey" : "not a 1-bit image");
+  read_colours(png, info, source);
+  source.as_bits = source.bits == 1 && !exact && (source.sink == nullptr || source.colours.are_black_and_white());
+  if (source.sink != nullptr && source.bits == 16) png_set_swap(png);  // low byte first
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced images are not supported");
-  const std::size_t step = static_cast<std::size_t>(depth) / 8, stride = grey ? columns * step : row_bytes(columns);
-  const std::size_t coded_stride = (std::size_t{columns} * static_cast<std::size_t>(coded) + 7) / 8;
+  const std::size_t coded_stride = (std::size_t{columns} * source.bits + 7) / 8;
   if ((coded_stride + 1) * std::uint64_t{rows} / kMaxExpansion > source.bytes) {
     png_error(png, "more pixels than a file of this size can hold");
   }
-  const bool invert = !grey && !set_is_dark(png, info, colour_type);
   png_uint_32 per_unit_x = 0, per_unit_y = 0;
   int unit = 0;
   if (png_get_pHYs(png, info, &per_unit_x, &per_unit_y, &unit) != 0 && unit == PNG_RESOLUTION_METER) {
     source.dpi_x = per_unit_x * 0.0254;
     source.dpi_y = per_unit_y * 0.0254;
   }
-  if (!prepare(source, columns, stride)) png_error(png, "out of memory");
+  if (!prepare(source, source.as_bits ? coded_stride : std::max<std::size_t>(coded_stride, columns)))
+    png_error(png, "out of memory");
   for (std::uint32_t r = 0; r < rows; ++r) {
     png_read_row(png, reinterpret_cast<png_bytep>(source.row.data()), nullptr);
-    if (grey && !levels) bits_of_grey(source.row, columns, step, false, threshold);
-    if (!add_row(source, row_bytes(columns), invert))
-      png_error(png, levels ? "a value is no level" : "too many runs for the memory");
+    if (const char* wrong = add_row(source); wrong != nullptr) png_error(png, wrong);
   }
   png_read_end(png, nullptr);
   return true;
@@ -343,12 +376,13 @@ Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, i
   source->file = file;
   source->bytes = bytes;
   source->sink = sink;
+  source->threshold = threshold;
   png_structp reader = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), keep_error, ignore_warning);
   png_infop info = reader != nullptr ? png_create_info_struct(reader) : nullptr;
   bool whole = false;
   if (info != nullptr) {
     png_set_read_fn(reader, source.get(), read_bytes);
-    whole = read_rows(reader, info, *source, threshold);
+    whole = read_rows(reader, info, *source);
   }
   png_destroy_read_struct(&reader, &info, nullptr);
   if (!whole) {
