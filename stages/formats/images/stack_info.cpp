@@ -11,6 +11,7 @@
 
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
+#include "stages/formats/images/image_formats.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/late/tiff.h"
@@ -265,7 +266,9 @@ Result<ImageKind> kind_of(const std::string& path, std::uint64_t page) {
   if (begins("\x89PNG", 4)) return ImageKind{"PNG", head[24], head[25] == 3 ? "by its palette" : "0 is black", "deflate"};
   if (begins("BM", 2)) return ImageKind{"BMP", head[28], "by its palette", "none"};
   if (begins("P4", 2)) return ImageKind{"PBM", 1, "0 is white", "none"};
-  if (begins("P5", 2)) return ImageKind{"PGM", 8, "0 is black", "none"};
+  if (begins("P1", 2)) return ImageKind{"PBM", 1, "0 is white", "ASCII"};
+  if (begins("P5", 2)) return ImageKind{"PGM", pgm_bits(*file), "0 is black", "none"};
+  if (begins("P2", 2)) return ImageKind{"PGM", pgm_bits(*file), "0 is black", "ASCII"};
   return Error{Fault::kInput, path + ": neither TIFF nor PNG nor BMP nor PBM nor PGM"};
 }
 
