@@ -532,11 +532,11 @@ std::string read_tiff_head(TIFF* tiff, std::uint64_t file_bytes, int threshold, 
   TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &head.compression);
   const std::uint16_t bits = head.bits;
   const bool exact = sink != nullptr && !sink->nearest;
-  const bool grey = exact ? bits == 4 || bits == 8 : threshold > 0 && (bits == 4 || bits == 8 || bits == 16);
+  const bool grey = exact ? bits == 4 || bits == 8 : threshold > 0 && (bits == 2 || bits == 4 || bits == 8 || bits == 16);
   const bool known = TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &head.photometric) != 0;
   if (!known || head.photometric > PHOTOMETRIC_MINISBLACK || (!grey && (exact || bits != 1)) || head.samples != 1) {
     if (exact) return "neither 4 nor 8 bits of grey";
-    return threshold > 0 ? "neither 1-bit nor grey of 4, 8 or 16 bits" : "not a 1-bit image";
+    return threshold > 0 ? "neither 1-bit nor grey of 2, 4, 8 or 16 bits" : "not a 1-bit image";
   }
   std::uint16_t kind = SAMPLEFORMAT_UINT;
   TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLEFORMAT, &kind);
@@ -555,15 +555,45 @@ std::string read_tiff_head(TIFF* tiff, std::uint64_t file_bytes, int threshold, 
   return TIFFScanlineSize(tiff) == static_cast<tmsize_t>(head.stride()) ? "" : "rows of an unexpected length";
 }
 
+/// Whether the current directory is a thumbnail or a mask. Damage of such a one does not matter.
+bool is_no_layer(TIFF* tiff, std::string& message) {
+  std::uint32_t kind = 0;
+  TIFFGetField(tiff, TIFFTAG_SUBFILETYPE, &kind);
+  if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) return false;
+  message.clear();
+  return true;
+}
+
+/// Finds the directory of the only image that is no thumbnail; the first one if all are.
+/// page  its position, to be selected; 0: it is the current one. returns  false if there are several
+bool select_only_image(TIFF* tiff, std::string& message, std::uint64_t& page) {
+  if (TIFFLastDirectory(tiff) != 0) return true;
+  const std::uint64_t first = TIFFCurrentDirOffset(tiff);
+  std::string kept = message;
+  do {
+    if (is_no_layer(tiff, message)) continue;
+    if (page != 0) return false;
+    page = TIFFCurrentDirOffset(tiff);
+  } while (message.empty() && TIFFReadDirectory(tiff) != 0);
+  if (page == 0) page = first, message = std::move(kept);
+  return true;
+}
+
 /// One row as libtiff decodes it. returns  why not, or nothing
 std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, int threshold, LevelSink* sink,
                               RunsBuilder& builder) {
   // Values of two bytes are in the order of this program's hosts, little-endian. Those of min-is-white: bright is small.
   const bool low = head.bright_is_low();
-  if (head.grey() && sink != nullptr) return sink->add_row(row, head.columns, head.bits, low) ? "" : "a value is no level";
+  unsigned bits = head.bits;
+  if (bits == 2) {
+    static const Colours kColours = Colours::of_grey(3);
+    widen_row(row, head.columns, bits, kColours);
+    bits = 8;
+  }
+  if (head.grey() && sink != nullptr) return sink->add_row(row, head.columns, bits, low) ? "" : "a value is no level";
   const int below = low ? 256 - threshold : threshold;
-  if (head.bits == 4) bits_of_nibbles(row, head.columns, below);
-  if (head.bits >= 8) bits_of_grey(row, head.columns, head.bits / 8u, head.bits == 16, below);
+  if (bits == 4) bits_of_nibbles(row, head.columns, below);
+  if (bits >= 8) bits_of_grey(row, head.columns, bits / 8u, bits == 16, below);
   return builder.add_row(row.first(row_bytes(head.columns)), head.grey() ? low : !low) ? "" : "too many runs";
 }
 
@@ -578,13 +608,13 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
   };
   const TiffHandle handle = open_for_reading(file, path, message, "out of memory or files", "no directory");
   if (handle == nullptr) return failure(message);
+  if (page == 0 && !select_only_image(handle.get(), message, page) && threshold > 0)
+    return failure("several images in one file; write one a layer");
   if (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0) return failure(message.empty() ? "no such page" : message);
   if (!message.empty()) return failure(message);
   TiffHead head;
   const std::string wrong = read_tiff_head(handle.get(), bytes, threshold, sink, head);
   if (!wrong.empty()) return failure(wrong);
-  if (threshold > 0 && page == 0 && TIFFLastDirectory(handle.get()) == 0)
-    return failure("several images in one file; write one a layer");
 
   const bool to_sink = head.grey() && sink != nullptr;
   if (to_sink) sink->levels.start(head.columns);
@@ -596,7 +626,7 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
     return image;
   }
   RunsBuilder builder(head.columns);
-  Buffer<std::byte> row(head.stride());
+  Buffer<std::byte> row(head.bits == 2 ? head.columns : head.stride());
   for (std::uint32_t r = 0; r < head.rows; ++r) {
     if (TIFFReadScanline(handle.get(), row.data(), r, 0) < 0 || !message.empty()) {
       return failure(fmt::format("row {}: {}", r, message.empty() ? "cannot be decoded" : message));
@@ -614,15 +644,15 @@ Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path)
   const TiffHandle handle = open_for_reading(file, path, message);
   if (handle == nullptr) return Error{Fault::kInput, fmt::format("{}: not a TIFF: {}; take a whole file", path, message)};
   std::vector<std::uint64_t> pages;
+  const bool alone = TIFFLastDirectory(handle.get()) != 0;
   do {
-    std::uint32_t kind = 0;
-    TIFFGetField(handle.get(), TIFFTAG_SUBFILETYPE, &kind);
-    if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) pages.push_back(TIFFCurrentDirOffset(handle.get()));
+    if (!is_no_layer(handle.get(), message)) pages.push_back(TIFFCurrentDirOffset(handle.get()));
   } while (pages.size() <= kMaxPages && TIFFReadDirectory(handle.get()) != 0);
   if (!message.empty() || pages.size() > kMaxPages) {
     return Error{Fault::kInput, fmt::format("{}: page {}: {}; take a whole file", path, pages.size(),
                                             message.empty() ? "too many of them" : message)};
   }
+  if (pages.empty() || alone) pages.assign(1, 0);
   return pages;
 }
 

@@ -14,17 +14,19 @@
 namespace lamina {
 namespace {
 
+/// Orientation 0, which some programs write, is none: the default is taken.
 int keep_first_message(TIFF*, void* user, const char*, const char* format, va_list arguments) {
-  std::string& message = *static_cast<std::string*>(user);
-  if (!message.empty()) return 1;
   char text[256];
   std::vsnprintf(text, sizeof text, format, arguments);
-  message = text;
+  std::string& message = *static_cast<std::string*>(user);
+  if (message.empty() && std::strstr(text, "Bad value 0 for \"Orientation\" tag") == nullptr) message = text;
   return 1;
 }
 
+/// The length of a single strip follows from the image.
 int keep_warning_of_damage(TIFF* tiff, void* user, const char* module, const char* format, va_list arguments) {
-  const bool harmless = std::strstr(format, "Unknown field") != nullptr;
+  const bool harmless = std::strstr(format, "Unknown field") != nullptr ||
+                        std::strstr(format, "is missing required \"StripByteCounts\" field, calc") != nullptr;
   return harmless ? 1 : keep_first_message(tiff, user, module, format, arguments);
 }
 
