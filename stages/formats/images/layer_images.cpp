@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "stages/formats/images/image.h"
+#include "stages/formats/images/image_order.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/text/readable.h"
 
@@ -65,9 +66,7 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
     return Error{
         Fault::kInput,
         fmt::format("{}: contains neither manifest.json of lamina jet nor images .png, .tif, .bmp or .pbm", one_line(folder))};
-  std::ranges::sort(images, [](const Numbered& a, const Numbered& b) {
-    return a.number != b.number ? a.number < b.number : a.path < b.path;
-  });
+  if (Status status = sort_images(folder, images); !status) return status.error();
   for (std::size_t i = 1; i < images.size(); ++i) {
     if (images[i].number == images[i - 1].number + 1 || (gaps && images[i].number != images[i - 1].number)) continue;
     if (images[i].number == images[i - 1].number)

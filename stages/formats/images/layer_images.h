@@ -22,10 +22,12 @@ struct Numbered {
   std::string path;
 };
 
-/// Images .png, .tif, .tiff, .bmp, .pbm, .pgm of a folder in the order of the last numbers in their names; at least one.
+/// Images .png, .tif, .tiff, .bmp, .pbm, .pgm of a folder in the order of the last numbers in their names, or of heights with
+/// decimal points (sort_images()); at least one.
 /// Hidden files, folders and files of other kinds are passed over.
 /// gaps    numbers may be missing
-/// errors  kInput: no such images, no number in a name, two of one number, a number missing, a numbered JPEG, GIF or the like
+/// errors  kInput: no such images, no number in a name, two of one number or of two orders, a number missing, a numbered JPEG,
+/// GIF or the like
 Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool gaps = false);
 
 /// Facts that the files do not state.

@@ -31,7 +31,7 @@ struct ImageStack {
   std::function<Result<Runs>(std::uint32_t)> read;  // a layer's solid, its rows as the image has them
 };
 
-/// A folder of images .png, .tif, .tiff, .pbm, in the order of the last numbers in their names.
+/// A folder of images .png, .tif, .tiff, .pbm, in the order of numbered_images().
 /// errors  kInput: no such images, a gap in their numbering; kUsage: no size of a pixel. cost  reads the names and one image
 Result<ImageStack> stack_of_images(const std::string& folder, const StackRequest& request);
 
