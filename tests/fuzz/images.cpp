@@ -226,6 +226,8 @@ std::vector<std::string> grey_seeds() {
     seeds.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
   seeds.emplace_back("P5\n# grey\n3 2 255\n\x00\x40\x7f\x80\xc0\xff", 24);
+  seeds.emplace_back("P2\n3 2 300\n0 40 # grey\n150 151 200 300\n");
+  seeds.emplace_back("P1\n3 2\n011 1 0 0\n");
   std::string bmp = "BM";
   for (const std::uint32_t value : {54u + 4 * 4 + 2 * 4, 0u, 54u + 4 * 4, 40u, 3u, 2u}) put(bmp, value, 4);
   put(bmp, 1, 2), put(bmp, 8, 2);
