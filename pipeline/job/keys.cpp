@@ -163,7 +163,7 @@ std::vector<std::string_view> image_formats() {
 }
 
 std::string check_image_format(std::string_view text) {
-  return !formats::extension_of(text) ? not_one_of(text, image_formats()) : std::string();
+  return !formats::extension_of(text) ? formats::unknown_format(text) : std::string();
 }
 
 std::string check_title(std::string_view) { return {}; }

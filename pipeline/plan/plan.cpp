@@ -329,7 +329,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
     if (!printer) return printer.error();
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
-    if (!formats::extension_of(job.format)) return usage("unknown format '{}'", job.format);
+    if (!formats::extension_of(job.format)) return usage("{}", formats::unknown_format(job.format));
     const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
     if (formats::find_level_format(job.format) != nullptr && !dosed) {
       return usage(

@@ -13,6 +13,7 @@
 #include "stages/formats/png/png_format.h"
 #include "stages/formats/tiff/tiff.h"
 #include "stages/geometry/bits.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::formats {
 
@@ -122,6 +123,19 @@ std::optional<std::string_view> extension_of(std::string_view id) {
   if (const ImageFormat* format = find_image_format(id)) return format->extension;
   const LevelFormat* format = find_level_format(id);
   return format != nullptr ? std::optional(format->extension) : std::nullopt;
+}
+
+std::string unknown_format(std::string_view id) {
+  const std::string begin = lower_case(std::string(id.substr(0, 3)));
+  std::string like, all;
+  const auto add = [&](std::string_view known) {
+    if (known == "null") return;
+    all += fmt::format("{}{}", all.empty() ? "" : ", ", known);
+    if (begin.size() == 3 && known.starts_with(begin)) like += fmt::format("{}{}", like.empty() ? "" : ", ", known);
+  };
+  for (const ImageFormat& format : kFormats) add(format.id);
+  for (const LevelFormat& format : kLevelFormats) add(format.id);
+  return fmt::format("unknown value '{}'; use one of {}", id, like.empty() ? all : like);
 }
 
 }  // namespace lamina::formats

@@ -107,4 +107,7 @@ const LevelFormat* find_level_format(std::string_view id);
 /// Of a format of one bit or of levels; nothing if there is none with this id.
 std::optional<std::string_view> extension_of(std::string_view id);
 
+/// "unknown value 'tif'; use one of tiff-g4, ...": the formats that begin with the same three letters, else all.
+std::string unknown_format(std::string_view id);
+
 }  // namespace lamina::formats

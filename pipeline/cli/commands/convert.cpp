@@ -161,7 +161,7 @@ Status choose_format(const Arguments& arguments, const std::string& id, Conversi
   all.bits = formats::find_image_format(id);
   all.grey = formats::find_level_format(id);
   if (all.grey == nullptr && (all.bits == nullptr || all.bits->extension.empty()))
-    return usage("--format {}: unknown image format; `lamina jet --help-all` lists them", id);
+    return usage("--format: {}", formats::unknown_format(id));
   const bool nibbles = id == "tiff-4";
   all.full = nibbles ? 15 : 255;
   if (all.grey == nullptr && arguments.has("--levels"))
