@@ -12,7 +12,7 @@ namespace {
 using test::Directory;
 using test::gcode_file;
 
-constexpr double kUnit = test::kPi / 4 * 1.75 * 1.75;  // mm3 of a mm of filament
+constexpr double kFilamentMm2 = test::kPi / 4 * 1.75 * 1.75;  // mm3 of a mm of filament
 
 /// mm of filament of all beads; -1 with the reason if the file is refused.
 double fed_by(const std::string& text) {
@@ -22,9 +22,9 @@ double fed_by(const std::string& text) {
   double sum = 0;
   for (std::uint32_t n = 0; n < file->count(); ++n) {
     const auto layer = file->layer(n, true);
-    for (const BeadFeed& feed : layer->feeds) sum += feed.volume_mm3 / kUnit;
+    for (const BeadFeed& feed : layer->feeds) sum += feed.volume_mm3 / kFilamentMm2;
   }
-  EXPECT_NEAR(sum, file->fed_mm3() / kUnit, 1e-9 * (1 + sum));
+  EXPECT_NEAR(sum, file->fed_mm3() / kFilamentMm2, 1e-9 * (1 + sum));
   return sum;
 }
 
@@ -41,7 +41,7 @@ TEST(GcodeNetFilament, M221IsAppliedFromItsLineOnToItsTool) {
       {"M83\nM221\n" + bead, 2},
       {"M83\n" + bead + "M221 S0\nG1 X9 E1\n", 2},
       {"M82\nG92 E5\nM221 S50\nG1 X10 E6\nG1 X0 E8\nG92 E0\nM221 S100\nG1 X10 E1\n", 2.5},
-      {"M200 D1.75\nM83\nM221 S50\nG1 X10 E2\n", 1 / kUnit},
+      {"M200 D1.75\nM83\nM221 S50\nG1 X10 E2\n", 1 / kFilamentMm2},
       {";LAYER:0\nM83\nM221 S50\n" + bead + ";LAYER:1\n" + bead, 2},
   };
   for (const auto& [text, millimetres] : cases) EXPECT_NEAR(fed_by(text), millimetres, 1e-7) << text;
@@ -61,7 +61,7 @@ TEST(GcodeNetFilament, APrimeInAMoveDepositsNothing) {
   // The 80 beads of bugs3/J09 with a retraction of 5 mm while travelling: 1154 mm3 where every move that feeds counts.
   std::string text = "M83\n";
   for (int i = 0; i < 80; ++i) text += fmt::format("G1 X30 Y{} E1\nG1 X20 E-5\nG1 X10 Y{} E5\n", i, i + 1);
-  EXPECT_NEAR(fed_by(text) * kUnit, 192.42, 0.005);
+  EXPECT_NEAR(fed_by(text) * kFilamentMm2, 192.42, 0.005);
 }
 
 TEST(GcodeNetFilament, ABeadBeginsWhereTheRestIsFedAgain) {
@@ -73,12 +73,12 @@ TEST(GcodeNetFilament, ABeadBeginsWhereTheRestIsFedAgain) {
   const auto layer = file->layer(0, true);
   ASSERT_GT(layer->beads.size(), 4u);
   EXPECT_EQ(layer->beads[1].from, (Point2{12'500'000, 0}));
-  EXPECT_NEAR(layer->feeds[1].volume_mm3 / kUnit, 1.5, 1e-12);
+  EXPECT_NEAR(layer->feeds[1].volume_mm3 / kFilamentMm2, 1.5, 1e-12);
   EXPECT_NEAR(layer->feeds[1].primed_mm3, 0, 1e-12);
   EXPECT_FALSE(layer->feeds[1].joined);
   EXPECT_TRUE(layer->feeds[2].joined);
   double arc = 0;
-  for (std::size_t i = 3; i < layer->beads.size(); ++i) arc += layer->feeds[i].volume_mm3 / kUnit;
+  for (std::size_t i = 3; i < layer->beads.size(); ++i) arc += layer->feeds[i].volume_mm3 / kFilamentMm2;
   EXPECT_NEAR(arc, 1, 1e-9);
   EXPECT_NEAR(static_cast<double>(layer->beads[3].from.x), 35e6, 2e4) << "half of the arc is passed";
   EXPECT_FALSE(layer->feeds[3].joined);

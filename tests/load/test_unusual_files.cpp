@@ -10,18 +10,18 @@ namespace {
 
 using Entries = std::vector<std::pair<std::string, std::string>>;
 
-std::vector<Triangle> box() { return placed(loaded(write_file("box.stl", binary_stl(unit_box())))); }
+std::vector<Triangle> clean_box() { return placed(loaded(write_file("box.stl", binary_stl(unit_box())))); }
 
 /// The same, with the diagonals of its faces as readers of OBJ draw them.
-std::vector<Triangle> obj_box() { return placed(loaded(write_file("box.obj", box_obj()))); }
+std::vector<Triangle> clean_obj_box() { return placed(loaded(write_file("box.obj", box_obj()))); }
 
-std::string write_3mf(const std::string& resources, const std::string& build) {
+std::string write_package(const std::string& resources, const std::string& build) {
   return write_file("part.3mf", zip(package(model(resources, build))));
 }
 
 TEST(UnusualObj, EveryStatementContinuesBehindABackslash) {
   const std::string text = "mtllib a.mtl\no box\ng all parts\ns off\nvt 0 0\nvn 0 0 1\nusemtl red\n" + box_obj();
-  const std::vector<Triangle> clean = obj_box();
+  const std::vector<Triangle> clean = clean_obj_box();
   for (const char* line_end : {"\n", "\r\n", "\r"}) {
     for (const char* broken : {"\\", " \\", "\\ ", " \\ "}) {
       for (std::size_t at = 0; (at = text.find(' ', at)) != text.npos; ++at) {
@@ -60,12 +60,12 @@ TEST(UnusualObj, LinesThatABackslashTakesAreNamed) {
   for (const char* line : {"v 10 20 0\n", "f 1 4 3 2\n", "f 1 2 6 5\n"})
     commented.insert(commented.find(line) + std::string(line).size() - 1, " # C:\\parts\\");
   const Part part = loaded(write_file("comments.obj", commented + "g a # C:\\"));
-  EXPECT_EQ(placed(part), obj_box());
+  EXPECT_EQ(placed(part), clean_obj_box());
   EXPECT_TRUE(part.notes.empty()) << notes_of(part);
 }
 
 TEST(UnusualObj, VerticesThatNoFaceUsesMayBeAnything) {
-  const std::vector<Triangle> clean = obj_box();
+  const std::vector<Triangle> clean = clean_obj_box();
   for (const char* numbers : {"nan 0 0", "0 NaN 1", "inf 1 -inf", "1e9 2 3", "0 0 -1e999", "1.#QNAN 0 0", "-nan(ind) 0 0"}) {
     const std::string vertex = fmt::format("v {}\n", numbers), last = box_obj() + vertex;
     for (int before = 0; before < 4; ++before) {
@@ -92,21 +92,21 @@ TEST(Unusual3mf, ItemsThatAreNotPrintableAreLeftOut) {
   const std::string objects = box_object(1, 10, 20, 30) + box_object(2, 5, 5, 5) + components(3, component(2) + component(2));
   for (const char* no : {"0", "false", " 0 "}) {
     for (const int id : {2, 3}) {
-      const Part part = loaded(write_3mf(objects, build(no, id) + item(1) + build(no, id)));
-      EXPECT_EQ(placed(part), box()) << no;
+      const Part part = loaded(write_package(objects, build(no, id) + item(1) + build(no, id)));
+      EXPECT_EQ(placed(part), clean_box()) << no;
       EXPECT_CONTAINS(notes_of(part), "2 build items are not planned: marked as not printable");
     }
-    EXPECT_CONTAINS(refusal(write_3mf(objects, build(no, 1))),
+    EXPECT_CONTAINS(refusal(write_package(objects, build(no, 1))),
                     "nothing to print (1 build item is not planned: marked as not printable)");
   }
-  for (const char* yes : {"1", "true"}) EXPECT_EQ(placed(loaded(write_3mf(objects, build(yes, 1)))), box());
+  for (const char* yes : {"1", "true"}) EXPECT_EQ(placed(loaded(write_package(objects, build(yes, 1)))), clean_box());
 }
 
 TEST(Unusual3mf, SurfacesAloneAreRefusedAsSuch) {
   const std::string surface = box_object(1, 10, 20, 30, "type=\"surface\"");
   for (const std::string& build :
        {surface, surface + box_object(2, 1, 1, 1, "type=\"support\""), surface + components(2, component(1))})
-    EXPECT_CONTAINS(refusal(write_3mf(build, build == surface ? item(1) : item(1) + item(2))),
+    EXPECT_CONTAINS(refusal(write_package(build, build == surface ? item(1) : item(1) + item(2))),
                     "type \"surface\", which is no solid");
 }
 
@@ -119,16 +119,16 @@ TEST(Unusual3mf, ThumbnailsAndAttachmentsDoNotMatter) {
       "<Relationship Target=\"/Metadata/no.png\" Id=\"r9\" Type=\"http://schemas.openxmlformats.org/package/"
       "2006/relationships/metadata/thumbnail\"/>");
   const Part part = loaded(write_file("no_thumbnail.3mf", zip(entries)));
-  EXPECT_EQ(placed(part), box());
+  EXPECT_EQ(placed(part), clean_box());
   EXPECT_CONTAINS(notes_of(part), "a thumbnail that is named and not contained (core 2.1.3): '/Metadata/no.png'");
   load::LoadOptions options;
   options.expanded_limit = 10'000;
   for (const char* name : {"Metadata/plate_1.png", "Attachments/log.txt", "3D/Textures/wood.png", "other/_rels/x.rels"}) {
     entries = plain;
     entries.push_back({name, std::string(100'000, '\0')});
-    EXPECT_EQ(placed(loaded(write_file("large.3mf", zip(entries)), options)), box()) << name;
+    EXPECT_EQ(placed(loaded(write_file("large.3mf", zip(entries)), options)), clean_box()) << name;
     std::rotate(entries.begin(), entries.end() - 1, entries.end());
-    EXPECT_EQ(placed(loaded(write_file("large.3mf", zip(entries)), options)), box()) << name;
+    EXPECT_EQ(placed(loaded(write_file("large.3mf", zip(entries)), options)), clean_box()) << name;
   }
   for (std::size_t needed : {1u, 2u}) {
     entries = plain;
@@ -137,7 +137,7 @@ TEST(Unusual3mf, ThumbnailsAndAttachmentsDoNotMatter) {
   }
   entries.push_back({"bomb.txt", std::string(80u << 20, ' ')});
   entries[2] = plain[2];
-  EXPECT_EQ(placed(loaded(write_file("bomb.3mf", zip(entries)))), box());
+  EXPECT_EQ(placed(loaded(write_file("bomb.3mf", zip(entries)))), clean_box());
 }
 
 TEST(UnusualStl, NamesOfSolidsMayHaveAnyByte) {
@@ -145,19 +145,19 @@ TEST(UnusualStl, NamesOfSolidsMayHaveAnyByte) {
                                   std::string("\0facet\0", 7), std::string(3000, '\0')}) {
     for (const char* line_end : {"\n", "\r\n", "\r", " "}) {
       const Part part = loaded(write_file("name.stl", ascii_stl(unit_box(), line_end, name)));
-      EXPECT_EQ(placed(part), box()) << name.size() << ' ' << int{line_end[0]};
+      EXPECT_EQ(placed(part), clean_box()) << name.size() << ' ' << int{line_end[0]};
     }
   }
 }
 
 TEST(UnusualStl, BlankLinesInFrontDoNotMatter) {
-  const std::vector<Triangle> clean = box();
+  const std::vector<Triangle> clean = clean_box();
   for (const std::size_t count : {1u, 2u, 4090u, 4094u, 4095u, 4096u, 4097u, 5000u, 8191u, 8192u, 300'000u}) {
     for (const char* blank : {"\n", "\r\n", " ", "\t\n"}) {
       std::string front;
       while (front.size() < count) front += blank;
       EXPECT_EQ(placed(loaded(write_file("late.stl", front + ascii_stl(unit_box())))), clean) << count;
-      EXPECT_EQ(placed(loaded(write_file("late.txt", front + box_obj()))), obj_box()) << count;
+      EXPECT_EQ(placed(loaded(write_file("late.txt", front + box_obj()))), clean_obj_box()) << count;
       EXPECT_CONTAINS(refusal(write_file("late.stl", front + "ISO-10303-21;\nHEADER;\n")), "is STEP");
       EXPECT_CONTAINS(refusal(write_file("blank.stl", front)), "is text, but neither STL nor OBJ");
     }
@@ -189,7 +189,7 @@ TEST(UnusualNumbers, DecimalCommasAreNamed) {
     const std::string stl = with_comma(ascii_stl(unit_box()), "vertex 0 0 0", fmt::format("vertex {} 0 0", number));
     EXPECT_CONTAINS(refusal(write_file("comma.stl", stl)), fmt::format("'{}{}", number, expected));
     EXPECT_CONTAINS(refusal(write_file("comma.obj", with_comma(box_obj(), "v 10", fmt::format("v {}", number)))), expected);
-    EXPECT_CONTAINS(refusal(write_3mf(with_comma(box_object(1, 1, 1, 1), "x=\"1\"", fmt::format("x=\"{}\"", number)), item(1))),
+    EXPECT_CONTAINS(refusal(write_package(with_comma(box_object(1, 1, 1, 1), "x=\"1\"", fmt::format("x=\"{}\"", number)), item(1))),
                     expected);
   }
   for (const char* number : {"1,", ",", "1,2,3", "1,x", "a,5", "1.000,5"})
