@@ -277,11 +277,11 @@ bool GcodeCommands::read_line() {
   const bool read = file_.next(text_);
   position_.line += read || !file_.status() ? 1 : 0;
   position_.byte = file_.offset();
-  constexpr std::size_t kLongest = 64 << 10;  // of commands: firmwares take some 256 bytes
+  constexpr std::size_t kMaxCommandBytes = 64 << 10;  // of commands: firmwares take some 256 bytes
   const bool comment = read && !text_.empty() && text_[std::min(text_.find_first_not_of(" \t"), text_.size() - 1)] == ';';
   if (read && !comment) commands_ = strip_comments(text_, stripped_);
   parentheses_ = commands_.data() == stripped_.data();
-  if (!file_.status() || commands_.size() > kLongest)
+  if (!file_.status() || commands_.size() > kMaxCommandBytes)
     return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
   if (!read) return false;
   if (comment) text_.remove_prefix(text_.find(';'));
