@@ -133,6 +133,17 @@ class ObjParser {
     return {begin, static_cast<std::size_t>(at_ - begin)};
   }
 
+  /// Whether the physical line from here on begins as a vertex or a face does.
+  bool begins_element() const {
+    const char* p = at_;
+    const auto blank = [&] { return p != end_ && (*p == ' ' || *p == '\t'); };
+    while (blank()) ++p;
+    if (p == end_ || (*p != 'v' && *p != 'f')) return false;
+    if (++p; !blank()) return false;
+    while (blank()) ++p;
+    return p != end_ && std::string_view("0123456789+-.").find(*p) != std::string_view::npos;
+  }
+
   /// What a backslash joins to the line is part of it, even if it begins as a vertex or a face does; only comments, such as
   /// "# C:\parts\", end with their line.
   void skip_line() {
@@ -143,11 +154,7 @@ class ObjParser {
         continue;
       }
       at_ += continuation();
-      const char* const begin = at_;
-      const std::string_view kind = word(), number = word();
-      const bool is_number = !number.empty() && std::string_view("0123456789+-.").find(number.front()) != number.npos;
-      if ((kind == "v" || kind == "f") && is_number && swallowed_++ == 0) swallowed_offset_ = offset_of(kind.data());
-      at_ = begin;
+      if (begins_element() && swallowed_++ == 0) swallowed_offset_ = offset_of(at_);
     }
     if (at_ != end_) ++at_;
   }

@@ -160,10 +160,10 @@ TEST(GcodeDialects, NotesNameTheFirstLineOnWhichFirmwaresDiffer) {
       {"M221 S95\nG1 X10 E1\n", "line 2: M221 S95 is applied: volumes are that percentage of E"},
   };
   const Directory directory;
-  for (const auto& [text, note] : files) {
+  for (const auto& [text, expected] : files) {
     const auto file = gcode_file(directory, "M83\n;HEIGHT:0.2\n" + text);
     ASSERT_TRUE(file) << text << file.error().message;
-    const auto found = std::ranges::find_if(file->notes(), [&](const std::string& line) {
+    const auto found = std::ranges::find_if(file->notes(), [&, &note = expected](const std::string& line) {
       return line.starts_with(note.substr(0, 5)) && line.find(note.substr(note.find(':'))) != std::string::npos;
     });
     EXPECT_NE(found, file->notes().end()) << text;

@@ -189,8 +189,9 @@ TEST(UnusualNumbers, DecimalCommasAreNamed) {
     const std::string stl = with_comma(ascii_stl(unit_box()), "vertex 0 0 0", fmt::format("vertex {} 0 0", number));
     EXPECT_CONTAINS(refusal(write_file("comma.stl", stl)), fmt::format("'{}{}", number, expected));
     EXPECT_CONTAINS(refusal(write_file("comma.obj", with_comma(box_obj(), "v 10", fmt::format("v {}", number)))), expected);
-    EXPECT_CONTAINS(refusal(write_package(with_comma(box_object(1, 1, 1, 1), "x=\"1\"", fmt::format("x=\"{}\"", number)), item(1))),
-                    expected);
+    EXPECT_CONTAINS(
+        refusal(write_package(with_comma(box_object(1, 1, 1, 1), "x=\"1\"", fmt::format("x=\"{}\"", number)), item(1))),
+        expected);
   }
   for (const char* number : {"1,", ",", "1,2,3", "1,x", "a,5", "1.000,5"})
     EXPECT_CONTAINS(refusal(write_file("comma.obj", with_comma(box_obj(), "v 10", fmt::format("v {}", number)))),

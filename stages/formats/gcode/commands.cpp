@@ -402,11 +402,12 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
   if (!found) return false;
   char letter = scanner.letter();
   double code = scanner.value();
-  const bool repeats = letter == 'E' || (letter >= 'X' && letter <= 'Z');
+  const bool repeats = letter == 'E' || letter == 'F' || (letter >= 'X' && letter <= 'Z');
   if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) return false;
   if (letter == 'T') {  // what another tool has drawn back is not fed by this one
-    if (code != position_.tool) position_.retracted = 0;
-    position_.tool = static_cast<std::uint8_t>(std::clamp<double>(code, 0, GcodeFile::kTools - 1));
+    const double tool = std::clamp<double>(code, 0, GcodeFile::kTools - 1);
+    if (tool != position_.tool) position_.retracted = 0;
+    position_.tool = static_cast<std::uint8_t>(tool);
     return false;
   }
   if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 221) return false;  // may hold any text

@@ -311,9 +311,12 @@ void GcodeSurvey::add_to_box(const RawBead& raw) {
   const double unit = volume_of_unit(raw.volumetric, file_.filament_mm_);
   const GcodeBead bead = bead_of(raw, position.width > 0 ? position.width : width_of(raw, height, unit), position.type);
   const Nm half = bead.width / 2, top = static_cast<Nm>(nm_of(raw.to[2]));
+  const auto moved = [](Nm at, std::int64_t by) {
+    return static_cast<Nm>(std::clamp<std::int64_t>(at + by, -kNmReach, kNmReach));
+  };
   for (const Point2 end : {bead.from, bead.to}) {
-    file_.box_.add(Point3{end.x - half, end.y - half, top});
-    file_.box_.add(Point3{end.x + half, end.y + half, top});
+    file_.box_.add(Point3{moved(end.x, -half), moved(end.y, -half), top});
+    file_.box_.add(Point3{moved(end.x, half), moved(end.y, half), top});
   }
 }
 

@@ -17,14 +17,16 @@ std::string_view strip_comments(std::string_view line, std::string& scratch) {
   while (end < line.size() && line[end] != ';' && line[end] != '*' && line[end] != '(') ++end;
   if (end == line.size() || line[end] != '(') return line.substr(0, end);
   scratch.assign(line.substr(0, end));
-  bool comment = false;
+  std::size_t depth = 0;
   for (const char c : line.substr(end)) {
-    if (comment) {
-      comment = c != ')';
+    if (c == '(') {
+      ++depth;
+    } else if (c == ')') {
+      depth -= depth > 0;
+    } else if (depth > 0) {
+      continue;
     } else if (c == ';' || c == '*') {
       break;
-    } else if (c == '(') {
-      comment = true;
     } else {
       scratch += c;
     }

@@ -187,8 +187,9 @@ const Json::List& Json::elements() const { return held<List>("a list"); }
 
 std::int64_t Json::whole() const {
   if (const auto* number = std::get_if<std::uint64_t>(&value_)) return static_cast<std::int64_t>(*number);
-  if (const auto* number = std::get_if<double>(&value_)) return static_cast<std::int64_t>(*number);
-  return held<std::int64_t>("a number");
+  const auto* number = std::get_if<double>(&value_);
+  if (number != nullptr && *number >= -0x1p63 && *number < 0x1p63) return static_cast<std::int64_t>(*number);
+  return held<std::int64_t>("a whole number");
 }
 
 double Json::number() const {
