@@ -442,6 +442,7 @@ TEST(ImageOrder, OfOtherNumbersIsRefusedWhereThereAreTwo) {
     EXPECT_NE(message.find(words), std::string::npos) << message;
     EXPECT_EQ(std::ranges::count(message, '\n'), 0);
   };
+  refused({"v2.9.pbm", "v2.10.pbm"}, "two orders");  // two names show no steps
   refused({"a000_b7.pbm", "a001_b8.pbm", "a002_b9.pbm", "a003_b0.pbm", "a004_b1.pbm"},
           "the names allow two orders: by number 1 of each a000_b7.pbm, a001_b8.pbm, a002_b9.pbm, ...; by the last number "
           "a003_b0.pbm, a004_b1.pbm, a000_b7.pbm, ...",

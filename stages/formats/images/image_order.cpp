@@ -112,7 +112,7 @@ Status sort_images(const std::string& folder, std::vector<Numbered>& images) {
   if (decimals && all_heights) {
     const Sorted sorted(heights);
     const bool same = sorted.order == order;
-    if (sorted.distinct && ordered && !same && !sorted.equal_steps)
+    if (sorted.distinct && ordered && !same && (!sorted.equal_steps || images.size() < 3))
       return two_orders(folder, images, "height", sorted.order, "the last number", order);
     if (sorted.distinct && !(ordered && same && counted && sorted.equal_steps)) {
       order = sorted.order;
