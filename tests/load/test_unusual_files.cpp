@@ -69,7 +69,7 @@ TEST(UnusualObj, VerticesThatNoFaceUsesMayBeAnything) {
   for (const char* numbers : {"nan 0 0", "0 NaN 1", "inf 1 -inf", "1e9 2 3", "0 0 -1e999", "1.#QNAN 0 0", "-nan(ind) 0 0"}) {
     const std::string vertex = fmt::format("v {}\n", numbers), last = box_obj() + vertex;
     for (int before = 0; before < 4; ++before) {
-      // Numbers backwards count from the end, whatever is in front.
+      // Numbers backwards count from the end, regardless of what precedes.
       std::string text;
       for (int i = 0; i < before; ++i) text += vertex;
       text +=
