@@ -43,8 +43,8 @@ def folder(root):
 def save(root, name, result):
     os.makedirs(folder(root), exist_ok=True)
     with open(os.path.join(folder(root), name + ".json"), "w", encoding="utf-8") as file:
-        json.dump(result, file, indent=1, sort_keys=True)
-        file.write("\n")
+        text = json.dumps(result, indent=1, sort_keys=True)
+        file.write(text.replace(os.path.abspath(root) + os.sep, "") + "\n")  # paths as in any clone
 
 
 def load(root, name):
