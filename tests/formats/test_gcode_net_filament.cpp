@@ -51,6 +51,16 @@ TEST(GcodeNetFilament, M221IsAppliedFromItsLineOnToItsTool) {
   EXPECT_NE(refused.error().message.find("line 2: M221 S-5: a flow is 0 to 10000 %"), std::string::npos);
 }
 
+TEST(GcodeNetFilament, OfLinesThatAreEasilyMisread) {
+  const std::pair<std::string, double> cases[] = {
+      {"M83\nT2\nG1 X20 E1\nG1 E-1\nT2\nG1 X30 E2\n", 2},
+      {"M83\nT20\nG1 X20 E1\nG1 E-1\nT20\nG1 X30 E2\n", 2},  // named again, a tool keeps its retraction
+      {"M83\nG1 X10 E1\nF1800 X20 E1\n", 2},                 // GCODE_MOTION_MODES: F begins a move, as X does
+      {"M83\nG1 X10 E1 (a(b) c)\nG1 X0 E1 (thickness (mm)) ; x\n", 2},
+  };
+  for (const auto& [text, millimetres] : cases) EXPECT_NEAR(fed_by(text), millimetres, 1e-9) << text;
+}
+
 TEST(GcodeNetFilament, RepRapFirmwareScalesMovesOfAxesOnly) {
   const std::string text = "M83\nM221 S50\nG1 X10 E1\nG1 E-1\nG1 X20 E3\n";
   EXPECT_NEAR(fed_by(text), 0.5 + 1.5 - 0.5, 1e-9);

@@ -53,6 +53,9 @@ TEST(UnusualObj, LinesThatABackslashTakesAreNamed) {
     }
   }
   const Part two = loaded(write_file("taken.obj", box_obj() + "v 1 1 1 \\\nv 2 2 2\\\nv 3 3 3\n"), options);
+  std::string continued = "g a \\\n";  // in a time that grows with its length: its square would be minutes
+  for (int i = 0; i < 200'000; ++i) continued += "\\\n";
+  EXPECT_EQ(loaded(write_file("continued.obj", continued + "\n" + box_obj())).meshes[0].triangles.size(), 12u);
   EXPECT_CONTAINS(notes_of(two), "line 16 begins as a vertex or a face");
   EXPECT_CONTAINS(notes_of(two), "and so do 1 more");
   // Comments end with their line.
