@@ -203,6 +203,7 @@ Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, cons
   report->cuts += high->cuts;
   report->merged += high->merged;
   report->gaps.add(high->gaps);
+  report->level.keep_larger(high->level);
   slice::LayerContours both;
   for (std::uint32_t b = 0; b < slicer.bodies(); ++b) {
     const ContoursView low_view = out.of(b, work.rebased), high_view = work.highest.of(b, work.rebased_highest);

@@ -256,10 +256,15 @@ class RowObserver : public ImageObserver {
     rows_.add_capped(record.layer, found.capped_rows, found.first_capped_row, found.first_capped_instance, grid);
     rows_.add_open(record.layer, found.open_rows, found.first_open_row, grid);
     capped_ += found.capped_rows;
+    level_.add(record.layer, found.level);
   }
   void warn(const Summary&, std::vector<Warning>& warnings) override {
     const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
-    rows_.report(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
+    const auto name = [&](std::uint32_t instance) {
+      return part.empty() ? std::string() : plan_.scene->parts[part[instance]].path;
+    };
+    rows_.report(name(rows_.first_capped()), warnings);
+    level_.report(name(level_.owner()), warnings);
   }
   void report(Summary& summary) const override {
     if (capped_ > 0)
@@ -270,6 +275,7 @@ class RowObserver : public ImageObserver {
  private:
   const Plan& plan_;
   checks::RowWarnings rows_;
+  checks::LevelWarnings level_;
   std::uint64_t capped_ = 0;
 };
 

@@ -137,7 +137,12 @@ class PathObserver : public ContourObserver {
   void layer(const LayerRecord& record, const slice::SectionReport* made) override {
     sums_.add(*record.paths);
     volume_mm3_ += record.paths->area_mm2 * mm(record.layer.thickness);
-    if (made != nullptr) cuts_ += made->cuts;
+    if (made == nullptr) return;
+    cuts_ += made->cuts;
+    level_.add(record.layer, made->level);
+  }
+  void warn(const Summary&, std::vector<Warning>& warnings) override {
+    level_.report(plan_.sections->names()[level_.owner()], warnings);
   }
   void report(Summary& summary) const override {
     summary.volume_mm3 = volume_mm3_;
@@ -162,6 +167,7 @@ class PathObserver : public ContourObserver {
   PathFacts sums_;
   double volume_mm3_ = 0;
   std::uint64_t cuts_ = 0;
+  checks::LevelWarnings level_;
 };
 
 /// Gaps between cuts: closed, or left open.

@@ -168,6 +168,7 @@ Status LayerImager::section_of(const Solid& solid, const Layer& layer, ImageWork
   if (!solid.instance.empty() && report.capped_rows > 0) {
     report.first_capped_instance = solid.instance[report.first_capped_instance];
   }
+  if (!solid.instance.empty() && report.level.area_um2 > 0) report.level.owner = solid.instance[report.level.owner];
   record.capped_rows += report.capped_rows;
   notes.report.add_solid(report);
   return {};
@@ -188,7 +189,10 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
   const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
   const bool inside = containment == Containment::kInside;
   combine(work.lowest, work.highest, inside ? SetOperation::kIntersection : SetOperation::kUnion, image);
-  return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
+  raster::LayerReport report = low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
+  report.level = low.level;
+  report.level.keep_larger(high.level);
+  return report;
 }
 
 std::array<Nm, 2> LayerImager::planes(const Layer& layer) const {

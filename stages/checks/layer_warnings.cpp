@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stages/checks/solid_checks.h"
+#include "stages/data/mesh.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::checks {
@@ -63,6 +64,28 @@ void RowWarnings::report(const std::string& part, std::vector<Warning>& warnings
                                 "--no-repair to close the parts",
                                 open_.rows, open_.layers.count, open_.position),
                     warnings);
+}
+
+void LevelWarnings::add(const Layer& layer, const LevelFace& face) {
+  constexpr std::uint64_t kReported = 1'000'000;  // um2: less is a rounded top or a small facet, and shows in few pixels
+  if (face.area_um2 < kReported) return;
+  layers_.add(layer);
+  if (face.area_um2 <= largest_.area_um2) return;
+  largest_ = face;
+  position_ = fmt::format("layer {} is sampled, z {:.4f} mm", layer.index, mm(layer.plane()));
+}
+
+void LevelWarnings::report(const std::string& part, std::vector<Warning>& warnings) const {
+  // All corners have to count as above the plane, or none.
+  const double down_mm = mm(largest_.highest - kPlaneReach), up_mm = mm(kPlaneReach + 1 - largest_.lowest);
+  const auto rounded_up = [](double length_mm) { return fmt::format("{:.4f}", length_mm + 0.00005); };
+  layers_.warn("horizontal-face",
+               fmt::format("{}: {:.2f} mm2 of a horizontal face lie within 0.001 mm of where {}, and may be printed in part{}; "
+                           "{} the face by {} mm, or choose another layer thickness",
+                           part, static_cast<double>(largest_.area_um2) / 1e6, position_,
+                           layers_.count > 1 ? fmt::format(" ({} such layers)", layers_.count) : "",
+                           down_mm <= up_mm ? "lower" : "raise", rounded_up(std::min(down_mm, up_mm))),
+               warnings, part);
 }
 
 namespace {

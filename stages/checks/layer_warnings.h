@@ -3,6 +3,7 @@
 // codes   chains-open     cuts of layers stay open
 //         undivided       segmented lines are too short for the requested pores
 //         no-bead         none fits
+//         horizontal-face  lies within a micrometre of a sampling plane and is printed in part
 //         rows-capped, rows-open  rows of images that only repair closes, or that stay open
 //         empty, layers-empty, lost-pixels, cover-top, mixed-powders; volumes, lost parts and bleeds are not in records
 #pragma once
@@ -15,6 +16,7 @@
 
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
+#include "stages/data/level_face.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 
@@ -69,6 +71,22 @@ class RowWarnings {
 
   Rows capped_, open_;
   std::uint32_t instance_ = 0;
+};
+
+/// Horizontal faces that sampling planes cut in part. Of layers in their order.
+class LevelWarnings {
+ public:
+  /// face  the largest of the layer. Less than 1 mm2 is not reported
+  void add(const Layer& layer, const LevelFace& face);
+  /// Of the largest one.
+  std::uint32_t owner() const { return largest_.owner; }
+  /// part  of that owner
+  void report(const std::string& part, std::vector<Warning>& warnings) const;
+
+ private:
+  LevelFace largest_;
+  ReportedLayers layers_;
+  std::string position_;  // of the largest
 };
 
 /// Heights at which a part is of one powder: planes from <= z < to, nm, as sections have them.

@@ -53,6 +53,22 @@ struct Box {
 /// Room that a loader leaves behind a list of triangles, so that later stages can pad it without moving it.
 inline constexpr std::size_t kTriangleSlack = 32;
 
+// --- a vertex and a sampling plane: the one rule of every section (bitmaps, contours, the areas of sections).
+//
+// File formats hold 24 bits of a coordinate, and rotations round: vertices of one horizontal face differ by some nanometres, so a
+// plane through them would meet half of its triangles. A vertex up to kPlaneReach above a plane therefore counts as in the plane,
+// for this plane alone and in all triangles at once: the mesh stays closed, and no surface moves by more than that.
+
+/// nm; a float in mm has steps of 31 nm from 256 mm on
+inline constexpr Nm kPlaneReach = 100;
+
+constexpr bool is_above_plane(std::int64_t z, std::int64_t plane) { return z > plane + kPlaneReach; }
+
+/// The height at which a vertex counts, nm: above the plane, or at most in it.
+constexpr Nm height_for_plane(Nm z, std::int64_t plane) {
+  return is_above_plane(z, plane) || z <= plane ? z : static_cast<Nm>(plane);
+}
+
 class MeshBlocks;  // stages/geometry/blocks/mesh_blocks.h
 
 /// One solid. Triangles T from `repaired_from` on were added by repair (caps over openings).

@@ -172,7 +172,7 @@ LayerBound::CrossingCount LayerBound::of(const CrossingSums::Slab& slab, std::ui
 LayerBound::CrossingCount LayerBound::at(Nm plane) const {
   CrossingCount total;
   for (const Copies& one : copies_) {
-    const CrossingSums::Slab* slab = tables_[one.table].at(std::int64_t{plane} - one.lift);
+    const CrossingSums::Slab* slab = tables_[one.table].at(std::int64_t{plane} + kPlaneReach - one.lift);
     if (slab == nullptr) continue;
     const CrossingCount count = of(*slab, one.count);
     total = {total.segments + count.segments, total.crossings + count.crossings, total.clusters + count.clusters};

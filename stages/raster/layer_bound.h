@@ -20,6 +20,9 @@ namespace lamina::raster {
 ///
 /// Slabs are 2^k nm high, counted from height 0 of the mesh, and no more than kMaxSlabs. Sums are made by many threads, in any
 /// order: slopes are rounded up so that doubles add them exactly. Copyable; 16 bytes a slab.
+///
+/// A plane is looked up kPlaneReach higher, where it meets what it meets, though the ends of a cut may lie up to that much lower:
+/// tents are higher by what a slab's slope and the facet's longest edge make of it.
 class CrossingSums {
  public:
   /// lowest, highest  between which clusters lie, nm

@@ -94,6 +94,8 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   const State& state = *state_;
   LayerReport report;
   const LayerBound::CrossingCount bound = state.bound.front().at(plane);
+  // What it meets is what one there would if no vertex counted as in it.
+  const auto meets = static_cast<Nm>(std::min(std::int64_t{plane} + kPlaneReach, kNmReach));
   const std::uint32_t rows = state.grid.rows();
   out.columns = state.grid.columns();
   out.change.clear();
@@ -118,17 +120,18 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
     }
   };
   scratch.visits.clear();
+  scratch.segments.level.clear();
   ensure_capacity(scratch.visits, bound.clusters);
   if (engine == Engine::kRays) {
     each_band([&](std::uint32_t first, std::uint32_t last) {
       scratch.visits.clear();
-      state.beams.front().find_clusters(state.sampling, plane, first, last, scratch.visits);
+      state.beams.front().find_clusters(state.sampling, meets, first, last, scratch.visits);
       append(scratch.visits, first, last);
     });
   } else {
     for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
       const PlacedMesh& placed = state.placed[i];
-      const std::int64_t z = std::int64_t{plane} - placed.offset.z;
+      const std::int64_t z = std::int64_t{meets} - placed.offset.z;
       state.heights[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find(z, z, [&](std::uint32_t cluster) {
         scratch.visits.push_back({cluster, i});
       });
@@ -151,6 +154,8 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
     }
   }
   out.row_offset.resize(std::size_t{rows} + 1, static_cast<std::uint32_t>(out.change.size()));
+  std::ranges::sort(scratch.segments.level, {}, &LevelFace::owner);
+  for (const LevelFace& face : scratch.segments.level) report.level.keep_larger(face);
   report.scratch_bytes = scratch.bytes();
   return report;
 }
@@ -177,7 +182,7 @@ void Rasterizer::mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t
   const auto first_from = [&](std::int64_t z) { return std::ranges::lower_bound(planes, z) - planes.begin(); };
   for (const PlacedMesh& one : state_->placed) {
     if (!visited.emplace(one.mesh, one.offset.z).second) continue;
-    const std::int64_t lift = one.offset.z;
+    const std::int64_t lift = std::int64_t{one.offset.z} - kPlaneReach;
     for (std::uint32_t c = 0; c < one.mesh->cluster_count(); ++c) {
       const Box& box = one.mesh->bounds[c];
       if (first_from(box.lo.z + lift) == first_from(box.hi.z + lift)) continue;

@@ -63,7 +63,7 @@ void cut_clusters(const RowBand& band, std::span<const ClusterVisit> visits, Seg
     instance = visit.instance;
     found.reaches(indexed.vertex);
     const IndexedSource block{indexed.cluster, visit.cluster, indexed.vertex,
-                              indexed.step_of(std::int64_t{plane} - source.offset.z)};
+                              indexed.step_of(std::int64_t{plane} + kPlaneReach - source.offset.z)};
     while (!of_block.empty()) {
       if (found.is_full()) cut_found(), found.reaches(indexed.vertex);
       of_block = of_block.subspan(kernels.find(block, of_block, found));
@@ -82,6 +82,7 @@ void LayerReport::add_solid(const LayerReport& solid) {
   crossings += solid.crossings;
   capped_rows += solid.capped_rows;
   open_rows += solid.open_rows;
+  level.keep_larger(solid.level);
 }
 
 void ScanConverter::fill(const RowBand& band, const Segments& segments) {

@@ -37,6 +37,7 @@ struct LayerReport {
   std::uint32_t open_rows = 0;    // rows in which the crossings of a part do not add up to zero: it was not repaired
   std::uint32_t first_capped_row = 0, first_open_row = 0;  // geometry rows; the lowest, if there is any
   std::uint32_t first_capped_instance = 0;                 // of the facet that closes that row
+  LevelFace level;                                         // the largest, if any
   std::uint64_t scratch_bytes = 0;
 
   /// Adds the crossings and rows of another solid of the layer; rows to report come from the first solid that has any.

@@ -58,10 +58,12 @@ void Segments::append(const Segments& other, std::size_t i) {
   ++size;
 }
 
-ExactTriangle exact_triangle(const SegmentOrigin& origin, std::span<const PlacedMesh> placed) {
+ExactTriangle exact_triangle(const SegmentOrigin& origin, std::span<const PlacedMesh> placed, Nm plane) {
   const PlacedMesh& part = placed[origin.instance];
   const Triangle facet = part.mesh->blocks->triangle(origin.facet / kClusterSize, origin.facet % kClusterSize);
-  const auto on_bed = [&](const Point3& p) { return Point3{p.x + part.offset.x, p.y + part.offset.y, p.z + part.offset.z}; };
+  const auto on_bed = [&](const Point3& p) { 
+    return Point3{p.x + part.offset.x, p.y + part.offset.y, height_for_plane(p.z + part.offset.z, plane)};
+  };
   return {on_bed(facet.a), on_bed(facet.b), on_bed(facet.c)};
 }
 

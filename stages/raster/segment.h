@@ -5,7 +5,8 @@
 //
 // Why no crossing is lost or counted twice:
 //  - a corner with z <= Z is below the plane, so a triangle is cut through exactly two edges or not at all, even if
-//    corners lie exactly in the plane;
+//    corners lie exactly in the plane; corners some nanometres above count as in it (height_for_plane() in mesh.h), in all
+//    their triangles. So a plane meets just the triangles that one kPlaneReach higher would without this rule;
 //  - the rows of a segment are the half-open range [row(end 1), row(end 2)), where row(end) is the first row at or
 //    beyond the end; it depends on the mesh edge that carries the end and on nothing else, so the segments on both
 //    sides of an edge share rows without gap or overlap;
@@ -21,6 +22,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
+#include "stages/data/level_face.h"
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 
@@ -71,6 +73,7 @@ struct Segments {
   Buffer<SegmentRows> rows;
   Buffer<SegmentOrigin> origin;
   std::size_t size = 0;  // the arrays may be longer
+  Buffer<LevelFace> level;  // of each instance that has any in this layer
 
   static constexpr std::size_t kBytes = 2 * sizeof(double) + sizeof(SegmentRows) + sizeof(SegmentOrigin);  // a segment
 
@@ -80,7 +83,8 @@ struct Segments {
   /// Appends one of another list's.
   void append(const Segments& other, std::size_t i);
   std::uint64_t bytes() const {
-    return bytes_held(column) + bytes_held(columns_per_nm) + bytes_held(rows) + bytes_held(origin);
+    return bytes_held(column) + bytes_held(columns_per_nm) + bytes_held(rows) + bytes_held(origin) +
+           bytes_held(level);
   }
 };
 
@@ -115,8 +119,8 @@ struct ExactTriangle {
   }
 };
 
-/// The triangle that was cut, on the bed.
-ExactTriangle exact_triangle(const SegmentOrigin& origin, std::span<const PlacedMesh> placed);
+/// The triangle that was cut, on the bed, with its corners' heights as they count for the plane.
+ExactTriangle exact_triangle(const SegmentOrigin& origin, std::span<const PlacedMesh> placed, Nm plane);
 
 /// The first column whose centre is at or beyond the crossing of the triangle's plane with row centre y at height z.
 /// Needs nx != 0. Integers only: the crossing is a.x - (ny (y - a.y) + nz (z - a.z)) / nx, and a whole-numbered

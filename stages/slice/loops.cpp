@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -40,10 +41,18 @@ Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
   return static_cast<Nm>(from + whole - static_cast<std::int64_t>(kPositive));
 }
 
+[[gnu::cold]] void add_level(const Point3* corner, std::int64_t z, LevelFace& level) {
+  const auto above = [&](int k) { return static_cast<Nm>(height_for_plane(corner[k].z, z) - z); };
+  const std::int64_t ux = std::int64_t{corner[1].x} - corner[0].x, uy = std::int64_t{corner[1].y} - corner[0].y;
+  const std::int64_t vx = std::int64_t{corner[2].x} - corner[0].x, vy = std::int64_t{corner[2].y} - corner[0].y;
+  level.add(above(0), above(1), above(2), static_cast<std::uint64_t>(std::abs(ux * vy - uy * vx)));
+}
+
 }  // namespace
 
 Point2 crossing(const Edge& edge, std::int64_t z) {
-  const std::int64_t num = z - edge.low.z, den = std::int64_t{edge.high.z} - edge.low.z;
+  const Nm low_z = height_for_plane(edge.low.z, z);
+  const std::int64_t num = z - low_z, den = std::int64_t{edge.high.z} - low_z;
   const double share = static_cast<double>(num) / static_cast<double>(den);
   return {between(edge.low.x, edge.high.x, share, num, den), between(edge.low.y, edge.high.y, share, num, den)};
 }
@@ -56,6 +65,7 @@ void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> fac
   cuts.from_hash.resize(count);
   cuts.to_hash.resize(count);
   cuts.at.resize(count);
+  cuts.level = {};
   for (std::size_t i = 0; i < count; ++i) {
     if (i + kAhead < count) {
       const auto* next = reinterpret_cast<const char*>(&triangles[facets[i + kAhead]]);
@@ -63,14 +73,14 @@ void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> fac
       __builtin_prefetch(next + sizeof(Triangle) - 1);
     }
     const Point3* corner = &triangles[facets[i]].a;
-    const bool a = corner[0].z > z, b = corner[1].z > z, c = corner[2].z > z;
+    const bool a = is_above_plane(corner[0].z, z), b = is_above_plane(corner[1].z, z), c = is_above_plane(corner[2].z, z);
     // The tip is alone on its side; the plane cuts the two edges that start there.
     const std::uint32_t tip = a == b ? 2 : a == c ? 1 : 0;
     const Point3& own = corner[tip];
     const Point3& next = corner[tip == 2 ? 0 : tip + 1];
     const Point3& previous = corner[tip == 0 ? 2 : tip - 1];
     const std::uint64_t own_hash = hash_of(own), next_hash = hash_of(next), previous_hash = hash_of(previous);
-    if (own.z > z) {
+    if (is_above_plane(own.z, z)) {
       cuts.from[i] = {next, own};
       cuts.to[i] = {previous, own};
       cuts.from_hash[i] = hash_of(next_hash, own_hash);
@@ -82,6 +92,8 @@ void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> fac
       cuts.to_hash[i] = hash_of(own_hash, next_hash);
     }
     cuts.at[i] = crossing(cuts.from[i], z);
+    if (LevelFace::is_level(corner[0].z - z, corner[1].z - z, corner[2].z - z)) [[unlikely]]
+      add_level(corner, z, cuts.level);
   }
 }
 
@@ -124,7 +136,8 @@ PlaneIndex index_crossings(std::span<const Triangle> triangles, std::span<const 
             for (std::uint32_t facet = 0; facet < triangles.size(); ++facet) {
               const Triangle& t = triangles[facet];
               const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
-              const std::uint32_t first = first_at_or_above(low), last = first_at_or_above(high);
+              const std::uint32_t first = first_at_or_above(std::int64_t{low} - kPlaneReach),
+                                  last = first_at_or_above(std::int64_t{high} - kPlaneReach);
               if (first < last) use({first, last, facet});
             }
           }};

@@ -1,8 +1,8 @@
 // stages/slice/loops.h: one plane cuts the facets that it crosses, cuts are joined to chains, and gaps between chains are
 // closed.
 //
-// A corner with z <= Z is below the plane, as for the bitmaps; so a facet is cut through exactly two edges or not at
-// all. A crossing belongs to the mesh edge that carries it and is computed from that edge's lower end, in the same bits
+// A corner with z <= Z, or some nanometres above (height_for_plane()), is below the plane, as for the bitmaps; so a facet is cut
+// through exactly two edges or not at all. A crossing belongs to the mesh edge that carries it and is computed from that edge's lower end, in the same bits
 // for both facets that share it.
 //
 // Edges are found by their names, the two ends; points are never compared, so there is no tolerance and two crossings
@@ -16,6 +16,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
+#include "stages/data/level_face.h"
 #include "stages/data/mesh.h"
 #include "stages/geometry/interval_table.h"
 
@@ -33,6 +34,7 @@ struct Cuts {
   Buffer<Edge> from, to;
   Buffer<std::uint64_t> from_hash, to_hash;  // of the edges' names
   Buffer<Point2> at;                         // nm, where from[i] meets the plane
+  LevelFace level;                           // horizontal faces among the facets
 
   std::size_t size() const { return at.size(); }
   std::uint64_t bytes() const {
@@ -40,7 +42,7 @@ struct Cuts {
   }
 };
 
-/// Where an edge meets height z: low.z <= z < high.z. Rounded to the nearest nm, halves towards +infinity on the way
+/// Where an edge meets height z, low.z being below the plane and high.z above it. Rounded to the nearest nm, halves towards +infinity on the way
 /// from the lower end; decided in integers.
 Point2 crossing(const Edge& edge, std::int64_t z);
 
@@ -50,8 +52,7 @@ void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> fac
 
 // --- which facets a plane crosses, for planes known beforehand.
 
-/// The planes [first, last) that each facet crosses, by their numbers; facets between planes are not in it. A corner at a plane
-/// is below it.
+/// The planes [first, last) that each facet crosses, by their numbers; facets between planes are not in it.
 using PlaneIndex = IntervalTable<std::uint32_t>;
 
 /// triangles  nm, frame of the mesh; fewer than 2^32

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
@@ -77,6 +78,7 @@ void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScra
                       SectionReport& report) const {
   find_loops(meshes_[source.mesh].triangles, source, planes_, plane, scratch, closed);
   report.cuts += scratch.cuts.size();
+  report.level.keep_larger(scratch.cuts.level);
   if (scratch.open.size() == 0) return;
   report.gaps.add(close_gaps(scratch.open, options_.gap, closed));
 }
@@ -107,6 +109,7 @@ Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch
     return Error{status.error().fault, fmt::format("plane at {} mm: {}", mm(planes_[plane]), status.error().message)};
   };
   for (std::uint32_t b = 0; b < bodies_; ++b) {
+    LevelFace level = std::exchange(report.level, {});
     const std::span<const Placed> members = std::span(placed_).subspan(body_offset_[b], body_offset_[b + 1] - body_offset_[b]);
     if (members.size() == 1) {
       const Placed& only = members.front();
@@ -130,6 +133,9 @@ Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch
       append_moved(all, {0, 0}, out.contours);
     }
     out.body.push_back(out.contours.size());
+    report.level.owner = b;
+    level.keep_larger(report.level);
+    report.level = level;
   }
   return report;
 }

@@ -44,6 +44,7 @@ struct LayerContours {
 struct SectionReport {
   std::uint64_t cuts = 0;    // facets that the plane crosses, with copies once
   std::uint32_t merged = 0;  // groups of contours that needed a boolean operation
+  LevelFace level;           // the largest, of one body
   GapReport gaps;            // sums over bodies; first_open of the first one
 };
 

@@ -41,6 +41,8 @@ const std::vector<WarningKind> kKinds = {
     {"not-written", "slice part.stl --layer 1 --format 3mf --pattern raster --bead 1", Page::kNone},
     {"above-bed", "extrude part.stl --bottom 5" + kExtruded},
     {"empty", "jet part.stl --layer 100 --dpi 60 --allow-empty"},
+    {"horizontal-face", "jet level.obj --layer 0.1 --dpi 60", Page::kHasItNot},
+    {"horizontal-face", "slice level.obj --layer 0.1", Page::kNone},
     {"rows-capped", "jet open.obj" + kBed},
     {"rows-open", "jet open.obj part.stl --no-repair" + kBed, Page::kHasItNot},
     {"chains-open", "extrude open.obj part.stl --no-repair" + kExtruded},
@@ -99,6 +101,9 @@ class WarningKinds : public ::testing::Test {
     file("peg.obj", boxes_text({{0, 0, 0, 20, 20, 2}, {8, 8, 2, 11, 11, 4}}));
     file("open.obj", boxes_text({{0, 0, 0, 8, 8, 2}}, 0, true));
     write_box(in_ / "thin.stl", {0, 0, 0}, {8, 0.4F, 1});
+    file("level.obj",  // the top is 500 nm above the plane of its last layer on one side, and as much below on the other
+         "v 0 0 0\nv 9 0 0\nv 9 8 0\nv 0 8 0\nv 0 0 0.5505\nv 9 0 0.5495\nv 9 8 0.5495\nv 0 8 0.5505\n"
+         "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
     file("islands.obj", boxes_text({{0, 0, 0, 8, 8, 2}, {10, 0, 1, 12, 2, 2}}));
     file("hollow.obj", boxes_text({{0, 0, 0, 8, 8, 2}, {2, 2, 0.5, 5, 5, 1.5}}, 1));
     file("rib.obj", boxes_text({{0, 0, 0, 10, 10, 2}, {12, 0, 0, 12.5, 10, 1}}));

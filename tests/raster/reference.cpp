@@ -29,7 +29,10 @@ Runs reference_layer(std::span<const Triangle> triangles, const PixelGrid& grid,
   const std::int64_t columns = grid.columns(), rows = grid.rows();
   const auto centre = [](const PixelAxis& axis, std::int64_t i) { return ((2 * i + 1) * axis.span) / (2 * axis.dots); };
   std::vector<std::map<std::int64_t, int>> steps(static_cast<std::size_t>(rows));  // column -> change of winding
-  for (const Triangle& t : triangles) {
+  for (Triangle t : triangles) {
+    for (Point3* p : {&t.a, &t.b, &t.c}) {  // up to 100 nm above the plane is in it
+      if (p->z > plane && std::int64_t{p->z} - plane <= 100) p->z = plane;
+    }
     const Point3 corner[3] = {t.a, t.b, t.c};
     std::vector<std::pair<Point3, Point3>> cut;  // edges that the plane crosses
     for (int k = 0; k < 3; ++k) {

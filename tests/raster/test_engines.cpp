@@ -125,6 +125,71 @@ TEST(Engines, AgreeOnTetrahedraAnywhereAndOnNeedles) {
   }
 }
 
+/// A slab of 12 x 9 mm on z = 0 whose top is a grid of facets; `height` gives the height of each of its vertices.
+template <class Height>
+Triangles rough_slab(const Height& height) {
+  constexpr int kColumns = 12, kRows = 9;
+  const auto at = [](int i, int j, Nm z) { return Point3{1'000'000 * i + 500'007, 1'000'000 * j + 700'003, z}; };
+  std::vector<Nm> top;
+  for (int k = 0; k < (kColumns + 1) * (kRows + 1); ++k) top.push_back(height());
+  const auto up = [&](int i, int j) { return at(i, j, top[static_cast<std::size_t>(j * (kColumns + 1) + i)]); };
+  Triangles out;
+  const auto quad = [&](Point3 a, Point3 b, Point3 c, Point3 d) { out.insert(out.end(), {{a, b, c}, {a, c, d}}); };
+  for (int i = 0; i < kColumns; ++i) {
+    for (int j = 0; j < kRows; ++j) {
+      quad(up(i, j), up(i + 1, j), up(i + 1, j + 1), up(i, j + 1));
+      quad(at(i, j, 0), at(i, j + 1, 0), at(i + 1, j + 1, 0), at(i + 1, j, 0));
+    }
+    quad(at(i, 0, 0), at(i + 1, 0, 0), up(i + 1, 0), up(i, 0));
+    quad(at(i + 1, kRows, 0), at(i, kRows, 0), up(i, kRows), up(i + 1, kRows));
+  }
+  for (int j = 0; j < kRows; ++j) {
+    quad(at(0, j + 1, 0), at(0, j, 0), up(0, j), up(0, j + 1));
+    quad(at(kColumns, j, 0), at(kColumns, j + 1, 0), up(kColumns, j + 1), up(kColumns, j));
+  }
+  return out;
+}
+
+TEST(Engines, AHorizontalFaceWithNoiseIsInALayerOrIsNot) {
+  const PixelGrid grid{{254, 14'000'000}, {254, 11'000'000}};
+  constexpr Nm kPlane = 600'000;
+  struct Case {
+    Nm from, to;  // heights above the plane
+    std::uint64_t pixels;
+    bool reported;
+  };
+  for (const Case& one : {Case{-1000, 0, 0, false}, {-60, 100, 0, false}, {1, 100, 0, false}, {101, 900, 120 * 90, false},
+                          {90, 110, 1, true}, {-1000, 1000, 1, true}, {-2500, 2500, 1, true}}) {
+    std::mt19937 random(static_cast<unsigned>(one.to - one.from));
+    std::uniform_int_distribution<Nm> pick(one.from, one.to);
+    const Triangles slab = rough_slab([&] { return kPlane + pick(random); });
+    const std::uint64_t pixels = expect_exact(slab, grid, {kPlane});
+    Mesh mesh = make_mesh(slab);
+    const std::vector<Instance> instances{{0, {0, 0, -kPlane}}, {0, {0, 0, 0}}};
+    auto rasterizer = raster::Rasterizer::build({&mesh, 1}, instances, grid, FillRule::kNonzero, true, true);
+    ASSERT_TRUE(rasterizer.ok());
+    raster::LayerScratch scratch;
+    Runs runs;
+    const LevelFace face = rasterizer->layer(Engine::kContours, kPlane, scratch, runs).level;
+    const LevelFace by_rays = rasterizer->layer(Engine::kRays, kPlane, scratch, runs).level;
+    if (one.pixels != 1) {
+      EXPECT_EQ(set_pixels(runs), one.pixels) << one.from << " to " << one.to << " nm";
+    } else {
+      EXPECT_GT(set_pixels(runs), 120u * 90 / 50) << "the face is not in doubt";
+      EXPECT_LT(set_pixels(runs), 120u * 90 - 120 * 90 / 50) << "the face is not in doubt";
+    }
+    EXPECT_GE(pixels, set_pixels(runs));
+    EXPECT_EQ(face.area_um2 > 0, one.reported);
+    EXPECT_EQ(face.area_um2, by_rays.area_um2);
+    EXPECT_EQ(std::pair(face.lowest, face.highest), std::pair(by_rays.lowest, by_rays.highest));
+    if (!one.reported) continue;
+    EXPECT_EQ(face.owner, 1u);
+    EXPECT_LE(face.area_um2, 108'000'000u);
+    EXPECT_GE(face.lowest, -kLevelReach);
+    EXPECT_LE(face.highest, kLevelReach);
+  }
+}
+
 TEST(Engines, AgreeAtTheFarEndOfTheReach) {
   // A bed of 2.1 m at low resolution: float holds these coordinates to 128 nm only.
   const PixelGrid grid{{120, 2'147'000'000}, {150, 2'147'000'000}};

@@ -49,13 +49,13 @@ Point3 corner_of(Kind kind, const Bed& bed, const Point3& near, std::mt19937& ra
   switch (kind) {
     case Kind::kOnCentres: return {50'000 + 100'000 * below(58), 25'000 + 50'000 * below(98), 250'000 * below(8)};
     case Kind::kHuge: return {below(2'147'000'000), below(2'147'000'000), below(2'147'000'000)};
-    case Kind::kFlat: return {below(30'000'000), below(25'000'000), bed.plane - 10 + below(20)};
+    case Kind::kFlat: return {below(30'000'000), below(25'000'000), bed.plane - 10 + below(130)};  // and just beyond what counts as in the plane
     case Kind::kAlongRows: return {below(30'000'000), near.y + below(90'000), below(2'000'000)};
     case Kind::kUpright: return {near.x + below(2), below(25'000'000), below(2'000'000)};
     case Kind::kNear: {  // ends within a nanometre or so of row centres, crossings of column centres
       const std::int64_t row = below(bed.grid.rows() - 1), column = below(bed.grid.columns() - 1);
       return {static_cast<Nm>(bed.grid.x.centre(column)) - 1 + below(3), static_cast<Nm>(bed.grid.y.centre(row)) - 1 + below(3),
-              bed.plane + (random() % 2 == 0 ? -1 : 1) * below(3)};
+              bed.plane + (random() % 2 == 0 ? 0 : kPlaneReach) + below(6) - 3};
     }
     case Kind::kAny: break;
   }
@@ -131,7 +131,7 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClu
   Crossings all;
   const std::uint32_t facets = part.mesh.cluster_count() * kClusterSize;
   for (std::uint32_t i = 0; i < facets * part.placed.size(); ++i) {
-    const ExactTriangle t = raster::exact_triangle({i % facets, i / facets}, part.placed);
+    const ExactTriangle t = raster::exact_triangle({i % facets, i / facets}, part.placed, plane);
     std::vector<std::int64_t> ends;
     const Point3 corners[] = {t.a, t.b, t.c, t.a};
     for (int k = 0; k < 3; ++k) {

@@ -37,14 +37,30 @@ inline constexpr std::size_t kClustersAhead = 8;
   for (std::uint32_t k = first; k < first + kCornersAhead; k += 2) __builtin_prefetch(found.base + found.corner[0][k]);
 }
 
-/// The plane in the frame of a mesh, where corners lie; one out of reach of any corner cuts nothing.
-inline Nm plane_in_mesh(Nm plane, const Point3& offset) {
+/// The plane in the frame of a mesh, where corners lie, and up to where corners count as in it; one out of reach of any corner
+/// cuts nothing.
+struct PlaneInMesh {
+  Nm z, reach;
+};
+inline PlaneInMesh plane_in_mesh(Nm plane, const Point3& offset) {
   constexpr std::int64_t kMin = std::numeric_limits<Nm>::min(), kMax = std::numeric_limits<Nm>::max();
-  return static_cast<Nm>(std::clamp(std::int64_t{plane} - offset.z, kMin, kMax));
+  const auto within = [&](std::int64_t z) { return static_cast<Nm>(std::clamp(z, kMin, kMax)); };
+  const std::int64_t z = std::int64_t{plane} - offset.z;
+  return {within(z), within(z + kPlaneReach)};
 }
 
 /// The first row at or beyond the point in which the plane meets an edge, decided in integers. The plane is `up` above the tip.
 [[gnu::cold]] std::uint32_t exact_end(const PixelSampling& sampling, Nm tip_y, Nm up, Nm edge_y, Nm edge_z);
+
+/// Edges from the tip of a cut facet that rise or fall by less may belong to a horizontal face in the plane (LevelFace).
+inline constexpr std::int32_t kLevelEdge = 2048;
+static_assert(kLevelEdge > 2 * kLevelReach);
+
+/// Adds facets to the horizontal faces of the layer, if they are part of one, in the band in which their first row lies.
+/// number     of the first facet (CutFacets)
+/// lanes      of the facets, a bit each
+/// instance   of each facet
+[[gnu::cold]] void note_level(const CutTask& task, const Nm* number, std::uint32_t lanes, const std::uint32_t* instance);
 
 /// The crossing of a segment with a row, decided in integers.
 std::uint32_t exact_crossing(const FillTask& task, std::size_t segment, std::uint32_t row);

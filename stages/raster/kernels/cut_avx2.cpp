@@ -60,6 +60,16 @@ LAMINA_INLINE Turns turns_of(__m256i a_z, __m256i b_z, __m256i c_z, __m256i plan
           _mm256_andnot_si256(a_c, a_b), _mm256_xor_si256(a_b, _mm256_set1_epi32(-1))};
 }
 
+/// The plane in the frame of a mesh, and heights as they count for it (height_for_plane()).
+struct Planes {
+  __m256i z, reach;
+  LAMINA_INLINE explicit Planes(const PlaneInMesh& plane)
+      : z(_mm256_set1_epi32(plane.z)), reach(_mm256_set1_epi32(plane.reach)) {}
+  LAMINA_INLINE __m256i counted(__m256i height) const {
+    return _mm256_blendv_epi8(_mm256_min_epi32(height, z), height, _mm256_cmpgt_epi32(height, reach));
+  }
+};
+
 /// One coordinate of eight facets, turned.
 struct Turned {
   __m256i tip, left, right;  // edges from the tip
@@ -88,10 +98,10 @@ LAMINA_INLINE Points corners_at(const Nm* base, const std::int32_t* corner) {
 
 /// Puts numbers of eight facets (CutFacets::Number) where `put` says.
 template <class Put>
-LAMINA_INLINE void put_numbers(const Turns& turn, const Points& p, const Points& q, const Points& r, __m256i plane,
-                               const Point3& offset, Put&& put) {
-  const Turned z = turned(turn, p.z, q.z, r.z);
-  put(CutFacets::kUp, _mm256_sub_epi32(plane, z.tip));
+LAMINA_INLINE void put_numbers(const Turns& turn, const Points& p, const Points& q, const Points& r,
+                               const Planes& plane, const Point3& offset, Put&& put) {
+  const Turned z = turned(turn, plane.counted(p.z), plane.counted(q.z), plane.counted(r.z));
+  put(CutFacets::kUp, _mm256_sub_epi32(plane.z, z.tip));
   put(CutFacets::kLeftZ, z.left), put(CutFacets::kRightZ, z.right);
   const Turned y = turned(turn, p.y, q.y, r.y);
   put(CutFacets::kTipY, _mm256_add_epi32(y.tip, _mm256_set1_epi32(offset.y)));
@@ -104,7 +114,7 @@ LAMINA_INLINE void put_numbers(const Turns& turn, const Points& p, const Points&
 /// What all facets of a task share, and where the next segment goes: kept in registers, since what is written could be anything
 /// for all that compilers know.
 struct Cutter {
-  const PixelSampling& sampling;
+  const CutTask& task;
   double *column, *columns_per_nm;
   SegmentRows* rows;
   SegmentOrigin* origin;
@@ -113,7 +123,7 @@ struct Cutter {
 };
 LAMINA_INLINE Cutter cutter_for(const CutTask& task) {
   Segments& out = task.out;
-  return {task.sampling,
+  return {task,
           out.column.data(),
           out.columns_per_nm.data(),
           out.rows.data(),
@@ -154,7 +164,7 @@ LAMINA_INLINE __m256i pairs(__m128i first, __m128i second) {
 
 /// Appends the segments of the live ones of four facets; the arrays are long enough.
 LAMINA_INLINE void cut_four(Cutter& cutter, const CutFacets& facets, std::uint32_t i, int live, __m128i instance) {
-  const PixelSampling& sampling = cutter.sampling;
+  const PixelSampling& sampling = cutter.task.sampling;
   const auto whole = [&](std::uint32_t which) LAMINA_AVX2 { return four(facets.number[which] + i); };
   const auto real = [&](std::uint32_t which) LAMINA_AVX2 { return _mm256_cvtepi32_pd(whole(which)); };
   const __m256d left_z = real(CutFacets::kLeftZ), right_z = real(CutFacets::kRightZ);
@@ -176,6 +186,15 @@ LAMINA_INLINE void cut_four(Cutter& cutter, const CutFacets& facets, std::uint32
   const __m128i first = _mm_max_epi32(_mm_min_epi32(row, other_row), cutter.row_begin);
   const __m128i last = _mm_min_epi32(_mm_max_epi32(row, other_row), cutter.row_end);
   const auto valid = static_cast<unsigned>(live & _mm_movemask_ps(_mm_castsi128_ps(_mm_cmplt_epi32(first, last))));
+
+  const __m128i rise = _mm_or_si128(_mm_abs_epi32(whole(CutFacets::kLeftZ)), _mm_abs_epi32(whole(CutFacets::kRightZ)));
+  const __m128i is_low = _mm_cmplt_epi32(rise, _mm_set1_epi32(kLevelEdge));
+  const auto level = static_cast<unsigned>(live & _mm_movemask_ps(_mm_castsi128_ps(is_low)));
+  if (level != 0) [[unlikely]] {
+    alignas(16) std::uint32_t instances[4];
+    _mm_store_si128(reinterpret_cast<__m128i*>(instances), instance);
+    note_level(cutter.task, facets.number[0] + i, level, instances);
+  }
 
   const __m128i down = _mm_xor_si128(_mm_sub_epi32(row, other_row), whole(CutFacets::kLeftZ));
   const __m128i edges_x = _mm_or_si128(whole(CutFacets::kLeftX), whole(CutFacets::kRightX));
@@ -230,15 +249,15 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
   std::uint8_t crossed[CutFacets::kCapacity / 8];
   std::uint32_t count = 0;
   for (auto& corner : found.corner) store(corner + found.size, _mm256_setzero_si256());  // whole registers are read
-  const __m256i z = _mm256_set1_epi32(plane_in_mesh(task.plane, offset));
+  const Planes planes(plane_in_mesh(task.plane, offset));
   for (std::uint32_t i = 0; i < found.size; i += 8) {
     const unsigned live = found.size - i >= 8 ? 255u : (1u << (found.size - i)) - 1;
     const Points p = corners_at(found.base, found.corner[0] + i), q = corners_at(found.base, found.corner[1] + i),
                  r = corners_at(found.base, found.corner[2] + i);
-    const Turns turn = turns_of(p.z, q.z, r.z, z);
+    const Turns turn = turns_of(p.z, q.z, r.z, planes.reach);
     crossed[i / 8] = static_cast<std::uint8_t>(turn.crossed & live);
     count += static_cast<std::uint32_t>(std::popcount(turn.crossed & live));
-    put_numbers(turn, p, q, r, z, offset,
+    put_numbers(turn, p, q, r, planes, offset,
                 [&](std::uint32_t which, __m256i v) LAMINA_AVX2 { store(facets.number[which] + i, v); });
     store(facets.facet + i, eight(found.facet + i));
   }
@@ -254,17 +273,17 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
 
 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
-  const __m256i z = _mm256_set1_epi32(plane_in_mesh(plane, source.offset));
+  const Planes planes(plane_in_mesh(plane, source.offset));
   for (std::uint32_t first = 0; first < kClusterSize; first += 8) {
     const auto corner = [&](std::uint32_t k) LAMINA_AVX2 {
       return Points{eight(cluster.x[k] + first), eight(cluster.y[k] + first), eight(cluster.z[k] + first)};
     };
     const Points p = corner(0), q = corner(1), r = corner(2);
-    const Turns turn = turns_of(p.z, q.z, r.z, z);
+    const Turns turn = turns_of(p.z, q.z, r.z, planes.reach);
     if (turn.crossed == 0) continue;
     const std::uint32_t n = facets.size;
     const __m256i order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLanesOfEight[turn.crossed])));
-    put_numbers(turn, p, q, r, z, source.offset, [&](std::uint32_t which, __m256i v) LAMINA_AVX2 {
+    put_numbers(turn, p, q, r, planes, source.offset, [&](std::uint32_t which, __m256i v) LAMINA_AVX2 {
       store(facets.number[which] + n, _mm256_permutevar8x32_epi32(v, order));
     });
     store(facets.facet + n, _mm256_add_epi32(order, _mm256_set1_epi32(static_cast<int>(source.first_facet + first))));

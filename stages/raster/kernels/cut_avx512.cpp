@@ -33,6 +33,16 @@ LAMINA_INLINE Turns turns_of(__m512i a_z, __m512i b_z, __m512i c_z, __m512i plan
   return {static_cast<__mmask16>(a_b | a_c), static_cast<__mmask16>(a_b & ~a_c), static_cast<__mmask16>(~a_b)};
 }
 
+/// The plane in the frame of a mesh, and heights as they count for it (height_for_plane()).
+struct Planes {
+  __m512i z, reach;
+  LAMINA_INLINE explicit Planes(const PlaneInMesh& plane)
+      : z(_mm512_set1_epi32(plane.z)), reach(_mm512_set1_epi32(plane.reach)) {}
+  LAMINA_INLINE __m512i counted(__m512i height) const {
+    return _mm512_mask_min_epi32(height, _mm512_cmple_epi32_mask(height, reach), height, z);
+  }
+};
+
 /// One coordinate of 16 facets, turned.
 struct Turned {
   __m512i tip, left, right;  // edges from the tip
@@ -75,7 +85,7 @@ struct Sixteen {
 /// What all facets of a task share, and where the next segment goes: kept in registers, since what is written could be anything
 /// for all that compilers know.
 struct Cutter {
-  const PixelSampling& sampling;
+  const CutTask& task;
   double *column, *columns_per_nm;
   SegmentRows* rows;
   SegmentOrigin* origin;
@@ -86,7 +96,7 @@ struct Cutter {
 LAMINA_INLINE Cutter cutter_for(const CutTask& task) {
   const PixelSampling& sampling = task.sampling;
   Segments& out = task.out;
-  return {sampling,
+  return {task,
           out.column.data(),
           out.columns_per_nm.data(),
           out.rows.data(),
@@ -116,7 +126,7 @@ LAMINA_INLINE __m256i end_rows(const Cutter& cutter, Sixteen of, std::uint32_t e
     if ((near >> k & 1) == 0) continue;
     const auto number = [&](std::uint32_t which) LAMINA_AVX512 { return of.at(which)[i + k]; };
     rows[k] =
-        exact_end(cutter.sampling, number(CutFacets::kTipY), number(CutFacets::kUp), number(edge_x + 1), number(edge_x + 2));
+        exact_end(cutter.task.sampling, number(CutFacets::kTipY), number(CutFacets::kUp), number(edge_x + 1), number(edge_x + 2));
   }
   return _mm256_load_si256(reinterpret_cast<const __m256i*>(rows));
 }
@@ -166,7 +176,16 @@ LAMINA_INLINE void cut_sixteen(Cutter& cutter, Sixteen of, __mmask16 live, __m51
   const __m512i last = _mm512_min_epi32(_mm512_max_epi32(row, other_row), cutter.row_end);
   const unsigned valid = _mm512_mask_cmplt_epi32_mask(live, first, last);
 
-  const __m512i down = _mm512_xor_si512(_mm512_sub_epi32(row, other_row), of.whole(CutFacets::kLeftZ));
+  const __m512i left_z = of.whole(CutFacets::kLeftZ);
+  const __m512i rise = _mm512_or_si512(_mm512_abs_epi32(left_z), _mm512_abs_epi32(of.whole(CutFacets::kRightZ)));
+  const __mmask16 level = _mm512_mask_cmplt_epi32_mask(live, rise, _mm512_set1_epi32(kLevelEdge));
+  if (level != 0) [[unlikely]] {
+    alignas(64) std::uint32_t instances[kClusterSize];
+    _mm512_store_si512(instances, instance);
+    note_level(cutter.task, of.number, level, instances);
+  }
+
+  const __m512i down = _mm512_xor_si512(_mm512_sub_epi32(row, other_row), left_z);
   const __m512i edges_x = _mm512_or_si512(of.whole(CutFacets::kLeftX), of.whole(CutFacets::kRightX));
   __m512i count = _mm512_or_si512(_mm512_slli_epi32(_mm512_sub_epi32(last, first), SegmentRows::kFlagBits),
                                   _mm512_srli_epi32(down, 31));  // SegmentRows::kEnters
@@ -221,17 +240,17 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
   __mmask16 crossed[CutFacets::kCapacity / kClusterSize];
   std::uint32_t count = 0;
   for (auto& corner : found.corner) _mm512_storeu_si512(corner + found.size, _mm512_setzero_si512());  // whole registers
-  const __m512i z = _mm512_set1_epi32(plane_in_mesh(task.plane, offset));
+  const Planes plane(plane_in_mesh(task.plane, offset));
   for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {
     const unsigned live = found.size - i >= kClusterSize ? 0xFFFFu : (1u << (found.size - i)) - 1;
     const Points p = corners_at(found.base, found.corner[0] + i), q = corners_at(found.base, found.corner[1] + i),
                  r = corners_at(found.base, found.corner[2] + i);
-    const Turns turn = turns_of(p.z, q.z, r.z, z);
+    const Turns turn = turns_of(p.z, q.z, r.z, plane.reach);
     crossed[i / kClusterSize] = static_cast<__mmask16>(turn.crossed & live);
     count += static_cast<std::uint32_t>(std::popcount(turn.crossed & live));
     const auto put = [&](std::uint32_t which, __m512i v) LAMINA_AVX512 { _mm512_store_si512(facets.number[which] + i, v); };
-    const Turned in_z = turned(turn, p.z, q.z, r.z);
-    put(CutFacets::kUp, _mm512_sub_epi32(z, in_z.tip));
+    const Turned in_z = turned(turn, plane.counted(p.z), plane.counted(q.z), plane.counted(r.z));
+    put(CutFacets::kUp, _mm512_sub_epi32(plane.z, in_z.tip));
     put(CutFacets::kLeftZ, in_z.left), put(CutFacets::kRightZ, in_z.right);
     const Turned in_y = turned(turn, p.y, q.y, r.y);
     put(CutFacets::kTipY, _mm512_add_epi32(in_y.tip, _mm512_set1_epi32(offset.y)));
@@ -253,23 +272,26 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
 
 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
-  const __m512i z = _mm512_set1_epi32(plane_in_mesh(plane, source.offset));
-  const Turns turn = turns_of(load16(cluster.z[0]), load16(cluster.z[1]), load16(cluster.z[2]), z);
+  const Planes in_mesh(plane_in_mesh(plane, source.offset));
+  const __m512i a_z = load16(cluster.z[0]), b_z = load16(cluster.z[1]), c_z = load16(cluster.z[2]);
+  const Turns turn = turns_of(a_z, b_z, c_z, in_mesh.reach);
   if (turn.crossed == 0) return;
   const std::uint32_t n = facets.size;
   const auto put = [&](std::uint32_t which, __m512i v) LAMINA_AVX512 {
     _mm512_storeu_si512(facets.number[which] + n, _mm512_maskz_compress_epi32(turn.crossed, v));
   };
-  const auto put_turned = [&](const Nm(&of)[3][kClusterSize], std::uint32_t left, std::uint32_t right) LAMINA_AVX512 {
-    const Turned v = turned(turn, load16(of[0]), load16(of[1]), load16(of[2]));
+  const auto put_edges = [&](const Turned& v, std::uint32_t left, std::uint32_t right) LAMINA_AVX512 {
     put(left, v.left), put(right, v.right);
     return v.tip;
   };
-  put(CutFacets::kUp, _mm512_sub_epi32(z, put_turned(cluster.z, CutFacets::kLeftZ, CutFacets::kRightZ)));
-  put(CutFacets::kTipY,
-      _mm512_add_epi32(put_turned(cluster.y, CutFacets::kLeftY, CutFacets::kRightY), _mm512_set1_epi32(source.offset.y)));
-  put(CutFacets::kTipX,
-      _mm512_add_epi32(put_turned(cluster.x, CutFacets::kLeftX, CutFacets::kRightX), _mm512_set1_epi32(source.offset.x)));
+  const auto turned_corners = [&](const Nm(&of)[3][kClusterSize])
+                                  LAMINA_AVX512 { return turned(turn, load16(of[0]), load16(of[1]), load16(of[2])); };
+  const Turned z = turned(turn, in_mesh.counted(a_z), in_mesh.counted(b_z), in_mesh.counted(c_z));
+  put(CutFacets::kUp, _mm512_sub_epi32(in_mesh.z, put_edges(z, CutFacets::kLeftZ, CutFacets::kRightZ)));
+  const __m512i tip_y = put_edges(turned_corners(cluster.y), CutFacets::kLeftY, CutFacets::kRightY);
+  put(CutFacets::kTipY, _mm512_add_epi32(tip_y, _mm512_set1_epi32(source.offset.y)));
+  const __m512i tip_x = put_edges(turned_corners(cluster.x), CutFacets::kLeftX, CutFacets::kRightX);
+  put(CutFacets::kTipX, _mm512_add_epi32(tip_x, _mm512_set1_epi32(source.offset.x)));
   const __m512i lanes = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
   _mm512_storeu_si512(facets.facet + n, _mm512_add_epi32(_mm512_maskz_compress_epi32(turn.crossed, lanes),
                                                          _mm512_set1_epi32(static_cast<int>(source.first_facet))));

@@ -24,7 +24,7 @@ struct Above {
 /// The corner behind one.
 constexpr std::uint32_t kNextCorner[] = {1, 2, 0, 1};
 
-Above corners_above(const Cluster& cluster, Nm z) {
+Above corners_above(const Cluster& cluster, Nm z) {  // of what counts as in the plane
   Above above{};
 #if defined(__SSE2__)
   const __m128i plane = _mm_set1_epi32(z);
@@ -59,6 +59,9 @@ std::uint32_t facets_met(const FacetSteps& steps, std::uint8_t step) {
   return met;
 #endif
 }
+
+/// height_for_plane(), without a branch.
+Nm counted(Nm z, const PlaneInMesh& plane) { return z > plane.reach ? z : std::min(z, plane.z); }
 
 /// That of a facet which the plane does not cut may not fit into 32 bits; it is not used.
 Nm less(Nm a, Nm b) { return static_cast<Nm>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)); }
@@ -130,22 +133,27 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
 
 void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset, FoundFacets& found) {
   CutFacets facets;
-  const Nm z = plane_in_mesh(task.plane, offset), offset_x = offset.x, offset_y = offset.y;
+  const PlaneInMesh plane = plane_in_mesh(task.plane, offset);
+  const Nm z = plane.z, reach = plane.reach, offset_x = offset.x, offset_y = offset.y;
   auto& of = facets.number;
   std::uint32_t to = 0;
   for (std::uint32_t i = 0; i < found.size; ++i) {
     const Nm *const a = found.base + found.corner[0][i], *const b = found.base + found.corner[1][i],
                     *const c = found.base + found.corner[2][i];
     const Nm* const corner[] = {a, b, c, a, b};
-    const bool a_b = (a[2] > z) != (b[2] > z), a_c = (a[2] > z) != (c[2] > z);
+    const bool a_b = (a[2] > reach) != (b[2] > reach), a_c = (a[2] > reach) != (c[2] > reach);
+    const Nm a_z = counted(a[2], plane), b_z = counted(b[2], plane), c_z = counted(c[2], plane);
+    const Nm height[] = {a_z, b_z, c_z, a_z, b_z};
     const unsigned turn = a_b ? (a_c ? 0 : 1) : 2;
     const Nm *const tip = corner[turn], *const left = corner[turn + 1], *const right = corner[turn + 2];
     facets.facet[to] = found.facet[i];
     facets.instance[to] = instance;
     of[CutFacets::kTipX][to] = tip[0] + offset_x;
     of[CutFacets::kTipY][to] = tip[1] + offset_y;
-    of[CutFacets::kUp][to] = less(z, tip[2]);
-    for (std::uint32_t k = 0; k < 3; ++k) {
+    of[CutFacets::kUp][to] = less(z, height[turn]);
+    of[CutFacets::kLeftZ][to] = less(height[turn + 1], height[turn]);
+    of[CutFacets::kRightZ][to] = less(height[turn + 2], height[turn]);
+    for (std::uint32_t k = 0; k < 2; ++k) {
       of[CutFacets::kLeftX + k][to] = less(left[k], tip[k]);
       of[CutFacets::kRightX + k][to] = less(right[k], tip[k]);
     }
@@ -158,8 +166,9 @@ void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset
 
 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
-  const Nm plane_z = plane_in_mesh(plane, source.offset), offset_x = source.offset.x, offset_y = source.offset.y;
-  const Above above = corners_above(cluster, plane_z);
+  const PlaneInMesh in_mesh = plane_in_mesh(plane, source.offset);
+  const Nm offset_x = source.offset.x, offset_y = source.offset.y;
+  const Above above = corners_above(cluster, in_mesh.reach);
   const auto* const coordinates = reinterpret_cast<const Nm*>(&cluster);  // three of z, three of y, three of x
   const std::uint32_t tip_is_1 = above.tip_is_1(), tip_is_2 = above.tip_is_2();
   auto& of = facets.number;
@@ -174,13 +183,14 @@ void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
     constexpr std::uint32_t kX = 6 * kClusterSize, kY = 3 * kClusterSize;  // behind z
     of[CutFacets::kTipX][i] = tip[kX] + offset_x;
     of[CutFacets::kTipY][i] = tip[kY] + offset_y;
-    of[CutFacets::kUp][i] = plane_z - tip[0];
+    const Nm height = counted(tip[0], in_mesh);
+    of[CutFacets::kUp][i] = in_mesh.z - height;
     of[CutFacets::kLeftX][i] = left[kX] - tip[kX];
     of[CutFacets::kLeftY][i] = left[kY] - tip[kY];
-    of[CutFacets::kLeftZ][i] = left[0] - tip[0];
+    of[CutFacets::kLeftZ][i] = counted(left[0], in_mesh) - height;
     of[CutFacets::kRightX][i] = right[kX] - tip[kX];
     of[CutFacets::kRightY][i] = right[kY] - tip[kY];
-    of[CutFacets::kRightZ][i] = right[0] - tip[0];
+    of[CutFacets::kRightZ][i] = counted(right[0], in_mesh) - height;
     ++i;
   }
   facets.size = i;
@@ -213,6 +223,8 @@ void cut(const CutTask& task, CutFacets& facets) {
     rows[to] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first) << SegmentRows::kFlagBits | flags};
     origin[to] = {facets.facet[i], facets.instance[i]};
     to += first < last ? 1 : 0;
+    const auto is_low = [&](std::uint32_t edge) { return std::abs(of[edge][i]) < kLevelEdge; };
+    if (is_low(CutFacets::kLeftZ) && is_low(CutFacets::kRightZ)) note_level(task, of[0] + i, 1, facets.instance + i);
   }
   out.size = to;
   facets.size = 0;

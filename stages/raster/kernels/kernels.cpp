@@ -1,5 +1,9 @@
 #include "stages/raster/kernels/kernels.h"
 
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+
 #include "stages/raster/kernels/bodies.h"
 
 namespace lamina::raster {
@@ -49,14 +53,33 @@ std::uint32_t exact_end(const PixelSampling& sampling, Nm tip_y, Nm up, Nm edge_
   return static_cast<std::uint32_t>(exact_row(sampling.y, {0, tip_y, 0}, {0, tip_y + edge_y, edge_z}, up));
 }
 
+void note_level(const CutTask& task, const Nm* number, std::uint32_t lanes, const std::uint32_t* instance) {
+  for (; lanes != 0; lanes &= lanes - 1) {
+    const auto i = static_cast<std::uint32_t>(std::countr_zero(lanes));
+    const auto of = [&](std::uint32_t which) { return std::int64_t{number[which * CutFacets::kStride + i]}; };
+    const std::int64_t tip = -of(CutFacets::kUp), left = tip + of(CutFacets::kLeftZ), right = tip + of(CutFacets::kRightZ);
+    if (!LevelFace::is_level(tip, left, right)) continue;
+    const std::int64_t left_y = of(CutFacets::kLeftY), right_y = of(CutFacets::kRightY), tip_y = of(CutFacets::kTipY);
+    const PixelAxis& axis = task.sampling.y;
+    const std::int64_t row = axis.first_at_or_beyond(tip_y + std::min({std::int64_t{0}, left_y, right_y}));
+    if (row < task.row_begin || row >= task.row_end) continue;
+    if (axis.centre(row) > tip_y + std::max({std::int64_t{0}, left_y, right_y})) continue;  // engines need not find it
+    const std::int64_t area = of(CutFacets::kLeftX) * right_y - left_y * of(CutFacets::kRightX);
+    Buffer<LevelFace>& faces = task.out.level;
+    auto face = std::ranges::find(faces, instance[i], &LevelFace::owner);
+    if (face == faces.end()) face = faces.insert(face, LevelFace{0, 0, 0, instance[i]});
+    face->add(static_cast<Nm>(tip), static_cast<Nm>(left), static_cast<Nm>(right), static_cast<std::uint64_t>(std::abs(area)));
+  }
+}
+
 std::uint32_t exact_crossing(const FillTask& task, std::size_t segment, std::uint32_t row) {
-  return crossing_of(task, segment, exact_triangle(task.segments.origin[segment], task.placed), row);
+  return crossing_of(task, segment, exact_triangle(task.segments.origin[segment], task.placed, task.plane), row);
 }
 
 /// A facet whose x does not change with y has one column for all rows.
 FourWords decide_near(const FillTask& task, std::size_t segment, std::uint32_t row, std::uint32_t left, std::uint32_t near,
                       FourWords value) {
-  const ExactTriangle triangle = exact_triangle(task.segments.origin[segment], task.placed);
+  const ExactTriangle triangle = exact_triangle(task.segments.origin[segment], task.placed, task.plane);
   const std::uint32_t in_first = triangle.ny == 0 ? crossing_of(task, segment, triangle, row) : 0;
   for (std::uint32_t k = 0; k < std::min(left, 4u); ++k) {
     if ((near >> k & 1) == 0) continue;

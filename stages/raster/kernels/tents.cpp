@@ -24,11 +24,13 @@ LAMINA_BODY std::int32_t less(std::int32_t a, std::int32_t b) {
 LAMINA_BODY float raised(float x) { return std::bit_cast<float>((std::bit_cast<std::int32_t>(x) + 0x1FFF) & ~0x1FFF); }
 
 /// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added, and by
-/// ten operations more, of 2^-24 each, for which 2^-20 is added. A part of at least 2^-6 and of 11 bits is a multiple of 2^-16.
+/// ten operations more, of 2^-24 each, for which 2^-20 is added. A vertex that counts as in the plane lengthens a cut by what the
+/// longest edge does within kPlaneReach, and on its way down a tent counts as that much further up. A part of at least 2^-6 and of 11 bits is a multiple of 2^-16.
 LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, std::int32_t first, Tents& __restrict tents) {
   constexpr float kRounding = 1.0f / (1 << 21), kUp = 1 + 1.0f / (1 << 20);
   constexpr float kMin = 1.0f / (1 << 6);
   const auto bits = static_cast<int>(shift);
+  const float of_slope = 1 + static_cast<float>(kPlaneReach) / static_cast<float>(1 << bits);
   for (std::uint32_t i = 0; i < kClusterSize; ++i) {
     const Nm za = sides.z[0][i], zb = sides.z[1][i], zc = sides.z[2][i], ya = sides.y[0][i];
     const Nm lower = lesser(za, zb), upper = greater(za, zb);
@@ -41,7 +43,7 @@ LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, 
     const std::int32_t peak = lesser((middle >> bits) - first, last);
     const std::int32_t rise = greater(peak - begin, 1), fall = greater(last - peak, 1);
     const auto height = static_cast<float>(greater(less(hi, lo), 1));
-    const float top = (area + depth * height * kRounding) * kUp;  // times the facet's height
+    const float top = (area * of_slope + depth * (height * kRounding + kPlaneReach)) * kUp;  // times the facet's height
     const auto rises = static_cast<float>(rise), falls = static_cast<float>(fall);
     const float part = raised(top / (height * (rises * falls)) + kMin) * static_cast<float>(count);
     tents.begin[i] = begin;
