@@ -276,6 +276,7 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request) {
   options.unit_mm = millimetres_of(request.unit);
   options.drop_bad = job.drop_bad;
   options.repair = job.repair;
+  options.turn_shells = job.fill_rule == FillRule::kNonzero;
   options.winding = job.winding;
   options.weld_nm = nm_of(job.weld_um / 1000);
   return options;

@@ -44,6 +44,7 @@ struct LoadOptions {
   bool blocks = false;                   // closed meshes may come as Mesh::blocks, which are read in one pass, not as lists
   Isa isa = Isa::kAuto;                  // widest instructions of the loops that make blocks; no mesh depends on it
   std::shared_ptr<Scratch> scratch;      // none: each file takes its own
+  bool turn_shells = true;               // shells that are inside out and overlap others are turned over (shells.h), with a note
   bool winding = false;                  // close such a mesh by its winding number instead of caps: approximate
   std::int64_t weld_nm = kWeldByItself;  // repair joins open edges that are at most this far apart
   std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
@@ -60,7 +61,7 @@ using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Tri
 ///          each build item (a single one for STL and OBJ); coordinates as in the file after the transform, not yet
 ///          placed on a bed. Copies in a 3MF file share a mesh where every vertex snaps to the same place but for a
 ///          whole translation. Numbers in text (STL, OBJ, 3MF) are read in double precision. A closed object of a 3MF file
-///          whose volume is negative is turned over, with a note.
+///          whose volume is negative is turned over, with a note, and so are shells of any closed mesh (options.turn_shells).
 /// errors   kInput, one line: the file, the place in it (facet and byte, or line), what to do
 /// cost     two passes over the triangles, parallel; 36 bytes a triangle, 150 more while a mesh is repaired, and the
 ///          inflated bytes while a compressed file is read. A binary STL with options.blocks: one pass, 13 to 38 bytes a

@@ -18,6 +18,7 @@
 #include "stages/geometry/isa.h"
 #include "stages/load/kernels/kernels.h"
 #include "stages/load/repair/census.h"
+#include "stages/load/repair/shells.h"
 
 namespace lamina::load {
 namespace {
@@ -302,6 +303,7 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   mesh.repaired_from = triangles;
   mesh.blocks = blocks;
   notes.insert(notes.end(), header.notes.begin(), header.notes.end());
+  if (options.repair && options.turn_shells) turn_shells(mesh, "", notes);
   return mesh;
 }
 

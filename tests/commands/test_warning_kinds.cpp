@@ -42,7 +42,6 @@ const std::vector<WarningKind> kKinds = {
     {"above-bed", "extrude part.stl --bottom 5" + kExtruded},
     {"empty", "jet part.stl --layer 100 --dpi 60 --allow-empty"},
     {"horizontal-face", "jet level.obj --layer 0.1 --dpi 60", Page::kHasItNot},
-    {"horizontal-face", "slice level.obj --layer 0.1", Page::kNone},
     {"rows-capped", "jet open.obj" + kBed},
     {"rows-open", "jet open.obj part.stl --no-repair" + kBed, Page::kHasItNot},
     {"chains-open", "extrude open.obj part.stl --no-repair" + kExtruded},

@@ -73,6 +73,18 @@ TEST(Cut, PlaneThroughAFlatBottomIsCutAndThroughAFlatTopIsNot) {
   EXPECT_EQ(sliced(cube, -101).contours.contours.size(), 0u);
 }
 
+TEST(Cut, AFaceThatLiesOnBothSidesOfWhatCountsAsInThePlaneIsReported) {
+  Triangles cube = box({0, 0, 0}, {2'000'000, 1'000'000, 1'000'000});
+  for (Triangle& t : cube) {
+    for (Point3* p : {&t.a, &t.b, &t.c}) p->z += p->z > 0 && p->x > 0 ? 300 : 0;
+  }
+  const LevelFace face = sliced(cube, 1'000'000).report.level;
+  EXPECT_EQ(face.area_um2, 2'000'000u);
+  EXPECT_EQ(std::pair(face.lowest, face.highest), std::pair(0, 300));
+  EXPECT_EQ(sliced(cube, 1'000'200).report.level.area_um2, 0u);
+  EXPECT_EQ(sliced(cube, 998'900).report.level.area_um2, 0u);
+}
+
 TEST(Slice, CornersEdgesAndFacesInThePlaneCountOnce) {
   // Every facet orientation, with many corners exactly in the plane: area by the bitmap's rule at points between them.
   std::mt19937 random(11);

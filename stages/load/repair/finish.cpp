@@ -10,6 +10,7 @@
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/repair.h"
+#include "stages/load/repair/shells.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/weld.h"
 #include "stages/load/winding/winding.h"
@@ -267,6 +268,9 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
     mesh.closed = false;
     notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows of it may stay open"});
   }
+  const bool turns_shells = mesh.closed && options.repair && options.turn_shells && !flat;
+  if (turns_shells && found.volume_mm3 >= 0 && turn_shells(mesh, prefix, notes))
+    found = census(mesh.triangles, mesh.bounds.middle().z);
   if (mesh.closed && options.repair && !flat) {
     if (const Status solid = check_cancelled(source, prefix, mesh, found, notes); !solid) return solid.error();
   }
@@ -279,6 +283,7 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
         (name.size() > file ? name.substr(file) : "all of it") + " is inside out and is turned over: its volume is negative";
     // An object with instances in several orientations is reported once.
     if (std::ranges::none_of(notes, [&](const Note& note) { return note.text == reported; })) notes.push_back({true, reported});
+    if (turns_shells) turn_shells(mesh, prefix, notes);
   }
   return mesh;
 }

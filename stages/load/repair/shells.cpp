@@ -1,0 +1,186 @@
+#include "stages/load/repair/shells.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/load/repair/census.h"
+#include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/geometry.h"
+#include "stages/load/repair/surfaces.h"
+#include "stages/load/repair/topology.h"
+#include "stages/load/winding/winding.h"
+
+namespace lamina::load {
+namespace {
+
+/// The shell of each facet, by its first facet. Two bodies may have an edge in common, where four facets meet: facets are joined
+/// across such an edge only where a shell would be open there without that.
+Buffer<std::uint32_t> find_shells(const Indexed& mesh) {
+  const Buffer<Side> sides = sorted_sides(mesh.facet);
+  DisjointSets sets(mesh.facet.size());
+  std::vector<std::pair<const Side*, const Side*>> shared;  // edges with more than two facets
+  for_each_edge(std::span(sides), [&](const Side* begin, const Side* end) {
+    if (end - begin > 2) shared.emplace_back(begin, end);
+    if (end - begin == 2) sets.join(begin->facet, end[-1].facet);
+  });
+  for (bool joined = true; joined;) {
+    joined = false;
+    for (const auto& [begin, end] : shared) {
+      std::map<std::uint32_t, std::int64_t> surplus_of;
+      for (const Side* side = begin; side != end; ++side) surplus_of[sets.find(side->facet)] += side->forward ? 1 : -1;
+      const bool closed = std::ranges::all_of(surplus_of, [](const auto& one) { return one.second == 0; });
+      if (closed || surplus_of.size() == 1) continue;
+      for (const Side* side = begin + 1; side != end; ++side) sets.join(begin->facet, side->facet);
+      joined = true;
+    }
+  }
+  Buffer<std::uint32_t> shell(mesh.facet.size());
+  for (std::uint32_t f = 0; f < shell.size(); ++f) shell[f] = sets.find(f);
+  return shell;
+}
+
+struct ClosedShell {
+  std::vector<std::uint32_t> facets;
+  Box box;
+  Int128 sixfold_volume = 0;
+  std::optional<WindingTree> tree;
+  bool turned = false;
+};
+
+/// Whether `outer` contains `inner`.
+class ShellContainment {
+ public:
+  ShellContainment(std::span<const Triangle> triangles, const Point3& origin) : triangles_(triangles), origin_(origin) {}
+
+  bool operator()(ClosedShell& outer, const ClosedShell& inner) const {
+    const Box &out = outer.box, &in = inner.box;
+    const bool boxes = out.lo.x <= in.lo.x && out.lo.y <= in.lo.y && out.lo.z <= in.lo.z && in.hi.x <= out.hi.x &&
+                       in.hi.y <= out.hi.y && in.hi.z <= out.hi.z;
+    if (!boxes) return false;
+    if (!outer.tree) {
+      Buffer<Triangle> own;
+      for (const std::uint32_t f : outer.facets) own.push_back(triangles_[f]);
+      outer.tree.emplace(own, origin_);
+    }
+    return std::ranges::all_of(inner.facets, [&](std::uint32_t f) { return holds(*outer.tree, triangles_[f]); });
+  }
+
+ private:
+  bool holds(const WindingTree& tree, const Triangle& t) const {
+    constexpr double kOutside = 0.06;  // a corner of a box that lies on the outer one's corner has 1/8
+    const std::array<Point3, 3> corner{t.a, t.b, t.c};
+    const auto inside = [&](const std::array<double, 3>& weight) {
+      WindingTree::Point at{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        at[0] += weight[k] * (static_cast<double>(corner[k].x) - origin_.x);
+        at[1] += weight[k] * (static_cast<double>(corner[k].y) - origin_.y);
+        at[2] += weight[k] * (static_cast<double>(corner[k].z) - origin_.z);
+      }
+      return std::fabs(tree.at(at)) > kOutside;
+    };
+    constexpr double kThird = 1.0 / 3;
+    return inside({kThird, kThird, kThird}) && inside({1, 0, 0}) && inside({0, 1, 0}) && inside({0, 0, 1}) &&
+           inside({0.5, 0.5, 0}) && inside({0, 0.5, 0.5}) && inside({0.5, 0, 0.5});
+  }
+
+  std::span<const Triangle> triangles_;
+  Point3 origin_;
+};
+
+std::vector<ClosedShell> shells_of(const Mesh& mesh) {
+  const Indexed indexed = index_mesh(mesh.triangles);
+  const Buffer<std::uint32_t> shell_of = find_shells(indexed);
+  std::vector<ClosedShell> shells;
+  std::vector<std::uint32_t> number(shell_of.size());
+  for (std::uint32_t f = 0; f < shell_of.size(); ++f) {
+    if (collapsed(indexed.facet[f])) continue;
+    if (shell_of[f] == f) {
+      number[f] = static_cast<std::uint32_t>(shells.size());
+      shells.emplace_back();
+    }
+    ClosedShell& shell = shells[number[shell_of[f]]];
+    const Triangle& t = mesh.triangles[f];
+    shell.facets.push_back(f);
+    shell.box.add(t.a), shell.box.add(t.b), shell.box.add(t.c);
+    shell.sixfold_volume += sixfold_volume(t, mesh.triangles[shell_of[f]].a);  // a near tip, so that little cancels out
+  }
+  return shells;
+}
+
+/// Whether no shell can be inverted. Bodies with an edge in common are one shell to the diagnosis.
+bool is_plain(const Diagnosis& found) { return found.inverted_shells == 0 && found.non_manifold_edges.count == 0; }
+
+Buffer<Triangle> list_of(const MeshBlocks& blocks) {
+  Buffer<Triangle> list;
+  list.reserve(blocks.triangle_count() + kTriangleSlack);
+  for (std::uint32_t b = 0; b < blocks.block_count(); ++b) {
+    for (std::uint32_t i = 0; i < blocks.triangles_in(b); ++i)
+      list.push_back(blocks.triangle(b * MeshBlocks::kClusters + i / kClusterSize, i % kClusterSize));
+  }
+  return list;
+}
+
+}  // namespace
+
+std::uint32_t turn_inverted_shells(Mesh& mesh) {
+  std::vector<ClosedShell> shells = shells_of(mesh);
+  const ShellContainment contains(mesh.triangles, mesh.bounds.lo);
+  std::vector<ClosedShell*> inverted;
+  for (ClosedShell& shell : shells) {
+    if (shell.sixfold_volume >= 0) continue;
+    const bool is_hollow = std::ranges::any_of(shells, [&](ClosedShell& other) { return &other != &shell && contains(other, shell); });
+    if (!is_hollow) inverted.push_back(&shell);
+  }
+  if (inverted.empty()) return 0;
+  for (ClosedShell* outer : inverted) {
+    outer->turned = true;
+    for (ClosedShell& shell : shells) {
+      if (&shell == outer || !contains(*outer, shell)) continue;
+      // A hollow of a sound body that overlaps this one may lie in both.
+      const auto is_its_body = [&](ClosedShell& other) {
+        return &other != &shell && other.sixfold_volume > 0 && contains(other, shell) && !contains(*outer, other);
+      };
+      shell.turned |= shell.sixfold_volume > 0 || std::ranges::none_of(shells, is_its_body);
+    }
+  }
+  for (const ClosedShell& shell : shells) {
+    if (!shell.turned) continue;
+    for (const std::uint32_t f : shell.facets) std::swap(mesh.triangles[f].b, mesh.triangles[f].c);
+  }
+  const Census found = census(mesh.triangles, mesh.bounds.middle().z);
+  mesh.fingerprint = found.fingerprint;
+  mesh.volume_mm3 = found.volume_mm3;
+  return static_cast<std::uint32_t>(inverted.size());
+}
+
+bool turn_shells(Mesh& mesh, const std::string& prefix, std::vector<Note>& notes) {
+  if (!mesh.closed) return false;
+  if (mesh.blocks) {
+    const bool is_large = mesh.blocks->triangle_count() > kBlockSize;
+    if (is_large ? !may_have_negative_surface(*mesh.blocks) : is_plain(diagnose_blocks(mesh.blocks))) return false;
+    mesh.triangles = list_of(*mesh.blocks);
+  } else if (is_plain(diagnose(mesh, 0))) {
+    return false;
+  }
+  const std::uint32_t turned = turn_inverted_shells(mesh);
+  if (turned > 0) {
+    mesh.blocks.reset();
+    notes.push_back({true, fmt::format("{}{} inside out, and turned over: no other shell contains {}", prefix,
+                                       turned == 1 ? "a shell is" : fmt::format("{} shells are", turned),
+                                       turned == 1 ? "it" : "them")});
+  } else if (mesh.blocks) {
+    mesh.triangles = {};
+  }
+  return turned > 0;
+}
+
+}  // namespace lamina::load
