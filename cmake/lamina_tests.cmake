@@ -158,6 +158,8 @@ if(LAMINA_PYTHON)
   set_tests_properties(Python.ArraysAreTheDecodedFilesOfTheProgram PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300
                        ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
 endif()
+add_test(NAME Formats.FilesOfPublicReportsAreReadAsTheirFormatsSay
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/reported_files $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
 add_test(NAME Engines.AHorizontalFaceOfAnyFileIsInALayerOrIsNot
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/raster/tilted_slabs $<TARGET_FILE:lamina>)
 add_test(NAME Documentation.EveryQuestionHasItsAnswerNearTheIndex

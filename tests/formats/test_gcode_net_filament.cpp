@@ -68,7 +68,7 @@ TEST(GcodeNetFilament, RepRapFirmwareScalesMovesOfAxesOnly) {
 }
 
 TEST(GcodeNetFilament, APrimeInAMoveDepositsNothing) {
-  // The 80 beads of bugs3/J09 with a retraction of 5 mm while travelling: 1154 mm3 where every move that feeds counts.
+  // The 80 beads of reports/J09_m221.gcode with a retraction of 5 mm while travelling: 1154 mm3 where every move that feeds counts.
   std::string text = "M83\n";
   for (int i = 0; i < 80; ++i) text += fmt::format("G1 X30 Y{} E1\nG1 X20 E-5\nG1 X10 Y{} E5\n", i, i + 1);
   EXPECT_NEAR(fed_by(text) * kFilamentMm2, 192.42, 0.005);

@@ -461,7 +461,7 @@ TEST(ImageFormats, UnknownOnesNameTheNearest) {
   EXPECT_NE(unknown_format("jpeg").find("tiff-g4, tiff-packbits, tiff-none, png, pbm, bmp"), std::string::npos);
 }
 
-// Files that lamina read wrongly or refused: tests/corpus/images3, from shared/corpus/bugs3.
+// Files that lamina read wrongly or refused: tests/corpus/images3.
 TEST(OtherImages, FilesOfPublicReports) {
   const auto set_of = [](const std::string& name) {
     const auto stack = LayerImages::open(test::corpus_file("images3/" + name), {});
