@@ -160,6 +160,9 @@ if(LAMINA_PYTHON)
 endif()
 add_test(NAME Formats.FilesOfPublicReportsAreReadAsTheirFormatsSay
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/reported_files $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
+add_test(NAME Formats.LayersAreTheSameAfterPackersOfPng
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/packed_images $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR} 4)
+set_tests_properties(Formats.LayersAreTheSameAfterPackersOfPng PROPERTIES SKIP_RETURN_CODE 77)
 add_test(NAME Engines.AHorizontalFaceOfAnyFileIsInALayerOrIsNot
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/raster/tilted_slabs $<TARGET_FILE:lamina>)
 add_test(NAME Documentation.EveryQuestionHasItsAnswerNearTheIndex
