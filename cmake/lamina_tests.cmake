@@ -144,6 +144,8 @@ add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
                  --program $<TARGET_FILE:lamina>)
 add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_checkers $<TARGET_FILE:lamina>)
+add_test(NAME PrintTime.IsThatOfTheSimulatedPlanners
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/segment/print_time $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
