@@ -23,7 +23,6 @@ if(NOT DEFINED LAMINA_PYTHON)
   set(LAMINA_PYTHON ${python_default})  # -DLAMINA_PYTHON=ON or OFF otherwise; not kept, as packages may be installed later
 endif()
 if(NOT LAMINA_PYTHON)
-  message(STATUS "NOT BUILT: the Python module (it needs python3-dev and pybind11-dev, and no sanitizer)")
   return()
 endif()
 if(NOT Python_FOUND OR NOT pybind11_FOUND)

@@ -206,7 +206,6 @@ if(OPENCV_INCLUDE_DIR AND OPENCV_CORE_LIBRARY AND OPENCV_IMGPROC_LIBRARY)
   endif()
 else()
   set(LAMINA_SCAN OFF)
-  message(WARNING "OpenCV is not there: lamina-scan and its tests are NOT built. Debian: libopencv-core-dev libopencv-imgproc-dev")
 endif()
 
 if(LAMINA_BENCH)

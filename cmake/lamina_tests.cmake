@@ -133,6 +133,8 @@ find_program(PYTHON3 python3 REQUIRED)
 add_test(NAME Installed.AnotherProjectFindsTheLibraryAndPlansAPart
          COMMAND ${PROJECT_SOURCE_DIR}/tests/install/example ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
 set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart PROPERTIES TIMEOUT 900)
+add_test(NAME Configured.TheSummaryListsWhatIsLeftOutAndWhy
+         COMMAND ${PROJECT_SOURCE_DIR}/tests/install/summary ${PROJECT_SOURCE_DIR})
 add_test(NAME Documentation.EveryExampleOfEveryCommandRuns
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/examples $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
 add_test(NAME Documentation.EveryCommandOfTheGuidesPrintsWhatTheySay
@@ -144,6 +146,8 @@ add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
                  --program $<TARGET_FILE:lamina>)
 add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/formats/threemf_checkers $<TARGET_FILE:lamina>)
+add_test(NAME PrintTime.IsThatOfTheSimulatedPlanners
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/segment/print_time $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled

@@ -34,8 +34,11 @@ Status write_plot(const std::string& path, const Plot& plot) {
 
 Result<std::string> scanned(const std::string& what, const Json& request, const std::string& picture) {
   auto text = filter("lamina-scan", what, json_line(request));
-  if (!text && text.error().message.starts_with("lamina-scan: "))
-    return usage("photographs are read by lamina-scan, which is not installed; install the package lamina-scan");
+  if (!text && text.error().message.starts_with("lamina-scan: ")) {
+    return usage("photographs are read by the program lamina-scan, which is missing ({}); install the Debian package lamina-scan, or "
+                 "libopencv-core-dev and libopencv-imgproc-dev before lamina is built",
+                 text.error().message);
+  }
   if (!text) return text;
   const std::size_t end = text->find('\n') + 1;
   if (!picture.empty()) {

@@ -65,6 +65,10 @@ class LineWriter {
     char text[40];
     out_.append(text, fmt::format_to(text, FMT_COMPILE("\"{:016x}{:016x}\""), value.high, value.low));
   }
+  template <class Number>
+  void added_number(std::string_view key, const Number& value) {
+    number(key, value);
+  }
   void reason(std::string_view key, const LayerReason& value) { fixed(key, reason_name(value)); }
   /// A list of objects, left out if it is empty. describe(item) writes the numbers of one.
   template <class List, class Describe>
@@ -116,6 +120,11 @@ class LineReader {
     expect(error == std::errc());
     if constexpr (std::is_floating_point_v<Number>) expect(std::isfinite(value));
     if (good()) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+  }
+  /// A number that records of earlier builds do not have; it stays as it is then.
+  template <class Number>
+  void added_number(std::string_view key, Number& value) {
+    if (follows(key)) number(key, value);
   }
   void fixed(std::string_view key, std::string_view value) {
     begin(key);
@@ -222,6 +231,8 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("auxiliary_moves", t.auxiliary_moves);
   io.number("auxiliary_mm", t.auxiliary_mm);
   io.number("auxiliary_filament_mm", t.auxiliary_filament_mm);
+  io.added_number("last_x_nm", t.last.x);
+  io.added_number("last_y_nm", t.last.y);
   auto& deposited = paths.deposited;
   io.number("segmented_lines", deposited.segments.lines);
   io.number("pieces", deposited.segments.pieces);

@@ -31,6 +31,8 @@ class ToolpathFile {
   std::unique_ptr<formats::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
 
   // --- from one thread at a time, in layer order
+  /// Adds the travel from the layers before to a layer.
+  void travel_from(const formats::MoveTotals& before, formats::MoveTotals& layer) const { format_->travel_from(before, layer); }
   /// totals  of all layers. returns  the file's size
   Result<std::uint64_t> finish(const formats::MoveTotals& totals);
   Status keep() { return file_ ? file_->keep() : Status(); }

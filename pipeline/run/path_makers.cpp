@@ -327,6 +327,7 @@ class MoveMaker : public Maker {
     if (!made.waits) {
       if (Status status = deposit_pieces(layer, work, made); !status) return status;
     }
+    file_.travel_from(sums_.totals, made.facts.totals);
     made.record.paths = std::make_shared<const PathFacts>(made.facts);
     const std::string_view text(work.text.data(), work.text.size());
     if (Status status = made.waits ? file_.file().append(text, made.record) : file_.file().end_pieces(made.record); !status)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -21,14 +22,17 @@ struct MoveTotals {
   double bead_mm = 0, travel_mm = 0;
   double volume_mm3 = 0;   // of all beads: filament_mm x the filament's area x the machine's declared error
   double filament_mm = 0;  // sum of E; what is drawn back comes again and does not count
-  double seconds = 0;      // estimated: changes of speed take the profile's acceleration, corners its corner speed
+  double seconds = 0;      // as the firmware plans the moves (gcode/print_time.h)
   std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
   // The share of moves, beads, volume and filament that is not of the parts: skirts and prime lines.
   std::uint64_t auxiliary_moves = 0;
   double auxiliary_mm = 0, auxiliary_mm3 = 0, auxiliary_filament_mm = 0;
+  Point2 first{0, 0}, last{0, 0};  // the ends of all beads, if there are any
   std::uint64_t part_moves() const { return moves - auxiliary_moves; }
 
   void add(const MoveTotals& other) {
+    if (moves == 0) first = other.first;
+    if (other.moves > 0) last = other.last;
     moves += other.moves;
     travels += other.travels;
     retractions += other.retractions;
@@ -49,6 +53,8 @@ struct MoveTotals {
   /// Adds a bead. feed  mm of filament a mm3
   void deposit(const BeadMove& move, double length_mm, double feed) {
     const double volume = length_mm * move.area_mm2;
+    if (moves == 0) first = move.from;
+    last = move.to;
     ++moves;
     bead_mm += length_mm;
     volume_mm3 += volume;
@@ -101,6 +107,16 @@ class ExtrusionFormat {
   virtual void head(const ExtrusionHead& head, Buffer<char>& out) const = 0;
   virtual std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const = 0;
   virtual void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const = 0;
+  /// Of a travel between layers.
+  virtual double travel_seconds(double length_mm) const = 0;
+
+  /// Adds the travel from the layers before to a layer, whose writer does not know them.
+  void travel_from(const MoveTotals& before, MoveTotals& layer) const {
+    if (before.moves == 0 || layer.moves == 0) return;
+    const double length = std::hypot(mm(std::int64_t{layer.first.x} - before.last.x), mm(std::int64_t{layer.first.y} - before.last.y));
+    layer.travel_mm += length;
+    layer.seconds += travel_seconds(length);
+  }
 };
 
 /// `machine` has to outlive them.

@@ -157,6 +157,12 @@ TEST(GcodeDialects, NotesNameTheFirstLineOnWhichFirmwaresDiffer) {
       {"G1 X10 E1\nX20 E1\n", "line 3: words without a command"},
       {"G90 G1 X10 E1\n", "line 2: several commands in a line"},
       {"M221\nG1 X10 E1\n", "line 2: M221 without S"},
+      {"M106 S255 G1 X10 E1\n", "line 2: several commands in a line"},
+      {"T0 G1 X10 E1\n", "line 2: several commands in a line"},
+      {"G1 X10 E1\nX5 is the left side\n", "line 3: begins as a move without a command and is text"},
+      {"G1 X10 E1\nE1 to E3 of X,Y\nZ1?\n", "line 3 and 1 more: begins as a move"},
+      {"M221 S95 T1\nG1 X10 E1\n", "line 2: M221 is of one tool"},
+      {"M221 S95\nT1\nG1 X10 E1\n", "line 3: M221 is of one tool"},
       {"M221 S95\nG1 X10 E1\n", "line 2: M221 S95 is applied: volumes are that percentage of E"},
   };
   const Directory directory;
@@ -171,6 +177,51 @@ TEST(GcodeDialects, NotesNameTheFirstLineOnWhichFirmwaresDiffer) {
   const auto usual = gcode_file(directory, "N1 G01 X10.5 Y+1 ; (side)\n\tM117 e1 (x)\nMACRO_G1 x=5 x=6\nM83\r\nG1 X5 E.5*5\n");
   ASSERT_TRUE(usual) << usual.error().message;
   EXPECT_EQ(usual->notes(), std::vector<std::string>());
+}
+
+TEST(GcodeDialects, FilesThatNameTheirFirmwareHaveNoNoteOnToolsOfM221) {
+  const Directory directory;
+  for (const std::string firmware : {"Marlin", "RepRap", "Klipper"}) {
+    const auto file = gcode_file(directory, ";FLAVOR:" + firmware + "\nM83\n;HEIGHT:0.2\nM221 S50 T1\nG1 X10 E1\n");
+    ASSERT_TRUE(file) << file.error().message;
+    for (const std::string& note : file->notes()) EXPECT_EQ(note.find("one tool"), std::string::npos) << note;
+    const double share = firmware == "Klipper" ? 0.5 : 1;
+    EXPECT_NEAR(file->fed_mm3(), share * test::kPi / 4 * 1.75 * 1.75, 1e-9) << firmware;
+  }
+}
+
+// RepRapFirmware runs every G and M of a line; what stands behind other commands is not lost, and layers begin at any of them.
+TEST(GcodeDialects, CommandsOfALineAreThoseOfLinesOfTheirOwn) {
+  const std::string apart =
+      "M83\nG1 Z0.2\nM106 S255\nG1 X10 E1\nT1\nG1 X0 E1\nM83\nG1 Z0.4\nG1 X5 Y1 E1\nG1 X9 E2\nG1 Z0.6\nG1 X10 E1\nM104 S9\nG1 Y3 E1\n";
+  const std::string joined =
+      "M83\nG1 Z0.2 M106 S255 G1 X10 E1\nT1 G1 X0 E1 M83 G1 Z0.4 G1 X5 Y1 E1\nG1 X9 E2 (side) G1 Z0.6 G1 X10 E1 M104 S9 G1 Y3 E1 ; end\n";
+  const Directory one, other;
+  const auto right = gcode_file(one, apart), file = gcode_file(other, joined);
+  ASSERT_TRUE(right && file);
+  ASSERT_EQ(right->count(), 3u);
+  ASSERT_EQ(file->count(), 3u);
+  EXPECT_EQ(file->fed_mm3(), right->fed_mm3());
+  for (std::uint32_t n = 0; n < 3; ++n) {
+    const auto expected = right->layer(n), layer = file->layer(n);
+    ASSERT_TRUE(expected && layer) << n;
+    EXPECT_EQ(layer->z, expected->z);
+    ASSERT_EQ(layer->beads.size(), expected->beads.size()) << n;
+    for (std::size_t i = 0; i < layer->beads.size(); ++i) {
+      EXPECT_EQ(layer->beads[i].from, expected->beads[i].from) << n << ' ' << i;
+      EXPECT_EQ(layer->beads[i].to, expected->beads[i].to) << n << ' ' << i;
+      EXPECT_EQ(layer->beads[i].width, expected->beads[i].width) << n << ' ' << i;
+    }
+  }
+}
+
+TEST(GcodeDialects, TextOfCommandsIsNoCommand) {
+  const Directory directory;
+  const auto file = gcode_file(directory,
+                               "M83\n;HEIGHT:0.2\nM117 G1 X9 E9\nM118 S G1 X9 E9\nM23 G1.gco\nM486 AG1 X9 E9\nM98 P\"G1 X9 E9\"\nG1 X5 E1\n");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_NEAR(file->fed_mm3(), test::kPi / 4 * 1.75 * 1.75, 1e-9);
+  EXPECT_EQ(file->notes(), std::vector<std::string>());
 }
 
 TEST(GcodeDialects, ExponentsAreWordsAndTextIsNoCommand) {

@@ -1,5 +1,6 @@
 // Images of other programs in every depth, palette, transparency, byte order and order of names, against values that are
 // calculated here.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <png.h>
@@ -451,7 +452,39 @@ TEST(ImageOrder, OfOtherNumbersIsRefusedWhereThereAreTwo) {
   refused({"0001_a7.pbm", "0002_a3.pbm", "0003_a9.pbm"}, "allow two orders", true);
   refused({"1.8.pbm", "1.9.pbm", "1.10.pbm", "1.11.pbm"}, "by height 1.10.pbm, 1.11.pbm, 1.8.pbm");
   refused({"z0.3.pbm", "z1.1.pbm", "z1.2.pbm"}, "by height z0.3.pbm");
-  refused({"z0.1.pbm", "z0.2.pbm", "z0.4.pbm"}, "number 3 is missing");
+  refused({"z0.1.pbm", "z0.2.pbm", "z0.4.pbm"}, "z0.4.pbm: height 0.3 is missing before it");
+  refused({"a01.pbm", "a02.pbm", "a04.pbm"}, "a04.pbm: number 3 is missing before it");
+}
+
+// Steps of 1/30 mm, and others that no decimals state.
+TEST(ImageOrder, HeightsMayBeRounded) {
+  EXPECT_EQ(order_of({"z0.033.pbm", "z0.067.pbm", "z0.100.pbm"}), "z0.033 z0.067 z0.100 ");
+  EXPECT_EQ(order_of({"z0.967.pbm", "z1.000.pbm", "z1.033.pbm"}), "z0.967 z1.000 z1.033 ");
+  for (const double step : {1 / 30.0, 0.0333, 0.0127, 0.0762, 0.125}) {
+    for (const int digits : {3, 4}) {
+      std::vector<std::string> names;
+      std::string expected;
+      for (int i = 1; i <= 300; ++i) {
+        names.push_back(fmt::format("z{:.{}f}.pbm", i * step, digits));
+        expected += names.back().substr(0, names.back().size() - 4) + " ";
+      }
+      EXPECT_EQ(order_of(names), expected) << step;
+      names.resize(7);
+      names.erase(names.begin() + 3);
+      EXPECT_NE(order_of(names).find(fmt::format("height {:.{}f} is missing before it", 4 * step, digits)), std::string::npos)
+          << step << ": " << order_of(names);
+    }
+  }
+  // Thicknesses that differ by more than rounding are no steps.
+  EXPECT_NE(order_of({"z0.030.pbm", "z0.065.pbm", "z0.100.pbm", "z0.131.pbm"}).find("is missing"), std::string::npos);
+  EXPECT_NE(order_of({"z0.3.pbm", "z0.5.pbm", "z0.8.pbm"}).find("height 0.4 is missing"), std::string::npos);
+}
+
+TEST(ImageOrder, AMinusIsASignWhereOtherHeightsHaveNone) {
+  EXPECT_EQ(order_of({"z-0.2.pbm", "z0.0.pbm", "z0.2.pbm"}), "z-0.2 z0.0 z0.2 ");
+  EXPECT_EQ(order_of({"z-0.2.pbm", "z-0.1.pbm", "z0.0.pbm", "z0.1.pbm"}), "z-0.2 z-0.1 z0.0 z0.1 ");
+  EXPECT_EQ(order_of({"z-0.1.pbm", "z-0.2.pbm", "z-0.3.pbm"}), "z-0.1 z-0.2 z-0.3 ");  // as in layer-0.1
+  EXPECT_NE(order_of({"z-0.2.pbm", "z0.0.pbm", "z0.4.pbm"}).find("height 0.2 is missing before it"), std::string::npos);
 }
 
 TEST(ImageFormats, UnknownOnesNameTheNearest) {

@@ -245,9 +245,10 @@ std::optional<std::string_view> behind_tag(std::string_view line, std::string_vi
   return std::nullopt;
 }
 
-/// CuraEngine's words: gcodeExport.cpp, GCodeExport::flavorToString().
+/// CuraEngine's words: gcodeExport.cpp, GCodeExport::flavorToString(); Klipper is none of them.
 GcodeFile::Firmware firmware_of(std::string_view flavor) {
   if (flavor.starts_with("Marlin")) return GcodeFile::Firmware::kMarlin;
+  if (flavor.starts_with("Klipper")) return GcodeFile::Firmware::kKlipper;
   return flavor.starts_with("RepRap") ? GcodeFile::Firmware::kRepRap : GcodeFile::Firmware::kUnknown;
 }
 
@@ -273,7 +274,8 @@ bool GcodeCommands::next(std::optional<RawBead>& bead) {
 }
 
 bool GcodeCommands::read_line() {
-  before_ = position_;
+  before_ = line_start_ = position_;
+  later_ = false;
   const bool read = file_.next(text_);
   position_.line += read || !file_.status() ? 1 : 0;
   position_.byte = file_.offset();
@@ -286,7 +288,8 @@ bool GcodeCommands::read_line() {
   if (!read) return false;
   if (comment) text_.remove_prefix(text_.find(';'));
   if (file_.ended_by_cr()) differ(Difference::kCr);
-  deposited_ = false;
+  if (const std::size_t left = std::exchange(position_.left, 0); left > 0 && left <= commands_.size())
+    commands_.remove_prefix(commands_.size() - left);
   return true;
 }
 
@@ -334,6 +337,7 @@ bool GcodeCommands::read_words(WordScanner& scanner, GcodeWords& words, bool any
     const char letter = scanner.letter();
     if ((letter == 'G' || letter == 'M') && scanner.has_number()) {
       commands_ = scanner.rest();
+      later_ = true;
       scanner.differences |= bit_of(Difference::kSeveral);
       return true;
     }
@@ -365,15 +369,32 @@ void GcodeCommands::set_flow(const GcodeWords& words) {
   if (!words.has('S')) return differ(Difference::kFlow);
   const double percent = words['S'], tool = words.has('T') ? words['T'] : words.has('D') ? words['D'] : position_.tool;
   if (!(percent >= 0 && percent <= 10'000)) return fail(fmt::format("M221 S{:g}: a flow is 0 to 10000 %", percent));
-  position_.flow[static_cast<std::size_t>(std::clamp<double>(tool, 0, GcodeFile::kTools - 1))] = static_cast<float>(percent);
+  const auto set = static_cast<float>(percent);
+  const std::size_t index = static_cast<std::size_t>(std::clamp<double>(tool, 0, GcodeFile::kTools - 1));
+  if (index != position_.tool && set != position_.flow[position_.tool]) differ_by_tool();
+  position_.flow[index] = set;
+  if (position_.firmware == GcodeFile::Firmware::kKlipper) std::ranges::fill(position_.flow, set);
   if (percent != 100 && flows.count == 0) flow = percent;
   if (percent != 100) flows.add(position_.line);
+}
+
+/// Only files that do not name their firmware.
+void GcodeCommands::differ_by_tool() {
+  if (position_.firmware == GcodeFile::Firmware::kUnknown) differ(Difference::kFlowOfTool);
+}
+
+void GcodeCommands::change_tool(double number) {
+  const double tool = std::clamp<double>(number, 0, GcodeFile::kTools - 1);
+  if (tool != position_.tool) position_.retracted = 0;  // what another tool has drawn back is not fed by this one
+  const std::uint8_t before = std::exchange(position_.tool, static_cast<std::uint8_t>(tool));
+  if (position_.flow[before] != position_.flow[position_.tool]) differ_by_tool();
 }
 
 /// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
 /// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
 bool GcodeCommands::feeds_relative() const {
-  return position_.relative_feed || (position_.relative && position_.firmware == GcodeFile::Firmware::kUnknown);
+  return position_.relative_feed || (position_.relative && position_.firmware != GcodeFile::Firmware::kMarlin &&
+                                     position_.firmware != GcodeFile::Firmware::kRepRap);
 }
 
 void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) {
@@ -394,8 +415,32 @@ void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) 
   if (code == 5) fail("splines (G5) are not drawn; export lines or arcs");
 }
 
+namespace {
+
+/// M commands whose argument may be text without quotes in Marlin or RepRapFirmware, which therefore no other command follows in a line.
+bool takes_text(double code) {
+  constexpr double kText[] = {16, 20, 23, 26, 28, 30, 32, 33, 36, 37, 38, 39, 98, 117, 118, 486, 550, 551, 552, 587, 588, 589, 928};
+  return std::ranges::find(kText, code) != std::end(kText);
+}
+
+}  // namespace
+
+/// What follows a command that changes nothing here: RepRapFirmware runs the next G or M of the line (StringParser::FindParameters).
+bool GcodeCommands::pass_over(WordScanner scanner) {
+  GcodeWords words;
+  if (read_words(scanner, words, true) && !commands_.empty()) differ(Difference::kSeveral);
+  return false;
+}
+
 /// Takes the next command of the line. returns  whether it deposits a bead
 bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
+  if (later_) {
+    before_ = position_;
+    before_.byte = line_start_.byte;
+    before_.line = line_start_.line;
+    before_.left = static_cast<std::uint32_t>(commands_.size());
+  }
+  deposited_ = false;
   WordScanner scanner(std::exchange(commands_, {}));
   bool found = scanner.next();
   if (found && scanner.letter() == 'N') found = scanner.next();  // behind a line's number
@@ -404,13 +449,12 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
   double code = scanner.value();
   const bool repeats = letter == 'E' || letter == 'F' || (letter >= 'X' && letter <= 'Z');
   if (!scanner.has_number() || (!repeats && letter != 'G' && letter != 'M' && letter != 'T')) return false;
-  if (letter == 'T') {  // what another tool has drawn back is not fed by this one
-    const double tool = std::clamp<double>(code, 0, GcodeFile::kTools - 1);
-    if (tool != position_.tool) position_.retracted = 0;
-    position_.tool = static_cast<std::uint8_t>(tool);
-    return false;
+  if (letter == 'T') {
+    change_tool(code);
+    return pass_over(scanner);
   }
-  if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 221) return false;  // may hold any text
+  if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 221)
+    return !takes_text(code) && pass_over(scanner);
   if (repeats) {
     if (position_.motion > 3) return false;
     const std::uint32_t before = scanner.differences | bit_of(Difference::kRepeat);
@@ -422,7 +466,8 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
   const bool moves = letter == 'G' && (code == 0 || code == 1 || code == 2 || code == 3),
              sets = letter == 'G' ? code == 92 : code > 100;
   GcodeWords words;
-  if (!read_words(scanner, words, !moves && !sets)) return false;
+  if (!read_words(scanner, words, repeats || (!moves && !sets))) return false;
+  if (repeats && scanner.failed()) return differ(Difference::kText), false;
   if (parentheses_) differ(Difference::kParentheses);
   for (std::uint32_t left = scanner.differences; left != 0; left &= left - 1)
     differ(static_cast<Difference>(std::countr_zero(left)));

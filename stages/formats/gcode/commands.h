@@ -105,7 +105,7 @@ struct RawBead {
   double speed;           // mm/s
   bool joined;            // BeadFeed
   double primed;          // before it: mm of filament, or mm3
-  bool first;             // of its line
+  bool first;             // of its command
   double length() const;  // over the bed
 };
 
@@ -128,7 +128,7 @@ class GcodeCommands {
     commands_ = {};
   }
   const FilePosition& position() const { return position_; }  // behind the line that next() returned for
-  const FilePosition& before() const { return before_; }      // in front of it
+  const FilePosition& before() const { return before_; }      // in front of the command, or of the line of a tag
   std::optional<std::string> fault;
   bool layer_tag = false;  // the line begins a layer
   SlicerFacts facts;       // of the lines so far
@@ -153,6 +153,9 @@ class GcodeCommands {
   void set_mode(char letter, double code, const GcodeWords& words);
   void set_relative(bool relative);
   void set_flow(const GcodeWords& words);
+  void differ_by_tool();
+  void change_tool(double number);
+  bool pass_over(WordScanner scanner);
   bool feeds_relative() const;
   void differ(Difference difference) { differences[static_cast<std::size_t>(difference)].add(position_.line); }
   bool move(double code, const GcodeWords& words, std::optional<RawBead>& bead);
@@ -168,8 +171,10 @@ class GcodeCommands {
   FileReader& file_;
   std::string_view text_, commands_;  // the line, and what of it is not run yet
   std::string stripped_;
-  bool parentheses_ = false, deposited_ = false;  // of the line
-  FilePosition position_, before_;
+  bool parentheses_ = false;  // of the line
+  bool later_ = false;        // the next command is not the first one of the line
+  bool deposited_ = false;    // of the command
+  FilePosition position_, before_, line_start_;
   Arc arc_;                  // under way
   std::uint64_t chord_ = 0;  // the last one that was given; 0 if no arc is under way
   RawBead whole_{};          // the arc from its start to its end

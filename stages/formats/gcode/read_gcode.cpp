@@ -246,7 +246,9 @@ constexpr std::string_view kDifferenceTexts[] = {
     "words without a command repeat the last move, as in Marlin built with GCODE_MOTION_MODES and RepRapFirmware in CNC mode; "
     "Klipper refuses them",
     "several commands in a line are all run, as in RepRapFirmware; Marlin and Klipper run one",
-    "M221 without S changes nothing, as in Marlin and RepRapFirmware; Klipper returns to 100 %"};
+    "M221 without S changes nothing, as in Marlin and RepRapFirmware; Klipper returns to 100 %",
+    "M221 is of one tool, as in Marlin and RepRapFirmware; Klipper has one percentage for all tools",
+    "begins as a move without a command and is text; left out, as in Klipper and in Marlin built without GCODE_MOTION_MODES"};
 static_assert(std::size(kDifferenceTexts) == static_cast<std::size_t>(Difference::kCount));
 
 GcodeBead bead_of(const RawBead& raw, double width_mm, std::uint32_t type) {

@@ -72,13 +72,14 @@ class GcodeFile {
   /// with_feeds  24 bytes a bead more
   Result<GcodeLayer> layer(std::uint32_t index, bool with_feeds = false) const;
 
-  /// Decides what G90 and G91 mean for E.
-  enum class Firmware : std::uint8_t { kUnknown, kMarlin, kRepRap };
+  /// Decides what G90 and G91 mean for E, and of which tools M221 is.
+  enum class Firmware : std::uint8_t { kUnknown, kMarlin, kRepRap, kKlipper };
   static constexpr std::uint8_t kTools = 16;  // those beyond share the flow of the last
-  /// Where the printer stands in front of a line.
+  /// Where the printer stands in front of a line, or of a later command of it.
   struct FilePosition {
     FilePosition() { std::ranges::fill(flow, 100.F); }
     std::uint64_t byte = 0, line = 0;
+    std::uint32_t left = 0;                        // bytes of commands from there to the end of the line; 0: all
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
     double speed = 0;                              // mm/s; 0 until a line states it

@@ -21,6 +21,8 @@ enum class Difference : std::uint8_t {
   kRepeat,
   kSeveral,
   kFlow,
+  kFlowOfTool,
+  kText,
   kCount
 };
 

@@ -38,7 +38,7 @@ int type_of(PathKind kind) {
 
 LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out,
                          const Switches& switches)
-    : machine_(machine), out_(out), height_(layer.thickness) {
+    : machine_(machine), out_(out), time_(machine), height_(layer.thickness) {
   feed_per_volume_ = 1 / machine.material.mm3_of_e();
   corner_x_ = nm_of(machine.bed.corner_mm[0]);
   corner_y_ = nm_of(machine.bed.corner_mm[1]);
@@ -67,7 +67,7 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
   if (!machine.code.layer.empty()) {
     append(out_, fill_code(machine.code.layer, machine, layers, layer.index, mm(top)));
   }
-  totals_.seconds += mm(layer.thickness) / machine.speed.lift_mm_s;
+  time_.move({0, 0, mm(layer.thickness), 0}, machine.speed.lift_mm_s);
 }
 
 char* LayerWriter::retract(char* text) {
@@ -76,16 +76,15 @@ char* LayerWriter::retract(char* text) {
   text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
   ++totals_.retractions;
   retracted_ = true;
-  return feed_retraction(text);
+  return feed_retraction(text, -1);
 }
 
-/// The end of a line that moves the filament alone.
-char* LayerWriter::feed_retraction(char* text) {
+/// The end of a line that moves the filament alone. sign  1 forth, -1 back
+char* LayerWriter::feed_retraction(char* text, int sign) {
   feed_rate_ = nearest(machine_.retraction.speed_mm_s * 60);
   text = put_fixed<0>(feed_rate_, put(text, " F"));
   *text++ = '\n';
-  totals_.seconds += machine_.retraction.length_mm / machine_.retraction.speed_mm_s;
-  last_speed_ = 0;
+  time_.move({0, 0, 0, sign * machine_.retraction.length_mm}, machine_.retraction.speed_mm_s);
   return text;
 }
 
@@ -115,25 +114,6 @@ void LayerWriter::tags(const BeadMove& move) {
   }
 }
 
-/// A move with a trapezoid of speed: from the speed at its corner, which is bounded by what the machine changes at once,
-/// to its own and, as the next corner is not known yet, on at that speed.
-void LayerWriter::time(double length_mm, double speed_mm_s, double unit_x, double unit_y) {
-  const double turn = std::hypot(unit_x - last_x_, unit_y - last_y_);  // 0 straight on, 2 back
-  const double top = std::min(speed_mm_s, last_speed_);
-  double entry = top;
-  if (turn > 1e-6) entry = std::min(top, machine_.speed.corner_mm_s / turn);
-  entry = std::max(entry, std::min(speed_mm_s, machine_.speed.corner_mm_s / 2));
-  const double a = machine_.speed.acceleration_mm_s2;
-  // The move before had to slow down to the entry speed, and this one speeds up from it.
-  totals_.seconds += last_speed_ > entry ? (last_speed_ - entry) * (last_speed_ - entry) / (2 * a * last_speed_) : 0;
-  const double reach = std::min(speed_mm_s, std::sqrt(entry * entry + 2 * a * length_mm));
-  const double ramp = (reach * reach - entry * entry) / (2 * a);
-  totals_.seconds += (reach - entry) / a + (length_mm - ramp) / reach;
-  last_speed_ = reach;
-  last_x_ = unit_x;
-  last_y_ = unit_y;
-}
-
 void LayerWriter::travel(Point2 to) {
   const double dx = mm(std::int64_t{to.x} - at_.x), dy = mm(std::int64_t{to.y} - at_.y);
   const double length = placed_ ? std::hypot(dx, dy) : 0;
@@ -149,7 +129,7 @@ void LayerWriter::travel(Point2 to) {
     return text;
   });
   if (length > 0) {
-    time(length, machine_.speed.travel_mm_s, dx / length, dy / length);
+    time_.move({dx, dy, 0, 0}, machine_.speed.travel_mm_s);
     totals_.travel_mm += length;
   }
   ++totals_.travels;
@@ -172,7 +152,7 @@ double LayerWriter::deposit(const BeadMove& move) {
         }
         text = put_fixed<5>(written_, put(text, "G1 E"));
       }
-      return feed_retraction(text);
+      return feed_retraction(text, 1);
     });
     retracted_ = false;
   }
@@ -190,7 +170,7 @@ double LayerWriter::deposit(const BeadMove& move) {
     return text;
   });
   totals_.deposit(move, length, feed_per_volume_);
-  if (length > 0) time(length, move.speed_mm_s, dx / length, dy / length);
+  time_.move({dx, dy, 0, volume * feed_per_volume_}, move.speed_mm_s);
   at_ = move.to;
   return length;
 }
@@ -199,6 +179,7 @@ const MoveTotals& LayerWriter::finish() {
   if (!retracted_ && machine_.retraction.length_mm > 0) {
     append_written(out_, kMaxLine, [&](char* text) { return retract(text); });
   }
+  totals_.seconds = time_.halt();
   return totals_;
 }
 
@@ -274,6 +255,9 @@ class GcodeFormat final : public ExtrusionFormat {
   }
   void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const override {
     append_tail(machine_, totals, layers, out);
+  }
+  double travel_seconds(double length_mm) const override {
+    return rest_to_rest(length_mm, machine_.speed.travel_mm_s, machine_.speed.acceleration_mm_s2);
   }
 
  private:

@@ -12,6 +12,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/toolpaths.h"
 #include "stages/formats/extrusion_format.h"
+#include "stages/formats/gcode/print_time.h"
 
 namespace lamina::formats::gcode {
 
@@ -27,14 +28,14 @@ class LayerWriter final : public LayerMoves {
  private:
   void travel(Point2 to);
   char* retract(char* text);
-  char* feed_retraction(char* text);
+  char* feed_retraction(char* text, int sign);
   void extrude_to(double filament_mm, char*& text);
   void tags(const BeadMove& move);
-  void time(double length_mm, double speed_mm_s, double unit_x, double unit_y);
 
   const Extruder& machine_;
   Buffer<char>& out_;
   MoveTotals totals_;
+  PrintTime time_;
   Nm height_;                    // of the layer
   double feed_per_volume_;       // mm of filament a mm3 of bead
   double fed_ = 0;               // mm of filament in this layer, exact
@@ -45,7 +46,6 @@ class LayerWriter final : public LayerMoves {
   std::int64_t corner_x_, corner_y_;  // nm
   int kind_ = -1;
   Nm width_ = -1;
-  double last_speed_ = 0, last_x_ = 0, last_y_ = 0;  // the end of the move before, for the estimate of time
 };
 
 void append_head(const Extruder& machine, const ExtrusionHead& facts, Buffer<char>& out);

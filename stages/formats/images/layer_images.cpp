@@ -66,14 +66,15 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
     return Error{
         Fault::kInput,
         fmt::format("{}: contains neither manifest.json of lamina jet nor images .png, .tif, .bmp or .pbm", one_line(folder))};
-  if (Status status = sort_images(folder, images); !status) return status.error();
+  const auto steps = sort_images(folder, images);
+  if (!steps) return steps.error();
   for (std::size_t i = 1; i < images.size(); ++i) {
     if (images[i].number == images[i - 1].number + 1 || (gaps && images[i].number != images[i - 1].number)) continue;
     if (images[i].number == images[i - 1].number)
       return Error{Fault::kInput, fmt::format("{}: has the number of {}; a layer is one image", one_line(images[i].path),
                                               one_line(fs::path(images[i - 1].path).filename().string()))};
-    return Error{Fault::kInput, fmt::format("{}: number {} is missing before it; add that image, or renumber the images",
-                                            one_line(images[i].path), images[i - 1].number + 1)};
+    return Error{Fault::kInput, fmt::format("{}: {} is missing before it; add that image, or renumber the images",
+                                            one_line(images[i].path), steps->name_of(images[i - 1].number + 1))};
   }
   return images;
 }

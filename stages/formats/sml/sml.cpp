@@ -109,6 +109,7 @@ class SmlFormat final : public ExtrusionFormat {
   std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t, Buffer<char>& out) const override {
     return std::make_unique<SmlLayer>(machine_, layer, out);
   }
+  double travel_seconds(double length_mm) const override { return length_mm / machine_.speed.travel_mm_s; }
   void tail(const MoveTotals& totals, std::uint32_t, Buffer<char>& out) const override {
     if (!machine_.sml.footer.empty()) append(out, machine_.sml.footer + (machine_.sml.footer.ends_with('\n') ? "" : "\n"));
     append(out, fmt::format("; bead {:.1f} mm, {:.3f} cm3\n", totals.bead_mm, totals.volume_mm3 / 1000));

@@ -79,6 +79,8 @@ Result<std::string> filter(const std::string& program, const std::string& argume
   std::array<char, 1 << 16> piece;
   while (const std::size_t got = std::fread(piece.data(), 1, piece.size(), out.get())) text.append(piece.data(), got);
   if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return text;
+  constexpr int kNotLoaded = 127;  // of the dynamic linker
+  if (WIFEXITED(state) && WEXITSTATUS(state) == kNotLoaded) return not_started(program, ELIBACC);
   if (WIFEXITED(state) && text.empty()) text = fmt::format("{} could not report its result", program);
   if (WIFEXITED(state)) return Error{static_cast<Fault>(WEXITSTATUS(state)), text};
   return Error{Fault::kInternal, fmt::format("{} was ended by signal {}", program, WTERMSIG(state))};

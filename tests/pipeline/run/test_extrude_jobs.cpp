@@ -266,6 +266,29 @@ TEST_F(ExtrudeProgram, ADryRunReportsTheTimeAndTheMaterialOfTheRunAndWritesNothi
   EXPECT_FALSE(fs::exists(file("b.gcode")));
 }
 
+// The travel from the last bead of a layer to the first of the next one, which the writer of a layer does not know.
+TEST_F(ExtrudeProgram, TravelsBetweenLayersAreInTheSumsAndInTheManifest) {
+  const auto result = run("extrude " + block(12, 9, 1.2, 2) + " --machine marlin --layer 0.3 --quiet --json -o " + file("a.gcode"));
+  ASSERT_EQ(result.code, 0) << result.err;
+  double x = 0, y = 0, mm = 0;
+  bool placed = false;
+  std::istringstream lines(text_of(file("a.gcode")));
+  for (std::string line; std::getline(lines, line);) {
+    double to_x = 0, to_y = 0;
+    const bool travels = line.starts_with("G0 ");
+    if (std::sscanf(line.c_str(), "G%*1d X%lf Y%lf", &to_x, &to_y) != 2) continue;
+    if (travels && placed) mm += std::hypot(to_x - x, to_y - y);
+    placed = true;
+    x = to_x;
+    y = to_y;
+  }
+  EXPECT_NEAR(result.json()["travel_mm"].get<double>(), mm, 0.05);
+  const std::string manifest = text_of(file("a.gcode.json"));
+  const std::size_t last = manifest.rfind("\"last_x_nm\": ");
+  ASSERT_NE(last, std::string::npos);
+  EXPECT_NEAR(std::stod(manifest.substr(last + 13)) * 1e-6, x, 0.001);
+}
+
 TEST_F(ExtrudeProgram, ADryRunCountsThePoresOfTheRunAndReportsThemOnce) {
   const std::string call = "extrude " + block(12, 9, 1.2, 2) + " --machine anet-a8 --layer 0.3 --fill segmented";
   const auto reported_pores = [&](const Outcome& outcome) {
