@@ -370,6 +370,11 @@ void GcodeCommands::set_flow(const GcodeWords& words) {
   if (percent != 100) flows.add(position_.line);
 }
 
+/// Of beads: P in Marlin and RepRapFirmware, S in Klipper and old files of Marlin. What no machine can do is ignored.
+void GcodeCommands::set_acceleration(double mm_s2) {
+  if (mm_s2 > 0 && mm_s2 <= 1e6) position_.acceleration = mm_s2;
+}
+
 /// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
 /// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
 bool GcodeCommands::feeds_relative() const {
@@ -383,6 +388,7 @@ void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) 
       if (words.has('D')) position_.volumetric = words['D'] > 0;
       if (words.has('S')) position_.volumetric = words['S'] != 0;
     }
+    if (code == 204) set_acceleration(words[words.has('P') ? 'P' : 'S']);
     if (code == 221) set_flow(words);
     return;
   }
@@ -396,6 +402,13 @@ void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) 
 
 /// Takes the next command of the line. returns  whether it deposits a bead
 bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
+  constexpr std::string_view kLimit = "SET_VELOCITY_LIMIT", kName = " ACCEL=";  // Klipper
+  if (commands_.starts_with(kLimit)) {
+    const std::size_t at = commands_.find(kName);
+    if (at != std::string_view::npos) set_acceleration(leading_number(commands_.substr(at + kName.size())));
+    commands_ = {};
+    return false;
+  }
   WordScanner scanner(std::exchange(commands_, {}));
   bool found = scanner.next();
   if (found && scanner.letter() == 'N') found = scanner.next();  // behind a line's number
@@ -410,7 +423,8 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     position_.tool = static_cast<std::uint8_t>(tool);
     return false;
   }
-  if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 221) return false;  // may hold any text
+  const bool known = code == 82 || code == 83 || code == 200 || code == 204 || code == 221;
+  if (letter == 'M' && !known) return false;  // may hold any text
   if (repeats) {
     if (position_.motion > 3) return false;
     const std::uint32_t before = scanner.differences | bit_of(Difference::kRepeat);
@@ -420,7 +434,7 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     code = position_.motion;
   }
   const bool moves = letter == 'G' && (code == 0 || code == 1 || code == 2 || code == 3),
-             sets = letter == 'G' ? code == 92 : code > 100;
+             sets = letter == 'G' ? code == 92 : code == 200 || code == 221;
   GcodeWords words;
   if (!read_words(scanner, words, !moves && !sets)) return false;
   if (parentheses_) differ(Difference::kParentheses);
@@ -469,6 +483,7 @@ bool GcodeCommands::deposit(RawBead raw, std::optional<RawBead>& bead) {
   raw.fed = net;
   raw.primed = std::exchange(position_.primed, 0) + again;
   raw.first = !std::exchange(deposited_, true);
+  raw.acceleration = position_.acceleration;
   if (!within_reach(raw)) return false;
   position_.deposits = true;
   bead = raw;
