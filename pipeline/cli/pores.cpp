@@ -359,12 +359,21 @@ Outcome predict_print(const Arguments& arguments, Context& context, const std::o
     context.say("note: no period along x or y: walls close the window, and k1 is not that of the filling; use a wider part");
   print_warnings(*pile, *report, context);
   context.say(beads->reported);
+  for (const Warning& warning : beads->warnings) context.say_text(fmt::format("warning   {}\n", one_line(warning.text)));
+  const Darcy* along = beads->depends_on_acceleration && report->flow[2] ? &*report->flow[2] : nullptr;
+  const K1Range range = along ? k1_range(along->k_m2[2] / segment::kDarcy, along->error_m2[2] / segment::kDarcy) : K1Range();
+  const std::string accuracy =
+      along ? fmt::format("accuracy  k1 along z is {:.3g} to {:.3g} D with voxels and acceleration (docs/theory/pores.md)\n",
+                          range.low, range.high)
+            : "";
   if (!arguments.has("--json"))
-    return context.print(as_text(*choice, *report) + (*inertia ? as_text(**inertia) : "") + as_text(*analysis) +
+    return context.print(as_text(*choice, *report) + accuracy + (*inertia ? as_text(**inertia) : "") + as_text(*analysis) +
                          as_text(*files));
   Json json = as_json(*choice, *report);
   if (*inertia) json["inertia"] = as_json(**inertia);
   add_to(*analysis, json);
+  json["warnings"] = warnings_json(beads->warnings);
+  if (along) json["k1_range_darcy"] = {range.low, range.high};
   if (!files->empty()) json["files"] = as_json(*files);
   return context.give(json);
 }

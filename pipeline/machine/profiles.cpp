@@ -172,6 +172,19 @@ void predict_calibration(const Job& job, ExtruderProfile& profile) {
   profile.predicted_calibration = true;
 }
 
+std::optional<Warning> calibration_warning(const ExtruderProfile& profile) {
+  const std::string& name = profile.machine.name;
+  if (profile.predicted_calibration)
+    return Warning{"calibration",
+                   fmt::format("{} has no calibration of its own; widths are predicted from the lag of its melt, {:g} s: "
+                               "lamina calibrate measures them",
+                               name, profile.machine.material.lag_s)};
+  if (has_measured_widths(profile)) return std::nullopt;
+  return Warning{"calibration", fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet "
+                                            "A8: lamina calibrate makes one",
+                                            name)};
+}
+
 bool is_named(const Job& job, std::string_view key) { return std::ranges::find(job.named, key) != job.named.end(); }
 
 void leave_to_machine(const Extruder& machine, Job& job) {

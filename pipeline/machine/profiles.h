@@ -62,6 +62,9 @@ bool has_measured_widths(const ExtruderProfile& profile);
 /// and layers of the job (stages/bead/predicted_tables.h), in place of those of another machine.
 void predict_calibration(const Job& job, ExtruderProfile& profile);
 
+/// Whose widths segmented lines have, if none were measured on this printer. profile  of predict_calibration()
+std::optional<Warning> calibration_warning(const ExtruderProfile& profile);
+
 /// Whether a file, an option or --set gave the key, as in "fill.walls".
 bool is_named(const Job& job, std::string_view key);
 

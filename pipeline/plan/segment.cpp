@@ -130,16 +130,7 @@ void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profil
     }
   }
   if (!segments.any()) return;
-  if (profile.predicted_calibration) {
-    warnings.push_back(
-        {"calibration", fmt::format("{} has no calibration of its own; widths are predicted from the lag of its melt, {:g} s: "
-                                    "lamina calibrate measures them",
-                                    profile.machine.name, profile.machine.material.lag_s)});
-  } else if (!has_measured_widths(profile)) {
-    warnings.push_back({"calibration", fmt::format("{} has no calibration of its own; widths and limits are those measured on "
-                                                   "an Anet A8: lamina calibrate makes one",
-                                                   profile.machine.name)});
-  }
+  if (auto warning = calibration_warning(profile)) warnings.push_back(std::move(*warning));
 }
 
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,

@@ -15,13 +15,20 @@ namespace lamina::pipeline {
 namespace {
 
 /// The shipped printer of that name. errors  those of read_extruder
-Result<std::optional<Extruder>> shipped_extruder_named(const std::string& name) {
+Result<std::optional<ExtruderProfile>> shipped_extruder_named(const std::string& name) {
   for (const ShippedProfile& shipped : shipped_extruders()) {
-    const Result<ExtruderProfile> profile = read_extruder(shipped.text, std::string(shipped.name));
+    Result<ExtruderProfile> profile = read_extruder(shipped.text, std::string(shipped.name));
     if (!profile) return profile.error();
-    if (profile->machine.name == name) return std::optional<Extruder>(profile->machine);
+    if (profile->machine.name == name) return std::optional<ExtruderProfile>(std::move(*profile));
   }
-  return std::optional<Extruder>();
+  return std::optional<ExtruderProfile>();
+}
+
+/// "500 mm/s2", and whether the file commands it.
+std::string acceleration_text(const formats::GcodeFile& file, const Extruder& machine) {
+  const auto& [low, high] = file.accelerations();
+  if (!(high > 0)) return fmt::format("{:g} mm/s2", machine.speed.acceleration_mm_s2);
+  return low == high ? fmt::format("{:g} mm/s2 as commanded", low) : fmt::format("{:g} to {:g} mm/s2 as commanded", low, high);
 }
 
 bead::DepositionRules rules_of(const Extruder& machine) {
@@ -177,8 +184,12 @@ class LayerBeads {
   /// nm: what the melt and the head have forgotten does not count
   std::int64_t memory(std::span<const BeadFeed> feeds) const {
     double fastest = rules_->usual_mm_s;
-    for (const BeadFeed& feed : feeds) fastest = std::max(fastest, feed.speed_mm_s);
-    const bead::BeadMachine& machine = rules_->machine;
+    bead::BeadMachine machine = rules_->machine;
+    for (const BeadFeed& feed : feeds) {
+      fastest = std::max(fastest, feed.speed_mm_s);
+      if (feed.acceleration_mm_s2 > 0)
+        machine.acceleration_mm_s2 = std::min(machine.acceleration_mm_s2, feed.acceleration_mm_s2);
+    }
     const double way = fastest * fastest / (2 * machine.acceleration_mm_s2) + 5 * machine.tau_s * fastest;
     return static_cast<std::int64_t>(1e6 * std::clamp(way, 10.0, 200.0));
   }
@@ -227,21 +238,35 @@ Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& 
       file.states_widths() ? "widths are those that the file states" : "widths are those of the fed volume";
   if (beads == "stated" && !machine.empty())
     return Error{Fault::kUsage, "--machine has no effect with --beads stated; remove one"};
-  if (beads == "stated") return BeadRules{std::nullopt, reported};
-  std::optional<Extruder> printer;
+  std::optional<ExtruderProfile> printer;
   if (!machine.empty()) {
-    const Result<ExtruderProfile> profile = find_extruder(machine);
+    Result<ExtruderProfile> profile = find_extruder(machine);
     if (!profile) return profile.error();
-    printer = profile->machine;
+    printer = std::move(*profile);
   } else if (!file.machine().empty()) {
-    Result<std::optional<Extruder>> named = shipped_extruder_named(file.machine());
+    Result<std::optional<ExtruderProfile>> named = shipped_extruder_named(file.machine());
     if (!named) return named.error();
     printer = std::move(*named);
   }
+  if (beads == "stated") {
+    BeadRules stated{std::nullopt, reported};
+    // A file of lamina states the widths of segmented lines that the calibration gave it.
+    if (printer && file.states_widths()) {
+      if (auto warning = calibration_warning(*printer)) stated.warnings.push_back(std::move(*warning));
+    }
+    return stated;
+  }
   if (printer) {
-    BeadRules found{rules_of(*printer), fmt::format("widths are those that {} deposits: lag {:g} s, {:g} mm/s2", printer->name,
-                                                    printer->material.lag_s, printer->speed.acceleration_mm_s2)};
+    const Extruder& known = printer->machine;
+    BeadRules found{rules_of(known), fmt::format("widths are those that {} deposits: lag {:g} s, {}", known.name,
+                                                 known.material.lag_s, acceleration_text(file, known))};
     found.rules->spread = beads != "deposited";
+    found.depends_on_acceleration = known.material.lag_s > 0 && file.changes_speeds();
+    if (!(known.material.lag_s > 0))
+      found.warnings.push_back(
+          {"calibration", fmt::format("{} states no lag of its melt (material.lag_s): beads follow the feed "
+                                      "at once, which makes pores of segmented lines too narrow",
+                                      known.name)});
     return found;
   }
   if (!beads.empty())

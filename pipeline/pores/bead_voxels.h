@@ -17,12 +17,15 @@ namespace lamina::pipeline {
 struct BeadRules {
   std::optional<bead::DepositionRules> rules;  // none: beads are as wide as the file states
   std::string reported;                        // for people: where widths come from
+  bool depends_on_acceleration = false;        // speeds change along lines, and the melt lags
+  std::vector<Warning> warnings = {};          // whose widths they are, if nothing was measured on the printer
 };
 
 /// beads    "spread": by the bead model (docs/theory/bead.md); "deposited": the same, without spread along their lines;
 /// "stated" by
 ///          the file; or "": spread where the printer is known
-/// machine  as --machine takes it; "": the one that the file names, if a profile of that name is shipped
+/// machine  its acceleration counts where the file commands none;
+///          as --machine takes it; "": the one that the file names, if a profile of that name is shipped
 /// errors   kUsage: an unknown printer or word; "deposited" or "spread" without a printer
 Result<BeadRules> bead_rules(const formats::GcodeFile& file, const std::string& beads, const std::string& machine);
 

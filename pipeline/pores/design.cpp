@@ -8,6 +8,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/report/summary.h"      // warnings_json
 #include "stages/segment/permeability.h"  // the unit
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
@@ -22,6 +23,9 @@ std::string heights_text(double from_mm, double to_mm) {
 }
 
 constexpr double kNoNearer = 0.02;
+constexpr std::uint32_t kOutsideRuns = 4;  // forward runs that show what is nearest to a target out of reach
+constexpr double kClearlyMissed = 2;       // tolerances: the one file of all regions cannot make up for it
+constexpr ForwardGrid kReachGrid{20, 40, 20, 1};
 constexpr double kMinNear = 0.01;  // walls fall between voxels
 
 /// The last comment before the keys.
@@ -94,6 +98,12 @@ std::vector<std::string> outside_of(const segment::DesignLimits& limits, const s
   return lines;
 }
 
+/// What a person has to know of the printer.
+std::vector<Warning> warnings_of(const ExtruderProfile& profile) {
+  auto warning = calibration_warning(profile);
+  return warning ? std::vector{std::move(*warning)} : std::vector<Warning>();
+}
+
 /// Of one step: with the number of lines that all share, or where that misses with any.
 Result<DesignedJob> design_step(DesignRequest request, const segment::TargetStep& step, std::uint32_t lines,
                                 const std::function<bool(double)>& report) {
@@ -160,9 +170,23 @@ Status check_together(const DesignRequest& request, double layer_mm, GradientJob
   return {};
 }
 
+/// A gradient whose last region is out of reach: those above it were not searched.
+GradientJob missed_job(std::vector<GradientStep> steps) {
+  GradientJob all;
+  for (const GradientStep& one : steps) all.runs += one.found.runs;
+  all.miss = steps.back().found.miss;
+  all.steps = std::move(steps);
+  return all;
+}
+
 constexpr std::string_view kSure =
-    "accuracy  +- is the error of the voxels; for seven printed samples, predicted k1 was 0.75 to 1.24 times the\n"
-    "          measured one and porosity within 2.3 points (bench/pores.md)\n";
+    "accuracy  to: with the voxels' error and the acceleration's uncertainty; predicted k1 of seven printed samples\n"
+    "          was 0.75 to 1.24 times the measured one, porosity within 2.3 points (bench/pores.md)\n";
+
+/// Darcy.
+K1Range range_of(const ForwardRun& forward) {
+  return k1_range(forward.permeability_m2 / segment::kDarcy, forward.permeability_error_m2 / segment::kDarcy);
+}
 
 std::string lines_text(const segment::SegmentSettings& keys) {
   return fmt::format("thick {:g} mm, thin {:g} mm, {} continuous line{} between segmented ones, S-C {:g}, C-C {:g} mm",
@@ -179,6 +203,13 @@ Json segment_json(const segment::SegmentSettings& keys) {
           {"thick_extrusion_percent", keys.thick_extrusion},
           {"thick_speed_percent", *keys.thick_speed},
           {"thin_speed_percent", keys.thin_speed}};
+}
+
+/// A line each.
+std::string warnings_text(const std::vector<Warning>& warnings) {
+  std::string text;
+  for (const Warning& warning : warnings) text += fmt::format("warning   {}\n", one_line(warning.text));
+  return text;
 }
 
 /// The targets, as options.
@@ -207,6 +238,8 @@ void report_plan(const DesignedJob& found, Json& json) {
   json["porosity_through"] = forward.porosity_through;
   json["k1_darcy"] = forward.permeability_m2 / segment::kDarcy;
   json["k1_error_darcy"] = forward.permeability_error_m2 / segment::kDarcy;
+  const K1Range range = range_of(forward);
+  json["k1_range_darcy"] = {range.low, range.high};
   json["resolved"] = forward.resolved;
   json["throat_mm"] = found.design.slots.throat_mm;
   json["pore_mm"] = {forward.pore_width_mm, forward.pore_length_mm};
@@ -258,7 +291,39 @@ Result<ExtruderProfile> designable_extruder(const std::string& machine) {
   return profile;
 }
 
-Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& report) {
+Result<std::vector<segment::Reach>> reachable(const std::string& machine, const std::function<bool(double)>& report) {
+  const auto profile = designable_extruder(machine);
+  if (!profile) return profile.error();
+  const auto limits = segment::DesignLimits::of(profile->machine, profile->calibration);
+  if (!limits) return Error{limits.error().fault, fmt::format("--machine {}: {}", machine, limits.error().message)};
+  const auto slots = segment::reach_of(*limits);
+  std::vector<segment::Reach> reach(slots.begin(), slots.end());
+  const auto run_of = [&](const segment::Choice& choice) -> Result<ForwardRun> {
+    const segment::SegmentSettings settings = limits->settings_of(choice);
+    const auto plan = limits->plan_of(settings);
+    if (!plan) return plan.error();
+    Job job;
+    if (const Status status = read_job_text(designed_job_text(machine, *profile, settings), "the job", job); !status)
+      return status.error();
+    return run_forward(job, machine, *plan, kReachGrid, report);
+  };
+  const segment::Reach few = reach.front(), many = reach.back();  // lines
+  const auto low = run_of(many.tightest);
+  if (!low) return low.error();
+  const auto high = run_of(few.widest);
+  if (!high) return high.error();
+  const auto ratio = [](double run, double of_slots) { return of_slots > 0 ? run / of_slots : 1; };
+  const double at_low = ratio(low->permeability_m2, many.permeability_m2.minimum);
+  const double at_high = ratio(high->permeability_m2, few.permeability_m2.maximum);
+  for (segment::Reach& one : reach)
+    one.permeability_m2 = {one.permeability_m2.minimum * at_low, one.permeability_m2.maximum * at_high};
+  return reach;
+}
+
+namespace {
+
+/// The search of design_job() with what is known.
+Result<DesignedJob> search_job(const DesignRequest& request, const std::function<bool(double)>& report) {
   const auto profile = designable_extruder(request.machine);
   if (!profile) return profile.error();
   const Calibration& calibration = profile->calibration;
@@ -267,7 +332,9 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   std::vector<segment::RatioAt> known = request.known;
   std::vector<std::string> tries;
   std::optional<DesignedJob> best;
-  while (tries.size() < request.max_runs) {
+  const bool outside = segment::out_of_reach(request.target, request.reach);
+  const std::uint32_t max_runs = outside ? std::min(kOutsideRuns, request.max_runs) : request.max_runs;
+  while (tries.size() < max_runs) {
     DesignedJob tried;
     tried.design = segment::search(request.target, *limits, request.ratio, request.lines, known);
     // Out of reach, and no run to come is nearer.
@@ -300,9 +367,29 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   best->runs = static_cast<std::uint32_t>(tries.size());
   best->known = std::move(known);
   best->widths = one_line(calibration.source);
+  best->warnings = warnings_of(*profile);
   best->toml.insert(0, "# Made by lamina design. By its forward run: " + predicted_lines(best->forward) + ".\n" +
                            std::string(kDesignedJobRuns));
   return *best;
+}
+
+}  // namespace
+
+Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& report) {
+  auto found = search_job(request, report);
+  if (!found || found->met || !request.target.porosity || segment::out_of_reach(request.target, request.reach)) return found;
+  // Slots say too much void where tables of widths do not conserve volume: once more, with what is fed.
+  const auto profile = designable_extruder(request.machine);
+  const auto limits = profile ? segment::DesignLimits::of(profile->machine, profile->calibration) : profile.error();
+  if (!limits) return limits.error();
+  DesignRequest again = request;
+  again.known = segment::fed_ratios(*limits, request.ratio.permeability);
+  again.known.insert(again.known.end(), found->known.begin(), found->known.end());
+  auto second = search_job(again, report);
+  if (!second) return second;
+  second->runs = found->runs += second->runs;
+  second->known = found->known;
+  return second->miss < found->miss ? second : found;
 }
 
 Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
@@ -311,11 +398,21 @@ Result<GradientJob> design_gradient(const DesignRequest& request, const std::vec
   if (!profile) return profile.error();
   const auto limits = segment::DesignLimits::of(profile->machine, profile->calibration);
   if (!limits) return Error{limits.error().fault, fmt::format("--machine {}: {}", request.machine, limits.error().message)};
-  const std::uint32_t lines = segment::common_lines(steps, *limits, request.ratio, request.tolerance);
   const double parts = static_cast<double>(steps.size()) + 1;
   DesignRequest next = request;
   next.near = near_of(steps, request.near);
   GradientJob all;
+  const auto ends_search = [&](const DesignedJob& found) {
+    return !request.nearest && found.miss > kClearlyMissed * request.tolerance;
+  };
+  // Targets rise or fall from the first region to the last.
+  for (const segment::TargetStep& step : {steps.front(), steps.back()}) {
+    if (request.nearest || !segment::out_of_reach(step.target, request.reach)) continue;
+    auto found = design_step(next, step, 0, report);
+    if (!found) return found.error();
+    if (ends_search(*found)) return missed_job({{step, std::move(*found)}});
+  }
+  const std::uint32_t lines = segment::common_lines(steps, *limits, request.ratio, request.tolerance);
   std::vector<DesignRange> ranges;
   for (const segment::TargetStep& step : steps) {
     const double done = static_cast<double>(all.steps.size());
@@ -325,6 +422,7 @@ Result<GradientJob> design_gradient(const DesignRequest& request, const std::vec
     all.runs += found->runs;
     ranges.push_back({step.from_mm, step.to_mm, found->design.settings});
     all.steps.push_back({step, std::move(*found)});
+    if (ends_search(all.steps.back().found)) return missed_job(std::move(all.steps));
   }
   all.toml = designed_job_text(request.machine, *profile, ranges);
   const double layer_mm = profile->calibration.height_mm;
@@ -346,27 +444,57 @@ Result<GradientJob> design_gradient(const DesignRequest& request, const std::vec
 }
 
 std::string predicted_lines(const ForwardRun& forward) {
-  return fmt::format("porosity {:.2f} %, k1 {:.4g} +- {:.2g} D along z, pores {:.3f} x {:.2f} mm", 100 * forward.porosity,
-                     forward.permeability_m2 / segment::kDarcy, forward.permeability_error_m2 / segment::kDarcy,
+  const K1Range range = range_of(forward);
+  return fmt::format("porosity {:.2f} %, k1 {:.4g} D along z ({:.3g} to {:.3g}), pores {:.3f} x {:.2f} mm",
+                     100 * forward.porosity, forward.permeability_m2 / segment::kDarcy, range.low, range.high,
                      forward.pore_width_mm, forward.pore_length_mm);
+}
+
+std::string as_text(const std::vector<segment::Reach>& reach, bool outside) {
+  std::string text = "reach     lines  porosity, %     k1, D           pores, mm\n";
+  const auto row = [](const segment::Interval& interval, double unit) {
+    return fmt::format("{:.3g} to {:.3g}", interval.minimum / unit, interval.maximum / unit);
+  };
+  for (std::size_t i = 0; i < reach.size(); ++i) {
+    const segment::Reach& one = reach[i];
+    text += fmt::format("          {:<7}{:<16}{:<16}{} x {}\n", i + 1, row(one.porosity, 0.01),
+                        row(one.permeability_m2, segment::kDarcy), row(one.pore_width_mm, 1), row(one.pore_length_mm, 1));
+  }
+  return outside ? text + "target    out of this reach; the nearest filling follows\n" : text;
+}
+
+Json as_json(const std::vector<segment::Reach>& reach) {
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < reach.size(); ++i) {
+    const segment::Reach& one = reach[i];
+    rows.push_back(
+        {{"continuous_lines", i + 1},
+         {"porosity", {one.porosity.minimum, one.porosity.maximum}},
+         {"k1_darcy", {one.permeability_m2.minimum / segment::kDarcy, one.permeability_m2.maximum / segment::kDarcy}},
+         {"pore_width_mm", {one.pore_width_mm.minimum, one.pore_width_mm.maximum}},
+         {"pore_length_mm", {one.pore_length_mm.minimum, one.pore_length_mm.maximum}}});
+  }
+  return rows;
 }
 
 std::string as_text(const DesignedJob& found) {
   const segment::SegmentSettings& keys = found.design.settings;
   const ForwardRun& forward = found.forward;
+  const K1Range range = range_of(forward);
   std::string text = fmt::format("lines     {}\nsettings  {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
                                  lines_text(keys), keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
   text +=
       fmt::format("porosity  {:.2f} %, {:.2f} % connected along z\n", 100 * forward.porosity, 100 * forward.porosity_through);
-  text +=
-      fmt::format("along z   k1 {:.4g} +- {:.2g} D ({:.4e} m2), throat {:.3f} mm\n", forward.permeability_m2 / segment::kDarcy,
-                  forward.permeability_error_m2 / segment::kDarcy, forward.permeability_m2, found.design.slots.throat_mm);
+  text += fmt::format("along z   k1 {:.4g} +- {:.2g} D ({:.4e} m2), {:.3g} to {:.3g} D; throat {:.3f} mm\n",
+                      forward.permeability_m2 / segment::kDarcy, forward.permeability_error_m2 / segment::kDarcy,
+                      forward.permeability_m2, range.low, range.high, found.design.slots.throat_mm);
   text += fmt::format("pores     {:.3f} x {:.2f} mm\n", forward.pore_width_mm, forward.pore_length_mm);
   text += kSure;
   if (!found.widths.empty()) text += fmt::format("widths    {}\n", found.widths);
   if (!forward.resolved) text += "note      voxels are too coarse for the pores; take a smaller --voxel\n";
   for (const std::string& line : found.outside) text += fmt::format("beyond    {}\n", line);
   if (found.outside.empty()) text += "beyond    nothing: lengths, gaps and extrusion are those that were measured\n";
+  text += warnings_text(found.warnings);
   return text + fmt::format("checked   by {} forward run{}; the target is met within {:.1f} %\n", found.runs,
                             found.runs == 1 ? "" : "s", 100 * found.miss);
 }
@@ -377,6 +505,7 @@ Json as_json(const DesignedJob& found, const std::string& output) {
   json["runs"] = found.runs;
   json["k1_over_slots"] = found.model_ratio;
   json["widths"] = found.widths;
+  json["warnings"] = warnings_json(found.warnings);
   json["beyond_measured"] = found.outside;
   return json;
 }
@@ -384,6 +513,7 @@ Json as_json(const DesignedJob& found, const std::string& output) {
 std::string as_text(const GradientJob& found) {
   std::string text;
   for (const GradientStep& one : found.steps) text += step_text(one);
+  if (found.toml.empty()) return text + warnings_text(found.steps.front().found.warnings);
   text += fmt::format(
       "whole     porosity {:.2f} %, k1 of the regions in series {:.4g} D along z; where two regions meet, pores\n"
       "          overlap only in part, which lowers k1\n",
@@ -391,6 +521,7 @@ std::string as_text(const GradientJob& found) {
   text += kSure;
   if (const std::string& widths = found.steps.front().found.widths; !widths.empty())
     text += fmt::format("widths    {}\n", widths);
+  text += warnings_text(found.steps.front().found.warnings);
   return text +
          fmt::format("checked   by {} forward runs, the last {} in one file of all regions; targets are met within {:.1f} %\n",
                      found.runs, found.steps.size(), 100 * found.miss);
@@ -399,11 +530,14 @@ std::string as_text(const GradientJob& found) {
 Json as_json(const GradientJob& found, const std::string& output) {
   Json json = {{"command", "design"}, {"met", found.met}, {"miss", found.miss}, {"job", output}, {"steps", Json::array()}};
   for (const GradientStep& one : found.steps) json["steps"].push_back(step_json(one));
-  json["porosity"] = found.porosity;
-  json["k1_in_series_darcy"] = found.permeability_m2 / segment::kDarcy;
-  json["continuous_lines"] = found.lines;
+  if (!found.toml.empty()) {
+    json["porosity"] = found.porosity;
+    json["k1_in_series_darcy"] = found.permeability_m2 / segment::kDarcy;
+    json["continuous_lines"] = found.lines;
+  }
   json["runs"] = found.runs;
   json["widths"] = found.steps.front().found.widths;
+  json["warnings"] = warnings_json(found.steps.front().found.warnings);
   return json;
 }
 
@@ -428,7 +562,8 @@ std::string missed_text(const GradientJob& found) {
     ++missed;
   }
   if (first == nullptr) return {};
-  return fmt::format("{} of {} regions; from {} nearest to {} is {}, which misses it by {:.0f} %", missed, found.steps.size(),
+  const std::string regions = found.toml.empty() ? "" : fmt::format("{} of {} regions; ", missed, found.steps.size());
+  return fmt::format("{}from {} nearest to {} is {}, which misses it by {:.0f} %", regions,
                      heights_text(first->step.from_mm, first->step.to_mm), target_text(first->step.target),
                      nearest_text(first->step.target, first->found), 100 * first->found.miss);
 }

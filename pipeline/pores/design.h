@@ -25,6 +25,8 @@ struct DesignRequest {
   segment::SlotRatio ratio{1, 0.85};    // as most plans have it: where the search begins
   std::vector<segment::RatioAt> known;  // of forward runs with the same machine and grid
   segment::LineBounds lines;
+  std::vector<segment::Reach> reach;  // of reachable(); empty: unknown
+  bool nearest = true;                // false: the first region of a gradient that is clearly missed ends the search
 };
 
 struct DesignedJob {
@@ -37,14 +39,25 @@ struct DesignedJob {
   double model_ratio = 1;               // k1 of the forward run / of the slots alone
   std::vector<std::string> outside;     // what of the choice lies beyond what was measured, one line each
   std::string widths;                   // where the widths of beads come from
+  std::vector<Warning> warnings;        // of the printer: it has no calibration of its own
   std::string toml;                     // of the job file
 };
 
 /// The printer, if pores are designed for it. errors  kUsage, of --machine
 Result<ExtruderProfile> designable_extruder(const std::string& machine);
 
+/// What the machine reaches with 1, 2, .. continuous lines: porosity by what is fed, k1 of slots, corrected by forward runs in
+/// coarse voxels of the tightest and the widest plan.
+/// errors  as of design_job()
+/// cost    of two forward runs with voxels of 20 um
+Result<std::vector<segment::Reach>> reachable(const std::string& machine, const std::function<bool(double)>& advance);
+/// A table, with a line if the target is out of it.
+std::string as_text(const std::vector<segment::Reach>& reach, bool outside);
+Json as_json(const std::vector<segment::Reach>& reach);
+
 /// Searches by slots (segment/design.h), runs the plan forward, corrects the slots by what that says, and searches again
-/// until every target is met, or the corrected slots show that none within the machine's limits meets them.
+/// until every target is met, or the corrected slots show that none within the machine's limits meets them. A few
+/// runs are enough for a target out of the request's reach.
 /// returns  the best forward run, even if it misses the target
 /// advance  receives the progress, 0 .. 1; false stops
 /// errors   kUsage: no such machine, or no calibration of segmented lines; of run_forward(); kInterrupted
@@ -57,7 +70,7 @@ struct GradientStep {
 };
 
 struct GradientJob {
-  std::vector<GradientStep> steps;  // from the bottom up
+  std::vector<GradientStep> steps;  // from the bottom up; without toml only those searched until one was missed
   double miss = 0;                  // of the step that misses its target by most
   bool met = false;                 // all of them
   std::uint32_t lines = 0;          // continuous ones in all regions; 0: not the same ones
@@ -78,7 +91,7 @@ struct GradientJob {
 Result<GradientJob> design_gradient(const DesignRequest& request, const std::vector<segment::TargetStep>& steps,
                                     const std::function<bool(double)>& advance);
 
-/// What a forward run says: "porosity 24.13 %, k1 101.9 +- 3.3 D along z, pores 0.071 x 1.61 mm"
+/// What a forward run says: "porosity 24.13 %, k1 101.9 D along z (78.9 to 150), pores 0.071 x 1.61 mm"
 std::string predicted_lines(const ForwardRun& forward);
 
 /// Lines that end with LF.

@@ -296,7 +296,10 @@ void add_pores(const std::string& path, Summary& summary) {
     summary.results.emplace_back("widths", histogram_line(histogram(sizes, false)));
     summary.results.emplace_back("lengths", histogram_line(histogram(sizes, true)));
   }
-  summary.facts["deposited"] = as_json(*print);
+  Json& deposited = summary.facts["deposited"] = as_json(*print);
+  // The plan's own sums: numbers of the file are rounded.
+  deposited["fed_mm3"] = summary.facts.at("filament_mm3");
+  deposited["fed_g"] = summary.facts.at("filament_g");
 }
 
 }  // namespace lamina::pipeline

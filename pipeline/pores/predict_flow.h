@@ -1,6 +1,7 @@
 // pipeline/pores/predict_flow.h: the pores of a window of voxels, Darcy's k1 and Forchheimer's k2.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <optional>
@@ -35,6 +36,15 @@ struct PoreRasters {
   VoxelView coarse;              // kFiner times as many as voxels about twice as large
   std::uint32_t finer = kFiner;  // 1: images, whose pixels are all that is known; voxels and fine are the same then
 };
+
+/// What k1 of segmented lines may be, m2: the voxels' error, and the acceleration of the head, which nothing in a plan shows.
+/// The profile's 500 mm/s2 was chosen with measured k1 in view, and public sources of the same printer say 400 and 1000. With
+/// these two k1 of six printed plans is 0.80 to 0.87 and 1.21 to 1.43 times that with 500 (bench/pores.md, table of other
+/// numbers): the range takes the outer factors, as evaluating each plan again would triple the cost.
+struct K1Range {
+  double low = 0, high = 0;
+};
+inline K1Range k1_range(double k1, double error) { return {0.80 * std::max(k1 - error, 0.0), 1.43 * (k1 + error)}; }
 
 struct PoreReport {
   std::uint64_t voxels = 0, empty = 0;

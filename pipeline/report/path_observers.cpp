@@ -336,11 +336,9 @@ class FilamentObserver : public MoveObserver {
   void layer(const LayerRecord&, const void*) override {}
   void report(Summary& summary) const override {
     const formats::MoveTotals& totals = sums_.totals;
-    const auto& material = plan_.moves->profile.machine.material;
-    const double filament_cm3 = totals.filament_mm * material.mm3_of_e() / 1000;
-    const double filament_g = filament_cm3 * material.density_g_cm3;
+    const formats::FilamentUse use = formats::filament_use(totals, plan_.moves->profile.machine);
     summary.results.emplace_back("filament",
-                                 fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
+                                 fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, use.mm3 / 1000, use.grams));
     summary.results.emplace_back("printing", fmt::format("about {}", formats::gcode::time_text(totals.seconds)));
     Json& facts = summary.facts;
     facts["moves"] = totals.part_moves();
@@ -350,7 +348,8 @@ class FilamentObserver : public MoveObserver {
     facts["bead_mm"] = totals.bead_mm - totals.auxiliary_mm;
     facts["travel_mm"] = totals.travel_mm;
     facts["filament_mm"] = totals.filament_mm;
-    facts["filament_g"] = filament_g;
+    facts["filament_mm3"] = use.mm3;
+    facts["filament_g"] = use.grams;
     facts["skirt"] = {{"moves", totals.auxiliary_moves},
                       {"bead_mm", totals.auxiliary_mm},
                       {"volume_mm3", totals.auxiliary_mm3},

@@ -52,7 +52,9 @@ class DepositedLine {
       else
         put(p, out);
     };
-    BeadLine line(rules_.machine, rules_.height_mm);
+    BeadMachine machine = rules_.machine;
+    if (feeds[0].acceleration_mm_s2 > 0) machine.acceleration_mm_s2 = feeds[0].acceleration_mm_s2;
+    BeadLine line(machine, rules_.height_mm);
     const double first = std::min(speed_of(feeds[0]), rules_.corner_mm_s);
     Joint joint{first, first_flow(first * area(0), speed_of(feeds[0]) * area(0), flow), true};
     for (std::size_t i = 0; i < beads.size(); ++i) {

@@ -17,7 +17,7 @@
 namespace lamina::bead {
 
 struct DepositionRules {
-  BeadMachine machine;     // its area does not count: what is fed does
+  BeadMachine machine;     // its area does not count: what is fed does; lines of a stated acceleration keep to that
   double corner_mm_s = 8;  // the change of velocity that is made at once, > 0
   double feed_ratio = 1;   // what is fed / what is commanded
   double height_mm = 0.2;  // of the layer, > 0

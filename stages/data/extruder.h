@@ -48,7 +48,8 @@ struct Extruder {
     double wall_mm_s = 30, inner_wall_mm_s = 40;
     double first_layer_mm_s = 15;  // speed limit of the first layer; thin segments exceed it by their share
     double travel_mm_s = 120, lift_mm_s = 10;
-    double acceleration_mm_s2 = 1000;  // for the estimate of time
+    double acceleration_mm_s2 = 1000;  // of the head: deposited widths and times depend on it
+    bool states_acceleration = false;  // the profile has it: G-code commands it
     double corner_mm_s = 8;            // change of speed that the machine makes at once
   } speed;
 

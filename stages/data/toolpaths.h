@@ -219,10 +219,11 @@ struct DepositedBead {
 
 /// What was commanded for one.
 struct BeadFeed {
-  double volume_mm3;      // fed along it
-  double speed_mm_s;      // of the head; 0: not stated
-  bool joined;            // it begins where the bead before ended, and nothing was moved in between
-  double primed_mm3 = 0;  // fed since the bead before, retractions and what took them back together
+  double volume_mm3;              // fed along it
+  double speed_mm_s;              // of the head; 0: not stated
+  bool joined;                    // it begins where the bead before ended, and nothing was moved in between
+  double primed_mm3 = 0;          // fed since the bead before, retractions and what took them back together
+  double acceleration_mm_s2 = 0;  // commanded; 0: not stated
 };
 
 }  // namespace lamina

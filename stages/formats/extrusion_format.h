@@ -74,6 +74,15 @@ struct MoveTotals {
   }
 };
 
+/// What a file takes: the one source of every volume and mass that is reported of it. Numbers of the file itself are rounded.
+struct FilamentUse {
+  double mm3 = 0, grams = 0;
+};
+inline FilamentUse filament_use(const MoveTotals& totals, const Extruder& machine) {
+  const double mm3 = totals.filament_mm * machine.material.mm3_of_e();
+  return {mm3, mm3 * 1e-3 * machine.material.density_g_cm3};
+}
+
 struct ExtrusionHead {
   std::string program;  // "lamina 0.1.0"
   std::string source;   // names of the parts, one line

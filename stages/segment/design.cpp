@@ -35,6 +35,7 @@ Result<DesignLimits> DesignLimits::of(const Extruder& machine, const Calibration
   limits.extrusion_ = {calibration.repeated.front().extrusion_percent, calibration.repeated.back().extrusion_percent};
   const auto& material = machine.material;
   const double full = bead_area(calibration.width_mm, calibration.height_mm, material.shape()) * material.flow;
+  limits.full_mm2_ = full;
   limits.continuous_mm_ = bead_width(full, calibration.height_mm,
                                      material.shape() == BeadShape::kEllipse ? BeadShape::kEllipse : BeadShape::kStadium);
   limits.speed_mm_s_ = calibration.speed_mm_s;
@@ -86,6 +87,11 @@ Result<Segmentation> DesignLimits::plan_of(const SegmentSettings& settings) cons
 Segmentation DesignLimits::deposited(Segmentation plan) const {
   plan.continuous_width_mm = continuous_mm_;
   return plan;
+}
+
+double DesignLimits::fed_porosity(const Segmentation& plan) const {
+  const double across = 2 * plan.spacing_sc_mm + (plan.continuous - 1.0) * plan.spacing_cc_mm;
+  return 1 - full_mm2_ * (plan.thick_extrusion / 100 + plan.continuous) / (across * calibration_->height_mm);
 }
 
 std::array<double, 4> DesignLimits::beyond(const Choice& choice) const {
@@ -167,6 +173,63 @@ Slots slots_of(const Segmentation& plan, double layer_mm) {
   slots.porosity = area / section;
   slots.permeability_m2 = flow / section * 1e-6;
   return slots;
+}
+
+// --- what can be reached
+
+namespace {
+
+/// All plans at the ends of what is free, with 1, 2, .. lines.
+template <class Take>
+void for_each_end(const DesignLimits& limits, const Take& take) {
+  const Interval extrusion = limits.extrusion();
+  for (std::uint32_t i = 0; i < 24 * DesignLimits::kMaxContinuous; ++i) {
+    const double share = i % 3 / 2.0;
+    const Choice choice = limits.nearest({i / 24 + 1, extrusion.minimum + share * (extrusion.maximum - extrusion.minimum),
+                                          i / 3 % 2 == 0 ? kThick.minimum : kThick.maximum, i / 6 % 2 == 0 ? 0 : INFINITY,
+                                          i / 12 % 2 == 0 ? kGap.minimum : kGap.maximum});
+    if (const auto plan = limits.plan_of(limits.settings_of(choice))) take(choice, *plan);
+  }
+}
+
+}  // namespace
+
+std::array<Reach, DesignLimits::kMaxContinuous> reach_of(const DesignLimits& limits) {
+  std::array<Reach, DesignLimits::kMaxContinuous> all;
+  const auto widen = [](Interval& interval, double value) {
+    interval = {std::min(interval.minimum, value), std::max(interval.maximum, value)};
+  };
+  for_each_end(limits, [&](const Choice& choice, const Segmentation& plan) {
+    Reach& reach = all[choice.continuous - 1];
+    const Slots slots = slots_of(limits.deposited(plan), limits.calibration().height_mm);
+    const Pores pores = predict_pores(plan);
+    if (slots.permeability_m2 < reach.permeability_m2.minimum) reach.tightest = choice;
+    if (slots.permeability_m2 > reach.permeability_m2.maximum) reach.widest = choice;
+    widen(reach.permeability_m2, slots.permeability_m2);
+    widen(reach.porosity, limits.fed_porosity(plan));
+    widen(reach.pore_width_mm, pores.width_mm);
+    widen(reach.pore_length_mm, pores.length_mm);
+  });
+  return all;
+}
+
+std::vector<RatioAt> fed_ratios(const DesignLimits& limits, double permeability) {
+  std::vector<RatioAt> all;
+  for_each_end(limits, [&](const Choice& choice, const Segmentation& plan) {
+    const Slots slots = slots_of(limits.deposited(plan), limits.calibration().height_mm);
+    all.push_back({choice, {limits.fed_porosity(plan) / slots.porosity, permeability}});
+  });
+  return all;
+}
+
+bool out_of_reach(const PoreTarget& target, std::span<const Reach> reach) {
+  const auto far = [](const std::optional<double>& value, const Interval& interval, double factor) {
+    return value && (*value * factor < interval.minimum || *value > interval.maximum * factor);
+  };
+  return !reach.empty() && std::ranges::all_of(reach, [&](const Reach& lines) {
+    return far(target.porosity, lines.porosity, 1.15) || far(target.permeability_m2, lines.permeability_m2, 1.5) ||
+           far(target.pore_width_mm, lines.pore_width_mm, 1.15) || far(target.pore_length_mm, lines.pore_length_mm, 1.15);
+  });
 }
 
 // --- the search

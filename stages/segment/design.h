@@ -56,6 +56,9 @@ class DesignLimits {
   /// measured one. A better model of beads belongs here.
   Segmentation deposited(Segmentation plan) const;
 
+  /// The void of a period by what is fed: thick and thin stretches are fed alike.
+  double fed_porosity(const Segmentation& plan) const;
+
   /// How far a choice is from what was measured, 0 where it was: extrusion, thick, thin, gap; 1 is far.
   std::array<double, 4> beyond(const Choice& choice) const;
 
@@ -64,7 +67,7 @@ class DesignLimits {
  private:
   const Calibration* calibration_ = nullptr;
   Interval extrusion_;
-  double speed_mm_s_ = 0, acceleration_ = 0, max_thin_ = 0, continuous_mm_ = 0;
+  double speed_mm_s_ = 0, acceleration_ = 0, max_thin_ = 0, continuous_mm_ = 0, full_mm2_ = 0;
 };
 
 // --- the pores of a segmented filling as slots between beads
@@ -88,6 +91,19 @@ struct Slots {
 /// cost      some thousand roots, 20 microseconds
 Slots slots_of(const Segmentation& plan, double layer_mm);
 
+// --- what can be reached
+
+/// The smallest and largest values of plans with a number of continuous lines; the plans that have those of k1.
+struct Reach {
+  Interval porosity{1, 0}, permeability_m2{1, 0}, pore_width_mm{1e9, 0}, pore_length_mm{1e9, 0};
+  Choice tightest, widest;
+};
+
+/// k1 and pores by slots, porosity by what is fed, of all plans at the ends of what is free, for 1 .. kMaxContinuous lines:
+/// every quantity rises or falls with each of them.
+/// cost  72 calls of slots_of()
+std::array<Reach, DesignLimits::kMaxContinuous> reach_of(const DesignLimits& limits);
+
 // --- the search
 
 /// The target: one or two of these. A pore is that of predict_pores().
@@ -108,6 +124,10 @@ struct RatioAt {
   SlotRatio ratio;
 };
 
+/// What is fed / what slots_of() says at the ends of what is free: tables of widths do not conserve volume.
+/// permeability  ratio that all of them get
+std::vector<RatioAt> fed_ratios(const DesignLimits& limits, double permeability);
+
 /// How many continuous lines may lie between two segmented ones.
 struct LineBounds {
   std::uint32_t minimum = 1, maximum = DesignLimits::kMaxContinuous;
@@ -123,6 +143,11 @@ struct Design {
   double miss = 0;    // of the target that is met worst: relative
   double beyond = 0;  // what was measured: length of DesignLimits::beyond()
 };
+
+/// Whether no number of lines comes near to the target: k1 is outside of its reach by more than a half, or another quantity by
+/// more than 15 %. That is more than slots, corrected at both ends, differ from forward runs (bench/design.md).
+/// reach  of 1, 2, .. lines; empty: unknown, nothing is out of it
+bool out_of_reach(const PoreTarget& target, std::span<const Reach> reach);
 
 /// The largest relative miss of what a plan is.
 double miss_of(const PoreTarget& target, const Slots& slots, const Pores& pores);

@@ -45,6 +45,20 @@ double volume_of_pieces(const Buffer<DepositedPiece>& pieces) {
   return sum;
 }
 
+TEST(DepositedBeads, ACommandedAccelerationCountsBeforeThatOfTheMachine) {
+  const auto widths = [](double machine, double commanded) {
+    CommandedWay way;
+    for (int i = 0; i < 8; ++i) way.add(1.5 * i, 0, 1.5 * (i + 1), 0, i % 2 == 0 ? 15 : 30, kDepositedArea, i > 0);
+    for (BeadFeed& feed : way.feeds) feed.acceleration_mm_s2 = commanded;
+    std::vector<double> all;
+    for (const DepositedPiece& piece : pieces_of(way, deposition_rules(machine))) all.push_back(piece.width_mm);
+    return all;
+  };
+  EXPECT_EQ(widths(400, 1000), widths(1000, 0));
+  EXPECT_EQ(widths(1000, 400), widths(400, 0));
+  EXPECT_NE(widths(400, 0), widths(1000, 0));
+}
+
 TEST(DepositedBeads, AnEvenLineIsWhatIsFedAndItsMelt) {
   CommandedWay way;
   way.add(1, 2, 21, 2, 15, kDepositedArea, false);

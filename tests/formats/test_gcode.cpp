@@ -170,5 +170,21 @@ TEST(Gcode, EveryWidthIsReportedInBothTagsAndTheHeadSaysHow) {
   EXPECT_GT(reported, 10);
 }
 
+TEST(Gcode, AStatedAccelerationIsCommandedAsTheFirmwareTakesIt) {
+  Extruder machine;
+  machine.speed.acceleration_mm_s2 = 500;
+  EXPECT_EQ(write_random(machine, 1, 3).text.find("M204"), std::string::npos) << "nothing states it";
+  machine.speed.states_acceleration = true;
+  for (const auto& [flavor, code] : {std::pair{"Marlin", "\nM204 P500 T500\n"},
+                                     {"RepRap", "\nM204 P500 T500\n"},
+                                     {"Klipper", "\nM204 S500\n"},
+                                     {"Repetier", "\nM201 X500 Y500\nM202 X500 Y500\n"}}) {
+    machine.code.flavor = flavor;
+    const std::string text = write_random(machine, 1, 3).text;
+    EXPECT_NE(text.find(code), std::string::npos) << flavor;
+    EXPECT_LT(text.find(code), text.find(";LAYER_CHANGE")) << flavor;
+  }
+}
+
 }  // namespace
 }  // namespace lamina::formats::gcode

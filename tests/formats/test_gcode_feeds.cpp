@@ -61,5 +61,26 @@ TEST(GcodeFeeds, ALayerRemembersTheSpeedAndTheLineBefore) {
   EXPECT_DOUBLE_EQ(third->feeds[1].speed_mm_s, 25.4) << "inches";
 }
 
+TEST(GcodeFeeds, BeadsHaveTheAccelerationThatIsCommandedBeforeThem) {
+  const Directory directory;
+  const auto file = gcode_file(directory,
+                               "G21\nG90\nM83\n;LAYER_CHANGE\n;HEIGHT:0.2\nG1 Z0.2 F600\nG1 X10 E0.5 F900\n"
+                               "M204 P500 T1000\nG1 X20 E0.5\nM204 T9\nM204\nM204 S-3\nM204 printing\nG1 X30 E0.5 F1800\n"
+                               ";LAYER_CHANGE\nG1 X40 E0.5\nM204 S700 ; both\nG1 X50 E0.5\n"
+                               "SET_VELOCITY_LIMIT VELOCITY=9 ACCEL=800 ACCEL_TO_DECEL=400\nG1 X60 E0.5 F900\n");
+  ASSERT_TRUE(file.ok()) << file.error().message;
+  const auto first = file->layer(0, true), second = file->layer(1, true);
+  ASSERT_TRUE(first.ok() && second.ok());
+  EXPECT_EQ(first->feeds[0].acceleration_mm_s2, 0) << "not stated yet";
+  EXPECT_EQ(first->feeds[1].acceleration_mm_s2, 500);
+  EXPECT_EQ(first->feeds[2].acceleration_mm_s2, 500) << "travels, nothing, and what no machine can do";
+  EXPECT_EQ(second->feeds[0].acceleration_mm_s2, 500) << "a layer begins with that of the one before";
+  EXPECT_EQ(second->feeds[1].acceleration_mm_s2, 700);
+  EXPECT_EQ(second->feeds[2].acceleration_mm_s2, 800);
+  EXPECT_EQ(file->accelerations()[0], 500);
+  EXPECT_EQ(file->accelerations()[1], 800);
+  EXPECT_TRUE(file->changes_speeds()) << "2 of 6 beads";
+}
+
 }  // namespace
 }  // namespace lamina

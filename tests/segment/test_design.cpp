@@ -109,6 +109,24 @@ TEST(DesignLimits, WhatIsRequestedIsBroughtWithinThem) {
   }
 }
 
+TEST(DesignReach, HasThePlansThatASearchFindsAndNoFarTarget) {
+  const auto reach = reach_of(limits());
+  for (const auto& lines : reach) {
+    EXPECT_LT(lines.porosity.minimum, lines.porosity.maximum);
+    EXPECT_LT(lines.permeability_m2.minimum, lines.permeability_m2.maximum);
+    EXPECT_GT(lines.pore_width_mm.minimum, 0.0299);
+  }
+  EXPECT_GT(reach[0].permeability_m2.maximum, reach[2].permeability_m2.maximum) << "more pores a line";
+  for (const double darcy : {0.01, 20.0, 100.0, 300.0, 1e5}) {
+    const Design found = search(porous(0, darcy), limits(), {});
+    EXPECT_LE(found.slots.permeability_m2, 1.02 * reach[0].permeability_m2.maximum) << darcy;
+    EXPECT_GE(found.slots.permeability_m2, 0.98 * reach[2].permeability_m2.minimum) << darcy;
+    EXPECT_EQ(out_of_reach(porous(0, darcy), reach), darcy < 1 || darcy > 1000) << darcy;
+  }
+  EXPECT_TRUE(out_of_reach(porous(0.5, 100), reach)) << "one of two is enough";
+  EXPECT_FALSE(out_of_reach(porous(0.5, 1e5), {})) << "nothing is known";
+}
+
 TEST(DesignLimits, WithoutWidthsOfRepeatedIntervalsNothingIsDesigned) {
   Calibration calibration = anet_a8_calibration();
   calibration.repeated.clear();

@@ -1,6 +1,7 @@
 // lamina design: computes the job of segmented lines for target pores, porosity or permeability.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "pipeline/cli/command.h"
@@ -146,6 +147,7 @@ Result<std::vector<segment::TargetStep>> read_steps(const Arguments& arguments, 
 Result<DesignRequest> read_request(const Arguments& arguments) {
   DesignRequest request;
   request.machine = arguments.text("--machine");
+  request.nearest = arguments.has("--nearest");
   double voxel = 10;
   if (const Status status = arguments.read("--voxel", {1, 50, " um"}, voxel); !status) return status.error();
   request.grid = {voxel, 2 * voxel, voxel, request.grid.positions};
@@ -154,7 +156,8 @@ Result<DesignRequest> read_request(const Arguments& arguments) {
 
 /// Reports the result and writes it, if it meets the target or the nearest is accepted. missed  of the error otherwise
 template <class Found>
-Outcome give_found(const Found& found, const std::string& missed, const Arguments& arguments, Context& context) {
+Outcome give_found(const Found& found, const DesignRequest& request, const std::string& missed, const Arguments& arguments,
+                   Context& context) {
   const std::string output = arguments.text("-o,--output");
   if (!arguments.has("--quiet")) context.say_text(as_text(found));
   const bool enough = found.met || arguments.has("--nearest"), written = !output.empty() && enough;
@@ -162,10 +165,24 @@ Outcome give_found(const Found& found, const std::string& missed, const Argument
     if (const Status status = write_file(output, found.toml); !status) return status;
   }
   if (arguments.has("--json")) {
-    if (const Status status = context.give(as_json(found, written ? output : "")); !status) return status;
+    Json json = as_json(found, written ? output : "");
+    json["reach"] = as_json(request.reach);
+    if (const Status status = context.give(json); !status) return status;
   }
   if (enough) return {};
   return failure(Fault::kVerification, "not reachable: {}; write it with --nearest", missed);
+}
+
+/// Prints what the machine reaches before anything is searched.
+Status find_reach(const std::vector<segment::PoreTarget>& targets, const std::function<bool(double)>& go_on,
+                  const Arguments& arguments, Context& context, DesignRequest& request) {
+  keep_on_signals();
+  auto reach = reachable(request.machine, go_on);
+  if (!reach) return reach.error();
+  request.reach = std::move(*reach);
+  const auto outside = [&](const segment::PoreTarget& target) { return segment::out_of_reach(target, request.reach); };
+  if (!arguments.has("--quiet")) context.say_text(as_text(request.reach, std::ranges::any_of(targets, outside)));
+  return {};
 }
 
 Outcome run_design(const Arguments& arguments, Context& context) {
@@ -180,18 +197,20 @@ Outcome run_design(const Arguments& arguments, Context& context) {
   if (target->gradient) {
     const auto steps = read_steps(arguments, *target);
     if (!steps) return steps.error();
-    keep_on_signals();
+    if (const Status status = find_reach({steps->front().target, steps->back().target}, go_on, arguments, context, *request);
+        !status)
+      return status;
     const auto found = design_gradient(*request, *steps, go_on);
     if (!found) return found.error();
-    return give_found(*found, missed_text(*found), arguments, context);
+    return give_found(*found, *request, missed_text(*found), arguments, context);
   }
   for (const char* flag : {"--height", "--steps", "--tops"})
     if (arguments.has(flag)) return at_option(flag, "needs a gradient, as in --porosity 20:26");
   request->target = target->bottom;
-  keep_on_signals();
+  if (const Status status = find_reach({request->target}, go_on, arguments, context, *request); !status) return status;
   const auto found = design_job(*request, go_on);
   if (!found) return found.error();
-  return give_found(*found,
+  return give_found(*found, *request,
                     fmt::format("nearest is {}, which misses the target by {:.0f} %", nearest_text(request->target, *found),
                                 100 * found->miss),
                     arguments, context);

@@ -29,6 +29,13 @@ std::string read_source(Text text, Profile& profile) {
   profile.calibration.source = one_line(text);
   return {};
 }
+std::string read_acceleration(Text text, Profile& profile) {
+  Extruder::Speed& speed = profile.machine.speed;
+  std::string wrong = read_value(text, Limits{1, 1e6, " mm/s2"}, speed.acceleration_mm_s2);
+  if (wrong.empty()) speed.states_acceleration = true;
+  return wrong;
+}
+std::string write_acceleration(const Profile& profile) { return number_text(profile.machine.speed.acceleration_mm_s2); }
 std::string write_source(const Profile& profile) { return profile.calibration.source; }
 
 constexpr Word<BeadShape> kShapes[] = {
@@ -153,7 +160,7 @@ constexpr Key<Profile> kKeys[] = {
     field<kMachine, &Extruder::speed, &Speed::first_layer_mm_s>({"speed", "first_layer_mm_s"}, kSpeed),
     field<kMachine, &Extruder::speed, &Speed::travel_mm_s>({"speed", "travel_mm_s"}, kSpeed),
     field<kMachine, &Extruder::speed, &Speed::lift_mm_s>({"speed", "lift_mm_s"}, kSpeed),
-    field<kMachine, &Extruder::speed, &Speed::acceleration_mm_s2>({"speed", "acceleration_mm_s2"}, {1, 1e6, " mm/s2"}),
+    custom<Profile, read_acceleration, write_acceleration>({"speed", "acceleration_mm_s2"}, Form::kBare),
     field<kMachine, &Extruder::speed, &Speed::corner_mm_s>({"speed", "corner_mm_s"}, {0.1, 1000, " mm/s"}),
 
     field<kMachine, &Extruder::retraction, &Retraction::length_mm>({"retraction", "length_mm"}, {0, 50, " mm"}),
@@ -221,6 +228,7 @@ std::string set_extruder_key(std::string_view name, std::string_view value, Extr
 std::string extruder_text(const ExtruderProfile& profile) {
   return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string& value) {
     if (key.name == "bead_area" && value.empty()) return false;
+    if (key.name == "acceleration_mm_s2" && !profile.machine.speed.states_acceleration) return false;
     return key.section != "calibration" || profile.own_calibration;
   });
 }

@@ -390,6 +390,11 @@ void GcodeCommands::change_tool(double number) {
   if (position_.flow[before] != position_.flow[position_.tool]) differ_by_tool();
 }
 
+/// Of beads: P in Marlin and RepRapFirmware, S in Klipper and old files of Marlin. What no machine can do is ignored.
+void GcodeCommands::set_acceleration(double mm_s2) {
+  if (mm_s2 > 0 && mm_s2 <= 1e6) position_.acceleration = mm_s2;
+}
+
 /// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
 /// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
 bool GcodeCommands::feeds_relative() const {
@@ -404,6 +409,7 @@ void GcodeCommands::set_mode(char letter, double code, const GcodeWords& words) 
       if (words.has('D')) position_.volumetric = words['D'] > 0;
       if (words.has('S')) position_.volumetric = words['S'] != 0;
     }
+    if (code == 204) set_acceleration(words[words.has('P') ? 'P' : 'S']);
     if (code == 221) set_flow(words);
     return;
   }
@@ -441,6 +447,13 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     before_.left = static_cast<std::uint32_t>(commands_.size());
   }
   deposited_ = false;
+  constexpr std::string_view kLimit = "SET_VELOCITY_LIMIT", kName = " ACCEL=";  // Klipper
+  if (commands_.starts_with(kLimit)) {
+    const std::size_t at = commands_.find(kName);
+    if (at != std::string_view::npos) set_acceleration(leading_number(commands_.substr(at + kName.size())));
+    commands_ = {};
+    return false;
+  }
   WordScanner scanner(std::exchange(commands_, {}));
   bool found = scanner.next();
   if (found && scanner.letter() == 'N') found = scanner.next();  // behind a line's number
@@ -453,7 +466,7 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     change_tool(code);
     return pass_over(scanner);
   }
-  if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 221)
+  if (letter == 'M' && code != 82 && code != 83 && code != 200 && code != 204 && code != 221)
     return !takes_text(code) && pass_over(scanner);
   if (repeats) {
     if (position_.motion > 3) return false;
@@ -464,7 +477,7 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     code = position_.motion;
   }
   const bool moves = letter == 'G' && (code == 0 || code == 1 || code == 2 || code == 3),
-             sets = letter == 'G' ? code == 92 : code > 100;
+             sets = letter == 'G' ? code == 92 : code == 200 || code == 204 || code == 221;
   GcodeWords words;
   if (!read_words(scanner, words, repeats || (!moves && !sets))) return false;
   if (repeats && scanner.failed()) return differ(Difference::kText), false;
@@ -514,6 +527,7 @@ bool GcodeCommands::deposit(RawBead raw, std::optional<RawBead>& bead) {
   raw.fed = net;
   raw.primed = std::exchange(position_.primed, 0) + again;
   raw.first = !std::exchange(deposited_, true);
+  raw.acceleration = position_.acceleration;
   if (!within_reach(raw)) return false;
   position_.deposits = true;
   bead = raw;

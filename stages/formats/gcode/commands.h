@@ -100,13 +100,14 @@ class Arc {
 /// A straight move, or a chord of an arc, that extrudes filament; mm.
 struct RawBead {
   double from[3], to[3];
-  double fed;             // mm of filament, or mm3: what leaves the nozzle
-  bool volumetric;        // fed is mm3
-  double speed;           // mm/s
-  bool joined;            // BeadFeed
-  double primed;          // before it: mm of filament, or mm3
-  bool first;             // of its command
-  double length() const;  // over the bed
+  double fed;               // mm of filament, or mm3: what leaves the nozzle
+  bool volumetric;          // fed is mm3
+  double speed;             // mm/s
+  bool joined;              // BeadFeed
+  double primed;            // before it: mm of filament, or mm3
+  bool first;               // of its command
+  double acceleration = 0;  // mm/s2, commanded; 0: not stated
+  double length() const;    // over the bed
 };
 
 /// Lines of a file that firmwares do not agree on: how many, and the first.
@@ -156,6 +157,7 @@ class GcodeCommands {
   void differ_by_tool();
   void change_tool(double number);
   bool pass_over(WordScanner scanner);
+  void set_acceleration(double mm_s2);
   bool feeds_relative() const;
   void differ(Difference difference) { differences[static_cast<std::size_t>(difference)].add(position_.line); }
   bool move(double code, const GcodeWords& words, std::optional<RawBead>& bead);

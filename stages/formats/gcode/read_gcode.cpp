@@ -291,6 +291,7 @@ class GcodeSurvey {
   Status read_all();
   Status check_limits() const;
   void add_to_box(const RawBead& raw);
+  void add_dynamics(const RawBead& raw);
   void take_filament();
   void note_widths();
   void note_climbs();
@@ -303,6 +304,7 @@ class GcodeSurvey {
   GcodeCommands walk_;
   LayerCutter cutter_;
   std::array<double, 2> fed_{};  // by all beads: mm of filament, mm3
+  double speed_ = 0;             // mm/s, of the bead before
 };
 
 void GcodeSurvey::add_to_box(const RawBead& raw) {
@@ -320,6 +322,17 @@ void GcodeSurvey::add_to_box(const RawBead& raw) {
     file_.box_.add(Point3{moved(end.x, -half), moved(end.y, -half), top});
     file_.box_.add(Point3{moved(end.x, half), moved(end.y, half), top});
   }
+}
+
+void GcodeSurvey::add_dynamics(const RawBead& raw) {
+  auto& [low, high] = file_.accelerations_;
+  if (raw.acceleration > 0) {
+    low = low > 0 ? std::min(low, raw.acceleration) : raw.acceleration;
+    high = std::max(high, raw.acceleration);
+  }
+  ++file_.beads_;
+  file_.speed_changes_ += raw.joined && raw.speed != speed_ ? 1 : 0;
+  speed_ = raw.speed;
 }
 
 Status GcodeSurvey::check_limits() const {
@@ -340,13 +353,17 @@ Status GcodeSurvey::read_all() {
   std::optional<RawBead> raw;
   while (walk_.next(raw)) {
     if (walk_.layer_tag) {
-      if (!cutter_.tagged()) file_.box_ = Box(), fed_ = {};  // beads of start code belong to no layer
+      if (!cutter_.tagged()) {  // beads of start code belong to no layer
+        file_.box_ = Box(), fed_ = {};
+        file_.accelerations_ = {}, file_.beads_ = file_.speed_changes_ = 0;
+      }
       cutter_.tag(walk_.before());
     } else {
       cutter_.add(*raw, walk_.before(), walk_.position());
       file_.states_widths_ |= walk_.position().width > 0;
       add_to_box(*raw);
       fed_[raw->volumetric ? 1 : 0] += raw->fed;
+      add_dynamics(*raw);
     }
     if (Status status = check_limits(); !status) return status;
   }
@@ -482,7 +499,7 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const 
     const double unit = volume_of_unit(raw->volumetric || volumetric_, filament_mm_);
     const double width = width_of(*raw, height_of(*raw, now.height, position.height, position.below), unit);
     layer.beads.push_back(bead_of(*raw, now.width > 0 ? now.width : width, now.type));
-    if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined, raw->primed * unit});
+    if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined, raw->primed * unit, raw->acceleration});
   }
   if (walk.fault || types.size() != types_.size() || layer.beads.size() != position.beads) return changed;
   // A layer without a bead is at the height of the nozzle at its end.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -66,6 +67,10 @@ class GcodeFile {
   /// Net filament of all beads, mm3: without that of start code, and without priming.
   double fed_mm3() const { return fed_mm3_; }
   double density_g_cm3() const { return density_g_cm3_; }  // of the filament, by comments; 0: not stated
+  /// The lowest and highest acceleration that beads are commanded with, mm/s2; 0: none is stated.
+  const std::array<double, 2>& accelerations() const { return accelerations_; }
+  /// More than a quarter of the beads begin at another speed than the one before on their line, as of segmented lines.
+  bool changes_speeds() const { return 4 * speed_changes_ > beads_; }
   /// What a person should know of the drawing, one line each: thin beads, spirals, arcs on which firmwares differ.
   const std::vector<std::string>& notes() const { return notes_; }
   /// errors  kUsage: no such layer, the file has changed
@@ -83,6 +88,7 @@ class GcodeFile {
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
     double speed = 0;                              // mm/s; 0 until a line states it
+    double acceleration = 0;                       // mm/s2, of M204 or SET_VELOCITY_LIMIT; 0 until a line states it
     bool relative = false, relative_feed = false;  // G91, M83
     Firmware firmware = Firmware::kUnknown;        // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
@@ -113,6 +119,8 @@ class GcodeFile {
   Box box_;
   bool states_widths_ = false, states_filament_ = false, volumetric_ = false;
   double filament_mm_ = 1.75, fed_mm3_ = 0, density_g_cm3_ = 0;
+  std::array<double, 2> accelerations_{};
+  std::uint64_t beads_ = 0, speed_changes_ = 0;
 };
 
 }  // namespace lamina::formats

@@ -30,5 +30,18 @@ TEST(Extruder, WidthsOfAPrinterWhoseLagIsKnownArePredictedUnlessTheyWereMeasured
   EXPECT_EQ(unknown->calibration.width_mm, measured->calibration.width_mm) << "those of another machine";
 }
 
+TEST(Extruder, AnAccelerationIsStatedByAProfileOrAJobOnly) {
+  const std::string plain = "[machine]\nname = \"x\"\n[speed]\nprint_mm_s = 30\n";
+  const auto silent = pipeline::read_extruder(plain, "x.toml");
+  const auto stated = pipeline::read_extruder(plain + "acceleration_mm_s2 = 800\n", "x.toml");
+  ASSERT_TRUE(silent && stated);
+  EXPECT_FALSE(silent->machine.speed.states_acceleration);
+  EXPECT_TRUE(stated->machine.speed.states_acceleration);
+  EXPECT_EQ(pipeline::extruder_text(*silent).find("acceleration_mm_s2"), std::string::npos);
+  EXPECT_NE(pipeline::extruder_text(*stated).find("acceleration_mm_s2 = 800"), std::string::npos);
+  const auto wrong = pipeline::read_extruder(plain + "acceleration_mm_s2 = 0\n", "x.toml");
+  EXPECT_FALSE(wrong.ok());
+}
+
 }  // namespace
 }  // namespace lamina

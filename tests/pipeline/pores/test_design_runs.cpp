@@ -102,5 +102,36 @@ TEST(DesignedJob, ARefusedTargetWritesNothingUnlessTheNearestIsWanted) {
   EXPECT_EQ(test::files_below(folder.path()).size(), 1u);
 }
 
+TEST(DesignedJob, WhatIsReachableIsPrintedBeforeTheNearestToAnImpossibleTarget) {
+  test::Directory folder;
+  const auto far = test::run_lamina(test::words_of("design --permeability 1e5 --machine anet-a8 --voxel 30 --json -o a.toml"),
+                                    folder.path());
+  EXPECT_EQ(far.code, 5);
+  const auto table = far.err.find("reach     lines  porosity, %"), outside = far.err.find("target    out of this reach");
+  ASSERT_NE(table, std::string::npos) << far.err;
+  EXPECT_LT(table, outside);
+  EXPECT_LT(outside, far.err.find("along z   k1 "));
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(far.out);
+  ASSERT_EQ(json["reach"].size(), 3u);
+  EXPECT_NEAR(json["reach"][0]["k1_darcy"][1].get<double>() / json["k1_darcy"].get<double>(), 1, 0.2)
+      << "the end is the nearest";
+  EXPECT_LE(json["runs"], 4);
+  EXPECT_TRUE(json["warnings"].empty()) << "its widths were measured";
+  EXPECT_LT(json["k1_range_darcy"][0], 0.81 * json["k1_darcy"].get<double>());
+  EXPECT_GT(json["k1_range_darcy"][1], 1.42 * json["k1_darcy"].get<double>());
+}
+
+TEST(DesignedJob, APrinterWithoutACalibrationIsWarnedOf) {
+  test::Directory folder;
+  const auto near =
+      test::run_lamina(test::words_of("design --pore 0.12x0.9 --machine marlin --voxel 30 --json"), folder.path());
+  ASSERT_EQ(near.code, 0) << near.err;
+  EXPECT_NE(near.err.find("warning   Marlin has no calibration of its own"), std::string::npos) << near.err;
+  EXPECT_EQ(near.err.find("target    out of this reach"), std::string::npos) << near.err;
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(near.out);
+  ASSERT_EQ(json["warnings"].size(), 1u);
+  EXPECT_EQ(json["warnings"][0]["code"], "calibration");
+}
+
 }  // namespace
 }  // namespace lamina

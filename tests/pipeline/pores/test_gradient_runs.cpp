@@ -54,6 +54,23 @@ TEST(DesignedGradient, ATargetThatRisesGivesPermeabilitiesThatRise) {
       << "a higher part continues with the settings of the top";
 }
 
+TEST(DesignedGradient, ARegionThatCannotBeMetEndsTheSearchUnlessTheNearestIsWanted) {
+  Directory folder;
+  const std::string far = "design --permeability 100:5000 --height 9 --steps 3 --machine anet-a8 --voxel 30 --json -o a.toml";
+  const auto refused = run_lamina(words_of(far), folder.path());
+  EXPECT_EQ(refused.code, 5);
+  EXPECT_NE(refused.err.find("not reachable: from 6 to 9 mm nearest to --permeability 5000 is"), std::string::npos)
+      << refused.err;
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(refused.out);
+  ASSERT_EQ(json["steps"].size(), 1u) << "those below were not searched";
+  EXPECT_LE(json["runs"], 4);
+  EXPECT_FALSE(json.contains("porosity"));
+  EXPECT_TRUE(files_below(folder.path()).empty());
+  const auto nearest = run_lamina(words_of(far + " --nearest"), folder.path());
+  EXPECT_EQ(nearest.code, 0) << nearest.err;
+  EXPECT_EQ(nlohmann::ordered_json::parse(nearest.out)["steps"].size(), 3u);
+}
+
 TEST(DesignedGradient, ARegionOfTheOneFileIsAsTheSameFillingAlone) {
   const auto steps = segment::steps_of(darcies(150), darcies(80), {1.5, 3});
   const auto found = pipeline::design_gradient(coarse_request(), steps, [](double) { return true; });

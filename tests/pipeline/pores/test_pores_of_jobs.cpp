@@ -53,6 +53,46 @@ TEST(PoresOfJobs, AJobOfFilamentHasThePoresOfItsToolpaths) {
       << text.out;
 }
 
+TEST(PoresOfJobs, TheCommandedAccelerationDecidesAndItsUncertaintyIsReported) {
+  Directory folder;
+  write_two_jobs(folder);
+  ASSERT_EQ(reported("extrude --job filament.toml --quiet -o part.gcode", folder).code, 0);
+  std::string text = read_text(folder / "part.gcode");
+  const std::size_t at = text.find("M204 P500 T500\n");
+  ASSERT_NE(at, std::string::npos);
+  const auto k1_with = [&](const std::string& acceleration) {
+    std::string other = text;
+    write_text(folder / "other.gcode", other.replace(at, 14, "M204 P" + acceleration));
+    const auto done = reported("permeability other.gcode --voxel 20 --json", folder);
+    EXPECT_EQ(done.code, 0) << done.err;
+    EXPECT_NE(done.err.find("lag 0.047 s, " + acceleration + " mm/s2 as commanded"), std::string::npos) << done.err;
+    const nlohmann::ordered_json json = nlohmann::ordered_json::parse(done.out);
+    const double k1 = json["flow"][2]["k1_darcy"];
+    EXPECT_LE(json["k1_range_darcy"][0], 0.8 * k1 + 1e-9);
+    EXPECT_GE(json["k1_range_darcy"][1], 1.43 * k1 - 1e-9);
+    return k1;
+  };
+  const double slow = k1_with("400"), usual = k1_with("500"), fast = k1_with("1000");
+  EXPECT_LT(slow, usual);
+  EXPECT_LT(usual, fast);
+  EXPECT_NEAR(fast / usual, 1.43, 0.35) << "about as in bench/pores.md";
+}
+
+TEST(PoresOfJobs, APrinterThatNothingWasMeasuredOnIsWarnedOf) {
+  Directory folder;
+  write_two_jobs(folder);
+  ASSERT_EQ(reported("extrude --job filament.toml --machine marlin --quiet -o part.gcode", folder).code, 0);
+  for (const auto& [beads, text] :
+       {std::pair{"stated", "Marlin has no calibration of its own"}, {"spread", "Marlin states no lag of its melt"}}) {
+    const auto done = reported(std::string("permeability part.gcode --no-flow --voxel 30 --json --beads ") + beads, folder);
+    ASSERT_EQ(done.code, 0) << done.err;
+    EXPECT_NE(done.err.find(std::string("warning   ") + text), std::string::npos) << done.err;
+    const nlohmann::ordered_json json = nlohmann::ordered_json::parse(done.out);
+    ASSERT_EQ(json["warnings"].size(), 1u) << beads;
+    EXPECT_EQ(json["warnings"][0]["code"], "calibration");
+  }
+}
+
 TEST(PoresOfJobs, AJobOfPowderHasThePoresOfItsBitmaps) {
   Directory folder;
   write_two_jobs(folder);
