@@ -180,8 +180,8 @@ GradientJob missed_job(std::vector<GradientStep> steps) {
 }
 
 constexpr std::string_view kSure =
-    "accuracy  to: with the voxels' error and the acceleration's uncertainty; predicted k1 of seven printed samples\n"
-    "          was 0.75 to 1.24 times the measured one, porosity within 2.3 points (bench/pores.md)\n";
+    "accuracy  the range of k1 has the error of the voxels (+-) and the uncertainty of the acceleration; predicted k1 of\n"
+    "          seven printed samples was 0.75 to 1.24 times the measured one, porosity within 2.3 points (bench/pores.md)\n";
 
 /// Darcy.
 K1Range range_of(const ForwardRun& forward) {

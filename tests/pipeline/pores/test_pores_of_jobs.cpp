@@ -56,7 +56,7 @@ TEST(PoresOfJobs, AJobOfFilamentHasThePoresOfItsToolpaths) {
 TEST(PoresOfJobs, TheCommandedAccelerationDecidesAndItsUncertaintyIsReported) {
   Directory folder;
   write_two_jobs(folder);
-  ASSERT_EQ(reported("extrude --job filament.toml --quiet -o part.gcode", folder).code, 0);
+  ASSERT_EQ(reported("extrude other.stl --job filament.toml --quiet -o part.gcode", folder).code, 0);
   std::string text = read_text(folder / "part.gcode");
   const std::size_t at = text.find("M204 P500 T500\n");
   ASSERT_NE(at, std::string::npos);
