@@ -40,7 +40,7 @@ constexpr SectionKeys heights_key{"heights", decides::all}, image_key{"image", d
 
 // --- [bed], [layers], [placement]
 
-constexpr Limits kSize{kMinMm, kMaxMm, " mm"}, kDpi{1, 25400, "", true};
+constexpr Limits kSize{kMinMm, kMaxMm, " mm"}, kDpi{.low = 1, .high = kMaxDpi, .one_for_all = true, .digits = kDpiDigits};
 
 // With a machine, absent bed and dpi come from the machine; jobs without one show the defaults of a bare bed.
 template <auto Member, const auto& Bare>
@@ -539,7 +539,7 @@ const PartKey kPartKeys[] = {
     structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
         part_key("material_range", "", "[{...}]", "other powders between two heights above the part's bottom")),
     field<&PartRequest::images, &PartImages::dpi>(
-        images_key("dpi", "", "DPI|XxY", "resolution of image parts whose files state none"), {1, 25'400, "", true}),
+        images_key("dpi", "", "DPI|XxY", "resolution of image parts whose files state none"), kDpi),
     field<&PartRequest::images, &PartImages::layer_mm>(
         images_key("layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's"),
         {0.001, kMaxMm, " mm"}),

@@ -209,7 +209,8 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
       return wrong("machine.profile", "is missing; name one with --machine");
     printer.bed = bare_bed(job);
     const auto dpi = job.dpi.value_or(kBareDpi);
-    printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
+    printer.grid = {PixelAxis(pitch_of_dpi(dpi[0]), nm_of(printer.bed.size_mm[0])),
+                    PixelAxis(pitch_of_dpi(dpi[1]), nm_of(printer.bed.size_mm[1]))};
     return printer;
   }
   if (const Status status = check_there(job, request.presets); !status) return status.error();

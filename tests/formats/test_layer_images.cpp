@@ -143,7 +143,7 @@ TEST(PlacedImage, TakesThePixelThatTheCentreLiesIn) {
       image.row_offset.push_back(static_cast<std::uint32_t>(image.change.size()));
     }
     Runs out;
-    position(image, placement_of(31, 23, own, own, grid, 4, 2), out);
+    position(image, placement_of(31, 23, {own}, {own}, grid, 4, 2), out);
     ASSERT_EQ(out.row_offset.size(), grid.rows() + 1u);
     for (std::uint32_t r = 0; r < grid.rows(); ++r) {
       std::vector<bool> got(grid.columns());

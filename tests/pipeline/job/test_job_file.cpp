@@ -321,7 +321,7 @@ TEST(JobFile, SetTakesValuesAsFilesAndOptionsDo) {
     const Status status = set_key(job, assignment);
     EXPECT_TRUE(status.ok()) << status.error().message;
   }
-  EXPECT_EQ(job.dpi, (std::array<std::int64_t, 2>{1200, 600}));
+  EXPECT_EQ(job.dpi, (std::array<double, 2>{1200, 600}));
   EXPECT_EQ(job.bed_mm, (std::array<double, 2>{100, 50}));
   EXPECT_EQ(job.format, "png");
   EXPECT_EQ(job.parts[0].copies, 3u);
