@@ -154,6 +154,7 @@ struct PartRequest {
 struct Job {
   std::vector<PartRequest> parts;
   std::optional<std::array<double, 2>> bed_mm;     // absent: the machine's bed, or kBareBedMm without a machine
+  std::optional<double> margin_mm;                 // absent: the machine's margin of the bed, or none
   std::optional<std::array<double, 2>> dpi;        // absent: the machine's dpi, or kBareDpi without a machine
   double layer_mm = 0.05;
   HeightsRequest heights;

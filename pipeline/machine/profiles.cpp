@@ -220,6 +220,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
   if (request.scan_speed_mm_s) machine.motion.scan_speed_mm_s = *request.scan_speed_mm_s;
   if (request.vat_rule) machine.powder.vat_rule = *request.vat_rule;
   if (request.blocked) machine.head.blocked = *request.blocked;
+  if (job.margin_mm) machine.bed.margin_mm = *job.margin_mm;
   auto resolved = resolve_profile(machine);
   if (!resolved) return resolved.error();
   if (job.dpi) {
@@ -227,7 +228,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
     resolved = resolve_profile(machine);
     if (!resolved) return resolved.error();
   }
-  printer.bed = {machine.bed.size_mm, true};
+  printer.bed = {machine.bed.size_mm, true, machine.bed.margin_mm};
   if (job.bed_mm && *job.bed_mm != machine.bed.size_mm) {
     return wrong("bed.size_mm", fmt::format("the bed of {} is {:g} x {:g} mm; leave it out or change the profile", machine.name,
                                             machine.bed.size_mm[0], machine.bed.size_mm[1]));

@@ -194,6 +194,18 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
   return loaded;
 }
 
+arrange::BedSpace space_of(const Bed& bed) {
+  return {nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(bed.margin_mm), bed.of_machine};
+}
+
+/// Requested positions in the margin are kept.
+void note_margin(const Bed& bed, const PartRequest& request, const Box& box, PartSummary& part) {
+  const auto [width, depth, margin, unused] = space_of(bed);
+  const bool inside = box.lo.x >= margin && box.lo.y >= margin && box.hi.x <= width - margin && box.hi.y <= depth - margin;
+  if (inside || !request.at_mm) return;
+  part.notes.push_back({false, fmt::format("its box lies in the margin of {:g} mm along the edges of the bed", bed.margin_mm)});
+}
+
 /// The space of a part.
 arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded, const Bed& bed) {
   arrange::BoxRequest request;
@@ -210,6 +222,13 @@ arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded, c
     const std::int64_t free_y = nm_of(bed.size_mm[1]) - request.at_y.value_or(0);
     if (free_x > 0) request.width = std::min(request.width, free_x);
     if (free_y > 0) request.depth = std::min(request.depth, free_y);
+  }
+  // Images of a whole bed include its margin.
+  const arrange::BedSpace space = space_of(bed);
+  if (loaded.images && !part.at_mm && part.copies == 1 &&
+      (request.width > space.width - 2 * space.margin || request.depth > space.depth - 2 * space.margin)) {
+    request.at_x = std::max<std::int64_t>(0, space.width - request.width) / 2;
+    request.at_y = std::max<std::int64_t>(0, space.depth - request.depth) / 2;
   }
   return request;
 }
@@ -283,7 +302,7 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
   for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p], bed));
 
   const Result<std::vector<arrange::BoxPosition>> positions =
-      arrange::arrange_boxes(requests, nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(job.gap_mm), bed.of_machine);
+      arrange::arrange_boxes(requests, space_of(bed), nm_of(job.gap_mm));
   if (!positions) return positions.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
@@ -331,7 +350,11 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
     const Box box{{static_cast<Nm>(position.x), static_cast<Nm>(position.y), static_cast<Nm>(bottom)},
                   {static_cast<Nm>(position.x + part.bounds.width()), static_cast<Nm>(position.y + part.bounds.depth()),
                    static_cast<Nm>(bottom + part.bounds.height())}};
-    if (scene.parts[position.request].bounds.empty()) scene.parts[position.request].bounds = box;
+    PartSummary& summary = scene.parts[position.request];
+    if (summary.bounds.empty()) {
+      summary.bounds = box;
+      note_margin(bed, job.parts[position.request], box, summary);
+    }
     scene.height = std::max<std::int64_t>(scene.height, box.hi.z);
     boxes.emplace_back(position.request, box);
   }
