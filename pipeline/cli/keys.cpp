@@ -254,7 +254,7 @@ Result<Job> read_job_options(std::string_view choice, const Arguments& arguments
   for (const JobKey& key : job_keys()) {
     if (key.flag.empty() || !has(choice, key) || !arguments.has(key.flag)) continue;
     const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
-    if (Status status = at_option(key.flag, key.read(text, job)); !status) return status.error();
+    if (Status status = at_option(key.flag, with_comma_hint(key.read(text, job), text)); !status) return status.error();
     job.named.push_back(fmt::format("{}.{}", key.section, key.name));
   }
   for (const PartKey& key : part_keys()) {
@@ -265,7 +265,8 @@ Result<Job> read_job_options(std::string_view choice, const Arguments& arguments
           .error();
     }
     PartRequest unused;
-    if (Status status = at_option(key.flag, key.read(arguments.text(key.flag), unused)); !status) return status.error();
+    const std::string text = arguments.text(key.flag);
+    if (Status status = at_option(key.flag, with_comma_hint(key.read(text, unused), text)); !status) return status.error();
     for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
   }
   if (Status status = check_together(choice, arguments, job); !status) return status.error();
@@ -335,6 +336,15 @@ std::vector<std::string> notes_on_needs(Product product, const Arguments& argume
     notes.emplace_back(
         "nothing is filled inside the walls, and powder stays loose there; add --fill raster, or --fill none if it is meant");
   }
+  for (const JobKey& key : job_keys()) {
+    // What may be meant as one number is two.
+    if (key.value.find("|XxY") == std::string_view::npos && key.value.find("MM[,") == std::string_view::npos) continue;
+    const std::string text = key.flag.empty() ? std::string() : arguments.text(key.flag), hint = comma_hint(text);
+    if (!hint.empty() && text.find_first_not_of("0123456789,") == std::string::npos)
+      notes.push_back(fmt::format("{} {}: is two numbers{}", key.flag, text, hint));
+  }
+  if (product == Product::kMoves && !job.output.empty() && !std::filesystem::path(job.output).has_extension())
+    notes.push_back(fmt::format("-o {}: is written as one file; end its name with .gcode or .sml", job.output));
   add_notes_on_keys(product, arguments, job, notes);
   for (const std::string& assignment : arguments.all("--set")) {
     const auto key = std::ranges::find_if(job_keys(), [&](const JobKey& k) {
