@@ -202,7 +202,7 @@ constexpr Need kNeeds[] = {
     {"--bridge", leaves_open, "applies to open meshes, and repair closes them; add --no-repair"},
     {"--title", writes_tiff, "applies to TIFF, other formats have no tag for it; remove it, or add --format tiff-g4"},
     {"--weld", repairs, "applies to repair, which is off; leave out one of the two"},
-    {"--gap", arranges, "applies between parts that are arranged, but there are none; add --copies or another part"},
+    {"--gap", arranges, "applies to several parts that are arranged, and here are none; add --copies or another part"},
     {"--margin", arranges_any, "applies to parts that are arranged, and --at places this one; leave out one of the two"},
     {"--unit", lacks_unit, "applies to STL and OBJ, and 3MF files state their unit; leave it out"},
     {"--first-layers", has_first_bleed, "applies to --first-bleed, but there is none; add it"},

@@ -16,7 +16,7 @@ std::vector<BoxPosition> placed(const std::vector<BoxRequest>& boxes, std::int64
 }
 
 TEST(Placement, SinglePartIsInTheMiddleRoundedDown) {
-  const auto positions = placed({{.width = 3, .depth = 4}}, {10, 10}, 5);
+  const auto positions = placed({{.width = 3, .depth = 4}}, 10, 10, 5);
   ASSERT_EQ(positions.size(), 1u);
   EXPECT_EQ(positions[0].x, 3);
   EXPECT_EQ(positions[0].y, 3);
@@ -45,7 +45,7 @@ TEST(Placement, RowsFillFromTheFrontLeftInOrder) {
 }
 
 TEST(Placement, CopiesOfAPositionFollowAlongX) {
-  const auto positions = placed({{.width = 4, .depth = 2, .copies = 3, .at_x = 1, .at_y = 2}}, {17, 9}, 2);
+  const auto positions = placed({{.width = 4, .depth = 2, .copies = 3, .at_x = 1, .at_y = 2}}, 17, 9, 2);
   ASSERT_EQ(positions.size(), 3u);
   for (std::int64_t i = 0; i < 3; ++i) {
     EXPECT_EQ(positions[i].x, 1 + 6 * i);

@@ -95,7 +95,7 @@ TEST_F(DecimalDpi, OfAMachineIsThatOfItsHead) {
   EXPECT_EQ(tree_text(folder.path() / "out/layers"), tree_text(folder.path() / "own/layers"));
   expect_refused("jet part.stl --machine nuferbj --layer 1 --dpi 262.3 --dry-run", 2, "reaches 262.01", folder);
   std::string profile = done("machines --show jet1000").out;
-  profile.replace(profile.find("\ndpi = 720"), 10, "\ndpi = 720.25");
+  profile.replace(profile.find("\nalong_dpi = 0"), 14, "\nalong_dpi = 720.25");
   write_text(folder / "mine.toml", profile);
   done("jet part.stl --machine ./mine.toml --layer 1 --quiet -o mine");
   done("verify --quiet mine");

@@ -39,7 +39,7 @@ TEST_F(Margin, OfAMachineAppliesUnlessTheJobHasItsOwn) {
   done("jet --job job.toml --layer 1 --dry-run --save-job saved.toml");
   EXPECT_NE(read_text(folder / "saved.toml").find("margin_mm = 2"), std::string::npos);
   for (const char* machine : {"nuferbj", "hp45", "oasis", "brundlefab", "reprap-inkjet"})
-    EXPECT_FALSE(says(std::string("jet part.stl --layer 1 --dry-run --at 0,0 --machine ") + machine, "margin")) << machine;
+    EXPECT_FALSE(says(std::string("machines --show ") + machine, "margin_mm = 5")) << machine;
   EXPECT_TRUE(says("machines --show production-1200", "margin_mm = 5"));
 }
 

@@ -32,7 +32,7 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
       {"slice", "--angle-step 30 --pattern contour", "--pattern raster"},
       {"slice", "--stagger 0,0.1 --pattern contour+raster", "--pattern raster"},
       {"slice", "--file-a-layer --format null", "--format svg"},
-      {"extrude", "--wall-speed 30 --walls 0 --fill raster", "--walls 1"},
+      {"extrude", "--wall-speed 30 --walls 0 --fill raster --layer 0.2", "--walls 1"},
       {"jet", "--allow-unbound", "--machine hp45 --preset binding.toml"},
       {"jet", "--allow-unbound --machine hp45", "--preset binding.toml"},
       {"jet", "--vat-rule first --machine nuferbj", "part.stl --material steel,bronze"},
