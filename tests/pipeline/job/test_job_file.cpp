@@ -21,7 +21,8 @@ FillChanges changes_of(std::string_view table) {
 Job unusual_job(const Directory& directory) {
   Job job;
   job.bed_mm = {123.4567, 0.1 + 0.2};
-  job.dpi = {600, 300};
+  job.margin_mm = 7;
+  job.dpi = {600, 262.0061};
   job.layer_mm = 1e-6;
   job.gap_mm = 0;
   job.fill_rule = FillRule::kEvenOdd;
