@@ -71,7 +71,8 @@ def memory(out):
     write_box(prism, 20, 20, 100)
     peaks = []
     for layers in ("0:20", "0:2000"):
-        summary, _ = run([prism, "--machine", "production-1200", "--layer", "0.05", "--layers", layers, "--format", "null"],
+        summary, _ = run([prism, "--machine", "production-1200", "--margin", "0", "--layer", "0.05", "--layers", layers,
+                          "--format", "null"],
                          os.path.join(out, "memory"))
         peaks.append(summary["peak_resident_bytes"] / 2**20)
         shutil.rmtree(os.path.join(out, "memory"))
@@ -96,7 +97,7 @@ def main(arguments=None):
         "96 crowns": [crown, "--copies", "96", "--layer", "0.1"],
     }
     bed = ["--bed", f"{BED}x{BED}", "--dpi", str(DPI)]
-    machine = ["--machine", "production-1200"]
+    machine = ["--machine", "production-1200", "--margin", "0"]
     rows = []
     for name, case in cases.items():
         check = os.path.join(options.out, "check")

@@ -120,8 +120,36 @@ bool lies_in_pairs(Product, const Job& job) { return job.segment.all.continuous 
 bool repairs(Product, const Job& job) { return job.repair; }
 bool leaves_open(Product, const Job& job) { return !job.repair; }
 bool arranges(Product, const Job& job) {
-  return std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.at_mm || part.copies > 1; });
+  return job.parts.size() > 1 ? !std::ranges::all_of(job.parts, [](const PartRequest& p) { return p.at_mm && p.copies == 1; })
+                              : job.parts.empty() || job.parts.front().copies > 1;
 }
+bool arranges_any(Product, const Job& job) {
+  return job.parts.empty() || !std::ranges::all_of(job.parts, [](const PartRequest& part) { return part.at_mm.has_value(); });
+}
+bool turns_lines(Product, const Job& job) {
+  return (job.fill.all.pattern != infill::Pattern::kNone && job.fill.all.pattern != infill::Pattern::kContour) ||
+         job.segment.any() || varies_filling(job);
+}
+bool shifts_lines(Product product, const Job& job) {
+  return turns_lines(product, job) && (job.fill.all.pattern != infill::Pattern::kContourRaster || varies_filling(job));
+}
+bool has_walls(Product, const Job& job) {
+  return job.fill.all.walls > 0 || job.fill.all.pattern == infill::Pattern::kContour ||
+         job.fill.all.pattern == infill::Pattern::kContourRaster || varies_filling(job) || !is_named(job, "fill.walls");
+}
+bool lacks_unit(Product, const Job& job) {
+  const auto states = [](const PartRequest& part) { return lower_case(part.path).ends_with(".3mf"); };
+  return job.parts.empty() || !std::ranges::all_of(job.parts, states);
+}
+bool has_first_bleed(Product, const Job& job) { return job.dose.first_bleed_um.has_value(); }
+bool inspects(Product, const Job& job) { return job.inspect; }
+bool has_machine(Product, const Job& job) { return !job.machine.profile.empty(); }
+bool mixes_powders(Product, const Job& job) {
+  return std::ranges::any_of(job.parts, [&](const PartRequest& part) {
+    return !part.material_ranges.empty() || part.material != job.parts.front().material;
+  });
+}
+bool writes_files(Product, const Job& job) { return job.slice.format != "null"; }
 bool writes_tiff(Product, const Job& job) { return job.format.starts_with("tiff"); }
 bool writes_cli(Product, const Job& job) { return job.slice.format.starts_with("cli"); }
 
@@ -140,7 +168,9 @@ constexpr std::string_view kUniform =
                            kShrinks =
                                "applies to steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "applies to beads, but there are none; add --fill, --pattern or --walls",
-                           kLines = "applies to lines, but there is no pattern; add --fill or --pattern";
+                           kLines = "applies to lines, but there is no pattern; add --fill or --pattern",
+                           kTurned = "applies to lines with a direction, but there are none; add --fill raster",
+                           kShifted = "applies to lines of raster, honeycomb and quatrefoil, but there are none; add --fill";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
     {"--cusp-of", shrinks, kShrinks, scaled},
@@ -161,9 +191,9 @@ constexpr Need kNeeds[] = {
     {"--bead-gap", deposits_lines, kLines},
     {"--line-distance", deposits_lines, kLines},
     {"--gap-formula", deposits_lines, kLines},
-    {"--angle", deposits_lines, kLines},
-    {"--angle-step", deposits_lines, kLines},
-    {"--stagger", deposits_lines, kLines},
+    {"--angle", turns_lines, kTurned},
+    {"--angle-step", turns_lines, kTurned},
+    {"--stagger", shifts_lines, kShifted},
     {"--print-speed", deposits_lines, "applies to filling lines, but there is no pattern; add --fill, or use --wall-speed"},
     {"--segment-rule", cuts_lines,
      "applies to lines; closed curves are cut by their length under every rule; remove the option"},
@@ -172,7 +202,15 @@ constexpr Need kNeeds[] = {
     {"--bridge", leaves_open, "applies to open meshes, and repair closes them; add --no-repair"},
     {"--title", writes_tiff, "applies to TIFF, other formats have no tag for it; remove it, or add --format tiff-g4"},
     {"--weld", repairs, "applies to repair, which is off; leave out one of the two"},
-    {"--gap", arranges, "is between parts that are arranged, and --at places this one; leave out one of the two"},
+    {"--gap", arranges, "applies to several parts that are arranged, and here are none; add --copies or another part"},
+    {"--margin", arranges_any, "applies to parts that are arranged, and --at places this one; leave out one of the two"},
+    {"--unit", lacks_unit, "applies to STL and OBJ, and 3MF files state their unit; leave it out"},
+    {"--first-layers", has_first_bleed, "applies to --first-bleed, but there is none; add it"},
+    {"--min-wall", inspects, "applies to --inspect; add it"},
+    {"--allow-unbound", has_machine, "applies to the binder that a machine's powder needs; add --machine"},
+    {"--vat-rule", mixes_powders, "applies to layers of two powders, but there is one; add --material"},
+    {"--wall-speed", has_walls, "applies to walls, but there are none; add --walls"},
+    {"--file-a-layer", writes_files, "applies to files, but --format null writes none; choose another format"},
     {"--empty-first-layer", writes_cli, "applies to CLI files; add --format cli or cli-binary"},
 };
 
@@ -216,7 +254,7 @@ Result<Job> read_job_options(std::string_view choice, const Arguments& arguments
   for (const JobKey& key : job_keys()) {
     if (key.flag.empty() || !has(choice, key) || !arguments.has(key.flag)) continue;
     const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
-    if (Status status = at_option(key.flag, key.read(text, job)); !status) return status.error();
+    if (Status status = at_option(key.flag, with_comma_hint(key.read(text, job), text)); !status) return status.error();
     job.named.push_back(fmt::format("{}.{}", key.section, key.name));
   }
   for (const PartKey& key : part_keys()) {
@@ -227,7 +265,8 @@ Result<Job> read_job_options(std::string_view choice, const Arguments& arguments
           .error();
     }
     PartRequest unused;
-    if (Status status = at_option(key.flag, key.read(arguments.text(key.flag), unused)); !status) return status.error();
+    const std::string text = arguments.text(key.flag);
+    if (Status status = at_option(key.flag, with_comma_hint(key.read(text, unused), text)); !status) return status.error();
     for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
   }
   if (Status status = check_together(choice, arguments, job); !status) return status.error();
@@ -240,16 +279,25 @@ Result<Job> read_job_options(std::string_view choice, const Arguments& arguments
 
 Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study) {
   // A job that selects the pattern "none" has no lines by intention.
-  const bool named = arguments.has("--pattern") || arguments.has("--fill");
+  const bool intended =
+      (arguments.has("--pattern") || arguments.has("--fill")) && job.fill.all.pattern == infill::Pattern::kNone;
   for (const Need& need : kNeeds) {
-    const bool beads = need.met == deposits_lines || need.met == deposits_beads;
+    const bool beads = need.met == deposits_lines || need.met == deposits_beads || need.met == turns_lines ||
+                       need.met == shifts_lines;
     const auto met = study ? need.in_study : need.met;
-    if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && named)) continue;
+    if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && intended)) continue;
     return at_option(need.flag, std::string(need.unmet));
   }
   if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off")
     return usage("--no-repair and --repair exclude each other; give one of them");
   return {};
+}
+
+Status check_machine_needs(const Machine& machine, const Arguments& arguments) {
+  if (!arguments.has("--allow-unbound") || machine.powder.min_saturation_percent > 0) return {};
+  return at_option("--allow-unbound", fmt::format("applies to powder.min_saturation_percent, which {} does not state; leave "
+                                                  "it out",
+                                                  machine.name));
 }
 
 Status check_machine_needs(const Extruder& machine, const Arguments& arguments) {
@@ -261,6 +309,23 @@ Status check_machine_needs(const Extruder& machine, const Arguments& arguments) 
   return {};
 }
 
+namespace {
+
+/// Keys of files and --set that do nothing in this job, but for defaults.
+void add_notes_on_keys(Product product, const Arguments& arguments, const Job& job, std::vector<std::string>& notes) {
+  const Job plain;
+  for (const Need& need : kNeeds) {
+    if (arguments.has(need.flag) || need.met(product, job)) continue;
+    for (const JobKey& key : job_keys()) {
+      const std::string name = fmt::format("{}.{}", key.section, key.name);
+      if (key.flag == need.flag && is_named(job, name) && decides_in(product, key, job) && key.write(job) != key.write(plain))
+        notes.push_back(fmt::format("{}: {}", name, need.unmet));
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<std::string> notes_on_needs(Product product, const Arguments& arguments, const Job& job) {
   std::vector<std::string> notes;
   if (arguments.has("--layer") && !job.heights.thickness_mm.empty()) {
@@ -271,6 +336,16 @@ std::vector<std::string> notes_on_needs(Product product, const Arguments& argume
     notes.emplace_back(
         "nothing is filled inside the walls, and powder stays loose there; add --fill raster, or --fill none if it is meant");
   }
+  for (const JobKey& key : job_keys()) {
+    // What may be meant as one number is two.
+    if (key.value.find("|XxY") == std::string_view::npos && key.value.find("MM[,") == std::string_view::npos) continue;
+    const std::string text = key.flag.empty() ? std::string() : arguments.text(key.flag), hint = comma_hint(text);
+    if (!hint.empty() && text.find_first_not_of("0123456789,") == std::string::npos)
+      notes.push_back(fmt::format("{} {}: is two numbers{}", key.flag, text, hint));
+  }
+  if (product == Product::kMoves && !job.output.empty() && !std::filesystem::path(job.output).has_extension())
+    notes.push_back(fmt::format("-o {}: is written as one file; end its name with .gcode or .sml", job.output));
+  add_notes_on_keys(product, arguments, job, notes);
   for (const std::string& assignment : arguments.all("--set")) {
     const auto key = std::ranges::find_if(job_keys(), [&](const JobKey& k) {
       return assignment.starts_with(fmt::format("{}.{}=", k.section, k.name)) && !decides_in(product, k, job);

@@ -10,6 +10,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
 #include "stages/data/extruder.h"
+#include "stages/data/machine.h"
 
 namespace lamina::pipeline {
 
@@ -24,11 +25,12 @@ void add_key_options(std::string_view choice, CommandSpec& spec);
 /// check_job(). errors  kUsage, one line that begins with the option or file
 Result<Job> read_job_options(std::string_view choice, const Arguments& arguments);
 
-/// Refuses options that would do nothing in this job; keys of files are not checked.
+/// Refuses options that would do nothing in this job; of keys of files, notes_on_needs() reports them.
 /// study   of layers alone: an option without effect on the job may still affect the study
 /// errors  kUsage with the option, why, and what to add
 Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study = false);
-/// The same for options that the printer's files do not carry.
+/// The same for options that the printer's powder or its files make meaningless.
+Status check_machine_needs(const Machine& machine, const Arguments& arguments);
 Status check_machine_needs(const Extruder& machine, const Arguments& arguments);
 /// What options leave open, and those that do nothing but are harmless, a line each.
 std::vector<std::string> notes_on_needs(Product product, const Arguments& arguments, const Job& job);

@@ -307,8 +307,6 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
 Outcome predict_print(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   const std::string& path = arguments.operands.front();
   if (Status status = check_window_files(arguments); !status) return status;
-  if (arguments.has("--inertia") && arguments.has("--no-flow"))
-    return usage("--inertia has no effect with --no-flow; remove one");
   FlowRequest request;
   request.inertia = arguments.has("--inertia");
   request.section = arguments.has("--plot");

@@ -34,7 +34,7 @@ constexpr bool mirrors_y(Mirror mirror) { return mirror == Mirror::kY || mirror 
 
 /// Defaults of jobs without a machine.
 inline constexpr std::array<double, 2> kBareBedMm{490, 380};
-inline constexpr std::array<std::int64_t, 2> kBareDpi{1200, 1200};
+inline constexpr std::array<double, 2> kBareDpi{1200, 1200};
 
 /// Section [heights].
 using HeightsRequest = heights::Settings;
@@ -119,7 +119,7 @@ struct MaterialRange {
 
 /// The properties of images used as a part (docs/howto/plan_images.md) that their files do not state.
 struct PartImages {
-  std::optional<std::array<std::int64_t, 2>> dpi;  // absent: by the tags of the files
+  std::optional<std::array<double, 2>> dpi;        // absent: by the tags of the files
   std::optional<double> layer_mm;                  // absent: by the manifest next to them, or the job's
   std::uint32_t threshold = 128;                   // grey below it is dark, 1 .. 255
   bool invert = false;                             // bright pixels are jetted
@@ -154,7 +154,8 @@ struct PartRequest {
 struct Job {
   std::vector<PartRequest> parts;
   std::optional<std::array<double, 2>> bed_mm;     // absent: the machine's bed, or kBareBedMm without a machine
-  std::optional<std::array<std::int64_t, 2>> dpi;  // absent: the machine's dpi, or kBareDpi without a machine
+  std::optional<double> margin_mm;                 // absent: the machine's margin of the bed, or none
+  std::optional<std::array<double, 2>> dpi;        // absent: the machine's dpi, or kBareDpi without a machine
   double layer_mm = 0.05;
   HeightsRequest heights;
   double gap_mm = 5;  // between automatically arranged parts

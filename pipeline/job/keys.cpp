@@ -40,7 +40,7 @@ constexpr SectionKeys heights_key{"heights", decides::all}, image_key{"image", d
 
 // --- [bed], [layers], [placement]
 
-constexpr Limits kSize{kMinMm, kMaxMm, " mm"}, kDpi{1, 25400, "", true};
+constexpr Limits kSize{kMinMm, kMaxMm, " mm"}, kDpi{.low = 1, .high = kMaxDpi, .one_for_all = true, .digits = kDpiDigits};
 
 // With a machine, absent bed and dpi come from the machine; jobs without one show the defaults of a bare bed.
 template <auto Member, const auto& Bare>
@@ -59,6 +59,9 @@ const JobKey kBedKeys[] = {
                                      kSize),
     of_bed<&Job::dpi, kBareDpi>(
         {"bed", "dpi", "--dpi", "DPI|XxY", "resolution in pixels per inch along x and y, 1 to 25400", decides::images}, kDpi),
+    field<&Job::margin_mm>({"bed", "margin_mm", "--margin", "MM",
+                            "margin of the bed in mm that arranging keeps free; default: the machine's, else 0", decides::all},
+                           {0, kMaxMm, " mm"}),
     field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "layer thickness in mm", decides::all}, kSize),
 };
 
@@ -297,7 +300,11 @@ std::vector<std::string_view> slice_format_words() {
 }
 
 std::string check_slice_format(std::string_view text) {
-  return formats::find_slice_format(text) != nullptr ? "" : not_one_of(text, slice_format_words());
+  if (formats::find_slice_format(text) != nullptr) return {};
+  if (text == "tif" || text == "tiff" || formats::extension_of(text))
+    return fmt::format("'{}' is a format of images, which lamina jet writes; use one of {}", text.substr(0, 60),
+                       fmt::join(slice_format_words(), ", "));
+  return not_one_of(text, slice_format_words());
 }
 
 const JobKey kSliceKeys[] = {
@@ -465,7 +472,7 @@ const JobKey kRunKeys[] = {
     field<&Job::inspect>(
         {"run", "inspect", "--inspect", "", "detect islands, trapped powder, thin walls and touching parts", 0, "true"}),
     field<&Job::min_wall_mm>(
-        {"run", "min_wall_mm", "--min-wall", "MM", "min wall thickness in mm for --inspect; default: two pixels or a drop"},
+        {"run", "min_wall_mm", "--min-wall", "MM", "min wall thickness in mm for --inspect; default: the powder's, else 0.3"},
         {0, 1000, " mm"}),
     field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
                                 "accept layers with less binder than the machine's powder needs", 0, "true"})
@@ -539,7 +546,7 @@ const PartKey kPartKeys[] = {
     structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
         part_key("material_range", "", "[{...}]", "other powders between two heights above the part's bottom")),
     field<&PartRequest::images, &PartImages::dpi>(
-        images_key("dpi", "", "DPI|XxY", "resolution of image parts whose files state none"), {1, 25'400, "", true}),
+        images_key("dpi", "", "DPI|XxY", "resolution of image parts whose files state none"), kDpi),
     field<&PartRequest::images, &PartImages::layer_mm>(
         images_key("layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's"),
         {0.001, kMaxMm, " mm"}),

@@ -222,7 +222,8 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
       return wrong("machine.profile", "is missing; name one with --machine");
     printer.bed = bare_bed(job);
     const auto dpi = job.dpi.value_or(kBareDpi);
-    printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
+    printer.grid = {PixelAxis(pitch_of_dpi(dpi[0]), nm_of(printer.bed.size_mm[0])),
+                    PixelAxis(pitch_of_dpi(dpi[1]), nm_of(printer.bed.size_mm[1]))};
     return printer;
   }
   if (const Status status = check_there(job, request.presets); !status) return status.error();
@@ -232,6 +233,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
   if (request.scan_speed_mm_s) machine.motion.scan_speed_mm_s = *request.scan_speed_mm_s;
   if (request.vat_rule) machine.powder.vat_rule = *request.vat_rule;
   if (request.blocked) machine.head.blocked = *request.blocked;
+  if (job.margin_mm) machine.bed.margin_mm = *job.margin_mm;
   auto resolved = resolve_profile(machine);
   if (!resolved) return resolved.error();
   if (job.dpi) {
@@ -239,7 +241,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
     resolved = resolve_profile(machine);
     if (!resolved) return resolved.error();
   }
-  printer.bed = {machine.bed.size_mm, true};
+  printer.bed = {machine.bed.size_mm, true, machine.bed.margin_mm};
   if (job.bed_mm && *job.bed_mm != machine.bed.size_mm) {
     return wrong("bed.size_mm", fmt::format("the bed of {} is {:g} x {:g} mm; leave it out or change the profile", machine.name,
                                             machine.bed.size_mm[0], machine.bed.size_mm[1]));

@@ -77,12 +77,13 @@ void leave_to_machine(const Extruder& machine, Job& job);
 struct Bed {
   std::array<double, 2> size_mm = kBareBedMm;
   bool of_machine = false;  // fixed by the machine
+  double margin_mm = 0;     // where nothing is arranged
 };
 
 /// For parts without a printer.
 inline constexpr Bed kLargestBed{{kMaxMm, kMaxMm}};
 /// The bed of a job without a machine.
-inline Bed bare_bed(const Job& job) { return {job.bed_mm.value_or(kBareBedMm), false}; }
+inline Bed bare_bed(const Job& job) { return {job.bed_mm.value_or(kBareBedMm), false, job.margin_mm.value_or(0)}; }
 
 /// A profile with the job's changes, and the resulting grid.
 struct ResolvedMachine {

@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
 constexpr std::int64_t kMaxMicroseconds = 1'000'000'000'000;      // of a layer, as a replay counts them
 constexpr std::uint32_t kMaxDrops = 64;                           // of a pixel
-constexpr std::int64_t kMaxDots = 25'400, kMaxSpan = 1'000'000'000'000, kMinPixel = 1000;
+constexpr std::int64_t kMinPixel = 1000;                          // nm
 
 /// Of the letters that pipeline::check_material allows.
 bool is_material(std::string_view name) {

@@ -356,7 +356,8 @@ Result<Resolved> resolve(const Job& job, Product product) {
   }
   auto profile = resolve_extruder(job);
   if (!profile) return profile.error();
-  resolved.bed = {profile->machine.bed.size_mm, true};
+  if (job.margin_mm) profile->machine.bed.margin_mm = *job.margin_mm;
+  resolved.bed = {profile->machine.bed.size_mm, true, profile->machine.bed.margin_mm};
   resolved.extruder = std::move(*profile);
   if (job.leave_to_machine) {
     leave_to_machine(resolved.extruder->machine, resolved.job);

@@ -11,6 +11,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/load.h"
 #include "stages/program/bed.h"
@@ -193,6 +194,18 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
   return loaded;
 }
 
+arrange::BedSpace space_of(const Bed& bed) {
+  return {nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(bed.margin_mm), bed.of_machine};
+}
+
+/// Requested positions in the margin are kept.
+void note_margin(const Bed& bed, const PartRequest& request, const Box& box, PartSummary& part) {
+  const auto [width, depth, margin, unused] = space_of(bed);
+  const bool inside = box.lo.x >= margin && box.lo.y >= margin && box.hi.x <= width - margin && box.hi.y <= depth - margin;
+  if (inside || !request.at_mm) return;
+  part.notes.push_back({false, fmt::format("its box lies in the margin of {:g} mm along the edges of the bed", bed.margin_mm)});
+}
+
 /// The space of a part.
 arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded, const Bed& bed) {
   arrange::BoxRequest request;
@@ -209,6 +222,13 @@ arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded, c
     const std::int64_t free_y = nm_of(bed.size_mm[1]) - request.at_y.value_or(0);
     if (free_x > 0) request.width = std::min(request.width, free_x);
     if (free_y > 0) request.depth = std::min(request.depth, free_y);
+  }
+  // Images of a whole bed include its margin.
+  const arrange::BedSpace space = space_of(bed);
+  if (loaded.images && !part.at_mm && part.copies == 1 &&
+      (request.width > space.width - 2 * space.margin || request.depth > space.depth - 2 * space.margin)) {
+    request.at_x = std::max<std::int64_t>(0, space.width - request.width) / 2;
+    request.at_y = std::max<std::int64_t>(0, space.depth - request.depth) / 2;
   }
   return request;
 }
@@ -227,31 +247,22 @@ Status check_apart(const Job& job, const std::string& path) {
   return usage("{}: is in the output directory; name another one with -o", one_line(path));
 }
 
-/// Dots an inch of the images by key or tags. errors  kInput, kUsage
-Result<std::array<std::int64_t, 2>> dots_of(const PartRequest& part, const formats::LayerImages& images,
-                                            const PixelGrid& grid) {
-  std::array<double, 2> dpi{images.dpi_x(), images.dpi_y()};
-  if (part.images.dpi) dpi = {static_cast<double>((*part.images.dpi)[0]), static_cast<double>((*part.images.dpi)[1])};
+/// The pixels of the images by key or tags. errors  kInput, kUsage
+Result<std::array<DotPitch, 2>> pitch_of(const PartRequest& part, const formats::LayerImages& images, const PixelGrid& grid) {
+  const std::array<double, 2> dpi =
+      part.images.dpi.value_or(std::array{formats::requested_dpi(images.dpi_x()), formats::requested_dpi(images.dpi_y())});
   if (!(dpi[0] > 0) || !(dpi[1] > 0))
     return Error{Fault::kInput, fmt::format("{}: its files state no resolution; add part.dpi", one_line(part.path))};
-  std::array<std::int64_t, 2> dots{};
+  std::array<DotPitch, 2> pitch{};
   const std::array axes{&grid.x, &grid.y};
   for (std::size_t a = 0; a < 2; ++a) {
-    if (std::abs(dpi[a] - axes[a]->dpi()) <= 0.02) {
-      dots[a] = axes[a]->dots;
-    } else if (!part.images.resample) {
+    const bool same = std::abs(dpi[a] - axes[a]->dpi()) <= 0.02;
+    if (!same && !part.images.resample)
       return usage("{}: {:g} x {:g} dpi, the job has {:g} x {:g}; give the same --dpi, or part.resample = true",
                    one_line(part.path), dpi[0], dpi[1], grid.x.dpi(), grid.y.dpi());
-    } else if (axes[a]->span != kNmPerInch || dpi[a] < 1 || dpi[a] > 25'400) {
-      return usage(
-          "{}: {:g} dpi cannot be resampled to the job's {:g} x {:g}, which are not whole; plan the images at "
-          "the machine's",
-          one_line(part.path), dpi[a], grid.x.dpi(), grid.y.dpi());
-    } else {
-      dots[a] = std::llround(dpi[a]);
-    }
+    pitch[a] = same ? axes[a]->pitch() : pitch_of_dpi(dpi[a]);
   }
-  return dots;
+  return pitch;
 }
 
 Status check_no_transform(const PartRequest& part) {
@@ -263,9 +274,9 @@ Status check_no_transform(const PartRequest& part) {
 }
 
 /// nm that pixels of the image take on the bed. As many as a bed of this length has are as long as the bed.
-std::int64_t length_of(std::uint32_t pixels, std::int64_t dots, const PixelAxis& axis) {
-  const std::int64_t nm = pixels * axis.span / dots;
-  return pixels == ceil_div(axis.length * dots, axis.span) ? std::min(nm, axis.length) : nm;
+std::int64_t length_of(std::uint32_t pixels, const DotPitch& pitch, const PixelAxis& axis) {
+  const std::int64_t nm = pixels * pitch.span / pitch.dots;
+  return pixels == ceil_div(axis.length * pitch.dots, pitch.span) ? std::min(nm, axis.length) : nm;
 }
 
 }  // namespace
@@ -292,7 +303,7 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
   for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p], bed));
 
   const Result<std::vector<arrange::BoxPosition>> positions =
-      arrange::arrange_boxes(requests, nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(job.gap_mm), bed.of_machine);
+      arrange::arrange_boxes(requests, space_of(bed), nm_of(job.gap_mm));
   if (!positions) return positions.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
@@ -340,7 +351,11 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const Pixe
     const Box box{{static_cast<Nm>(position.x), static_cast<Nm>(position.y), static_cast<Nm>(bottom)},
                   {static_cast<Nm>(position.x + part.bounds.width()), static_cast<Nm>(position.y + part.bounds.depth()),
                    static_cast<Nm>(bottom + part.bounds.height())}};
-    if (scene.parts[position.request].bounds.empty()) scene.parts[position.request].bounds = box;
+    PartSummary& summary = scene.parts[position.request];
+    if (summary.bounds.empty()) {
+      summary.bounds = box;
+      note_margin(bed, job.parts[position.request], box, summary);
+    }
     scene.height = std::max<std::int64_t>(scene.height, box.hi.z);
     boxes.emplace_back(position.request, box);
   }
@@ -392,9 +407,9 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
       reported->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty, kSampledImages});
   if (!images) return images.error();
   OpenImages open;
-  const auto dots = dots_of(part, *images, *grid);
-  if (!dots) return dots.error();
-  open.dots = *dots;
+  const auto pitch = pitch_of(part, *images, *grid);
+  if (!pitch) return pitch.error();
+  open.pitch = *pitch;
   open.bottom = part.bottom_mm ? static_cast<Nm>(nm_of(*part.bottom_mm)) : reported->bottom;
   open.thickness = reported->thickness;
   const bool layer_named = std::ranges::find(job.named, "layers.thickness_mm") != job.named.end();
@@ -408,8 +423,8 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
   if (open.bottom + std::int64_t{open.thickness} * images->layers() > kNmReach)
     return usage("{}: {} layers of {} mm reach beyond {} mm; give thinner ones", one_line(part.path), images->layers(),
                  mm(open.thickness), mm(kNmReach));
-  open.width = length_of(images->columns(), open.dots[0], grid->x);
-  open.depth = length_of(images->rows(), open.dots[1], grid->y);
+  open.width = length_of(images->columns(), open.pitch[0], grid->x);
+  open.depth = length_of(images->rows(), open.pitch[1], grid->y);
   open.notes.push_back(
       {false, fmt::format("images: {} layers of {} mm, {} x {} pixels{}", images->layers(), number_text(mm(open.thickness)),
                           images->columns(), images->rows(),
@@ -444,7 +459,7 @@ PlacedImages placed_images(const OpenImages& open, const PartRequest& part, cons
   const std::int64_t column = snapped(x_nm, cut_x ? 0 : open.width, grid.x),
                      row = snapped(y_nm, cut_y ? 0 : open.depth, grid.y);
   placed.position =
-      formats::placement_of(open.images->columns(), open.images->rows(), open.dots[0], open.dots[1], grid, column, row);
+      formats::placement_of(open.images->columns(), open.images->rows(), open.pitch[0], open.pitch[1], grid, column, row);
   const auto at_nm = [](std::int64_t pixel, const PixelAxis& axis) { return pixel * axis.span / axis.dots; };
   if (part.at_mm && (std::abs(at_nm(column, grid.x) - x_nm) > 1 || std::abs(at_nm(row, grid.y) - y_nm) > 1))
     notes.push_back(

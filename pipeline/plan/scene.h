@@ -67,7 +67,7 @@ Status check_reach(const Machine& machine, const Scene& scene);
 /// The opened images of a part, with the data of a lamina manifest next to them and of the job's keys.
 struct OpenImages {
   std::shared_ptr<const formats::LayerImages> images;
-  std::array<std::int64_t, 2> dots{};  // an inch, or the bed's where they are the same
+  std::array<DotPitch, 2> pitch{};  // the bed's where they are the same
   Nm bottom = 0, thickness = 0;
   std::int64_t width = 0, depth = 0;  // nm on the bed
   std::vector<Note> notes;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <optional>
 #include <vector>
@@ -22,11 +21,27 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Two pixels, or a drop as it flies, whichever is wider.
+/// That of the powder, or 0.3 mm; at least two pixels, because thinner walls are not resolved.
 double narrowest_mm(const ImagePlan& images) {
-  const double pixel = 25.4 / std::min(images.grid.x.dpi(), images.grid.y.dpi());
-  const double drop_mm3 = images.machine ? images.machine->machine.head.drop_pl * 1e-6 : 0;
-  return std::max(2 * pixel, std::cbrt(6 * drop_mm3 / std::numbers::pi));
+  constexpr double kUnstated = 0.3;
+  const double stated = images.machine ? images.machine->machine.powder.min_wall_mm : 0;
+  return std::max(2 * 25.4 / std::min(images.grid.x.dpi(), images.grid.y.dpi()), stated > 0 ? stated : kUnstated);
+}
+
+/// The name of the part with the narrowest box around a spot; empty if there is none.
+std::string part_at(const Scene& scene, const checks::Spot& spot) {
+  const std::int64_t x = nm_of(spot.x_mm), y = nm_of(spot.y_mm), z = nm_of(spot.z_mm);
+  std::string name;
+  double narrowest = 0;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Box box = box_of(scene, scene.instances[i]);
+    if (x < box.lo.x || x > box.hi.x || y < box.lo.y || y > box.hi.y || z < box.lo.z || z > box.hi.z) continue;
+    const double area = static_cast<double>(box.width()) * static_cast<double>(box.depth());
+    if (!name.empty() && area >= narrowest) continue;
+    name = one_line(scene.parts[scene.part_of_instance[i]].path);
+    narrowest = area;
+  }
+  return name;
 }
 
 class Inspector : public ImageObserver {
@@ -121,7 +136,17 @@ void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   }
   std::vector<std::string> names;
   for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  checks::report(inspection_->finish(), names, min_mm_, reports_);
+  const checks::Findings& findings = inspection_->finish();
+  checks::report(findings, names, min_mm_, reports_);
+  const std::pair<const char*, const checks::Found*> kinds[] = {
+      {"islands", &findings.islands}, {"loose", &findings.loose}, {"hollows", &findings.hollows}, {"thin", &findings.thin}};
+  for (Warning& warning : reports_) {
+    for (const auto& [code, found] : kinds) {
+      if (warning.code != code) continue;
+      warning.part = part_at(*plan_.scene, found->spot);
+      if (!warning.part.empty()) warning.text = warning.part + ": " + warning.text;
+    }
+  }
   warnings.insert(warnings.end(), reports_.begin(), reports_.end());
 }
 

@@ -55,10 +55,11 @@ Status each_layer(const ReportSource& source, bool timed, Work work, Gather gath
 }
 
 /// The parts from their files, if found and unchanged.
-Result<Scene> parts_of(const fs::path& folder, const ManifestHead& head, const Job& job, const ReportOptions& options) {
+Result<Scene> parts_of(const fs::path& folder, const ManifestHead& head, const Job& job, const Machine* machine,
+                       const ReportOptions& options) {
   std::vector<std::string> folders = options.parts;
   folders.insert(folders.end(), {".", folder.string(), folder.parent_path().string()});
-  return find_parts(head, job, folders);
+  return find_parts(head, job, machine, folders);
 }
 
 Result<std::vector<ShownView>> views_of_parts(const Scene& scene) {
@@ -141,7 +142,8 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   Job job;
   const Status read = read_job_text(manifest.head.job_toml, "manifest.json", job);
   const fs::path folder = fs::absolute(source->manifest_path).lexically_normal().parent_path();
-  const auto parts = read ? parts_of(folder, manifest.head, job, options) : read.error();
+  const Machine* const machine = source->machine ? &*source->machine : nullptr;
+  const auto parts = read ? parts_of(folder, manifest.head, job, machine, options) : read.error();
   auto shown = parts ? views_of_parts(*parts) : parts.error();
   if (shown) {
     views = std::move(*shown);
@@ -151,7 +153,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   } else {
     report.without_parts = shown.error().message;
   }
-  ReportWarnings report_warnings(manifest, job, source->machine ? &*source->machine : nullptr, parts ? &*parts : nullptr);
+  ReportWarnings report_warnings(manifest, job, machine, parts ? &*parts : nullptr);
 
   // Reserves room for the layers' lines and the rest of the page.
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();

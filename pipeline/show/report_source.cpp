@@ -151,7 +151,8 @@ Result<ReportSource> report_source(const std::string& path) {
   return wrong(path, "is a job of lamina slice, and reports are of images and toolpaths; lamina preview draws its layers");
 }
 
-Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const std::vector<std::string>& folders) {
+Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const Machine* machine,
+                         const std::vector<std::string>& folders) {
   Job job = recorded;
   for (const PartSummary& part : head.parts) {
     if (part.triangles == 0)
@@ -163,7 +164,8 @@ Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const st
     if (part.path.empty()) return Error{Fault::kInput, fmt::format("{}: not found; name its folder with --parts", name)};
   }
   // The manifest decides the bed of images, because the machine's profile may have changed.
-  Bed bed{{mm(head.grid.x.length), mm(head.grid.y.length)}};
+  const double margin_mm = machine != nullptr ? machine->bed.margin_mm : job.margin_mm.value_or(0);
+  Bed bed{{mm(head.grid.x.length), mm(head.grid.y.length)}, false, margin_mm};
   if (head.product != Product::kImages) {
     const auto resolved = resolve(job, head.product);
     if (!resolved) return resolved.error();

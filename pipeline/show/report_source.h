@@ -43,7 +43,8 @@ Result<ReportSource> report_source(const std::string& path);
 ///
 /// A manifest names parts without their folders. Each is searched in `folders` (entries may also be files) and accepted if
 /// its triangles match the recorded fingerprint. errors  kInput: a missing or changed part, with its name; of load_scene
-Result<Scene> find_parts(const ManifestHead& head, const Job& job, const std::vector<std::string>& folders);
+Result<Scene> find_parts(const ManifestHead& head, const Job& job, const Machine* machine,
+                         const std::vector<std::string>& folders);
 
 /// Parts from above, from the front and from the right, `most` pixels along the longest side of all.
 Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t maximum);

@@ -19,6 +19,13 @@ struct BoxRequest {
   std::string name = {};                             // for messages
 };
 
+/// Where boxes may stand.
+struct BedSpace {
+  std::int64_t width = 0, depth = 0;  // nm
+  std::int64_t margin = 0;            // nm along each side, where nothing is arranged
+  bool of_machine = false;            // it is that of a machine, so that advice names no other size of it
+};
+
 /// The front left corner of one copy.
 struct BoxPosition {
   std::uint32_t request;  // index of its BoxRequest
@@ -29,13 +36,10 @@ struct BoxPosition {
 ///
 /// A request with a position gets it for its first copy; further ones follow along x, their width and the gap apart.
 /// The others fill rows from the left, `gap` apart; a row is as deep as its deepest box, and the next one begins
-/// behind it. The block of all rows is centred on the bed, rounded down. No box is turned.
+/// behind it. The block of all rows is centred on the bed, rounded down, and stays out of its margin. No box is turned.
 ///
-/// bed_of_machine  the bed is that of a machine, so that advice names no other size of it
-///
-/// errors  kUsage if a copy does not lie within the bed: which, by how much, and what would help
+/// errors  kUsage if a copy does not lie within the bed or its margin: which, by how much, and what would help
 /// cost    O(copies)
-Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
-                                               std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine = false);
+Result<std::vector<BoxPosition>> arrange_boxes(std::span<const BoxRequest> requests, const BedSpace& bed, std::int64_t gap);
 
 }  // namespace lamina::arrange

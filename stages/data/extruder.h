@@ -23,6 +23,7 @@ struct Extruder {
   struct ExtruderBed {
     std::array<double, 2> size_mm{220, 220};
     double build_height_mm = 250;
+    double margin_mm = 0;                   // along its sides, where nothing is arranged
     std::array<double, 2> corner_mm{0, 0};  // machine coordinates of its front left corner
   } bed;
 

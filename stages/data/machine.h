@@ -41,6 +41,7 @@ struct Machine {
     BedShape shape = BedShape::kRectangle;
     std::array<double, 2> size_mm{100, 100};  // of a round bed: its diameter, twice
     double build_height_mm = 100;
+    double margin_mm = 0;  // along its sides, where nothing is arranged
   } bed;
 
   struct Head {
@@ -109,6 +110,7 @@ struct Machine {
     double packing = 0.6;               // share of the powder bed that is solid
     double evaporates_percent = 0;      // of the jetted binder, before the next layer is spread
     double min_saturation_percent = 0;  // of the voids, that binds; 0: not stated
+    double min_wall_mm = 0;             // that holds when it is taken out; 0: not stated
   } powder;
 
   /// Keeps the nozzles from drying: firing off the bed, and wiping. Positions are those of the carriage.

@@ -135,7 +135,9 @@ std::string unknown_format(std::string_view id) {
   };
   for (const ImageFormat& format : kFormats) add(format.id);
   for (const LevelFormat& format : kLevelFormats) add(format.id);
-  return fmt::format("unknown value '{}'; use one of {}", id, like.empty() ? all : like);
+  const std::string nearest = like.substr(0, like.find(','));
+  return fmt::format("unknown value '{}'; use one of {}{}", id, like.empty() ? all : like,
+                     like.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
 }
 
 }  // namespace lamina::formats

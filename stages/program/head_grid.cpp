@@ -12,19 +12,10 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kNmPerUm = 1000;
 constexpr double kSlack = 1e-6;  // of a pixel: what rounding of angles may not decide
 
-/// Along one axis: whole dots in a span of nm.
-struct Pitch {
-  std::int64_t dots = 0, span = 0;
-  double nm() const { return static_cast<double>(span) / static_cast<double>(dots); }
-};
+DotPitch pitch_of_nm(double nm) { return {1000, std::llround(nm * 1000)}; }
 
-Pitch pitch_of_nm(double nm) { return {1000, std::llround(nm * 1000)}; }
-
-// Whole dpi stay exact; others are rounded to picometres.
-Pitch pitch_of_dpi(double dpi) {
-  if (dpi == std::floor(dpi)) return {static_cast<std::int64_t>(dpi), kNmPerInch};
-  return pitch_of_nm(kNmPerInch / dpi);
-}
+// Decimals of a few digits stay exact; others are rounded to picometres.
+DotPitch exact_pitch(double dpi) { return is_exact_dpi(dpi) ? pitch_of_dpi(dpi) : pitch_of_nm(kNmPerInch / dpi); }
 
 Error wrong(const Machine& machine, std::string_view key, const std::string& what) {
   return {Fault::kUsage, fmt::format("{}: {}: {}", machine.name.empty() ? "machine" : machine.name, key, what)};
@@ -63,7 +54,7 @@ class Builder {
   bool scan_x_ = machine_.mounting.scan_axis == ScanAxis::kX;
   double pitch_nm_ = machine_.head.pitch_um * kNmPerUm;  // of nozzles
   double angle_ = 0, sine_ = 0, cosine_ = 0;             // between row and scan
-  Pitch line_, position_;
+  DotPitch line_, position_;
 };
 
 Status Builder::check_head() {
@@ -122,7 +113,7 @@ Status Builder::turn_to_dpi() {
   if (!(mount.dpi >= 1 && mount.dpi <= 25'400)) {
     return wrong(machine_, "mounting.dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.dpi));
   }
-  line_ = pitch_of_dpi(mount.dpi);
+  line_ = exact_pitch(mount.dpi);
   const double sine = line_.nm() * passes / pitch_nm_;
   if (sine > 1 + kSlack) {
     return wrong(
@@ -164,13 +155,14 @@ Status Builder::divide_scan() {
       return wrong(machine_, "motion.ticks_per_pixel", "needs motion.encoder_dpi, the ticks an inch, 1 to 25400");
     }
     if (motion.ticks_per_pixel > 1000) return wrong(machine_, "motion.ticks_per_pixel", "give at most 1000");
-    position_ = pitch_of_dpi(motion.encoder_dpi);
+    position_ = exact_pitch(motion.encoder_dpi);
     position_.span *= motion.ticks_per_pixel;
+    if (position_.span > kMaxSpan) position_ = pitch_of_nm(position_.nm());
   } else if (mount.along_dpi != 0) {
     if (!(mount.along_dpi >= 1 && mount.along_dpi <= 25'400)) {
       return wrong(machine_, "mounting.along_dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.along_dpi));
     }
-    position_ = pitch_of_dpi(mount.along_dpi);
+    position_ = exact_pitch(mount.along_dpi);
   }
   if (position_.nm() < 1000) return wrong(machine_, "mounting.along_dpi", "pixels along the scan are shorter than 1 um");
   if (motion.lag_unit == LagUnit::kTick) {
@@ -187,9 +179,9 @@ Status Builder::divide_scan() {
 
 Status Builder::make_image() {
   const auto& mount = machine_.mounting;
-  const auto axis = [&](const Pitch& pitch, double mm_long, PixelAxis& made) {
+  const auto axis = [&](const DotPitch& pitch, double mm_long, PixelAxis& made) {
     if (!(mm_long > 0 && mm_long <= 2147)) return false;
-    made = PixelAxis(pitch.dots, nm_of(mm_long), pitch.span);
+    made = PixelAxis(pitch, nm_of(mm_long));
     return true;
   };
   if (!axis(scan_x_ ? position_ : line_, machine_.bed.size_mm[0], grid_.image.x) ||
@@ -283,14 +275,18 @@ void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::
                                                machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8))});
 }
 
-Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {
+Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<double, 2>& dpi) {
   const auto refuse = [](const std::string& what) { return Error{Fault::kUsage, "bed.dpi: " + what}; };
   const bool scan_x = machine.mounting.scan_axis == ScanAxis::kX;
-  const auto across = static_cast<double>(dpi[scan_x ? 1 : 0]), along = static_cast<double>(dpi[scan_x ? 0 : 1]);
+  const double across = dpi[scan_x ? 1 : 0], along = dpi[scan_x ? 0 : 1];
+  // What a request may differ by: whole dpi are rounded, decimals have two digits or more.
+  const auto rounding = [](double requested) { return requested == std::floor(requested) ? 0.5 : 0.006; };
   const double head = kNmPerInch / (grid.line_nm * grid.passes);
   const double passes = std::round(across / head);
   // The last nozzle may be a quarter of a pixel off.
-  if (passes < 1 || passes > 64 || std::abs(across / head - passes) * grid.nozzles > 0.25) {
+  const bool decimal = across != std::floor(across);
+  if (passes < 1 || passes > 64 || std::abs(across / head - passes) * grid.nozzles > 0.25 ||
+      (decimal && std::abs(across - head * passes) > rounding(across) * passes)) {
     return refuse(fmt::format(
         "{:g} dpi across the scan: the head of {} reaches {:.2f} and its multiples; change the tilt or the requested dpi",
         across, machine.name, head));
@@ -300,13 +296,13 @@ Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
   const double square = kNmPerInch / grid.line_nm * passes / grid.passes;
   if (machine.motion.ticks_per_pixel > 0) {
     const double ticks = std::round(machine.motion.encoder_dpi / along);
-    if (ticks < 1 || std::abs(machine.motion.encoder_dpi / ticks - along) > 0.5) {
+    if (ticks < 1 || std::abs(machine.motion.encoder_dpi / ticks - along) > rounding(along)) {
       return refuse(
           fmt::format("{:g} dpi along the scan: the encoder of {} has {:g} ticks an inch; use an integer fraction of it", along,
                       machine.name, machine.motion.encoder_dpi));
     }
     machine.motion.ticks_per_pixel = static_cast<std::uint32_t>(ticks);
-  } else if (std::abs(along - square) > 0.5) {
+  } else if (std::abs(along - square) > (decimal ? rounding(along) * passes : rounding(along))) {
     machine.mounting.along_dpi = along;
   } else {
     machine.mounting.along_dpi = 0;

@@ -33,6 +33,6 @@ void warn_of_fixed_stitching(const Machine& machine, const HeadGrid& grid, std::
 /// interlaced passes, along it by the length of a pixel.
 /// grid    of the machine as it is
 /// errors  kUsage, "bed.dpi: what is wrong": dpi that the head or the encoder cannot reach
-Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi);
+Status require_dpi(Machine& machine, const HeadGrid& grid, const std::array<double, 2>& dpi);
 
 }  // namespace lamina::program

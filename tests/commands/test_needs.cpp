@@ -9,6 +9,7 @@ namespace {
 TEST(Needs, OptionsWithoutEffectAreRefused) {
   const Directory directory;
   write_box(directory / "part.stl", {0, 0, 0}, {20, 10, 5});
+  write_text(directory / "binding.toml", "[powder]\nmin_saturation_percent = 1\n");
   const struct {
     const char *call, *flag, *remedy;  // remedy: makes it an option with an effect
   } rows[] = {
@@ -24,6 +25,17 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
       {"slice", "--angle 45", "--pattern raster"},
       {"slice", "--stagger 0,0.1", "--set fill.pattern=raster"},
       {"extrude", "--angle 45", "--fill segmented --machine anet-a8 --layer 0.2"},
+      {"jet", "--first-layers 3", "--first-bleed 50"},
+      {"jet", "--min-wall 1", "--inspect"},
+      {"jet", "--gap 3", "--copies 2"},
+      {"slice", "--angle 30 --pattern contour", "--pattern raster"},
+      {"slice", "--angle-step 30 --pattern contour", "--pattern raster"},
+      {"slice", "--stagger 0,0.1 --pattern contour+raster", "--pattern raster"},
+      {"slice", "--file-a-layer --format null", "--format svg"},
+      {"extrude", "--wall-speed 30 --walls 0 --fill raster --layer 0.2", "--walls 1"},
+      {"jet", "--allow-unbound", "--machine hp45 --preset binding.toml"},
+      {"jet", "--allow-unbound --machine hp45", "--preset binding.toml"},
+      {"jet", "--vat-rule first --machine nuferbj", "part.stl --material steel,bronze"},
   };
   const auto run = [&](const std::string& line) { return run_lamina(words_of(line), directory.path()); };
   for (const auto& row : rows) {
@@ -37,6 +49,31 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
     EXPECT_EQ(done.code, 0) << line << " " << row.remedy << "\n" << done.err;
   }
   EXPECT_EQ(run("extrude part.stl --bead 0.5 --dry-run").code, 0) << "a wall is deposited anyway";
+}
+
+TEST(Needs, KeysWithoutEffectAreNoted) {
+  const Directory directory;
+  write_box(directory / "part.stl", {0, 0, 0}, {20, 10, 5});
+  const auto notes = [&](const std::string& keys, const std::string& options) {
+    write_text(directory / "job.toml", keys + "\n[[part]]\npath = 'part.stl'\n");
+    const Outcome outcome = run_lamina(words_of(options + " --job job.toml --layer 1 --dry-run"), directory.path());
+    EXPECT_EQ(outcome.code, 0) << keys << "\n" << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_NE(notes("[dose]\nfirst_layers = 3", "jet").find("note: dose.first_layers: applies to --first-bleed"),
+            std::string::npos);
+  EXPECT_NE(notes("[run]\nmin_wall_mm = 3", "jet").find("note: run.min_wall_mm: applies to --inspect"), std::string::npos);
+  EXPECT_NE(notes("", "jet --set dose.first_layers=3").find("note: dose.first_layers: applies to"), std::string::npos);
+  for (const char* keys : {"[dose]\nfirst_layers = 1", "[dose]\nfirst_layers = 3\nfirst_bleed_um = 50"}) {
+    EXPECT_EQ(notes(keys, "jet").find("applies to"), std::string::npos) << keys;
+  }
+  EXPECT_EQ(notes("[dose]\nfirst_layers = 3", "slice").find("applies to"), std::string::npos) << "a key of lamina jet";
+}
+
+TEST(Needs, WhatMachinesIgnoreIsRefused) {
+  const Directory directory;
+  expect_refused("machines --preset example-steel", 2, "--preset: applies to --check and --show", directory);
+  expect_refused("machines --target f.stl --check hp45", 2, "--target: is written alone", directory);
 }
 
 }  // namespace

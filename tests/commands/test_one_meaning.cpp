@@ -143,7 +143,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
   } rows[] = {
       {"jet part.stl --dry-run --no-repair --weld 5", "--weld: applies to repair"},
       {"jet part.stl --dry-run --no-repair --repair winding", "--no-repair and --repair exclude each other"},
-      {"jet part.stl --dry-run --at 1,1 --gap 3", "--gap: is between parts"},
+      {"jet part.stl --dry-run --at 1,1 --gap 3", "--gap: applies to several parts"},
       {"slice part.stl --dry-run --layer 1 --empty-first-layer", "--empty-first-layer: applies to CLI files"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --fan 50", "--fan: is not in SML"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --nozzle-temperature 200",
@@ -196,9 +196,10 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"design part.stl --porosity 20 --machine anet-a8", "'part.stl': not expected here"},
       {"info part.stl --repair off --weld 3", "--weld: applies to repair"},
       {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: applies to repair"},
-      {"export part.stl --at 1,1 --gap 3 -o x.stl", "--gap: is between parts"},
+      {"export part.stl --at 1,1 --gap 3 -o x.stl", "--gap: applies to several parts"},
       {"report beads.gcode --parts part.stl -o a.html", "--parts: is of jobs of images"},
       {"preview beads.gcode --layer 2 --width 500 -o a.svg", "--width: applies to pictures of pixels"},
+      {"slice part.stl --dry-run --layer 1 --pattern contour --angle 30", "--angle: applies to lines with a direction"},
       {"manual jet -o pages", "--output: is for the pages of all commands"},
   };
   for (const auto& row : rows) {
@@ -211,7 +212,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
        {"jet part.stl --dry-run --quiet --repair winding --weld 5", "jet part.stl --dry-run --quiet --copies 2 --gap 3",
         "slice part.stl --dry-run --quiet --layer 1 --format cli --empty-first-layer",
         "heights part.stl --compare --thickness 0.5,1 --time-model 3",
-        "slice part.stl --dry-run --quiet --layer 1 --pattern contour --angle 30",
+        "slice part.stl --dry-run --quiet --layer 1 --pattern contour+raster --angle 30",
         "extrude part.stl --dry-run --quiet --fan 50", "extrude part.stl --dry-run --quiet --wall-speed 50",
         "extrude part.stl --dry-run --quiet --fill raster --print-speed 50",
         "extrude part.stl --dry-run --quiet --machine fdm-2000 --layer 0.254 --machine-set speed.wall_mm_s=9",

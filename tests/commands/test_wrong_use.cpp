@@ -100,7 +100,7 @@ TEST_F(WrongUse, UnknownNamesAreRefusedWithTheNearestKnownOne) {
 TEST_F(WrongUse, ValuesOutOfRangeNameTheirOption) {
   const std::pair<const char*, const char*> values[] = {
       {"--dpi", "0"},        {"--dpi", "-1"},       {"--dpi", "1e9"},   {"--dpi", "nan"},     {"--dpi", "600x"},
-      {"--dpi", "600.5"},    {"--layer", "0"},      {"--layer", "-1"},  {"--layer", "NaN"},   {"--layer", "inf"},
+      {"--dpi", "600.12345"},    {"--layer", "0"},      {"--layer", "-1"},  {"--layer", "NaN"},   {"--layer", "inf"},
       {"--layer", "1e-9"},   {"--layer", "0.05mm"}, {"--bed", "0x0"},   {"--bed", "-10x10"},  {"--bed", "10"},
       {"--bed", "2148x100"}, {"--bed", "nanxnan"},  {"--copies", "0"},  {"--copies", "1e10"}, {"--copies", "2.5"},
       {"--gap", "-1"},       {"--scale", "0"},      {"--scale", "1,2"}, {"--scale", "nan"},   {"--rotate", "90"},

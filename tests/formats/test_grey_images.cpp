@@ -239,7 +239,7 @@ TEST(GreyImages, ArePlacedAndMergedPixelByPixel) {
   for (const auto& [own, dots] : {std::pair{600, 600}, {300, 600}, {600, 250}}) {
     const PixelGrid grid{PixelAxis(dots, 2'000'000), PixelAxis(dots, 1'000'000)};
     Levels out;
-    position(levels_from(image), placement_of(31, 23, own, own, grid, 4, 2), out);
+    position(levels_from(image), placement_of(31, 23, {own}, {own}, grid, 4, 2), out);
     Pixels expected(grid.rows(), std::vector<unsigned>(grid.columns()));
     for (std::int64_t r = 0; r < grid.rows(); ++r)
       for (std::int64_t c = 0; c < grid.columns(); ++c) {

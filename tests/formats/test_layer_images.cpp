@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -130,8 +131,9 @@ TEST_F(LayerImagesTest, InvertedImageIsTheRest) {
 
 TEST(PlacedImage, TakesThePixelThatTheCentreLiesIn) {
   std::mt19937 random(3);
-  for (const auto& [own, dots] : {std::pair{600, 600}, {300, 600}, {600, 250}, {127, 600}}) {
-    const PixelGrid grid{PixelAxis(dots, 2'000'000), PixelAxis(dots, 1'500'000)};
+  for (const auto& [own_dpi, dpi] : {std::pair{600.0, 600.0}, {300, 600}, {600, 250}, {127, 600}, {540.43, 600}, {300, 262.006}}) {
+    const PixelGrid grid{PixelAxis(pitch_of_dpi(dpi), 2'000'000), PixelAxis(pitch_of_dpi(dpi), 1'500'000)};
+    const std::int64_t own = std::llround(own_dpi * 1000), dots = std::llround(dpi * 1000);
     Runs image;
     image.columns = 31;
     image.row_offset.push_back(0);
@@ -143,7 +145,7 @@ TEST(PlacedImage, TakesThePixelThatTheCentreLiesIn) {
       image.row_offset.push_back(static_cast<std::uint32_t>(image.change.size()));
     }
     Runs out;
-    position(image, placement_of(31, 23, own, own, grid, 4, 2), out);
+    position(image, placement_of(31, 23, pitch_of_dpi(own_dpi), pitch_of_dpi(own_dpi), grid, 4, 2), out);
     ASSERT_EQ(out.row_offset.size(), grid.rows() + 1u);
     for (std::uint32_t r = 0; r < grid.rows(); ++r) {
       std::vector<bool> got(grid.columns());

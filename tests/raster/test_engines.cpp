@@ -1,6 +1,7 @@
 // Both engines against the contract, on solids whose edges, corners and faces lie exactly on rows, columns and planes.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <set>
 
@@ -108,8 +109,10 @@ TEST(Engines, AgreeOnTetrahedraWithCornersOnCentresAndPlanes) {
 }
 
 TEST(Engines, AgreeOnTetrahedraAnywhereAndOnNeedles) {
-  const PixelGrid grid{{1200, 30'000'000}, {600, 25'000'000}};
+  const PixelGrid whole{{1200, 30'000'000}, {600, 25'000'000}};
+  const PixelGrid decimal{{pitch_of_dpi(1234.5678), 30'000'000}, {pitch_of_dpi(540.43), 25'000'000}};
   for (unsigned seed = 0; seed < 40; ++seed) {
+    const PixelGrid& grid = seed % 4 == 3 ? decimal : whole;
     std::mt19937 random(1000 + seed);
     const int flat = static_cast<int>(random() % 4);  // some are needles along x, along y, or nearly horizontal
     const auto pick = [&] {
@@ -328,8 +331,10 @@ TEST(Scan, AnOpenPartEndsWhereItEndsRegardlessOfWhatIsNextToIt) {
 }
 
 TEST(Grid, TheFirstPixelAtOrBeyondAPointIsFoundByCounting) {
-  for (std::int64_t dpi : {1, 72, 254, 600, 1200, 25400}) {
-    const PixelAxis axis(dpi, 30'000'000);
+  for (double dpi : {1.0, 72.0, 254.0, 262.006, 540.43, 600.0, 1200.0, 25399.9999, 25400.0}) {
+    const PixelAxis axis(pitch_of_dpi(dpi), 30'000'000);
+    EXPECT_EQ(axis.dpi(), dpi);
+    EXPECT_EQ(axis.span == kNmPerInch, dpi == std::floor(dpi));
     std::mt19937 random(static_cast<unsigned>(dpi));
     for (int i = 0; i < 200; ++i) {
       const std::int64_t nm = static_cast<std::int64_t>(random() % 30'000'000);

@@ -11,6 +11,7 @@
 #include "pipeline/manifest/manifest.h"
 #include "stages/dose/shares.h"
 #include "stages/formats/image_format.h"
+#include "stages/formats/images/image.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/raster/images.h"
 #include "stages/support/io/file.h"
@@ -188,10 +189,11 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   if (!mirror.empty() && mirror != "x" && mirror != "y" && mirror != "xy") return usage("--mirror {}: give x, y or xy", mirror);
   const auto request = request_of(arguments);
   if (!request) return request.error();
-  std::array<std::int64_t, 2> given{0, 0};
+  std::array<double, 2> given{0, 0};
   std::int64_t threads = 0;
+  const Limits resolution{.low = 1, .high = kMaxDpi, .one_for_all = true, .digits = kDpiDigits};
   for (const Status& status :
-       {arguments.read("--dpi", {1, 25'400, "", true}, given), arguments.read("--threads", {0, 4096}, threads)})
+       {arguments.read("--dpi", resolution, given), arguments.read("--threads", {0, 4096}, threads)})
     if (!status) return status;
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
@@ -200,12 +202,9 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   auto images = formats::LayerImages::open(reported->path, *request);
   if (!images) return images.error();
   std::array<double, 2>& dpi = all.dpi;
-  dpi = {images->dpi_x(), images->dpi_y()};
-  if (given[0] > 0) dpi = {static_cast<double>(given[0]), static_cast<double>(given[1])};
+  dpi = {formats::requested_dpi(images->dpi_x()), formats::requested_dpi(images->dpi_y())};
+  if (given[0] > 0) dpi = given;
   if (!(dpi[0] > 0) || !(dpi[1] > 0)) return failure(Fault::kInput, "{}: its files state no resolution; add --dpi", stack);
-  for (double& one : dpi) {
-    if (std::abs(one - std::round(one)) < 0.02) one = std::round(one);  // of whole pixels a metre
-  }
   all.first_number = images->first_number();
   all.images = std::move(*images);
   if (Status status = check_output(all, stack); !status) return status;

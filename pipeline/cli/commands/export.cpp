@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kExportKeys = "bed.size_mm placement load run.output part";
+constexpr std::string_view kExportKeys = "bed.size_mm bed.margin_mm placement load run.output part";
 
 CommandSpec export_spec() {
   CommandSpec spec;

@@ -154,6 +154,10 @@ Result<std::string> printer_text(const std::string& name, const std::vector<std:
 }
 
 Outcome run_machines(const Arguments& arguments, Context& context) {
+  const bool explains = arguments.has("--check") || arguments.has("--show") || !arguments.operands.empty();
+  if (arguments.has("--preset") && !explains) return at_option("--preset", "applies to --check and --show; add one of them");
+  if (arguments.has("--target") && (explains || arguments.has("--dialects")))
+    return at_option("--target", "is written alone; leave out --check, --show, --dialects and the names of machines");
   if (arguments.has("--target")) {
     const auto part = program::orientation_target();
     if (Status status = write_file(arguments.text("--target"), part); !status) return status.error();

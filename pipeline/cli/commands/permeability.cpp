@@ -198,6 +198,8 @@ Outcome analyse_file(const Arguments& arguments, Context& context, const std::op
   if (fits && !images) fits = refuse(arguments, std::array<std::string_view, 1>{"--periodic"}, "folders of images");
   if (fits && !beads) fits = refuse(arguments, kOfToolpaths, "toolpaths");
   if (fits && !arguments.has("--scan")) fits = refuse(arguments, std::array<std::string_view, 1>{"--range"}, "--scan DIR");
+  if (fits && arguments.has("--no-flow"))
+    fits = refuse(arguments, std::array<std::string_view, 2>{"--inertia", "--memory"}, "the flow, which --no-flow leaves out");
   if (!fits) return fits;
   return images  ? predict_stack(arguments, context)
          : beads ? predict_print(arguments, context, part)

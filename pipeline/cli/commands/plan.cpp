@@ -105,6 +105,10 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
     if (arguments.has("--job")) left = notes_on_defaults(arguments.text("--job"), resolved->job);
   }
+  if (resolved->printer && resolved->printer->machine) {
+    const Status status = check_machine_needs(resolved->printer->machine->machine, arguments);
+    if (!status) return status;
+  }
   std::optional<File> file;  // takes its name once the job is planned
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
@@ -206,7 +210,7 @@ PlanCommand jet_row() {
 // --- lamina slice
 
 constexpr std::string_view kSliceKeys =
-    "bed.size_mm layers heights placement image.fill load run.output run.threads run.memory run.sync run.layers "
+    "bed.size_mm bed.margin_mm layers heights placement image.fill load run.output run.threads run.memory run.sync run.layers "
     "run.strict run.allow_empty slice fill segment.fill part";
 
 constexpr std::string_view kSliceBasic =
@@ -255,7 +259,7 @@ PlanCommand slice_row() {
 // --- lamina extrude
 
 constexpr std::string_view kExtrudeKeys =
-    "layers heights placement machine.profile fill image.fill segment extrude load slice.tolerance_um run.output "
+    "bed.margin_mm layers heights placement machine.profile fill image.fill segment extrude load slice.tolerance_um run.output "
     "run.threads run.memory run.sync run.layers run.strict run.allow_empty part";
 
 constexpr std::string_view kExtrudeBasic =
@@ -295,7 +299,7 @@ Status complete_extrude(const Arguments&, Job& job) {
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
   if (job.output.empty() && !job.dry_run) return usage("-o FILE is missing; name the file for the toolpaths, or use --dry-run");
   std::error_code ignored;
-  if (!std::filesystem::is_directory(job.output, ignored)) return {};
+  if (job.output.empty() || (!std::filesystem::is_directory(job.output, ignored) && !job.output.ends_with('/'))) return {};
   return usage("-o {}: is a directory; name a file in it, as in {}", job.output,
                (std::filesystem::path(job.output) / "part.gcode").string());
 }

@@ -58,11 +58,11 @@ struct Arguments {
   /// Sets a value from an option's text, if present. errors  kUsage: "--jobs: ...", out of range or invalid
   template <class T>
   Status read(std::string_view flag, const Limits& limits, T& value) const {
-    return has(flag) ? at_option(flag, read_value(text(flag), limits, value)) : Status();
+    return has(flag) ? at_option(flag, with_comma_hint(read_value(text(flag), limits, value), text(flag))) : Status();
   }
   template <class T>
   Status read(std::string_view flag, std::string (*reader)(std::string_view, T&), T& value) const {
-    return has(flag) ? at_option(flag, reader(text(flag), value)) : Status();
+    return has(flag) ? at_option(flag, with_comma_hint(reader(text(flag), value), text(flag))) : Status();
   }
 };
 

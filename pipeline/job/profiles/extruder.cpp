@@ -139,6 +139,7 @@ constexpr Key<Profile> kKeys[] = {
 
     field<kMachine, &Extruder::bed, &Bed::size_mm>({"bed", "size_mm"}, {1, kMaxMm, " mm"}),
     field<kMachine, &Extruder::bed, &Bed::build_height_mm>({"bed", "build_height_mm"}, {1, kMaxMm, " mm"}),
+    field<kMachine, &Extruder::bed, &Bed::margin_mm>({"bed", "margin_mm"}, {0, kMaxMm, " mm"}).unsaid_at("0"),
     field<kMachine, &Extruder::bed, &Bed::corner_mm>({"bed", "corner_mm"}, {-kMaxMm, kMaxMm, " mm"}),
 
     field<kMachine, &Extruder::material, &Material::nozzle_mm>({"material", "nozzle_mm"}, {0.01, 20, " mm"}),

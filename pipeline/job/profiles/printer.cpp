@@ -128,6 +128,7 @@ constexpr Key<Machine> kKeys[] = {
     word<kShapes, kBed, &Bed::shape>({"bed", "shape"}),
     field<kBed, &Bed::size_mm>({"bed", "size_mm"}, kLength),
     field<kBed, &Bed::build_height_mm>({"bed", "build_height_mm"}, kLength),
+    field<kBed, &Bed::margin_mm>({"bed", "margin_mm"}, {0, kMaxMm, " mm"}).unsaid_at("0"),
 
     field<kHead, &Head::nozzles>({"head", "nozzles"}, {1, 65'535}),
     field<kHead, &Head::pitch_um>({"head", "pitch_um"}, {0, 1e6, " um"}),
@@ -183,6 +184,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 0.99}),
     field<kPowder, &Powder::evaporates_percent>({"powder", "evaporates_percent"}, {0, 99.9, " %"}).unsaid_at("0"),
     field<kPowder, &Powder::min_saturation_percent>({"powder", "min_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
+    field<kPowder, &Powder::min_wall_mm>({"powder", "min_wall_mm"}, {0, 1000, " mm"}).unsaid_at("0"),
 
     field<kPowder, &Powder::vat_depth_mm>({"powder", "vat_depth_mm"}, {0, kMaxMm, " mm"}).unsaid_at("0,0"),
     field<kPowder, &Powder::vat_area_mm2>({"powder", "vat_area_mm2"}, {0, 1e7, " mm2"}).unsaid_at("0"),

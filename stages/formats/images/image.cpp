@@ -48,6 +48,13 @@ Result<Image> read_image(const std::string& path, int threshold, std::uint64_t p
 
 }  // namespace
 
+double requested_dpi(double dpi) {
+  constexpr double kMetresAnInch = 0.0254, kSlack = 1e-4;
+  const double whole = std::round(dpi), per_metre = dpi / kMetresAnInch;
+  const bool metric = std::abs(per_metre - std::round(per_metre)) < kSlack;
+  return std::abs(dpi - whole) < (metric ? 0.02 : kSlack / 2) ? whole : dpi;
+}
+
 Result<Image> image(const std::string& path, std::uint8_t full) {
   if (full == 0) return read_image(path, 0);
   Levels unused;

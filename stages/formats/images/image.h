@@ -24,6 +24,9 @@ struct Image {
   std::string description = {};  // of a TIFF
 };
 
+/// The dpi that a file's resolution stands for: whole ones where it counts whole pixels a metre, as PNG and BMP do, else as is.
+double requested_dpi(double dpi);
+
 /// Decodes a 1-bit image as the writers make them (TIFF of any 1-bit compression, PNG, PBM), row by row: memory is
 /// the runs plus one row or strip of bits, or of Group 4 the coded strip.
 /// full    of images that carry levels, that of a full voxel: their runs are as levels() gives them

@@ -5,27 +5,37 @@
 namespace lamina::formats {
 namespace {
 
-/// The image's pixel that holds the centre of the pixel `place` behind the corner, at dots of the image in the bed's span.
-std::int64_t source_of(std::int64_t position, std::int64_t dots, const PixelAxis& axis) {
-  if (dots == axis.dots) return position;
-  return (2 * position + 1) * dots / (2 * axis.dots);
-}
+/// Pixels of an image along an axis of the bed, (2 p + 1) * image / (2 bed) of them up to the centre of the bed's pixel p.
+struct Scale {
+  __int128 image, bed;
+  Scale(const DotPitch& pitch, const PixelAxis& axis)
+      : image(__int128{pitch.dots} * axis.span), bed(__int128{axis.dots} * pitch.span) {}
+
+  /// The image's pixel that holds the centre of the pixel `position` behind the corner.
+  std::int64_t source(std::int64_t position) const {
+    return image == bed ? position : static_cast<std::int64_t>((2 * position + 1) * image / (2 * bed));
+  }
+  /// The first position whose source is not before the image's pixel `boundary`.
+  std::int64_t first(std::int64_t boundary) const {
+    return static_cast<std::int64_t>(ceil_div<__int128>(boundary * 2 * bed - image, 2 * image));
+  }
+};
 
 }  // namespace
 
-Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t dots_x, std::int64_t dots_y,
-                       const PixelGrid& grid, std::int64_t at_column, std::int64_t at_row) {
+Placement placement_of(std::uint32_t columns, std::uint32_t rows, const DotPitch& x, const DotPitch& y, const PixelGrid& grid,
+                       std::int64_t at_column, std::int64_t at_row) {
+  const Scale along(x, grid.x), across(y, grid.y);
   Placement placement;
   placement.columns = grid.columns();
   placement.rows = grid.rows();
   for (std::uint32_t boundary = 0; boundary <= columns; ++boundary) {
-    // The first place whose source is not before the boundary.
-    const std::int64_t position = ceil_div(std::int64_t{boundary} * 2 * grid.x.dots - dots_x, 2 * dots_x);
-    placement.column.push_back(static_cast<std::uint32_t>(std::clamp<std::int64_t>(at_column + position, 0, grid.columns())));
+    const std::int64_t column = at_column + along.first(boundary);
+    placement.column.push_back(static_cast<std::uint32_t>(std::clamp<std::int64_t>(column, 0, grid.columns())));
   }
   for (std::uint32_t r = 0; r < grid.rows(); ++r) {
     const std::int64_t behind = std::int64_t{grid.rows()} - 1 - r - at_row;  // rows from the image's front
-    const std::int64_t source = behind < 0 ? rows : source_of(behind, dots_y, grid.y);
+    const std::int64_t source = behind < 0 ? rows : across.source(behind);
     if (source >= rows) {
       if (placement.row.empty()) ++placement.first_row;
       continue;

@@ -19,10 +19,10 @@ struct Placement {
 };
 
 /// Places an image with its front left corner at a pixel of the bed, counted from the front left. What sticks out is cut off.
-/// dots_x, dots_y  of the image, an inch; those of the bed: pixel by pixel; else each pixel of the bed takes the image's
-///                 pixel that its centre lies in, in integers. span of the bed's axes is an inch then
-Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t dots_x, std::int64_t dots_y,
-                       const PixelGrid& grid, std::int64_t at_column, std::int64_t at_row);
+/// x, y  the image's pixels; those of the bed: pixel by pixel; else each pixel of the bed takes the image's pixel that its
+///       centre lies in, in integers
+Placement placement_of(std::uint32_t columns, std::uint32_t rows, const DotPitch& x, const DotPitch& y, const PixelGrid& grid,
+                       std::int64_t at_column, std::int64_t at_row);
 
 /// The image on the bed; `out` is another one. cost  O(changes + rows of the bed)
 void position(const RunsView& image, const Placement& placement, Runs& out);

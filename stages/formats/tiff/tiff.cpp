@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -17,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "stages/data/grid.h"
 #include "stages/data/units.h"
 #include "stages/formats/g4/decode.h"
 #include "stages/formats/g4/encode.h"
@@ -152,6 +154,37 @@ class LayerText {
   std::uint32_t page_ = 0, pages_ = 0;
 };
 
+// The first strip follows the header of a classic TIFF.
+constexpr std::size_t kStripAt = 8, kDirectoryAt = 4, kEntryBytes = 12, kMaxTail = 1024;
+
+template <class Number>
+Number number_at(std::span<const std::byte> bytes, std::size_t at) {
+  Number value = 0;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+template <class Number>
+void put_at(std::byte* bytes, std::size_t at, Number value) {
+  std::memcpy(bytes + at, &value, sizeof value);
+}
+
+/// libtiff keeps resolutions as floats: puts decimal dpi into its directory as the fractions that they are.
+void put_exact_resolution(const TagFrame& frame, Bytes& file) {
+  const std::size_t directory = number_at<std::uint32_t>(file, kDirectoryAt);
+  for (std::size_t e = 0; e < number_at<std::uint16_t>(file, directory); ++e) {
+    const std::size_t at = directory + 2 + e * kEntryBytes;
+    const auto tag = number_at<std::uint16_t>(file, at);
+    if (tag != TIFFTAG_XRESOLUTION && tag != TIFFTAG_YRESOLUTION) continue;
+    const double dpi = tag == TIFFTAG_XRESOLUTION ? frame.dpi_x : frame.dpi_y;
+    if (dpi == std::floor(dpi) || !is_exact_dpi(dpi)) continue;
+    const DotPitch exact = pitch_of_dpi(dpi);
+    const std::size_t value = number_at<std::uint32_t>(file, at + 8);
+    put_at(file.data(), value, static_cast<std::uint32_t>(exact.dots));
+    put_at(file.data(), value + 4, static_cast<std::uint32_t>(exact.span / kNmPerInch));
+  }
+}
+
 /// The whole file of an image. put_strips(TIFF*)  returns false where libtiff does not take them
 template <class PutStrips>
 Status write_file(Bytes& file, const TagFrame& frame, const LayerText& text, const PutStrips& put_strips) {
@@ -170,6 +203,7 @@ Status write_file(Bytes& file, const TagFrame& frame, const LayerText& text, con
     return refused(frame, message.empty() ? "out of memory" : message);
   }
   file.resize(memory.size);
+  put_exact_resolution(frame, file);
   return {};
 }
 
@@ -195,21 +229,6 @@ Status write_rows(Bytes& file, const TagFrame& frame, const LayerText& text, Byt
 // libtiff sorts its table of fields for every file that it opens: some 60 us, which is what a small layer takes to be encoded.
 // Layers of a job differ in their strip alone, so libtiff writes the directory of the first one, and those of others are
 // copies, moved behind their strips, with the strip's length put in. Layout: TIFF 6.0 (Adobe 1992), section 2.
-
-// The first strip follows the header of a classic TIFF.
-constexpr std::size_t kStripAt = 8, kDirectoryAt = 4, kEntryBytes = 12, kMaxTail = 1024;
-
-template <class Number>
-Number number_at(std::span<const std::byte> bytes, std::size_t at) {
-  Number value = 0;
-  std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
-}
-
-template <class Number>
-void put_at(std::byte* bytes, std::size_t at, Number value) {
-  std::memcpy(bytes + at, &value, sizeof value);
-}
 
 /// Bytes of a value of a type; 0: no type of TIFF 6.0.
 std::size_t bytes_of(std::uint16_t type) {
@@ -474,16 +493,52 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
   return true;
 }
 
+/// The resolutions of a directory of a classic TIFF as fractions, which libtiff rounds to floats. Unchanged if there are none.
+void read_fractions(int file, std::uint64_t directory, std::array<double, 2>& resolution) {
+  Bytes bytes(4);
+  const auto read = [&](std::uint64_t at) {
+    return ::pread(file, bytes.data(), bytes.size(), static_cast<off_t>(at)) == static_cast<ssize_t>(bytes.size());
+  };
+  if (!read(0)) return;
+  const bool swapped = bytes[0] == std::byte{'M'};
+  const auto whole = [&](std::size_t at, auto number) {
+    number = tiff::number_at<decltype(number)>(bytes, at);
+    if (swapped) std::ranges::reverse(std::as_writable_bytes(std::span(&number, 1)));
+    return number;
+  };
+  constexpr std::uint16_t kClassic = 42, kShort = 0;
+  constexpr std::uint32_t kLong = 0;
+  if (whole(2, kShort) != kClassic) return;
+  bytes.resize(2);
+  if (!read(directory)) return;
+  const std::size_t entries = whole(0, kShort);
+  bytes.resize(entries * tiff::kEntryBytes);
+  if (!read(directory + 2)) return;
+  std::array<std::uint32_t, 2> fraction_at{};
+  for (std::size_t at = 0; at < entries * tiff::kEntryBytes; at += tiff::kEntryBytes) {
+    const std::uint16_t tag = whole(at, kShort);
+    if ((tag == TIFFTAG_XRESOLUTION || tag == TIFFTAG_YRESOLUTION) && whole(at + 2, kShort) == TIFF_RATIONAL)
+      fraction_at[tag == TIFFTAG_XRESOLUTION ? 0 : 1] = whole(at + 8, kLong);
+  }
+  bytes.resize(8);
+  for (std::size_t a = 0; a < 2; ++a) {
+    if (fraction_at[a] == 0 || !read(fraction_at[a]) || whole(4, kLong) == 0) continue;
+    resolution[a] = static_cast<double>(whole(0, kLong)) / whole(4, kLong);
+  }
+}
+
 /// In dpi; 0 where the file does not say.
-void read_resolution(TIFF* tiff, Image& image) {
+void read_resolution(TIFF* tiff, int file, Image& image) {
   std::uint16_t unit = RESUNIT_INCH;
   TIFFGetFieldDefaulted(tiff, TIFFTAG_RESOLUTIONUNIT, &unit);
   float x = 0, y = 0;
   if (TIFFGetField(tiff, TIFFTAG_XRESOLUTION, &x) == 0 || TIFFGetField(tiff, TIFFTAG_YRESOLUTION, &y) == 0) return;
   if (unit == RESUNIT_NONE) return;
+  std::array<double, 2> resolution{x, y};
+  read_fractions(file, TIFFCurrentDirOffset(tiff), resolution);
   const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
-  image.dpi_x = double{x} * to_inch;
-  image.dpi_y = double{y} * to_inch;
+  image.dpi_x = resolution[0] * to_inch;
+  image.dpi_y = resolution[1] * to_inch;
 }
 
 /// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
@@ -619,7 +674,7 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
   const bool to_sink = head.grey() && sink != nullptr;
   if (to_sink) sink->levels.start(head.columns);
   Image image;
-  read_resolution(handle.get(), image);
+  read_resolution(handle.get(), file, image);
   image.description = description_of(handle.get());
   if (head.compression == COMPRESSION_CCITTFAX4 && !head.grey() &&
       read_g4(handle.get(), file, head.columns, head.rows, !head.bright_is_low(), image.runs)) {

@@ -40,10 +40,27 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+std::string comma_hint(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789";
+  const std::size_t comma = text.find(',');
+  if (comma == std::string_view::npos || comma == 0 || text.find(',', comma + 1) != std::string_view::npos) return {};
+  const std::string_view before = text.substr(0, comma), after = text.substr(comma + 1);
+  const std::string_view whole = before.substr(before.find_last_not_of(kDigits) + 1);
+  const std::string_view fraction = after.substr(0, after.find_first_not_of(kDigits));
+  if (whole.empty() || fraction.empty()) return {};
+  return fmt::format("; decimal numbers have a point, as {}.{}", whole, fraction);
+}
+
+std::string with_comma_hint(std::string wrong, std::string_view text) {
+  const std::string hint = wrong.empty() ? std::string() : comma_hint(text);
+  return wrong.find(hint) == std::string::npos ? wrong + hint : wrong;
+}
+
 std::string read_number(std::string_view text, double low, double high, std::string_view unit, double& value) {
   double parsed = 0;
   if (!parse(text, parsed)) {
-    return fmt::format("{} is not a finite number; give one from {} to {}{}", quoted(text), low, high, unit);
+    return fmt::format("{} is not a finite number; give one from {} to {}{}{}", quoted(text), low, high, unit,
+                       comma_hint(text));
   }
   if (parsed < low || parsed > high) {
     return fmt::format("{} is out of range; give a number from {} to {}{}", text, low, high, unit);
@@ -55,7 +72,7 @@ std::string read_number(std::string_view text, double low, double high, std::str
 std::string read_whole(std::string_view text, std::int64_t low, std::int64_t high, std::int64_t& value) {
   double parsed = 0;
   if (!parse(text, parsed) || parsed != std::floor(parsed)) {
-    return fmt::format("{} is not a whole number; give one from {} to {}", quoted(text), low, high);
+    return fmt::format("{} is not a whole number; give one from {} to {}{}", quoted(text), low, high, comma_hint(text));
   }
   if (parsed < static_cast<double>(low) || parsed > static_cast<double>(high)) {
     return fmt::format("{} is out of range; give a whole number from {} to {}", text, low, high);
@@ -89,7 +106,8 @@ std::string read_bytes(std::string_view text, std::uint64_t& bytes) {
   }
   double parsed = 0;
   if (!parse(number, parsed) || !(parsed * unit >= 1) || parsed * unit > std::ldexp(1.0, 50)) {
-    return fmt::format("{} is not a size from 1 byte to 1024 tebibytes; write it as 256M, 1G or in bytes", quoted(text));
+    return fmt::format("{} is not a size from 1 byte to 1024 tebibytes; write it as 256M, 1G or in bytes{}", quoted(text),
+                       comma_hint(text));
   }
   bytes = static_cast<std::uint64_t>(parsed * unit);
   return {};

@@ -19,6 +19,11 @@ std::string read_number(std::string_view text, double low, double high, std::str
 /// A whole number in [low, high]; 600 and 600.0 are both whole.
 std::string read_whole(std::string_view text, std::int64_t low, std::int64_t high, std::int64_t& value);
 
+/// "; decimal numbers have a point, as 0.05" for a text with one comma between digits, else "".
+std::string comma_hint(std::string_view text);
+/// The message of a reader with the hint, if it has none.
+std::string with_comma_hint(std::string wrong, std::string_view text);
+
 /// true or false.
 std::string read_switch(std::string_view text, bool& value);
 

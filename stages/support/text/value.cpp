@@ -1,17 +1,35 @@
 #include "stages/support/text/value.h"
 
+#include <cmath>
+
 #include "stages/support/text/readable.h"
 
 namespace lamina {
 
+namespace {
+
+std::string check_digits(double value, const Limits& limits) {
+  if (limits.digits == 0) return {};
+  const double unit = std::pow(10.0, limits.digits);
+  return std::round(value * unit) / unit == value
+             ? std::string()
+             : fmt::format("{} has too many digits after the point; give at most {}", number_text(value), limits.digits);
+}
+
+}  // namespace
+
 std::string read_value(std::string_view text, const Limits& limits, double& value) {
-  return read_number(text, limits.low, limits.high, limits.unit, value);
+  double read = 0;
+  std::string wrong = read_number(text, limits.low, limits.high, limits.unit, read);
+  if (wrong.empty()) wrong = check_digits(read, limits);
+  if (wrong.empty()) value = read;
+  return wrong;
 }
 std::string read_value(std::string_view text, const Limits&, bool& value) { return read_switch(text, value); }
 
 std::string check_value(double value, const Limits& limits) {
   return value >= limits.low && value <= limits.high  // nan is not
-             ? std::string()
+             ? check_digits(value, limits)
              : fmt::format("{} is out of range; give a number from {} to {}{}", number_text(value), limits.low, limits.high,
                            limits.unit);
 }

@@ -28,6 +28,7 @@ struct Limits {
   std::string_view unit = {};  // for messages, as in " mm"
   bool one_for_all = false;    // one number may stand for a list of fixed length
   std::size_t minimum = 0, maximum = 100'000;
+  std::uint32_t digits = 0;  // most digits after the point; 0: any number
 };
 
 // --- one value

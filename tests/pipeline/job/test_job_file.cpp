@@ -21,7 +21,8 @@ FillChanges changes_of(std::string_view table) {
 Job unusual_job(const Directory& directory) {
   Job job;
   job.bed_mm = {123.4567, 0.1 + 0.2};
-  job.dpi = {600, 300};
+  job.margin_mm = 7;
+  job.dpi = {600, 262.0061};
   job.layer_mm = 1e-6;
   job.gap_mm = 0;
   job.fill_rule = FillRule::kEvenOdd;
@@ -321,7 +322,7 @@ TEST(JobFile, SetTakesValuesAsFilesAndOptionsDo) {
     const Status status = set_key(job, assignment);
     EXPECT_TRUE(status.ok()) << status.error().message;
   }
-  EXPECT_EQ(job.dpi, (std::array<std::int64_t, 2>{1200, 600}));
+  EXPECT_EQ(job.dpi, (std::array<double, 2>{1200, 600}));
   EXPECT_EQ(job.bed_mm, (std::array<double, 2>{100, 50}));
   EXPECT_EQ(job.format, "png");
   EXPECT_EQ(job.parts[0].copies, 3u);

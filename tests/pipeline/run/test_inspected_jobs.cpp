@@ -241,8 +241,9 @@ TEST_F(InspectedJobs, AWiderMinWallFindsAllThatANarrowerOneFinds) {
     EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << minimum;
     EXPECT_EQ(count > 0 ? thin["locations"].size() : 0, count / 10) << "each wall is one place";
   }
-  // Two pixels are enough where nothing else is requested.
-  EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{});
+  // 0.3 mm are enough where nothing else is requested.
+  EXPECT_EQ(codes(inspect(stl("three.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.3, 1}}}))), std::set<std::string>{});
+  EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{"thin"});
   EXPECT_EQ(codes(inspect(part)), std::set<std::string>{"thin"});
 }
 
