@@ -29,6 +29,10 @@ double narrowest_mm(const ImagePlan& images) {
   return std::max(2 * pixel, std::cbrt(6 * drop_mm3 / std::numbers::pi));
 }
 
+/// Ten grains of 80 um. Grains form arches over openings below about five of their diameters: I. Zuriguel, "Clogging of
+/// granular materials in bottlenecks", Papers in Physics 6, 060014, 2014.
+constexpr double kMinDrainMm = 0.8;
+
 class Inspector : public ImageObserver {
  public:
   /// Idle unless the job requests it. The plan must outlive this object.
@@ -66,7 +70,7 @@ class Inspector : public ImageObserver {
   const Plan& plan_;
   std::optional<checks::Inspection> inspection_;
   std::vector<Warning> reports_;
-  double min_mm_ = 0;
+  double min_mm_ = 0, drain_mm_ = 0;
   bool kept_ = false;
 };
 
@@ -108,7 +112,9 @@ Inspector::Inspector(const Plan& plan) : plan_(plan) {
               static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
   }
   min_mm_ = plan.job.min_wall_mm.value_or(narrowest_mm(*plan.images));
-  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), plan.job.memory_bytes / 2);
+  drain_mm_ = plan.job.min_drain_mm.value_or(kMinDrainMm);
+  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), nm_of(drain_mm_),
+                      plan.job.memory_bytes / 2);
 }
 
 void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
@@ -121,12 +127,12 @@ void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   }
   std::vector<std::string> names;
   for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  checks::report(inspection_->finish(), names, min_mm_, reports_);
+  checks::report(inspection_->finish(), names, min_mm_, drain_mm_, reports_);
   warnings.insert(warnings.end(), reports_.begin(), reports_.end());
 }
 
 void Inspector::report(Summary& summary) const {
-  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_);
+  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_, drain_mm_);
 }
 
 Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
@@ -134,7 +140,7 @@ Status Inspector::check_file() const { return on() && whole() ? check_inspection
 Status Inspector::write(const ManifestHead& head) const {
   if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
   return write_inspection(plan_.job.output, head,
-                          {{"inspection", json_of(inspection_->findings(), min_mm_)}, {"warnings", warnings_json(reports_)}});
+                          {{"inspection", json_of(inspection_->findings(), min_mm_, drain_mm_)}, {"warnings", warnings_json(reports_)}});
 }
 
 bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }

@@ -238,8 +238,8 @@ TEST_F(InspectedJobs, AWiderMinWallFindsAllThatANarrowerOneFinds) {
     EXPECT_GE(count, before) << minimum;
     before = count;
     const double width = std::stod(minimum);
-    EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << minimum;
-    EXPECT_EQ(count > 0 ? thin["locations"].size() : 0, count / 10) << "each wall is one place";
+    EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 1u : 2u) << minimum;
+    EXPECT_EQ(count > 0 ? thin["locations"].size() : 0, count) << "each wall is one place";
   }
   // Two pixels are enough where nothing else is requested.
   EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{});
