@@ -113,8 +113,7 @@ Inspector::Inspector(const Plan& plan) : plan_(plan) {
   }
   min_mm_ = plan.job.min_wall_mm.value_or(narrowest_mm(*plan.images));
   drain_mm_ = plan.job.min_drain_mm.value_or(kMinDrainMm);
-  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), nm_of(drain_mm_),
-                      plan.job.memory_bytes / 2);
+  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), nm_of(drain_mm_), plan.job.memory_bytes / 2);
 }
 
 void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
@@ -139,8 +138,9 @@ Status Inspector::check_file() const { return on() && whole() ? check_inspection
 
 Status Inspector::write(const ManifestHead& head) const {
   if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
-  return write_inspection(plan_.job.output, head,
-                          {{"inspection", json_of(inspection_->findings(), min_mm_, drain_mm_)}, {"warnings", warnings_json(reports_)}});
+  return write_inspection(
+      plan_.job.output, head,
+      {{"inspection", json_of(inspection_->findings(), min_mm_, drain_mm_)}, {"warnings", warnings_json(reports_)}});
 }
 
 bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }

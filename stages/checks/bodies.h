@@ -45,6 +45,18 @@ PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin);
 
 inline std::uint64_t bytes_of(const Runs& runs) { return bytes_held(runs.row_offset) + bytes_held(runs.change); }
 
+/// Rows [first, last), into buffers that keep their capacity; empty ones of an image without rows.
+inline void copy_rows(const RunsView& from, std::uint32_t first, std::uint32_t last, Runs& to) {
+  to.columns = from.columns;
+  to.change.clear();
+  to.row_offset.assign(std::size_t{last} - first + 1, 0);
+  if (from.rows() < last) return;
+  const auto offset = from.row_offset.begin();
+  to.row_offset.assign(offset + first, offset + last + 1);
+  for (std::uint32_t& at : to.row_offset) at -= from.row_offset[first];
+  to.change.assign(from.change.begin() + from.row_offset[first], from.change.begin() + from.row_offset[last]);
+}
+
 /// Into buffers that keep their capacity.
 inline void copy_runs(const RunsView& from, Runs& to) {
   to.columns = from.columns;

@@ -6,8 +6,12 @@
 
 namespace lamina::checks {
 
-void Columns::push(const ColumnSpan& span) {
+void Columns::push(ColumnSpan span) {
   if (span.begin >= span.end) return;
+  if (span.bottom <= endless_from_) {
+    span.bottom = ColumnSpan::kEndless;
+    span.first_layer = span.attached = 0;
+  }
   if (next_.size() > next_row_.back()) {
     ColumnSpan& last = next_.back();
     if (last.end == span.begin && last.first_layer == span.first_layer && last.bottom == span.bottom &&
@@ -42,7 +46,8 @@ void Columns::end_columns(std::uint32_t row, std::size_t& at, std::size_t last, 
   }
 }
 
-void Columns::add(const Layer& layer, const RunsView& image, const RunsView& base, bool endless) {
+void Columns::add(const Layer& layer, const RunsView& image, const RunsView& base, bool endless, std::int64_t limit_nm) {
+  endless_from_ = limit_nm == INT64_MAX ? INT64_MIN : std::int64_t{layer.bottom} - limit_nm;
   const std::uint32_t rows = image.rows();
   if (row_.empty()) row_.assign(std::size_t{rows} + 1, 0);
   ended_.clear();

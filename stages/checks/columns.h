@@ -25,9 +25,11 @@ struct ColumnSpan {
 class Columns {
  public:
   /// Takes the next layer. base  what columns that begin in it are attached to: an image of the layer below, or empty.
-  /// endless  columns of the first layer have no bottom
+  /// endless  columns of the first layer have no bottom. limit_nm  columns that are as tall become endless: the neighbours of
+  /// such columns share a span, so that spans are bounded by what is below a surface and not by all of it
   /// cost  O(runs + spans)
-  void add(const Layer& layer, const RunsView& image, const RunsView& base, bool endless = false);
+  void add(const Layer& layer, const RunsView& image, const RunsView& base, bool endless = false,
+           std::int64_t limit_nm = INT64_MAX);
   /// Ends all columns.
   void finish();
   /// Columns that ended below the last layer that was added, from the top row down, from the left.
@@ -43,11 +45,12 @@ class Columns {
 
  private:
   std::uint64_t bound(const RunsView& image) const { return 2 * span_.size() + image.change.size(); }
-  void push(const ColumnSpan& span);
+  void push(ColumnSpan span);
   void begin_columns(std::uint32_t begin, std::uint32_t end, std::span<const std::uint32_t> base, const ColumnSpan& kind);
   void end_columns(std::uint32_t row, std::size_t& at, std::size_t last, std::uint32_t from, std::uint32_t to);
 
-  Buffer<std::uint32_t> row_, next_row_;  // offsets of rows
+  std::int64_t endless_from_ = INT64_MIN;  // height of the bottoms up to which columns become endless
+  Buffer<std::uint32_t> row_, next_row_;   // offsets of rows
   Buffer<ColumnSpan> span_, next_, ended_;
 };
 

@@ -110,17 +110,22 @@ Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_
     all_.add(pixels_of(placed_part.box, grid_, measures_.margin()));
   }
   if (placed_parts_.empty()) all_ = {0, 0, 0, 0};
+  top_ = all_.top;
+  const auto move = [&](PixelBox& box) { box.top -= top_, box.bottom -= top_; };
+  move(all_);
+  std::ranges::for_each(window_, move);
   measures_.set_window(all_);
 }
 
 Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const {
-  const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2, row = (std::int64_t{box.top} + box.bottom - 1) / 2;
+  const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2,
+                     row = top_ + (std::int64_t{box.top} + box.bottom - 1) / 2;
   return {mm(grid_.x.centre(column)), mm(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)), layer, mm(z)};
 }
 
 Location Inspection::position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
   const auto mm_of = [](std::uint32_t pixels, const PixelAxis& axis) { return pixels / axis.pixels_per_nm() / kNmPerMm; };
-  const std::uint32_t rows = grid_.rows();
+  const std::uint32_t rows = grid_.rows() - top_;
   return {
       amount,
       at,
@@ -254,7 +259,7 @@ void Inspection::note_edges(const Layer& layer, const RunsView& image) {
   for (std::uint32_t r = 0; r < image.rows() && !findings_.bed_edge; ++r) {
     const auto row = image.row(r);
     if (row.empty()) continue;
-    if (r == 0 || r + 1 == image.rows() || row.front() == 0) note(row.front(), r);
+    if (r + top_ == 0 || r + top_ + 1 == grid_.rows() || row.front() == 0) note(row.front(), r);
     if (row.back() == image.columns) note(row.back() - 1, r);
   }
 }
@@ -267,15 +272,14 @@ std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
 void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
   // The image, the numbers of its runs, and the layer below; the same of the powder, whose rows have one run less or more.
   constexpr std::uint64_t kOfRun = 8 + 8 + 12;
-  const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), minimum = kOfRun * (2 * runs - std::min(runs, rows));
-  if (stopped_ || minimum > max_bytes_) {
-    inspection = {};
-    inspection.min_bytes = stopped_ ? minimum : expected_bytes(image, all_);
-    return;
-  }
-  inspection.min_bytes = 0;
-  copy_runs(image, inspection.image);
-  measures_.prepare(image, inspection.scratch, inspection.measures);
+  const std::uint64_t runs = image.change.size() / 2, rows = all_.bottom, minimum = kOfRun * (2 * runs - std::min(runs, rows));
+  const bool too_large = stopped_ || minimum > max_bytes_;
+  copy_rows(image, top_, top_ + all_.bottom, inspection.image);
+  inspection.min_bytes = !too_large ? 0 : stopped_ ? minimum : expected_bytes(inspection.image, all_);
+  if (!too_large) return measures_.prepare(inspection.image, inspection.scratch, inspection.measures);
+  const std::uint64_t bytes = inspection.min_bytes;
+  inspection = {};
+  inspection.min_bytes = bytes;
 }
 
 void Inspection::stop(const Layer& layer, std::uint64_t bytes) {

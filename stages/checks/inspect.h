@@ -109,7 +109,7 @@ class Inspection {
   // --- from any thread
   /// About what prepare() adds to what a layer holds.
   std::uint64_t bytes_needed(const RunsView& image) const;
-  /// Keeps the image, and finds its thin regions.
+  /// Keeps the rows of the image that parts can reach, and measures its widths.
   void prepare(const RunsView& image, LayerInspection& inspection) const;
 
   // --- in layer order
@@ -143,7 +143,8 @@ class Inspection {
   const PixelGrid& grid_;
   std::vector<checks::Solid> placed_parts_;  // by bottom
   std::vector<PixelBox> window_;
-  PixelBox all_;  // of all placed parts, a pixel wider
+  PixelBox all_;           // of all placed parts, as wide as Measures needs
+  std::uint32_t top_ = 0;  // image row that is row 0 of the boxes here: rows above and below the parts are left out
   Measures measures_;
   double min_mm_, pixel_mm2_;
   std::uint64_t max_bytes_;

@@ -42,8 +42,7 @@ Measures::Measures(const PixelGrid& grid, std::int64_t min_nm, std::int64_t drai
       drain_(drains_.at(drains_.count() - 1)),
       roof_(roofs_.at(roofs_.count() - 1)),
       slot_(slots_.at(slots_.count() - 1)),
-      columns_(grid.columns()),
-      rows_(grid.rows()) {}
+      columns_(grid.columns()) {}
 
 std::uint32_t Measures::margin() const {
   const Stencil width = widths_.at(widths_.count() - 1);
@@ -175,7 +174,7 @@ void Measures::end_powder(std::uint32_t owner, bool open) {
 }
 
 void Measures::add_channels(const Layer& layer, const RunsView& channels, Follower& powder) {
-  channel_columns_.add(layer, channels, {}, !begun_);
+  channel_columns_.add(layer, channels, {}, !begun_, drain_nm_);
   channel_columns_.taller(std::int64_t{layer.bottom} + layer.thickness, 6 * drain_nm_ / 10, columns_, tall_channels_);
   channels_.find(tall_channels_);
   EndChannel rules{*this, powder, !begun_};
@@ -192,7 +191,7 @@ void Measures::add_upright(const Layer& layer, const RunsView& image, const Runs
 }
 
 void Measures::add_flat(const Layer& layer, const RunsView& image, Measured kind, bool endless, ShortColumns& flat) {
-  flat.columns.add(layer, image, {}, endless);
+  flat.columns.add(layer, image, {}, endless, min_nm_);
   end_flat(layer, image, kind, flat);
 }
 

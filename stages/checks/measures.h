@@ -56,7 +56,11 @@ class Measures {
 
   /// So many pixels around the parts belong to the window.
   std::uint32_t margin() const;
-  void set_window(const PixelBox& window) { window_ = window; }
+  /// Images have the rows [0, bottom) of the window, and all columns.
+  void set_window(const PixelBox& window) {
+    window_ = window;
+    rows_ = window.bottom;
+  }
 
   // --- from any thread
   void prepare(const RunsView& image, ThinScratch& scratch, LayerMeasures& measures) const;
