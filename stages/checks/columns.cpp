@@ -52,7 +52,7 @@ void Columns::add(const Layer& layer, const RunsView& image, const RunsView& bas
   if (row_.empty()) row_.assign(std::size_t{rows} + 1, 0);
   ended_.clear();
   next_.clear();
-  next_.reserve(bound(image));
+  next_.reserve(bound(image, base));
   next_row_.assign(1, 0);
   ColumnSpan kind;
   kind.bottom = endless ? ColumnSpan::kEndless : layer.bottom;

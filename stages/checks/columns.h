@@ -38,13 +38,18 @@ class Columns {
   /// Columns that are at least as tall at the height `top`. cost  O(spans)
   void taller(std::int64_t top, std::int64_t min_nm, std::uint32_t columns, Runs& result) const;
 
-  std::uint64_t need(const RunsView& image) const { return 2 * bound(image) * sizeof(ColumnSpan); }
+  /// Bytes that it holds after add(), and what ends then. of_ended  bytes that the caller keeps of each span that ends
+  std::uint64_t need(const RunsView& image, const RunsView& base, std::uint64_t of_ended) const {
+    return (2 * bound(image, base) + span_.size()) * sizeof(ColumnSpan) + span_.size() * of_ended;
+  }
   std::uint64_t bytes() const {
     return bytes_held(row_) + bytes_held(next_row_) + bytes_held(span_) + bytes_held(next_) + bytes_held(ended_);
   }
 
  private:
-  std::uint64_t bound(const RunsView& image) const { return 2 * span_.size() + image.change.size(); }
+  std::uint64_t bound(const RunsView& image, const RunsView& base) const {
+    return 2 * span_.size() + image.change.size() / 2 + base.change.size();
+  }
   void push(ColumnSpan span);
   void begin_columns(std::uint32_t begin, std::uint32_t end, std::span<const std::uint32_t> base, const ColumnSpan& kind);
   void end_columns(std::uint32_t row, std::size_t& at, std::size_t last, std::uint32_t from, std::uint32_t to);

@@ -22,7 +22,7 @@ std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
   powder.find(between);
   bodies += powder.need(between);
   // Image, powder, columns, and scratch of thin places.
-  return image.change.size_bytes() * 60 + image.row_offset.size_bytes() * 30 + bodies + bodies / 2;
+  return image.change.size_bytes() * 40 + image.row_offset.size_bytes() * 30 + bodies + bodies / 2;
 }
 
 std::string at(const Spot& spot) {

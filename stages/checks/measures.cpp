@@ -67,12 +67,13 @@ void Measures::prepare(const RunsView& image, ThinScratch& scratch, LayerMeasure
 }
 
 std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measures) const {
-  // Columns, those that end, their footprint and the bodies that it makes.
-  constexpr std::uint64_t kOfColumns = 4;
-  const std::uint64_t columns = thin_.columns.need(measures.solid.narrow) + slots_upright_.columns.need(measures.gaps.narrow) +
-                                roofs_flat_.columns.need(image) + gaps_flat_.columns.need(measures.powder) +
-                                channel_columns_.need(measures.channels);
-  return 3 * measures.run_bytes() + kOfColumns * columns;
+  // Spans that end, their footprint, and of regions the bodies that they make.
+  constexpr std::uint64_t kOfSpan = 40, kOfRegion = 120;
+  const LayerMeasures& of = measures;
+  return 3 * of.run_bytes() + thin_.columns.need(of.solid.narrow, thin_.base, kOfRegion) +
+         slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) +
+         roofs_flat_.columns.need(image, {}, kOfSpan) + gaps_flat_.columns.need(of.powder, {}, kOfSpan) +
+         channel_columns_.need(of.channels, {}, kOfSpan);
 }
 
 struct Measures::EndUpright {

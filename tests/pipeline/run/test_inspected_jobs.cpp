@@ -260,7 +260,7 @@ TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsReportedAndTheJobContinues) 
   const auto whole = inspect(job);
   EXPECT_EQ(whole["inspection"]["layers"], 4);
   EXPECT_FALSE(whole["inspection"].contains("stopped"));
-  const auto tight = inspect(job + " --memory 4M");
+  const auto tight = inspect(job + " --memory 16M");
   EXPECT_EQ(tight["layers_planned"], 4);
   EXPECT_EQ(tight["set_pixels"], whole["set_pixels"]);
   EXPECT_EQ(tight["inspection"]["layers"], 1);
