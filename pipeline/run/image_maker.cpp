@@ -284,8 +284,12 @@ class ImageMaker : public Maker {
           [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
     }
     if (inspector_->on()) {
-      add("inspect", [this](const Layer&, Work& work, Made&) {
+      add("inspect", [this, samples = imager_.samples()](const Layer& layer, Work& work, Made&) {
         inspector_->inspection().prepare(work.images.runs, work.layer_inspection);
+        for (std::uint32_t i = 0; samples && i < LayerImager::kSamples; ++i) {
+          imager_.sample(layer, i, work.images);
+          inspector_->inspection().add_sample(work.images.second, work.layer_inspection);
+        }
         return Status();
       });
       steps.back().needs = [this](std::uint32_t, const Ticket& ticket) -> Result<std::uint64_t> {

@@ -282,6 +282,12 @@ void Inspection::prepare(const RunsView& image, LayerInspection& inspection) con
   inspection.min_bytes = bytes;
 }
 
+void Inspection::add_sample(const RunsView& sample, LayerInspection& inspection) const {
+  if (inspection.min_bytes > 0) return;
+  copy_rows(sample, top_, top_ + all_.bottom, inspection.scratch.outside);
+  measures_.add_sample(inspection.scratch.outside, inspection.scratch, inspection.measures);
+}
+
 void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
   findings_.stop = {layer.index, mm(layer.bottom), bytes};
   measures_.finish();

@@ -111,6 +111,8 @@ class Inspection {
   std::uint64_t bytes_needed(const RunsView& image) const;
   /// Keeps the rows of the image that parts can reach, and measures its widths.
   void prepare(const RunsView& image, LayerInspection& inspection) const;
+  /// After prepare(), as often as there are samples: Measures::add_sample().
+  void add_sample(const RunsView& sample, LayerInspection& inspection) const;
 
   // --- in layer order
   /// Inspects no more layers, and frees its memory.

@@ -1,6 +1,7 @@
 #include "stages/checks/measures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "stages/geometry/combine.h"
@@ -20,7 +21,7 @@ void clear_rows(std::uint32_t columns, std::uint32_t rows, Runs& runs) {
 
 std::uint64_t LayerMeasures::run_bytes() const {
   return size_of(powder) + size_of(channels) + size_of(necks) + size_of(solid.wide) + size_of(solid.narrow) +
-         size_of(gaps.wide) + size_of(gaps.narrow);
+         size_of(gaps.wide) + size_of(gaps.narrow) + size_of(inner) + size_of(hidden);
 }
 
 std::uint64_t Measures::ShortColumns::bytes() const {
@@ -63,7 +64,16 @@ void Measures::prepare(const RunsView& image, ThinScratch& scratch, LayerMeasure
     drop_at_edge(window_, scratch, measures.gaps.narrow);
     measures.scratch.find(image, measures.solid, widths_.two_squares(widths_.count() - 1), measures.necks);
   }
+  clear_rows(image.columns, image.rows(), measures.hidden);
+  inner_pixels(image, measures.inner);
   if (drain_nm_ > 0) erode(measures.powder, window_, drain_, scratch, measures.channels);
+}
+
+void Measures::add_sample(const RunsView& sample, ThinScratch& scratch, LayerMeasures& measures) const {
+  combine(measures.inner, sample, SetOperation::kDifference, scratch.left);
+  if (scratch.left.change.empty()) return;
+  combine(measures.hidden, scratch.left, SetOperation::kUnion, scratch.chosen);
+  std::swap(measures.hidden, scratch.chosen);
 }
 
 std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measures) const {
@@ -104,6 +114,21 @@ struct Measures::EndNeck {
   void end(const Body& body) {
     if (body.top - body.bottom < 2 * all.min_nm_) return;
     all.found_.push_back({Measured::kContact, body, body.pixels / (body.last_layer - body.first_layer + 1), 0});
+  }
+};
+
+struct Measures::EndHidden {
+  Measures& all;
+  void begin(Body&) {}
+  void grow(Body&) {}
+  void join(const Body&, const Body&, const Body&) {}
+  void end(const Body& body) {
+    std::array<double, 3> sides{all.column_nm_ * (body.box.right - body.box.left),
+                                all.row_nm_ * (body.box.bottom - body.box.top), static_cast<double>(body.top - body.bottom)};
+    std::ranges::sort(sides);
+    const auto minimum = static_cast<double>(all.min_nm_);
+    if (sides[2] < 2 * minimum || sides[1] < minimum) return;
+    all.found_.push_back({Measured::kGap, body, body.pixels / (body.last_layer - body.first_layer + 1), 0});
   }
 };
 
@@ -174,6 +199,21 @@ void Measures::end_powder(std::uint32_t owner, bool open) {
   }
 }
 
+/// The layer below the last one, whose neighbours are known now.
+void Measures::add_hidden(const RunsView& inner, const RunsView& hidden) {
+  if (begun_) {
+    if (below_.row_offset.empty()) clear_rows(columns_, rows_, below_);
+    combine(latest_hidden_, below_, SetOperation::kIntersection, between_layers_);
+    combine(between_layers_, inner, SetOperation::kIntersection, below_);
+    hidden_.find(below_);
+    EndHidden rules{*this};
+    hidden_.add(latest_, below_, rules);
+  }
+  std::swap(below_, latest_inner_);
+  copy_runs(inner, latest_inner_);
+  copy_runs(hidden, latest_hidden_);
+}
+
 void Measures::add_channels(const Layer& layer, const RunsView& channels, Follower& powder) {
   channel_columns_.add(layer, channels, {}, !begun_, drain_nm_);
   channel_columns_.taller(std::int64_t{layer.bottom} + layer.thickness, 6 * drain_nm_ / 10, columns_, tall_channels_);
@@ -224,6 +264,7 @@ void Measures::end_flat(const Layer& layer, const RunsView&, Measured kind, Shor
 }
 
 void Measures::add(const Layer& layer, const RunsView& image, const LayerMeasures& measures, Follower& powder) {
+  if (min_nm_ > 0) add_hidden(measures.inner, measures.hidden);
   latest_ = layer;
   if (drain_nm_ > 0) add_channels(layer, measures.channels, powder);
   if (min_nm_ > 0) {
@@ -258,12 +299,15 @@ void Measures::finish() {
   gaps_flat_.bodies.finish(gap);
   EndNeck neck{*this};
   necks_.finish(neck);
+  EndHidden hidden{*this};
+  hidden_.finish(hidden);
 }
 
 std::uint64_t Measures::bytes() const {
   return thin_.bytes() + slots_upright_.bytes() + roofs_flat_.bytes() + gaps_flat_.bytes() + channel_columns_.bytes() +
-         channels_.bytes() + necks_.bytes() + bytes_of(tall_channels_) + pockets_.capacity() * sizeof(Pocket) +
-         free_.capacity() * sizeof(std::uint32_t) + found_.capacity() * sizeof(Item);
+         channels_.bytes() + necks_.bytes() + hidden_.bytes() + bytes_of(below_) + bytes_of(latest_inner_) +
+         bytes_of(latest_hidden_) + bytes_of(between_layers_) + bytes_of(tall_channels_) +
+         pockets_.capacity() * sizeof(Pocket) + free_.capacity() * sizeof(std::uint32_t) + found_.capacity() * sizeof(Item);
 }
 
 }  // namespace lamina::checks

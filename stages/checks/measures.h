@@ -6,7 +6,9 @@
 //             must be 1.5 w tall on average, or some 3 w: ridges and cones above about 20 degrees are sharp, not thin. Chips
 //             are left out: the cube of a body's longest side is at least four times its volume
 //   roofs     columns of material shorter than w, where a disc of 2 w fits into those of 2 w of height
-//   gaps      the same two in powder; columns that powder joins to the edge of the window are no gap. Discs are of 3 w
+//   gaps      the same two in powder; columns that powder joins to the edge of the window are no gap. Discs are of 3 w.
+//             Gaps between pixels too: points between pixels that are in powder, though all pixels around are set, also in the
+//             layers below and above; 2 w long and w wide
 //   contacts  wide parts of a layer that meet in less than w (thin.h), over a height of 2 w
 //   drains    positions of a disc of the drain's width, 0.6 of it high, in powder: a body of them, at least a cube of that
 //   width,
@@ -34,9 +36,12 @@ struct LayerMeasures {
   Runs channels;  // corners of drains in it
   Runs necks;
   Widths solid, gaps;
+  Runs inner;   // pixels of the solid without an edge nearby
+  Runs hidden;  // those of them where a sample between pixels is not set
   Necks scratch;
   std::uint64_t bytes() const {
-    return bytes_of(powder) + bytes_of(channels) + bytes_of(necks) + solid.bytes() + gaps.bytes() + scratch.bytes();
+    return bytes_of(powder) + bytes_of(channels) + bytes_of(necks) + solid.bytes() + gaps.bytes() + bytes_of(inner) +
+           bytes_of(hidden) + scratch.bytes();
   }
   std::uint64_t run_bytes() const;  // without capacity to spare
 };
@@ -64,6 +69,9 @@ class Measures {
 
   // --- from any thread
   void prepare(const RunsView& image, ThinScratch& scratch, LayerMeasures& measures) const;
+
+  /// After prepare(). sample  the section at points that are less than a pixel and a layer from those of the image
+  void add_sample(const RunsView& sample, ThinScratch& scratch, LayerMeasures& measures) const;
 
   // --- in layer order
   /// Bytes that add() needs about.
@@ -109,6 +117,7 @@ class Measures {
   struct EndFlat;
   struct EndChannel;
   struct EndNeck;
+  struct EndHidden;
   struct Pocket {
     Item item;
     std::uint32_t next, tail;
@@ -117,6 +126,7 @@ class Measures {
   void add_upright(const Layer& layer, const RunsView& image, const RunsView& narrow, Measured kind, Upright& upright);
   void add_flat(const Layer& layer, const RunsView& image, Measured kind, bool endless, ShortColumns& flat);
   void end_flat(const Layer& layer, const RunsView& image, Measured kind, ShortColumns& flat);
+  void add_hidden(const RunsView& inner, const RunsView& hidden);
   void add_channels(const Layer& layer, const RunsView& channels, Follower& powder);
   void keep_pocket(const Item& item, Follower& powder, std::uint32_t column, std::uint32_t row);
   double longest_nm(const Body& body) const;
@@ -133,7 +143,8 @@ class Measures {
   Upright thin_, slots_upright_;
   ShortColumns roofs_flat_, gaps_flat_;
   Columns channel_columns_;
-  Follower channels_{false}, necks_{true};
+  Follower channels_{false}, necks_{true}, hidden_{true};
+  Runs below_, latest_inner_, latest_hidden_, between_layers_;  // inner pixels two layers below; the layer below; a result
   Runs tall_channels_;
   std::vector<Pocket> pockets_;
   std::vector<std::uint32_t> free_;

@@ -290,6 +290,31 @@ void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, R
   spread(scratch.fits, stencil, To::kPixels, box, scratch.spans, result);
 }
 
+void inner_pixels(const RunsView& image, Runs& result) {
+  begin_rows(image.columns, result);
+  Buffer<std::uint32_t> both;
+  // Of runs that are a pixel shorter at both ends.
+  const auto intersect = [](std::span<const std::uint32_t> a, std::uint32_t less_a, std::span<const std::uint32_t> b,
+                            std::uint32_t less_b, Buffer<std::uint32_t>& out) {
+    for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+      const std::uint32_t begin = std::max(a[i] + less_a, b[j] + less_b), end = std::min(a[i + 1] - less_a, b[j + 1] - less_b);
+      if (begin < end) {
+        out.push_back(begin);
+        out.push_back(end);
+      }
+      (a[i + 1] - less_a < b[j + 1] - less_b ? i : j) += 2;
+    }
+  };
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    both.clear();
+    if (r > 0 && r + 1 < image.rows()) {
+      intersect(image.row(r - 1), 1, image.row(r), 1, both);
+      intersect(both, 0, image.row(r + 1), 1, result.change);
+    }
+    end_row(result);
+  }
+}
+
 void Necks::mark(const RunsView& wide, const RunsView& rest, std::uint64_t minimum) {
   neighbour_.assign(pieces_.count(), UINT32_MAX);
   joins_.assign(pieces_.count(), 0);

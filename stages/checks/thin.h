@@ -102,6 +102,9 @@ void erode(const RunsView& image, const PixelBox& window, const Stencil& stencil
 /// All pixels of an image that the stencil covers where it is within the image.
 void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, Runs& result);
 
+/// Pixels whose eight neighbours are set.
+void inner_pixels(const RunsView& image, Runs& result);
+
 /// Where wide parts of an image meet in less than the last stencil: corners and necks that touch two of them, at sides or
 /// corners, gaps of one pixel included, since parts that meet in an edge may leave one. Parts of fewer pixels than `minimum`
 /// are no part. cost  O(runs)

@@ -146,6 +146,16 @@ TEST_F(PlantedShapes, EachFaultIsReportedWithItsPartAndPosition) {
          return Planted{block(8, 6).cut(box({2 - s, -1, 2}, {9, 7, 2 + t})), {4, 3, 2.1}};
        },
        true},
+      {"a slot between pixels", "gaps",
+       [](double t, double s) {
+         return Planted{block(8, 6).cut(box({4, 1, 0.5}, {4 + t / 5, 1 + 4 * s, 5})), {4, 3, 2}};
+       },
+       true},
+      {"a gap between layers", "gaps",
+       [](double t, double s) {
+         return Planted{block(8, 6).cut(box({4 - 2 * s, -1, 2}, {9, 7, 2 + t / 5})), {5, 3, 2}};
+       },
+       true},
       {"a hollow with a fine drain at the side", "drains",
        [](double t, double s) {
          return Planted{
