@@ -187,13 +187,14 @@ struct Job {
   bool resume = false;
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
-  bool strict = false;                // warnings are errors
-  bool inspect = false;               // detect islands, hollows and thin walls in the layers
-  std::optional<double> min_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
-  bool allow_empty = false;           // a whole job may have nothing
-  bool allow_unbound = false;         // layers may get less binder than the machine's powder needs
-  bool timing = false;                // break down the run time
-  bool quote = false;                 // report the consumption of each part, also without prices
+  bool strict = false;                 // warnings are errors
+  bool inspect = false;                // detect islands, hollows and thin walls in the layers
+  std::optional<double> min_wall_mm;   // what is narrower is thin; absent: two pixels, or a drop
+  std::optional<double> min_drain_mm;  // powder does not leave through less; absent: 0.8
+  bool allow_empty = false;            // a whole job may have nothing
+  bool allow_unbound = false;          // layers may get less binder than the machine's powder needs
+  bool timing = false;                 // break down the run time
+  bool quote = false;                  // report the consumption of each part, also without prices
   bool json = false;
   bool quiet = false;
   std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"

@@ -470,9 +470,12 @@ const JobKey kRunKeys[] = {
     field<&Job::allow_empty>(
         {"run", "allow_empty", "--allow-empty", "", "accept a job without any pixel, contour or bead", 0, "true"}),
     field<&Job::inspect>(
-        {"run", "inspect", "--inspect", "", "detect islands, trapped powder, thin walls and touching parts", 0, "true"}),
+        {"run", "inspect", "--inspect", "", "detect islands, trapped powder, thin walls, gaps and touching parts", 0, "true"}),
     field<&Job::min_wall_mm>(
         {"run", "min_wall_mm", "--min-wall", "MM", "min wall thickness in mm for --inspect; default: the powder's, else 0.3"},
+        {0, 1000, " mm"}),
+    field<&Job::min_drain_mm>(
+        {"run", "min_drain_mm", "--min-drain", "MM", "min width of drains of hollows in mm for --inspect; default: 0.8"},
         {0, 1000, " mm"}),
     field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
                                 "accept layers with less binder than the machine's powder needs", 0, "true"})

@@ -25,6 +25,7 @@ Json json_of(const checks::Found& found, const std::string& amount) {
   for (const checks::Location& position : found.locations) {
     Json& one = json["locations"].emplace_back(json_of(position.spot));
     one["last_layer"] = position.last_layer;
+    if (position.part != UINT32_MAX) one["part"] = position.part;
     one["box_mm"] = position.box_mm;
     one[amount] = position.amount;
   }
@@ -120,13 +121,18 @@ std::string refills_text(const std::vector<std::uint32_t>& refills) {
   return text + " for vats to be filled";
 }
 
-Json json_of(const checks::Findings& findings, double min_mm) {
+Json json_of(const checks::Findings& findings, double min_mm, double drain_mm) {
   Json json{{"layers", findings.layers},
             {"min_wall_mm", min_mm},
+            {"min_drain_mm", drain_mm},
             {"islands", json_of(findings.islands, "mm2")},
             {"loose", json_of(findings.loose, "mm3")},
             {"hollows", json_of(findings.hollows, "mm3")},
+            {"drains", json_of(findings.drains, "mm3")},
             {"thin", json_of(findings.thin, "mm2")},
+            {"roofs", json_of(findings.roofs, "mm2")},
+            {"gaps", json_of(findings.gaps, "mm2")},
+            {"contacts", json_of(findings.contacts, "mm2")},
             {"touching", Json::array()}};
   for (const auto& pair : findings.touching) {
     json["touching"].push_back({{"part", pair.part}, {"other", pair.other}, {"at", json_of(pair.spot)}});

@@ -39,7 +39,7 @@ std::string ranges_text(std::span<const checks::LayerRange> ranges);
 /// "pauses before layers 812, 1630 and 4 more for vats to be filled"; empty without refills.
 std::string refills_text(const std::vector<std::uint32_t>& refills);
 
-/// min_mm  least width of what is not thin
-Json json_of(const checks::Findings& findings, double min_mm);
+/// min_mm  least width of what is not thin. drain_mm  the same of drains
+Json json_of(const checks::Findings& findings, double min_mm, double drain_mm);
 
 }  // namespace lamina::pipeline

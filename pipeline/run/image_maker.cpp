@@ -28,21 +28,9 @@ double narrowest_mm(const ImagePlan& images) {
   return std::max(2 * 25.4 / std::min(images.grid.x.dpi(), images.grid.y.dpi()), stated > 0 ? stated : kUnstated);
 }
 
-/// The name of the part with the narrowest box around a spot; empty if there is none.
-std::string part_at(const Scene& scene, const checks::Spot& spot) {
-  const std::int64_t x = nm_of(spot.x_mm), y = nm_of(spot.y_mm), z = nm_of(spot.z_mm);
-  std::string name;
-  double narrowest = 0;
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const Box box = box_of(scene, scene.instances[i]);
-    if (x < box.lo.x || x > box.hi.x || y < box.lo.y || y > box.hi.y || z < box.lo.z || z > box.hi.z) continue;
-    const double area = static_cast<double>(box.width()) * static_cast<double>(box.depth());
-    if (!name.empty() && area >= narrowest) continue;
-    name = one_line(scene.parts[scene.part_of_instance[i]].path);
-    narrowest = area;
-  }
-  return name;
-}
+/// Ten grains of 80 um. Grains form arches over openings below about five of their diameters: I. Zuriguel, "Clogging of
+/// granular materials in bottlenecks", Papers in Physics 6, 060014, 2014.
+constexpr double kMinDrainMm = 0.8;
 
 class Inspector : public ImageObserver {
  public:
@@ -81,7 +69,7 @@ class Inspector : public ImageObserver {
   const Plan& plan_;
   std::optional<checks::Inspection> inspection_;
   std::vector<Warning> reports_;
-  double min_mm_ = 0;
+  double min_mm_ = 0, drain_mm_ = 0;
   bool kept_ = false;
 };
 
@@ -123,7 +111,8 @@ Inspector::Inspector(const Plan& plan) : plan_(plan) {
               static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
   }
   min_mm_ = plan.job.min_wall_mm.value_or(narrowest_mm(*plan.images));
-  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), plan.job.memory_bytes / 2);
+  drain_mm_ = plan.job.min_drain_mm.value_or(kMinDrainMm);
+  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), nm_of(drain_mm_), plan.job.memory_bytes / 2);
 }
 
 void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
@@ -136,30 +125,21 @@ void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
   }
   std::vector<std::string> names;
   for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  const checks::Findings& findings = inspection_->finish();
-  checks::report(findings, names, min_mm_, reports_);
-  const std::pair<const char*, const checks::Found*> kinds[] = {
-      {"islands", &findings.islands}, {"loose", &findings.loose}, {"hollows", &findings.hollows}, {"thin", &findings.thin}};
-  for (Warning& warning : reports_) {
-    for (const auto& [code, found] : kinds) {
-      if (warning.code != code) continue;
-      warning.part = part_at(*plan_.scene, found->spot);
-      if (!warning.part.empty()) warning.text = warning.part + ": " + warning.text;
-    }
-  }
+  checks::report(inspection_->finish(), names, min_mm_, drain_mm_, reports_);
   warnings.insert(warnings.end(), reports_.begin(), reports_.end());
 }
 
 void Inspector::report(Summary& summary) const {
-  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_);
+  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_, drain_mm_);
 }
 
 Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
 
 Status Inspector::write(const ManifestHead& head) const {
   if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
-  return write_inspection(plan_.job.output, head,
-                          {{"inspection", json_of(inspection_->findings(), min_mm_)}, {"warnings", warnings_json(reports_)}});
+  return write_inspection(
+      plan_.job.output, head,
+      {{"inspection", json_of(inspection_->findings(), min_mm_, drain_mm_)}, {"warnings", warnings_json(reports_)}});
 }
 
 bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }
@@ -303,8 +283,12 @@ class ImageMaker : public Maker {
           [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
     }
     if (inspector_->on()) {
-      add("inspect", [this](const Layer&, Work& work, Made&) {
+      add("inspect", [this, samples = imager_.samples()](const Layer& layer, Work& work, Made&) {
         inspector_->inspection().prepare(work.images.runs, work.layer_inspection);
+        for (std::uint32_t i = 0; samples && i < LayerImager::kSamples; ++i) {
+          imager_.sample(layer, i, work.images);
+          inspector_->inspection().add_sample(work.images.second, work.layer_inspection);
+        }
         return Status();
       });
       steps.back().needs = [this](std::uint32_t, const Ticket& ticket) -> Result<std::uint64_t> {

@@ -115,6 +115,39 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   return {};
 }
 
+bool LayerImager::samples() const {
+  const PixelGrid& grid = plan_.images->grid;
+  const auto inside = [](Nm low, Nm high, const PixelAxis& axis) {
+    const auto pixel = static_cast<std::int64_t>(1 / axis.pixels_per_nm()) + 1;
+    return low >= pixel && high <= axis.length - pixel;
+  };
+  const Scene& scene = *plan_.scene;
+  return plan_.job.heights.containment == Containment::kAcross && plan_.job.levels == 0 && scene.images.empty() &&
+         !plan_.images->beads && std::ranges::all_of(scene.instances, [&](const Instance& instance) {
+           const Box box = box_of(scene, instance);
+           return inside(box.lo.x, box.hi.x, grid.x) && inside(box.lo.y, box.hi.y, grid.y);
+         });
+}
+
+void LayerImager::sample(const Layer& layer, std::uint32_t number, ImageWork& work) const {
+  constexpr std::array<std::array<int, 3>, kSamples> kQuarters{{{-1, 1, 2}, {1, 2, -1}, {2, -1, 1}}};
+  const auto& [x, y, z] = kQuarters[number];
+  const PixelGrid& grid = plan_.images->grid;
+  const auto quarters = [](int of, const PixelAxis& axis) { return static_cast<Nm>(of * axis.span / (4 * axis.dots)); };
+  const std::array<Nm, 2> shift{quarters(x, grid.x), quarters(y, grid.y)};
+  const Nm height = plane(layer) + z * (layer.thickness / 4);
+  const auto engine = plan_.job.engine == Engine::kContours ? raster::Engine::kContours : raster::Engine::kRays;
+  bool first = true;
+  for (const Solid& solid : plan_.images->solids.all()) {
+    solid.rasterizer.layer(engine, height, work.scratch, first ? work.second : work.section, shift);
+    if (!first) {
+      combine(work.second, work.section, SetOperation::kUnion, work.lowest);
+      std::swap(work.second, work.lowest);
+    }
+    first = false;
+  }
+}
+
 std::uint64_t LayerImager::changes_of_images(Nm plane) const {
   std::uint64_t changes = 0;
   for (const PlacedImages& part : plan_.scene->images) {

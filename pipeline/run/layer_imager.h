@@ -46,6 +46,12 @@ class LayerImager {
   Status raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
   /// Of a job of shares of voxels: the image becomes that of voxels half full or more.
   void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
+  /// The section of all solids at points between pixels and layers, into work.second: kSamples of them, spread evenly along x,
+  /// y, z and their diagonals.
+  static constexpr std::uint32_t kSamples = 3;
+  void sample(const Layer& layer, std::uint32_t number, ImageWork& work) const;
+  /// Whether there are such samples: parts are sections of meshes, and no closer than a pixel to the edges of the bed.
+  bool samples() const;
   /// Merges the layer with those of the parts that are images, whose pixels it adds to notes.part_pixels, if those are wanted.
   /// errors  kInput: an image cannot be read; kUsage: it sets pixels outside of the bed
   Status images(const Layer& layer, ImageWork& work, ImageNotes& notes) const;

@@ -45,6 +45,18 @@ PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin);
 
 inline std::uint64_t bytes_of(const Runs& runs) { return bytes_held(runs.row_offset) + bytes_held(runs.change); }
 
+/// Rows [first, last), into buffers that keep their capacity; empty ones of an image without rows.
+inline void copy_rows(const RunsView& from, std::uint32_t first, std::uint32_t last, Runs& to) {
+  to.columns = from.columns;
+  to.change.clear();
+  to.row_offset.assign(std::size_t{last} - first + 1, 0);
+  if (from.rows() < last) return;
+  const auto offset = from.row_offset.begin();
+  to.row_offset.assign(offset + first, offset + last + 1);
+  for (std::uint32_t& at : to.row_offset) at -= from.row_offset[first];
+  to.change.assign(from.change.begin() + from.row_offset[first], from.change.begin() + from.row_offset[last]);
+}
+
 /// Into buffers that keep their capacity.
 inline void copy_runs(const RunsView& from, Runs& to) {
   to.columns = from.columns;
@@ -60,8 +72,10 @@ struct Body {
   std::uint32_t first_layer = UINT32_MAX, last_layer = 0;  // numbers
   std::int64_t bottom = 0, top = 0;                        // nm above the bed
   PixelBox box;
-  std::uint32_t owner = kNone;  // any value of a follower's rules
-  bool open = false;            // the same
+  std::uint32_t owner = kNone;                     // any value of a follower's rules
+  bool open = false;                               // the same
+  std::uint32_t column = 0, row = 0;               // a pixel of its last layer
+  std::uint64_t area = 0, tall = 0, detached = 0;  // pixels that rules count (ColumnBodies)
 };
 
 /// Sets of numbers; the least number of a set stands for it.
@@ -109,12 +123,13 @@ class Pieces {
   void find(const RunsView& image, bool diagonal);
   std::size_t count() const { return box.size(); }
   std::uint64_t bytes() const {
-    return sets_.bytes() + bytes_held(of_run) + bytes_held(pixels) + box.capacity() * sizeof(PixelBox);
+    return sets_.bytes() + bytes_held(of_run) + bytes_held(pixels) + bytes_held(first) + box.capacity() * sizeof(PixelBox);
   }
 
   Buffer<std::uint32_t> of_run;  // piece of each run
   Buffer<std::uint64_t> pixels;  // by piece
   std::vector<PixelBox> box;     // by piece
+  Buffer<std::uint32_t> first;   // run of each piece
 
  private:
   Sets sets_;
@@ -128,6 +143,7 @@ class Follower {
 
   /// The pieces of the next layer: before add() of it.
   void find(const RunsView& image) { pieces_.find(image, diagonal_); }
+  const Pieces& pieces() const { return pieces_; }
   /// Bytes that are held once add() has been through the layer whose pieces were found.
   std::uint64_t need(const RunsView& image) const;
 
@@ -146,6 +162,8 @@ class Follower {
 
   /// The bodies of the last layer; rules may change owner and open of them between layers.
   std::span<Body> live() { return bodies_; }
+  /// That of a pixel of the last layer; null if the pixel is not set.
+  Body* body_at(std::uint32_t column, std::uint32_t row);
 
   std::uint64_t bytes() const {
     return pieces_.bytes() + sets_.bytes() + bytes_of(below_) + bytes_held(body_below_) + bytes_held(number_) +
@@ -153,7 +171,7 @@ class Follower {
   }
 
  private:
-  void start(const Layer& layer);
+  void start(const Layer& layer, const RunsView& image);
 
   bool diagonal_;
   Pieces pieces_;
@@ -169,7 +187,7 @@ class Follower {
 template <class Rules>
 void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   const auto old = static_cast<std::uint32_t>(bodies_.size());
-  start(layer);
+  start(layer, image);
   for (std::size_t p = old; p < bodies_.size(); ++p) rules.grow(bodies_[p]);
   for (std::uint32_t r = 0; r < image.rows() && r < below_.view().rows(); ++r) {
     for_touching(below_, r, image, r, false, [&](std::uint32_t under, std::uint32_t over) {
@@ -187,6 +205,9 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
       all.last_layer = std::max(all.last_layer, other.last_layer);
       all.top = std::max(all.top, other.top);
       all.box.add(other.box);
+      all.area += other.area;
+      all.tall += other.tall;
+      all.detached += other.detached;
       all.open = all.open || other.open;
       if (all.owner == Body::kNone) all.owner = other.owner;
     });
@@ -203,6 +224,8 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
     if (number_[root] != Body::kNone) continue;
     number_[root] = static_cast<std::uint32_t>(next_.size());
     next_.push_back(bodies_[root]);
+    next_.back().column = bodies_[old + p].column;
+    next_.back().row = bodies_[old + p].row;
   }
   for (std::uint32_t b = 0; b < old; ++b) {
     if (sets_.find(b) == b && number_[b] == Body::kNone) rules.end(bodies_[b]);

@@ -21,8 +21,8 @@ std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
   Follower powder(false);
   powder.find(between);
   bodies += powder.need(between);
-  // Image, powder, and scratch of thin places.
-  return image.change.size_bytes() * 8 + image.row_offset.size_bytes() * 7 + bodies + bodies / 2;
+  // Image, powder, columns, and scratch of thin places.
+  return image.change.size_bytes() * 40 + image.row_offset.size_bytes() * 30 + bodies + bodies / 2;
 }
 
 std::string at(const Spot& spot) {
@@ -87,8 +87,9 @@ struct Inspection::Powder {
     body.open = all.findings_.layers == 0 || box.left == all.all_.left || box.right == all.all_.right ||
                 box.top == all.all_.top || box.bottom == all.all_.bottom;
   }
-  void join(const Body&, const Body&, const Body&) {}
+  void join(const Body& stays, const Body& ends, const Body&) { all.measures_.join_powder(stays.owner, ends.owner); }
   void end(const Body& body) {
+    all.measures_.end_powder(body.owner, body.open);
     const double volume = static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_;
     if (body.open || volume < all.min_mm_ * all.min_mm_ * all.min_mm_) return;
     all.note_body(all.findings_.hollows, body, volume, body.last_layer);
@@ -96,34 +97,41 @@ struct Inspection::Powder {
 };
 
 Inspection::Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
-                       std::uint64_t max_bytes)
+                       std::int64_t drain_nm, std::uint64_t max_bytes)
     : grid_(grid),
       placed_parts_(std::move(placed_parts)),
-      stencils_(grid, min_nm),
+      measures_(grid, min_nm, drain_nm),
       min_mm_(static_cast<double>(min_nm) / kNmPerMm),
       pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)),
       max_bytes_(max_bytes) {
   std::ranges::stable_sort(placed_parts_, {}, [](const checks::Solid& placed_part) { return placed_part.box.lo.z; });
   for (const checks::Solid& placed_part : placed_parts_) {
     window_.push_back(pixels_of(placed_part.box, grid_, 1));
-    all_.add(window_.back());
+    all_.add(pixels_of(placed_part.box, grid_, measures_.margin()));
   }
   if (placed_parts_.empty()) all_ = {0, 0, 0, 0};
+  top_ = all_.top;
+  const auto move = [&](PixelBox& box) { box.top -= top_, box.bottom -= top_; };
+  move(all_);
+  std::ranges::for_each(window_, move);
+  measures_.set_window(all_);
 }
 
 Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const {
-  const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2, row = (std::int64_t{box.top} + box.bottom - 1) / 2;
+  const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2,
+                     row = top_ + (std::int64_t{box.top} + box.bottom - 1) / 2;
   return {mm(grid_.x.centre(column)), mm(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)), layer, mm(z)};
 }
 
 Location Inspection::position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
   const auto mm_of = [](std::uint32_t pixels, const PixelAxis& axis) { return pixels / axis.pixels_per_nm() / kNmPerMm; };
-  const std::uint32_t rows = grid_.rows();
+  const std::uint32_t rows = grid_.rows() - top_;
   return {
       amount,
       at,
       {mm_of(box.left, grid_.x), mm_of(rows - box.bottom, grid_.y), mm_of(box.right, grid_.x), mm_of(rows - box.top, grid_.y)},
-      last_layer};
+      last_layer,
+      Body::kNone};
 }
 
 void Inspection::note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer) {
@@ -136,37 +144,35 @@ void Inspection::note_body(Found& found, const Body& body, double amount, std::u
   found.spot = at;
 }
 
-/// A thin wall is thin in many layers: the places that lie upon each other are one.
-void Inspection::note_thin(const Layer& layer, const ThinRegions& thin) {
-  Found& found = findings_.thin;
-  std::vector<Wall> walls;
-  for (const ThinRegion& position : thin.largest) {
-    const auto below = std::ranges::find_if(walls_, [&](const Wall& wall) { return wall.last.meets(position.box); });
-    Wall wall{position.box, position.box, position.pixels, layer, layer};
-    if (below != walls_.end()) {
-      wall.all.add(below->all);
-      wall.max_pixels = std::max(wall.max_pixels, below->max_pixels);
-      wall.first = below->first;
-      walls_.erase(below);
-    }
-    walls.push_back(wall);
+void Inspection::note_measured() {
+  for (const Measures::Item& item : measures_.found()) {
+    const bool drain = item.kind == Measured::kDrain;
+    Found& found = drain                             ? findings_.drains
+                   : item.kind == Measured::kRoof    ? findings_.roofs
+                   : item.kind == Measured::kGap     ? findings_.gaps
+                   : item.kind == Measured::kContact ? findings_.contacts
+                                                     : findings_.thin;
+    const double size = drain ? item.pixel_nm * 1e-6 : static_cast<double>(item.pixels);
+    note_body(found, item.body, size * pixel_mm2_, item.body.last_layer);
   }
-  for (const Wall& wall : walls_) end_wall(wall);
-  walls_ = std::move(walls);
-  if (thin.count == 0) return;
-  found.count += thin.count;
-  found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
-  ++found.layers;
-  const ThinRegion& largest = thin.largest.front();
-  const double mm2 = static_cast<double>(largest.pixels) * pixel_mm2_;
-  if (mm2 <= found.largest) return;
-  found.largest = mm2;
-  found.spot = spot(largest.box, layer.index, layer.bottom);
+  measures_.found().clear();
 }
 
-void Inspection::end_wall(const Wall& wall) {
-  const Spot at = spot(wall.all, wall.first.index, wall.first.bottom);
-  findings_.thin.note_location(position(wall.all, at, static_cast<double>(wall.max_pixels) * pixel_mm2_, wall.latest.index));
+/// The part with the smallest box around the middle of each location.
+void Inspection::name_parts(Found& found) const {
+  for (Location& at : found.locations) {
+    const auto in = [](double mm_at, Nm low, Nm high) { return mm(low) <= mm_at && mm_at <= mm(high); };
+    double smallest = 0;
+    for (const checks::Solid& placed : placed_parts_) {
+      const Box& box = placed.box;
+      if (!in(at.spot.x_mm, box.lo.x, box.hi.x) || !in(at.spot.y_mm, box.lo.y, box.hi.y) || at.spot.z_mm > mm(box.hi.z))
+        continue;
+      const double area = mm(box.width()) * mm(box.depth());
+      if (at.part != Body::kNone && area >= smallest) continue;
+      at.part = placed.part;
+      smallest = area;
+    }
+  }
 }
 
 /// Whether all of a body lies where a copy's box is.
@@ -253,32 +259,39 @@ void Inspection::note_edges(const Layer& layer, const RunsView& image) {
   for (std::uint32_t r = 0; r < image.rows() && !findings_.bed_edge; ++r) {
     const auto row = image.row(r);
     if (row.empty()) continue;
-    if (r == 0 || r + 1 == image.rows() || row.front() == 0) note(row.front(), r);
+    if (r + top_ == 0 || r + top_ + 1 == grid_.rows() || row.front() == 0) note(row.front(), r);
     if (row.back() == image.columns) note(row.back() - 1, r);
   }
 }
 
 std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
   // The image, what lies around it and what is left of it; rows of these, and of four that hold little.
-  return stopped_ ? 0 : 3 * image.change.size_bytes() + 7 * image.row_offset.size_bytes();
+  return stopped_ ? 0 : 10 * image.change.size_bytes() + 20 * image.row_offset.size_bytes();
 }
 
 void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
   // The image, the numbers of its runs, and the layer below; the same of the powder, whose rows have one run less or more.
   constexpr std::uint64_t kOfRun = 8 + 8 + 12;
-  const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), minimum = kOfRun * (2 * runs - std::min(runs, rows));
-  if (stopped_ || minimum > max_bytes_) {
-    inspection = {};
-    inspection.min_bytes = stopped_ ? minimum : expected_bytes(image, all_);
-    return;
-  }
-  inspection.min_bytes = 0;
-  copy_runs(image, inspection.image);
-  inspection.thin = thin_regions(image, stencils_, inspection.scratch);
+  const std::uint64_t runs = image.change.size() / 2, rows = all_.bottom, minimum = kOfRun * (2 * runs - std::min(runs, rows));
+  const bool too_large = stopped_ || minimum > max_bytes_;
+  copy_rows(image, top_, top_ + all_.bottom, inspection.image);
+  inspection.min_bytes = !too_large ? 0 : stopped_ ? minimum : expected_bytes(inspection.image, all_);
+  if (!too_large) return measures_.prepare(inspection.image, inspection.scratch, inspection.measures);
+  const std::uint64_t bytes = inspection.min_bytes;
+  inspection = {};
+  inspection.min_bytes = bytes;
+}
+
+void Inspection::add_sample(const RunsView& sample, LayerInspection& inspection) const {
+  if (inspection.min_bytes > 0) return;
+  copy_rows(sample, top_, top_ + all_.bottom, inspection.scratch.outside);
+  measures_.add_sample(inspection.scratch.outside, inspection.scratch, inspection.measures);
 }
 
 void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
   findings_.stop = {layer.index, mm(layer.bottom), bytes};
+  measures_.finish();
+  note_measured();
   leave();
 }
 
@@ -286,7 +299,7 @@ void Inspection::leave() {
   stopped_ = true;
   solid_ = Follower(true);
   powder_ = Follower(false);
-  between_ = {};
+  measures_ = Measures(grid_, 0, 0);
 }
 
 void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
@@ -294,10 +307,10 @@ void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
   if (inspection.min_bytes > 0) return stop(layer, inspection.min_bytes);
   const RunsView image = inspection.image;
   solid_.find(image);
-  complement(image, all_, between_);
-  powder_.find(between_);
-  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + inspection.thin.bytes +
-                              solid_.need(image) + between_.view().change.size_bytes() + powder_.need(between_);
+  const RunsView between = inspection.measures.powder;
+  powder_.find(between);
+  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + solid_.need(image) +
+                              powder_.need(between) + measures_.need(image, inspection.measures);
   if (bytes > max_bytes_) return stop(layer, bytes);
   layer_ = layer;
   // The first layer that holds anything is the bottom of what it holds.
@@ -307,10 +320,11 @@ void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
   solid_.add(layer, image, solids);
   if (solids.islands > 0) ++findings_.islands.layers;
   note_outgrown(layer);
+  measures_.add(layer, image, inspection.measures, powder_);
   Powder powder{*this};
-  powder_.add(layer, between_, powder);
+  powder_.add(layer, between, powder);
+  note_measured();
   note_edges(layer, image);
-  note_thin(layer, inspection.thin);
   ++findings_.layers;
   below_ = layer.bottom;
 }
@@ -320,16 +334,23 @@ const Findings& Inspection::finish() {
   solid_.finish(solids);
   // What reaches the last layer is open at the top.
   struct Open {
-    void end(const Body&) {}
-  } open;
+    Measures& measures;
+    void end(const Body& body) { measures.end_powder(body.owner, true); }
+  } open{measures_};
   powder_.finish(open);
-  note_thin({}, {});
-  for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.thin}) found->sort_locations();
+  measures_.finish();
+  note_measured();
+  for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.drains, &findings_.thin,
+                       &findings_.roofs, &findings_.gaps, &findings_.contacts}) {
+    found->sort_locations();
+    name_parts(*found);
+  }
   return findings_;
 }
 
-void report(const Findings& findings, std::span<const std::string> part, double min_mm, std::vector<Warning>& warnings) {
-  const auto& [layers, islands, loose, hollows, thin, touching, bed_edge, stop] = findings;
+void report(const Findings& findings, std::span<const std::string> part, double min_mm, double drain_mm,
+            std::vector<Warning>& warnings) {
+  const auto& [layers, islands, loose, hollows, drains, thin, roofs, gaps, contacts, touching, bed_edge, stop] = findings;
   const auto warn = [&](const char* code, const Spot& spot, std::string text, std::string of_part = {}) {
     warnings.push_back({code, std::move(text), std::move(of_part), spot.layer, spot.z_mm});
   };
@@ -352,12 +373,25 @@ void report(const Findings& findings, std::span<const std::string> part, double 
                      "be solid",
                      of(hollows.count, "closed hollow", "closed hollows"), hollows.amount, hollows.largest, at(hollows.spot)));
   }
-  if (thin.count > 0) {
-    warn("thin", thin.spot,
-         fmt::format("{} in {} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: they may break; make them thicker, or "
-                     "set a smaller --min-wall",
-                     of(thin.count, "spot", "spots"), of(thin.layers, "layer", "layers"), min_mm, thin.largest, at(thin.spot)));
+  if (drains.count > 0) {
+    warn(
+        "drains", drains.spot,
+        fmt::format("{} of about {:.3g} mm3 with drains narrower than {:.3g} mm, the largest of {:.3g} mm3 {}: powder stays in "
+                    "them; widen the drains, or set a smaller --min-drain",
+                    of(drains.count, "hollow", "hollows"), drains.amount, drain_mm, drains.largest, at(drains.spot)));
   }
+  const auto narrow = [&](const char* code, const Found& found, std::string_view one, std::string_view several,
+                          std::string_view advice) {
+    if (found.count == 0) return;
+    warn(code, found.spot,
+         fmt::format("{} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: {}, or set a smaller --min-wall",
+                     of(found.count, one, several), min_mm, found.largest, at(found.spot), advice));
+  };
+  narrow("thin", thin, "wall or pin", "walls or pins", "they may break; make them thicker");
+  narrow("roofs", roofs, "roof or floor", "roofs or floors", "they may break; make them thicker");
+  narrow("gaps", gaps, "gap", "gaps", "they may close, or keep powder; make them wider");
+  narrow("contacts", contacts, "edge, corner or neck that joins two bodies", "edges, corners or necks that join two bodies",
+         "they may break; let the bodies overlap more");
   for (const Findings::Touching& pair : touching) {
     const std::string parts = pair.part == pair.other
                                   ? "copies of " + name_of(part, pair.part)

@@ -1,10 +1,15 @@
 // stages/checks/inspect.h: inspects the layers of a powder job for faults to know before printing: unsupported pieces, bodies
-// that belong to no part, closed hollows full of powder, thin regions, parts that grow together, parts at the edge of the bed.
+// that belong to no part, hollows full of powder, thin material and gaps, parts that grow together, parts at the edge of the
+// bed.
 //
 // codes   islands      pieces of layers with nothing below that are not the bottom of a part
 //         loose        bodies without the bottom of a part: they fall off
 //         hollows      powder that no way leads out from, more than a cube of the least width
-//         thin         places narrower than the least width
+//         drains       hollows that open through less than a drain's width
+//         thin         walls and pins narrower than the least width, within layers
+//         roofs        material that is thinner along z
+//         gaps         powder between material that is narrower, within layers or along z
+//         contacts     bodies that meet in an edge, a corner or a narrower neck
 //         touching     parts that grow together
 //         bed-edge     layers that reach the edge of the image
 #pragma once
@@ -18,6 +23,7 @@
 #include <vector>
 
 #include "stages/checks/bodies.h"
+#include "stages/checks/measures.h"
 #include "stages/checks/solid_checks.h"
 #include "stages/checks/thin.h"
 #include "stages/data/grid.h"
@@ -39,8 +45,9 @@ struct Spot {
 struct Location {
   double amount = 0;  // as Found::amount
   Spot spot;
-  std::array<double, 4> box_mm{};  // left, front, right, back, from the left and the front of the bed
-  std::uint32_t last_layer = 0;    // the first is the spot's
+  std::array<double, 4> box_mm{};   // left, front, right, back, from the left and the front of the bed
+  std::uint32_t last_layer = 0;     // the first is the spot's
+  std::uint32_t part = UINT32_MAX;  // of the job; UINT32_MAX: its middle is in the box of none
 };
 
 /// Some of one kind.
@@ -49,9 +56,8 @@ struct Found {
   double amount = 0;                // of all: mm2, or mm3 of bodies
   double largest = 0;               // the same of the largest
   Spot spot;                        // of the largest, the first of equals
-  std::uint32_t layers = 0;         // that hold them; of bodies none
-  std::vector<Location> locations;  // the largest, at most kMax: the largest first, equal ones from the bottom up; thin ones
-                                    // that lie upon each other are one, as large as in the layer where most of it is thin
+  std::uint32_t layers = 0;         // that contain islands; of other kinds none
+  std::vector<Location> locations;  // the largest, at most kMax: the largest first, equal ones from the bottom up
 
   static constexpr std::size_t kMax = 20;
   void note_location(const Location& position);
@@ -61,7 +67,7 @@ struct Found {
 
 struct Findings {
   std::uint32_t layers = 0;  // inspected
-  Found islands, loose, hollows, thin;
+  Found islands, loose, hollows, drains, thin, roofs, gaps, contacts;
   struct Touching {
     std::uint32_t part = 0, other = 0;  // of the job; equal for copies of one
     Spot spot;
@@ -81,29 +87,32 @@ struct Findings {
 struct LayerInspection {
   Runs image;
   ThinScratch scratch;
-  ThinRegions thin;
+  LayerMeasures measures;
   std::uint64_t min_bytes = 0;  // to inspect it, if above the limit: then the rest is empty
-  std::uint64_t bytes() const { return bytes_of(image) + scratch.bytes(); }
+  std::uint64_t bytes() const { return bytes_of(image) + scratch.bytes() + measures.bytes(); }
 };
 
 /// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
 /// memory  two layers' runs with their numbers and bodies. Where these and the inspection of a layer exceed the limit, the
 ///         inspection stops and frees its memory; where it stops depends on the images alone
-/// cost    O(runs) a layer for all but thin regions
+/// cost    O(runs) a layer for all but discs (thin.h)
 class Inspection {
  public:
   /// grid          of the images; must outlive this object
   /// placed_parts  the boxes of all copies; a piece at the bottom of one is not an island
-  /// min_nm        the width below which a region is thin; 0: none is
+  /// min_nm        the width below which material and gaps are thin; 0: none is
+  /// drain_nm      the width below which powder does not leave a hollow; 0: any lets it out
   /// max_bytes     limit of memory, with the inspection of one layer
-  Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm,
+  Inspection(const PixelGrid& grid, std::vector<checks::Solid> placed_parts, std::int64_t min_nm, std::int64_t drain_nm,
              std::uint64_t max_bytes = UINT64_MAX);
 
   // --- from any thread
   /// About what prepare() adds to what a layer holds.
   std::uint64_t bytes_needed(const RunsView& image) const;
-  /// Keeps the image, and finds its thin regions.
+  /// Keeps the rows of the image that parts can reach, and measures its widths.
   void prepare(const RunsView& image, LayerInspection& inspection) const;
+  /// After prepare(), as often as there are samples: Measures::add_sample().
+  void add_sample(const RunsView& sample, LayerInspection& inspection) const;
 
   // --- in layer order
   /// Inspects no more layers, and frees its memory.
@@ -114,23 +123,17 @@ class Inspection {
   const Findings& findings() const { return findings_; }
 
   /// Without LayerInspection.
-  std::uint64_t bytes() const { return solid_.bytes() + powder_.bytes() + bytes_of(between_); }
+  std::uint64_t bytes() const { return solid_.bytes() + powder_.bytes() + measures_.bytes(); }
 
  private:
   struct Solids;
   struct Powder;
-  /// A thin region that continues from layer to layer.
-  struct Wall {
-    PixelBox all, last;  // of all its layers; of the last one
-    std::uint64_t max_pixels = 0;
-    Layer first, latest;
-  };
 
   Spot spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const;
   Location position(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const;
   void note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer);
-  void note_thin(const Layer& layer, const ThinRegions& thin);
-  void end_wall(const Wall& wall);
+  void note_measured();
+  void name_parts(Found& found) const;
   void stop(const Layer& layer, std::uint64_t bytes);
   bool is_in(std::uint32_t placed_part, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
@@ -142,21 +145,21 @@ class Inspection {
   const PixelGrid& grid_;
   std::vector<checks::Solid> placed_parts_;  // by bottom
   std::vector<PixelBox> window_;
-  PixelBox all_;  // of all placed parts, a pixel wider
-  Stencils stencils_;
+  PixelBox all_;           // of all placed parts, as wide as Measures needs
+  std::uint32_t top_ = 0;  // image row that is row 0 of the boxes here: rows above and below the parts are left out
+  Measures measures_;
   double min_mm_, pixel_mm2_;
   std::uint64_t max_bytes_;
   std::atomic<bool> stopped_ = false;
   std::int64_t below_ = 0;  // bottom of the layer before
   bool holds_ = false;      // any layer so far
   Layer layer_{};
-  std::vector<Wall> walls_;  // of the last layer, that the next one may continue
   Follower solid_{true}, powder_{false};
-  Runs between_;  // the powder of a layer
   Findings findings_;
 };
 
 /// One warning for each kind. part  names of files
-void report(const Findings& findings, std::span<const std::string> part, double min_mm, std::vector<Warning>& warnings);
+void report(const Findings& findings, std::span<const std::string> part, double min_mm, double drain_mm,
+            std::vector<Warning>& warnings);
 
 }  // namespace lamina::checks

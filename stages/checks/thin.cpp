@@ -124,7 +124,7 @@ void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox
 /// Pixels of `of`, all of which are set in the image, that the stencil covers nowhere.
 void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, const Stencil& stencil, ThinScratch& scratch) {
   const PixelBox corners = corners_in(box, stencil);
-  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, marks, pieces] = scratch;
   if (&of == &image) {
     complement(image, box, outside);
     spread(outside, stencil, To::kCorners, corners, spans, grown);
@@ -154,6 +154,20 @@ std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t mi
     end_row(result);
   }
   return largest;
+}
+
+/// The pieces of an image in which `marks` sets nothing.
+void unmarked(const RunsView& image, const RunsView& marks, ThinScratch& scratch, Runs& result) {
+  Pieces& pieces = scratch.pieces;
+  pieces.find(image, true);
+  scratch.marks.assign(pieces.count(), 0);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    for_touching(image, r, marks, r, false, [&](std::uint32_t run, std::uint32_t) { scratch.marks[pieces.of_run[run]] = 1; });
+  }
+  for (std::size_t p = 0; p < pieces.count(); ++p) {
+    if (scratch.marks[p] != 0) pieces.pixels[p] = 0;
+  }
+  pick(image, pieces, 0, UINT64_MAX, result);
 }
 
 /// Puts the largest in front, and no more than so many.
@@ -197,25 +211,41 @@ void complement(const RunsView& image, const PixelBox& window, Runs& result) {
 }
 
 std::uint64_t ThinScratch::bytes() const {
-  std::uint64_t total = bytes_held(spans) + pieces.bytes();
+  std::uint64_t total = bytes_held(spans) + bytes_held(marks) + pieces.bytes();
   for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending}) total += bytes_of(*image);
   return total;
 }
 
 // From wide to narrow. What a stencil covers is thin for no narrower one, so that each inspects what those before it left, and
 // of that the pieces that are large enough for it: few corners are.
-ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
+ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch, Widths* widths) {
   ThinRegions locations;
+  if (widths != nullptr) {
+    copy_runs(image, widths->wide);
+    widths->narrow.columns = image.columns;
+    widths->narrow.row_offset.assign(image.row_offset.size(), 0);
+    widths->narrow.change.clear();
+  }
   if (stencils.count() < 2 || image.change.empty()) return locations;
   const PixelBox box = box_of(image);
-  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, marks, pieces] = scratch;
   const std::uint64_t corner = stencils.two_squares(1);
   std::uint32_t number = stencils.count() - 1;
   uncovered(image, box, image, stencils.at(number), scratch);
+  if (widths != nullptr) {
+    copy_runs(grown, widths->wide);
+    unmarked(image, grown, scratch, widths->narrow);
+  }
+  const auto add_narrow = [&](std::uint64_t minimum) {
+    if (widths == nullptr || pick(left, pieces, minimum, UINT64_MAX, chosen) == 0) return;
+    combine(widths->narrow, chosen, SetOperation::kUnion, grown);
+    std::swap(widths->narrow, grown);
+  };
   pieces.find(left, true);
   locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinRegion);
   for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) locations.bytes += held->view().change.size_bytes();
   take(pieces, stencils.two_squares(number), locations);
+  add_narrow(stencils.two_squares(number));
   std::uint64_t maximum = pick(left, pieces, corner, stencils.two_squares(number), pending);
   while (--number > 0) {
     const std::uint64_t minimum = stencils.two_squares(number);
@@ -226,11 +256,129 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
     uncovered(image, box, chosen, stencils.at(number), scratch);
     pieces.find(left, true);
     take(pieces, minimum, locations);
+    add_narrow(minimum);
     maximum = std::max(maximum, pick(left, pieces, corner, minimum, chosen));
     combine(waiting, chosen, SetOperation::kUnion, pending);
   }
   keep_largest(locations.largest, ThinRegions::kMax);
   return locations;
+}
+
+void drop_at_edge(const PixelBox& window, ThinScratch& scratch, Runs& image) {
+  Pieces& pieces = scratch.pieces;
+  pieces.find(image, true);
+  for (std::size_t p = 0; p < pieces.count(); ++p) {
+    const PixelBox& box = pieces.box[p];
+    const bool at_edge =
+        box.left == window.left || box.right == window.right || box.top == window.top || box.bottom == window.bottom;
+    if (at_edge) pieces.pixels[p] = 0;
+  }
+  pick(image, pieces, 0, UINT64_MAX, scratch.chosen);
+  std::swap(image, scratch.chosen);
+}
+
+void erode(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners) {
+  const PixelBox within = corners_in(window, stencil);
+  complement(image, window, scratch.outside);
+  spread(scratch.outside, stencil, To::kCorners, within, scratch.spans, scratch.grown);
+  complement(scratch.grown, within, corners);
+}
+
+void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, Runs& result) {
+  const PixelBox box = image.change.empty() ? PixelBox{0, 0, 0, 0} : box_of(image);
+  erode(image, box, stencil, scratch, scratch.fits);
+  spread(scratch.fits, stencil, To::kPixels, box, scratch.spans, result);
+}
+
+void inner_pixels(const RunsView& image, Runs& result) {
+  begin_rows(image.columns, result);
+  Buffer<std::uint32_t> both;
+  // Of runs that are a pixel shorter at both ends.
+  const auto intersect = [](std::span<const std::uint32_t> a, std::uint32_t less_a, std::span<const std::uint32_t> b,
+                            std::uint32_t less_b, Buffer<std::uint32_t>& out) {
+    for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+      const std::uint32_t begin = std::max(a[i] + less_a, b[j] + less_b), end = std::min(a[i + 1] - less_a, b[j + 1] - less_b);
+      if (begin < end) {
+        out.push_back(begin);
+        out.push_back(end);
+      }
+      (a[i + 1] - less_a < b[j + 1] - less_b ? i : j) += 2;
+    }
+  };
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    both.clear();
+    if (r > 0 && r + 1 < image.rows()) {
+      intersect(image.row(r - 1), 1, image.row(r), 1, both);
+      intersect(both, 0, image.row(r + 1), 1, result.change);
+    }
+    end_row(result);
+  }
+}
+
+void Necks::mark(const RunsView& wide, const RunsView& rest, std::uint64_t minimum) {
+  neighbour_.assign(pieces_.count(), UINT32_MAX);
+  joins_.assign(pieces_.count(), 0);
+  const auto note = [&](std::uint32_t run, std::uint32_t of_wide) {
+    const std::uint32_t part = wide_.of_run[of_wide];
+    if (wide_.pixels[part] < minimum) return;
+    std::uint32_t& neighbour = neighbour_[pieces_.of_run[run]];
+    if (neighbour != UINT32_MAX && neighbour != part) joins_[pieces_.of_run[run]] = 1;
+    neighbour = part;
+  };
+  for (std::uint32_t r = 0; r < rest.rows(); ++r) {
+    for (std::uint32_t next = r == 0 ? 0 : r - 1; next < std::min(r + 2, rest.rows()); ++next) {
+      for_touching(rest, r, wide, next, true, note);
+    }
+  }
+}
+
+/// The image with the pixels between two of its pixels, in rows, columns and diagonals.
+void Necks::bridge(const RunsView& image) {
+  begin_rows(image.columns, bridged_);
+  const auto add = [&](std::int64_t begin, std::int64_t end) {
+    if (begin < end) spans_.push_back(static_cast<std::uint64_t>(begin) << 32 | static_cast<std::uint64_t>(end));
+  };
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::size_t row_begin = bridged_.change.size();
+    spans_.clear();
+    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; i += 2) add(image.change[i], image.change[i + 1]);
+    for (std::int64_t shift = -1; r > 0 && r + 1 < image.rows() && shift <= 1; ++shift) {
+      const auto above = image.row(r - 1), below = image.row(r + 1);
+      for (std::size_t i = 0, j = 0; i < above.size() && j < below.size();) {
+        const std::int64_t end = above[i + 1] + shift, other_end = below[j + 1] - shift;
+        add(std::max(above[i] + shift, below[j] - shift), std::min({end, other_end, std::int64_t{image.columns}}));
+        (end < other_end ? i : j) += 2;
+      }
+    }
+    std::ranges::sort(spans_);
+    for (const std::uint64_t span : spans_) {
+      const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
+      if (bridged_.change.size() > row_begin && begin <= bridged_.change.back() + 1) {
+        bridged_.change.back() = std::max(bridged_.change.back(), end);
+      } else {
+        add_run(begin, end, bridged_);
+      }
+    }
+    end_row(bridged_);
+  }
+}
+
+void Necks::find(const RunsView& image, const Widths& widths, std::uint64_t minimum, Runs& result) {
+  bridge(image);
+  combine(bridged_, widths.wide, SetOperation::kDifference, not_wide_);
+  combine(not_wide_, widths.narrow, SetOperation::kDifference, rest_);
+  wide_.find(widths.wide, false);
+  pieces_.find(rest_, true);
+  mark(widths.wide, rest_, minimum);
+  for (std::size_t p = 0; p < pieces_.count(); ++p) {
+    if (joins_[p] == 0) pieces_.pixels[p] = 0;
+  }
+  pick(rest_, pieces_, 0, UINT64_MAX, result);
+}
+
+std::uint64_t Necks::bytes() const {
+  return bytes_of(rest_) + bytes_of(not_wide_) + bytes_of(bridged_) + wide_.bytes() + pieces_.bytes() + bytes_held(neighbour_) +
+         bytes_held(joins_) + bytes_held(spans_);
 }
 
 VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch) {

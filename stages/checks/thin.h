@@ -74,8 +74,16 @@ struct ThinRegions {
 struct ThinScratch {
   Runs outside, anchors, grown, fits, left, chosen, waiting, pending;
   Buffer<std::uint64_t> spans;
+  Buffer<std::uint8_t> marks;
   Pieces pieces;
   std::uint64_t bytes() const;
+};
+
+/// Parts of an image. What is in neither is corners, and necks between wide parts.
+struct Widths {
+  Runs wide;    // what the last stencil covers
+  Runs narrow;  // thin regions, and pieces that the last stencil does not fit into, of any size
+  std::uint64_t bytes() const { return bytes_of(wide) + bytes_of(narrow); }
 };
 
 /// Places that for any of the stencils are thin: pixels that it covers nowhere where it lies on set pixels alone, and that
@@ -83,7 +91,38 @@ struct ThinScratch {
 /// Corners of thick bodies leave less: of a width of 2 r 0.22 r squared at right angles and 4.3 r squared at 20 degrees. More
 /// stencils find more: never less. cost  O(rows of the last stencil x runs), and for narrower ones that of the places that are
 /// left
-ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch);
+/// widths  if not null: where the image is wide, and where it is narrow
+ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch, Widths* widths = nullptr);
+
+/// Removes the pieces that reach the edge of the window.
+void drop_at_edge(const PixelBox& window, ThinScratch& scratch, Runs& image);
+
+/// The top left corners of all positions in which the stencil is within the image and the window.
+void erode(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners);
+/// All pixels of an image that the stencil covers where it is within the image.
+void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, Runs& result);
+
+/// Pixels whose eight neighbours are set.
+void inner_pixels(const RunsView& image, Runs& result);
+
+/// Where wide parts of an image meet in less than the last stencil: corners and necks that touch two of them, at sides or
+/// corners, gaps of one pixel included, since parts that meet in an edge may leave one. Parts of fewer pixels than `minimum`
+/// are no part. cost  O(runs)
+class Necks {
+ public:
+  void find(const RunsView& image, const Widths& widths, std::uint64_t minimum, Runs& result);
+  std::uint64_t bytes() const;
+
+ private:
+  void mark(const RunsView& wide, const RunsView& rest, std::uint64_t minimum);
+  void bridge(const RunsView& image);
+
+  Runs bridged_, rest_, not_wide_;
+  Pieces wide_, pieces_;
+  Buffer<std::uint32_t> neighbour_;  // wide part of each piece of the rest
+  Buffer<std::uint8_t> joins_;       // by piece of the rest: it touches two
+  Buffer<std::uint64_t> spans_;      // of a row
+};
 
 /// The pixels between the runs of `image`, in rows and columns [first, last) of the window; nothing beyond it.
 void complement(const RunsView& image, const PixelBox& window, Runs& result);

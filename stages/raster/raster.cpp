@@ -81,7 +81,8 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
   const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().max_crossings() / kBandCrossings, 1, rows);
   state.band_rows = ceil_div(rows, static_cast<std::uint32_t>(bands));
   if (rays) {
-    auto beams = BeamIndex::build(state.placed, grid, state.band_rows);
+    // Shifted sampling reaches a row further on each side.
+    auto beams = BeamIndex::build(state.placed, grid, state.band_rows + 2);
     if (!beams) return beams.error();
     state.beams.push_back(std::move(*beams));
   }
@@ -90,8 +91,17 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
   return rasterizer;
 }
 
-LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const {
+LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out, const std::array<Nm, 2>& shift) const {
   const State& state = *state_;
+  std::uint32_t lowest_row = state.first_row, highest_row = state.last_row;
+  std::vector<PlacedMesh> moved;
+  if (shift != std::array<Nm, 2>{}) {
+    moved = state.placed;
+    for (PlacedMesh& one : moved) one.offset.x -= shift[0], one.offset.y -= shift[1];
+    lowest_row -= std::min(lowest_row, 1u);
+    highest_row = std::min(highest_row + 1, state.grid.rows());
+  }
+  const std::vector<PlacedMesh>& placed_meshes = moved.empty() ? state.placed : moved;
   LayerReport report;
   const LayerBound::CrossingCount bound = state.bound.front().at(plane);
   // What it meets is what one there would if no vertex counted as in it.
@@ -102,19 +112,19 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   ensure_capacity(out.change, bound.crossings + RowsTask::kMoreCrossings);
   out.row_offset.reserve(std::size_t{rows} + 1);
   out.row_offset.assign(1, 0);
-  out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
+  out.row_offset.resize(std::size_t{rows - highest_row} + 1, 0);
 
   const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
     scratch.segments.size = 0;
     scratch.segments.ensure_capacity(std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kMoreSegments);
-    const RowBand band{state.kernels, state.sampling, state.placed, plane, first_row, last_row};
+    const RowBand band{state.kernels, state.sampling, placed_meshes, plane, first_row, last_row};
     cut_clusters(band, visits, scratch.segments);
     scratch.scan.append_rows(band, scratch.segments, state.rule, out, report);
   };
   // Bands from the back of the bed to its front, the order of the image's rows.
   const auto each_band = [&](auto&& take) {
-    for (std::uint32_t last = state.last_row; last > state.first_row;) {
-      const std::uint32_t first = std::max(state.first_row, last - std::min(last, state.band_rows));
+    for (std::uint32_t last = highest_row; last > lowest_row;) {
+      const std::uint32_t first = std::max(lowest_row, last - std::min(last, state.band_rows));
       take(first, last);
       last = first;
     }
@@ -125,25 +135,28 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   if (engine == Engine::kRays) {
     each_band([&](std::uint32_t first, std::uint32_t last) {
       scratch.visits.clear();
-      state.beams.front().find_clusters(state.sampling, meets, first, last, scratch.visits);
+      // Boxes of clusters are where parts are without the shift.
+      const std::uint32_t more = moved.empty() ? 0 : 1;
+      state.beams.front().find_clusters(state.sampling, meets, first - std::min(first, more),
+                                        std::min(last + more, state.grid.rows()), scratch.visits);
       append(scratch.visits, first, last);
     });
   } else {
-    for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
-      const PlacedMesh& placed = state.placed[i];
+    for (std::uint32_t i = 0; i < placed_meshes.size(); ++i) {
+      const PlacedMesh& placed = placed_meshes[i];
       const std::int64_t z = std::int64_t{meets} - placed.offset.z;
       state.heights[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find(z, z, [&](std::uint32_t cluster) {
         scratch.visits.push_back({cluster, i});
       });
     }
     if (scratch.visits.size() <= kMaxClusters) {
-      append(scratch.visits, state.first_row, state.last_row);
+      append(scratch.visits, lowest_row, highest_row);
     } else {
       each_band([&](std::uint32_t first, std::uint32_t last) {
         const std::int64_t low = state.sampling.y.centre(first), high = state.sampling.y.centre(last - 1);
         scratch.near.clear();
         for (const ClusterVisit& visit : scratch.visits) {
-          const PlacedMesh& placed = state.placed[visit.instance];
+          const PlacedMesh& placed = placed_meshes[visit.instance];
           const Box& box = placed.mesh->bounds[visit.cluster];
           const bool reaches =
               std::int64_t{box.hi.y} + placed.offset.y >= low && std::int64_t{box.lo.y} + placed.offset.y <= high;

@@ -6,6 +6,7 @@
 // by height and needs no tree.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -43,8 +44,10 @@ class Rasterizer {
                                   FillRule rule, bool rays, bool contours, Isa isa = Isa::kAuto);
 
   /// The runs of the layer at height `plane` (nm), into `out` (its capacity is reused).
+  /// shift  of the sampling points from the centres of pixels along x and y, nm, at most half a pixel: then corners must be a
+  ///        pixel away from the edges of the bed
   /// cost  O(facets near the plane + crossings log(crossings of a row)); no allocation once the scratch is warm
-  LayerReport layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const;
+  LayerReport layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out, const std::array<Nm, 2>& shift = {}) const;
 
   /// Bytes that the layer at `plane` may need at most: scratch and runs. From tables of heights, made once (layer_bound.h).
   std::uint64_t layer_bytes_bound(Nm plane) const;

@@ -34,7 +34,7 @@ class BoundedInspection : public testing::Test {
   Findings inspect(std::uint64_t max_bytes, std::uint32_t layers = kLayers, std::size_t slots = 1) {
     const std::int64_t side = 20 * kNmPerMm, up = 100'000;
     const Box box{{0, 0, 0}, {static_cast<Nm>(side), static_cast<Nm>(side), static_cast<Nm>(kLayers * up)}};
-    Inspection inspection(grid_, {{box, 0}}, 300'000, max_bytes);
+    Inspection inspection(grid_, {{box, 0}}, 300'000, 500'000, max_bytes);
     std::vector<LayerInspection> inspections(slots);
     held_.clear();
     inspected_ = 0;
@@ -50,7 +50,7 @@ class BoundedInspection : public testing::Test {
   static std::string reported(const Findings& findings) {
     std::vector<Warning> warnings;
     const std::string name = "plate";
-    report(findings, {&name, 1}, 0.3, warnings);
+    report(findings, {&name, 1}, 0.3, 0.5, warnings);
     std::string text;
     for (const Warning& warning : warnings) text += warning.code + ": " + warning.text + "\n";
     return text;
@@ -86,6 +86,9 @@ TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
     EXPECT_EQ(found.hollows.count, below.hollows.count);
     EXPECT_EQ(found.thin.count, below.thin.count);
     EXPECT_EQ(found.thin.locations.size(), below.thin.locations.size());
+    EXPECT_EQ(found.roofs.count, below.roofs.count);
+    EXPECT_EQ(found.gaps.count, below.gaps.count);
+    EXPECT_EQ(found.contacts.count, below.contacts.count);
     EXPECT_LE(found.loose.count, below.loose.count);
     const std::string text = reported(found);
     EXPECT_EQ(text.find(found.layers == 0 ? "not-inspected: no layer was inspected"
@@ -93,7 +96,7 @@ TEST_F(BoundedInspection, HoldsNoMoreThanItMayAndReportsWhatItFoundBefore) {
               text.rfind("not-inspected"))
         << text;
     EXPECT_NE(text.find("give --memory"), std::string::npos) << text;
-    EXPECT_EQ(pipeline::json_of(found, 0.3)["stopped"]["layer"], found.layers);
+    EXPECT_EQ(pipeline::json_of(found, 0.3, 0.5)["stopped"]["layer"], found.layers);
   }
   EXPECT_EQ(last, kLayers);
   EXPECT_EQ(reported(all).find("not-inspected"), std::string::npos);
@@ -103,9 +106,9 @@ TEST_F(BoundedInspection, StopsWhereItDoesRegardlessOfTheScratchOfLayers) {
   const Findings all = inspect(UINT64_MAX);
   const std::uint64_t maximum = *std::ranges::max_element(held_);
   for (const std::uint64_t may : {maximum / 16, maximum / 4, maximum / 2, maximum}) {
-    const std::string one = json_text(pipeline::json_of(inspect(may), 0.3));
+    const std::string one = json_text(pipeline::json_of(inspect(may), 0.3, 0.5));
     for (const std::size_t slots : {2, 3, 5, 12})
-      EXPECT_EQ(json_text(pipeline::json_of(inspect(may, kLayers, slots), 0.3)), one) << may;
+      EXPECT_EQ(json_text(pipeline::json_of(inspect(may, kLayers, slots), 0.3, 0.5)), one) << may;
   }
 }
 

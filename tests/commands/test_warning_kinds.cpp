@@ -49,6 +49,10 @@ const std::vector<WarningKind> kKinds = {
     {"loose", "jet islands.obj" + kInspected},
     {"hollows", "jet hollow.obj" + kInspected},
     {"thin", "jet rib.obj --min-wall 1" + kInspected},
+    {"drains", "jet drained.obj --fill-rule positive" + kInspected},
+    {"roofs", "jet part.stl --min-wall 3" + kInspected},
+    {"gaps", "jet gap.obj --min-wall 0.5" + kInspected},
+    {"contacts", "jet edge.obj --min-wall 0.5" + kInspected},
     {"touching", "jet --job touching.toml" + kInspected},
     {"bed-edge", "jet part.stl --at 0,5" + kInspected},
     {"not-inspected", "jet --job noise.toml --memory 2M" + kInspected},
@@ -105,6 +109,9 @@ class WarningKinds : public ::testing::Test {
          "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
     file("islands.obj", boxes_text({{0, 0, 0, 8, 8, 2}, {10, 0, 1, 12, 2, 2}}));
     file("hollow.obj", boxes_text({{0, 0, 0, 8, 8, 2}, {2, 2, 0.5, 5, 5, 1.5}}, 1));
+    file("drained.obj", boxes_text({{0, 0, 0, 8, 8, 3}, {2, 2, 0.5, 6, 6, 2.5}, {0, 4, 1, 2.5, 4.4, 1.4}}, 2));
+    file("gap.obj", boxes_text({{0, 0, 0, 4, 8, 2}, {4.3, 0, 0, 8, 8, 2}}));
+    file("edge.obj", boxes_text({{0, 0, 0, 4, 4, 2}, {4, 4, 0, 8, 8, 2}}));
     file("rib.obj", boxes_text({{0, 0, 0, 10, 10, 2}, {12, 0, 0, 12.5, 10, 1}}));
     file("neck.obj", boxes_text({{0, 0, 0, 10, 10, 2}, {4.9, 4.9, 2, 5.1, 5.1, 5}, {0, 0, 5, 10, 10, 7}}));
     file("lost.toml",
