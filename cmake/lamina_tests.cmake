@@ -158,6 +158,11 @@ if(LAMINA_PYTHON)
   set_tests_properties(Python.ArraysAreTheDecodedFilesOfTheProgram PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300
                        ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
 endif()
+if(LAMINA_PYTHON AND LAMINA_SCAN)
+  add_test(NAME Photographs.StripesAndOffsetsAreReadFromImagesOfAnotherProgram
+           COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/calibration/photographs/series $<TARGET_FILE:lamina>)
+  set_tests_properties(Photographs.StripesAndOffsetsAreReadFromImagesOfAnotherProgram PROPERTIES SKIP_RETURN_CODE 77)
+endif()
 add_test(NAME Documentation.EveryQuestionHasItsAnswerNearTheIndex
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/questions ${PROJECT_SOURCE_DIR})
 add_test(NAME Documentation.EveryFigureOfTheReadmeIsInAPageOfItsCommit
