@@ -169,6 +169,11 @@ add_test(NAME Formats.LayersAreTheSameAfterPackersOfPng
 set_tests_properties(Formats.LayersAreTheSameAfterPackersOfPng PROPERTIES SKIP_RETURN_CODE 77)
 add_test(NAME Engines.AHorizontalFaceOfAnyFileIsInALayerOrIsNot
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/raster/tilted_slabs $<TARGET_FILE:lamina>)
+if(LAMINA_PYTHON AND LAMINA_SCAN)
+  add_test(NAME Photographs.StripesAndOffsetsAreReadFromImagesOfAnotherProgram
+           COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/calibration/photographs/series $<TARGET_FILE:lamina>)
+  set_tests_properties(Photographs.StripesAndOffsetsAreReadFromImagesOfAnotherProgram PROPERTIES SKIP_RETURN_CODE 77)
+endif()
 add_test(NAME Documentation.EveryQuestionHasItsAnswerNearTheIndex
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/questions ${PROJECT_SOURCE_DIR})
 add_test(NAME Documentation.EveryFigureOfTheReadmeIsInAPageOfItsCommit

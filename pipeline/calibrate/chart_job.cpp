@@ -13,6 +13,7 @@
 #include "pipeline/run/run.h"
 #include "stages/calibration/chart/layout.h"
 #include "stages/calibration/chart/rows.h"
+#include "stages/calibration/robust.h"
 #include "stages/formats/chart/chart.h"
 #include "stages/formats/image_format.h"
 #include "stages/support/io/file.h"
@@ -64,40 +65,35 @@ std::string list_of(const std::vector<std::uint32_t>& nozzles) {
   return nozzles.empty() ? "none" : fmt::format("{}", fmt::join(nozzles, ", "));
 }
 
-constexpr double kReportedPixels = 0.1, kErrors = 4;  // as of single nozzles
-
-/// Nozzles that were read along the scan or across it, and those that are too uncertain to report.
-std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* detected, const char* error) {
+/// Nozzles that were read along the scan or across it.
+std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* um, const char* error, const char* within) {
   std::vector<std::optional<Located>> read(nozzles.size());
   for (std::size_t n = 0; n < nozzles.size(); ++n) {
-    if (nozzles[n].is_null() || nozzles[n].at(detected).is_null()) continue;
-    read[n] = Located{nozzles[n].at(detected).get<double>(), nozzles[n].at(error).get<double>()};
+    if (nozzles[n].is_null() || nozzles[n].at(um).is_null()) continue;
+    read[n] = Located{nozzles[n].at(um).get<double>(), nozzles[n].at(error).get<double>(), nozzles[n].at(within).get<double>()};
   }
   return read;
 }
 
-/// A nozzle of a later row that lands too far along the scan stands less far behind than the profile says.
-std::string correct_rows(const std::vector<std::optional<Located>>& along, const Chart& chart, Machine& machine) {
+/// A nozzle of a later row that lands too far along the scan stands less far behind than the profile says. Rows whose offset
+/// may be chance keep what the profile says.
+std::string correct_rows(const std::vector<std::optional<Located>>& along, Machine& machine) {
   std::vector<double>& rows = machine.head.row_offset_um;
   if (rows.size() < 2) return "";
   const auto detected = calibration::rows_of(along, static_cast<std::uint32_t>(rows.size()));
-  const double pixel_um = 1e-3 * (chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm);
   std::string line;
-  std::size_t unreadable = 0;
   for (std::size_t r = 1; r < rows.size(); ++r) {
-    line += line.empty() ? "rows      against the first one, changed by " : ", ";
-    if (!detected[r] || kErrors * detected[r]->error_um > kReportedPixels * pixel_um) {
+    line += line.empty() ? "rows      against the first one, change of " : ", ";
+    if (!detected[r]) {
       line += "unreadable";
-      ++unreadable;
       continue;
     }
     const double late = std::round(10 * detected[r]->um) / 10;
-    rows[r] -= late;
-    line += fmt::format("{:+g} um (within {:.1f})", 0 - late, detected[r]->within_um);
+    const bool certain = std::abs(late) > detected[r]->within_um;
+    if (certain) rows[r] -= late;
+    line += fmt::format("{:+g} um (within {:.1f}{})", 0 - late, detected[r]->within_um, certain ? "" : "; profile unchanged");
   }
-  const char* why = "4 sigma in the photograph is above 0.1 pixel";
-  if (unreadable + 1 == rows.size()) return fmt::format("rows      not reported: {}", why);
-  return unreadable == 0 ? line : fmt::format("{}: {}", line, why);
+  return line;
 }
 
 /// How far nozzles lie off, of all that were read.
@@ -108,9 +104,18 @@ std::string positions_line(const std::vector<std::optional<Located>>& along,
     for (const auto& one : nozzles) um = std::max(um, one ? std::abs(one->um) : 0);
     return um;
   };
+  const auto limit = [](const std::vector<std::optional<Located>>& nozzles) {
+    std::vector<double> um;
+    for (const auto& one : nozzles) {
+      if (one) um.push_back(one->within_um);
+    }
+    return calibration::median_of(std::move(um));
+  };
   const auto read = std::ranges::count_if(along, [](const auto& one) { return one.has_value(); });
-  return fmt::format("nozzles   {} read, within {:.0f} um along the scan and {:.0f} across it of the head's line", read,
-                     maximum(along), maximum(across));
+  return fmt::format(
+      "nozzles   {} read, within {:.0f} um along the scan and {:.0f} across it of the head's line; median 99 % "
+      "limits {:.1f} and {:.1f} um",
+      read, maximum(along), maximum(across), limit(along), limit(across));
 }
 
 /// A length, or that it cannot be determined.
@@ -150,20 +155,6 @@ std::vector<std::string> joint_lines(const Json& stitches) {
   return lines;
 }
 
-/// Offsets that four standard errors do not hold within a tenth of a pixel.
-std::string unreadable_line(const Json& nozzles) {
-  std::size_t detected = 0, unreadable = 0;
-  for (const Json& nozzle : nozzles) {
-    if (nozzle.is_null()) continue;
-    for (const char* key : {"along_um", "across_um"}) {
-      ++detected;
-      unreadable += nozzle.at(key).is_null();
-    }
-  }
-  if (unreadable == 0) return "";
-  return fmt::format("omitted   {} of {} nozzle offsets: 4 sigma in the photograph is above 0.1 pixel", unreadable, detected);
-}
-
 std::vector<std::string> take(const Json& json, const Chart& chart, Machine& machine) {
   const auto blocked_nozzles = json.at("blocked").get<std::vector<std::uint32_t>>();
   const auto weak = json.at("weak").get<std::vector<std::uint32_t>>(),
@@ -177,18 +168,16 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
   std::vector<std::string> lines;
   lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's position",
                               json.at("pixels_per_mm").get<double>(), json.at("scatter_um").get<double>()));
-  const auto read_along = read_nozzles(nozzles, "along_detected_um", "along_error_um"),
-             read_across = read_nozzles(nozzles, "across_detected_um", "across_error_um");
+  const auto read_along = read_nozzles(nozzles, "along_um", "along_error_um", "along_within_um"),
+             read_across = read_nozzles(nozzles, "across_um", "across_error_um", "across_within_um");
   lines.push_back(positions_line(read_along, read_across));
   machine.head.blocked.assign(blocked.begin(), blocked.end());
   lines.push_back("blocked   " + list_of(machine.head.blocked));
   if (!weak.empty()) lines.push_back(fmt::format("weak      {}: some dashes missing, not counted as blocked", list_of(weak)));
   if (!unreadable.empty()) lines.push_back("unknown   " + list_of(unreadable) + ": all of their dashes are hidden");
-  if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
+  if (auto rows = correct_rows(read_along, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
   for (std::string& line : joint_lines(json.at("stitches"))) lines.push_back(std::move(line));
-  if (auto unreadable_offsets = unreadable_line(nozzles); !unreadable_offsets.empty())
-    lines.push_back(std::move(unreadable_offsets));
   if (const Json* gain = json.find("dot_gain_um")) {
     const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
     const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;

@@ -12,15 +12,13 @@ Json reading_json(const calibration::ChartReading& reading) {
     for (const auto& one : list) {
       Json& entry = json.emplace_back();
       if (!one) continue;
-      const auto add = [&](const char* name, const char* detected, const char* error, const char* within,
-                           const calibration::Measure& measure) {
-        entry[name] = measure.reported ? Json(rounded(measure.um)) : Json();
-        entry[detected] = measure.error_um > 0 ? Json(rounded(measure.um)) : Json();  // null: all dashes are marred
+      const auto add = [&](const char* name, const char* error, const char* within, const calibration::Measure& measure) {
+        entry[name] = measure.known() ? Json(rounded(measure.um)) : Json();
         entry[error] = rounded(measure.error_um);
         entry[within] = rounded(measure.within_um);
       };
-      add("along_um", "along_detected_um", "along_error_um", "along_within_um", one->along);
-      add("across_um", "across_detected_um", "across_error_um", "across_within_um", one->across);
+      add("along_um", "along_error_um", "along_within_um", one->along);
+      add("across_um", "across_error_um", "across_within_um", one->across);
     }
     return json;
   };
@@ -51,8 +49,12 @@ Json reading_json(const calibration::ChartReading& reading) {
 }
 
 Json comparison_json(const calibration::Comparison& comparison) {
-  Json json = {
-      {"likeness", comparison.likeness}, {"missing", Json::array()}, {"bodies", Json::array()}, {"extra", Json::array()}};
+  Json json = {{"likeness", comparison.position.likeness},
+               {"rotation_deg", comparison.position.rotation_deg},
+               {"also_deg", comparison.position.also_deg},
+               {"missing", Json::array()},
+               {"bodies", Json::array()},
+               {"extra", Json::array()}};
   for (const calibration::MissingBand& band : comparison.bands)
     json["missing"].push_back({{"from_mm", band.from_mm}, {"to_mm", band.to_mm}, {"missing_mm", band.missing_mm}});
   for (const calibration::BodyReading& body : comparison.bodies)

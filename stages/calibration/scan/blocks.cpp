@@ -263,7 +263,7 @@ std::vector<JointReading> read_stitches(const Photo& photo, const Chart& chart, 
     }
     if (s <= chart.stitches.size()) joint.across_um = across_um(photo, chart, fit, chart.stitches[s - 1], s, inks, lines);
     const auto differs = [&](const std::optional<double>& um, const Measure& to, const Measure& from, double max_nm) {
-      return um && to.reported && from.reported && std::abs(*um - (to.um - from.um)) > 1e-3 * max_nm;
+      return um && to.known() && std::abs(*um - (to.um - from.um)) > 1e-3 * max_nm + std::hypot(to.within_um, from.within_um);
     };
     joint.agrees =
         !differs(joint.along_um, head.swath[s]->along, head.swath[s - 1]->along, kAgreeAlong * along_of(chart, pixel_nm)) &&

@@ -35,8 +35,9 @@ struct JointReading {
   std::uint32_t swath = 0;
   std::optional<double> along_um;  // by its vernier; absent: no vernier, or too little of it is detected
   std::optional<double>
-      across_um;       // by the height of its block; absent: its outermost nozzles are blocked, or no gain is known
-  bool agrees = true;  // with the swaths' offsets, within a quarter of a pixel along the scan and one across it
+      across_um;  // by the height of its block; absent: its outermost nozzles are blocked, or no gain is known
+  bool agrees =
+      true;  // with the swaths' offsets and their limits, within a quarter of a pixel along the scan and one across it
 };
 
 /// Of all joints between swaths that were printed.

@@ -1,9 +1,10 @@
 #include "stages/calibration/scan/compare.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
@@ -13,18 +14,9 @@
 namespace lamina::calibration {
 namespace {
 
-constexpr double kMaxTurnDeg = 6;
 constexpr double kMinMissingMm = 0.2;
 constexpr double kAwayMm = 0.5, kMinMm2 = 1, kMinShare = 0.5;  // of extra ink; the last of full ink
 constexpr double kMaxCells = 2000;                             // along an axis of the image that is searched
-
-/// The layer in cells as large as pixels of the photograph: the share of each that is set.
-struct LayerCells {
-  cv::Mat share;             // CV_32F
-  double left = 0, top = 0;  // mm
-  double side = 0;           // mm
-  Spot middle(int x, int y) const { return {left + (x + 0.5) * side, top + (y + 0.5) * side}; }
-};
 
 LayerCells cells_of(const ExpectedLayer& layer) {
   LayerCells cells;
@@ -62,143 +54,6 @@ LayerCells cells_of(const ExpectedLayer& layer) {
     }
   }
   return cells;
-}
-
-/// What is left without slow changes of the light. wide  of them, pixels
-cv::Mat without_shade(const cv::Mat& image, double wide) {
-  cv::Mat slow;
-  cv::GaussianBlur(image, slow, {}, wide, wide, cv::BORDER_REPLICATE);
-  return image - slow;
-}
-
-/// The best place of a picture in a larger one, and how alike they are there, by correlation.
-struct PictureMatch {
-  double likeness = -1, turn_deg = 0, scale = 1;
-  cv::Point2d at;  // of the middle of the cells, pixels of the photograph
-};
-
-PictureMatch best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<double>& turns,
-                        const std::vector<double>& scales) {
-  const int side =
-      cv::getOptimalDFTSize(std::max({photo.cols, photo.rows, cells.cols, cells.rows}) + std::max(cells.cols, cells.rows) / 2);
-  cv::Mat padded = cv::Mat::zeros(side, side, CV_32F), photo_waves;
-  photo.copyTo(padded(cv::Rect(0, 0, photo.cols, photo.rows)));
-  cv::dft(padded, photo_waves);
-  const double photo_energy = cv::norm(photo);
-  PictureMatch best;
-  for (const double turn : turns) {
-    for (const double scale : scales) {
-      cv::Mat to = cv::getRotationMatrix2D(
-          {0.5f * static_cast<float>(cells.cols - 1), 0.5f * static_cast<float>(cells.rows - 1)}, -turn, scale);
-      to.at<double>(0, 2) += 0.5 * (side - cells.cols);
-      to.at<double>(1, 2) += 0.5 * (side - cells.rows);
-      cv::Mat turned, waves, product;
-      cv::warpAffine(cells, turned, to, {side, side}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
-      const double energy = cv::norm(turned);
-      cv::dft(turned, waves);
-      cv::mulSpectrums(photo_waves, waves, product, 0, true);
-      cv::idft(product, product, cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-      double maximum = 0;
-      cv::Point at;
-      cv::minMaxLoc(product, nullptr, &maximum, nullptr, &at);
-      const double likeness = maximum / std::max(photo_energy * energy, 1e-9);
-      if (likeness <= best.likeness) continue;
-      const auto wrapped = [&](int shift) { return shift > side / 2 ? shift - side : shift; };
-      best = {likeness, turn, scale, {wrapped(at.x) + 0.5 * (side - 1), wrapped(at.y) + 0.5 * (side - 1)}};
-    }
-  }
-  return best;
-}
-
-/// Turns and scales from coarse to fine, on small copies.
-View first_view(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer, double& likeness) {
-  const double small = std::min(1.0, 220.0 / std::max({photo.cols, photo.rows, cells.cols, cells.rows}));
-  cv::Mat few, little;
-  cv::resize(photo, few, {}, small, small, cv::INTER_AREA);
-  cv::resize(cells, little, {}, small, small, cv::INTER_AREA);
-  std::vector<double> turns, scales;
-  for (double turn = -kMaxTurnDeg; turn <= kMaxTurnDeg; turn += 1) turns.push_back(turn);
-  PictureMatch match = best_match(few, little, turns, {0.97, 1.0, 1.03});
-  turns.clear();
-  for (double turn = -0.75; turn <= 0.75; turn += 0.25) turns.push_back(match.turn_deg + turn);
-  match = best_match(few, little, turns, {match.scale - 0.015, match.scale, match.scale + 0.015});
-  likeness = match.likeness;
-  // Pixel centres of small copies: (i + 0.5) / small - 0.5.
-  const Spot at{(match.at.x + 0.5) / small - 0.5, (match.at.y + 0.5) / small - 0.5};
-  const double c = std::cos(match.turn_deg * std::numbers::pi / 180) * match.scale / layer.side,
-               s = std::sin(match.turn_deg * std::numbers::pi / 180) * match.scale / layer.side;
-  View view;
-  view.middle = {layer.left + 0.5 * cells.cols * layer.side, layer.top + 0.5 * cells.rows * layer.side};
-  view.unit = 0.5 * std::max(cells.cols, cells.rows) * layer.side;
-  view.photo_middle = {0.5 * (photo.cols - 1), 0.5 * (photo.rows - 1)};
-  view.radius = std::hypot(photo.cols, photo.rows) / 2;
-  view.h = {c * view.unit, -s * view.unit, at.x, s * view.unit, c * view.unit, at.y, 0, 0};
-  return view;
-}
-
-/// Moves the view until edges lie on edges: least squares of photo(view(place)) - gain * layer(place), by Gauss and Newton.
-void refine(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer, View& view) {
-  struct Sample {
-    Spot position;
-    double value;
-  };
-  cv::Mat dx, dy, slope_x, slope_y;
-  cv::Sobel(cells, dx, CV_32F, 1, 0);
-  cv::Sobel(cells, dy, CV_32F, 0, 1);
-  cv::Sobel(photo, slope_x, CV_32F, 1, 0, 3, 1.0 / 8);
-  cv::Sobel(photo, slope_y, CV_32F, 0, 1, 3, 1.0 / 8);
-  std::vector<Sample> samples;
-  double steepest = 0;
-  cv::Mat steep;
-  cv::magnitude(dx, dy, steep);
-  cv::minMaxLoc(steep, nullptr, &steepest);
-  for (int y = 0; y < cells.rows; ++y) {
-    for (int x = 0; x < cells.cols; ++x) {
-      if (static_cast<double>(steep.at<float>(y, x)) > 0.15 * steepest)
-        samples.push_back({layer.middle(x, y), static_cast<double>(cells.at<float>(y, x))});
-    }
-  }
-  const std::size_t step = samples.size() / 20'000 + 1;
-  for (int round = 0; round < 15; ++round) {
-    LeastSquares linear(9);
-    double vv = 1e-9, pv = 0;
-    for (std::size_t i = 0; i < samples.size(); i += step) {
-      const Spot p = view.at(samples[i].position.x, samples[i].position.y);
-      pv += darkness_at(photo, p.x, p.y) * samples[i].value;
-      vv += samples[i].value * samples[i].value;
-    }
-    const double gain = pv / vv;
-    for (std::size_t i = 0; i < samples.size(); i += step) {
-      const Spot& m = samples[i].position;
-      const Spot p = view.at(m.x, m.y);
-      if (p.x < 1 || p.y < 1 || p.x > photo.cols - 2 || p.y > photo.rows - 2) continue;
-      const double gx = darkness_at(slope_x, p.x, p.y), gy = darkness_at(slope_y, p.x, p.y);
-      const double u = (m.x - view.middle.x) / view.unit, v = (m.y - view.middle.y) / view.unit,
-                   w = 1 + view.h[6] * u + view.h[7] * v;
-      const double g = -(gx * p.x + gy * p.y);
-      const std::array<double, 9> slope{gx * u / w, gx * v / w, gx / w,    gy * u / w,       gy * v / w,
-                                        gy / w,     g * u / w,  g * v / w, -samples[i].value};
-      linear.add(slope, gain * samples[i].value - darkness_at(photo, p.x, p.y));
-    }
-    linear.damp(1e-9, 0);
-    std::array<double, 9> change{};
-    if (!linear.solve(change)) return;
-    for (std::size_t i = 0; i < 8; ++i) view.h[i] += change[i];
-    if (std::ranges::all_of(change.begin(), change.begin() + 6, [](double one) { return std::abs(one) < 1e-4; })) return;
-  }
-}
-
-/// The photograph in the cells of the layer.
-cv::Mat in_cells(const cv::Mat& image, const LayerCells& layer, const View& view) {
-  cv::Mat detected(layer.share.size(), CV_32F);
-  for (int y = 0; y < detected.rows; ++y) {
-    for (int x = 0; x < detected.cols; ++x) {
-      const Spot m = layer.middle(x, y), p = view.at(m.x, m.y);
-      const bool inside = p.x >= 0 && p.y >= 0 && p.x < image.cols - 1 && p.y < image.rows - 1;
-      detected.at<float>(y, x) = inside ? static_cast<float>(darkness_at(image, p.x, p.y)) : -1.0f;
-    }
-  }
-  return detected;
 }
 
 /// Darkness against the light of blank cells, to which a surface of second degree is fitted. In further rounds those that are
@@ -304,19 +159,6 @@ std::vector<BodyReading> bodies_of(const cv::Mat& dark, const LayerCells& layer,
   return bodies;
 }
 
-/// The best similarity of the mirrored layer to the photograph.
-double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const LayerCells& layer) {
-  double best = -1;
-  for (const int axis : {0, 1}) {
-    cv::Mat mirrored;
-    cv::flip(cells, mirrored, axis);
-    double likeness = 0;
-    first_view(photo, mirrored, layer, likeness);
-    best = std::max(best, likeness);
-  }
-  return best;
-}
-
 cv::Mat disc_of(double across_cells) {
   const int side = 2 * static_cast<int>(std::ceil(across_cells / 2)) + 1;
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side});
@@ -346,7 +188,7 @@ ColourField field_of(const Photo& photo, const ExpectedLayer& layer, const View&
     }
   }
   cv::dilate(field.wanted, field.wanted, disc_of(2 * kAwayMm / field.side));
-  field.light = in_cells(photo.light, {field.wanted, 0, 0, field.side}, view);
+  field.light = in_cells(photo.light, {field.wanted, 0, 0, field.side}, view, -1);
   return field;
 }
 
@@ -379,33 +221,25 @@ std::vector<ExtraInk> extra_ink(const Photo& photo, const ExpectedLayer& layer, 
 }  // namespace
 
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
-  constexpr double kMinLikeness = 0.25, kClearly = 0.05;
+  constexpr double kMinLikeness = 0.6, kClearly = 0.02;
   const LayerCells cells = cells_of(layer);
   if (cells.share.empty())
     return Error{Fault::kInput,
                  "cannot be compared: the layer is empty, or too large for pixels of the size that --pixel says"};
-  const double wide = std::max(8.0, 0.08 * std::max(cells.share.cols, cells.share.rows));
-  const cv::Mat detected = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
-  Comparison comparison;
-  comparison.view = first_view(detected, wanted, cells, comparison.likeness);
-  if (const double mirrored = mirrored_likeness(detected, wanted, cells);
-      mirrored >= kMinLikeness && mirrored > comparison.likeness + kClearly)
+  const LayerPosition position = locate_layer(photo.light, cells);
+  if (position.mirrored_likeness >= kMinLikeness && position.mirrored_likeness > position.likeness + kClearly)
     return Error{Fault::kInput, "is a mirror image of the layer; flip the picture, or photograph the layer from above"};
-  if (comparison.likeness < kMinLikeness)
-    return Error{
-        Fault::kInput,
-        "does not show the layer: it has to be upright, rotated by at most 6 degrees, with a pixel size close to --pixel"};
-  for (const double blur : {4.0, 2.0, 1.0}) {
-    cv::Mat soft, soft_cells;
-    cv::GaussianBlur(detected, soft, {}, blur);
-    cv::GaussianBlur(wanted, soft_cells, {}, blur);
-    refine(soft, soft_cells, cells, comparison.view);
-  }
+  if (position.likeness < kMinLikeness)
+    return Error{Fault::kInput,
+                 fmt::format("does not show the layer (correlation {:.2f}, at least {} is needed): photograph it from above, "
+                             "with a pixel size within 5 % of --pixel",
+                             std::max(position.likeness, 0.0), kMinLikeness)};
+  Comparison comparison{position, {}, {}, {}};
   cv::Mat blank, full;
   cv::dilate(cells.share > 0.01, blank, disc_of(8));
   blank = blank == 0;
   cv::erode(cells.share > 0.99, full, disc_of(4));
-  const cv::Mat dark = darkness_of(in_cells(photo.light, cells, comparison.view), blank, 1, 1);
+  const cv::Mat dark = darkness_of(in_cells(photo.light, cells, position.view, -1), blank, 1, 1);
   std::vector<float> inked;
   for (int y = 0; y < dark.rows; ++y) {
     for (int x = 0; x < dark.cols; ++x) {
@@ -421,7 +255,7 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
     return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};
   comparison.bands = missing_bands(dark, full, cells, layer.scan_along_x, ink);
   comparison.bodies = bodies_of(dark, cells, ink);
-  comparison.extra = extra_ink(photo, layer, comparison.view, ink);
+  comparison.extra = extra_ink(photo, layer, position.view, ink);
   return comparison;
 }
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "stages/calibration/scan/locate.h"
 #include "stages/calibration/scan/photo.h"
-#include "stages/calibration/scan/sheet_fit.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
@@ -35,16 +35,15 @@ struct ExtraInk {
 };
 
 struct Comparison {
-  View view;
-  double likeness = 0;  // correlation of layer and photograph, 1 at most
+  LayerPosition position;
   std::vector<MissingBand> bands;
   std::vector<BodyReading> bodies;
   std::vector<ExtraInk> extra;
 };
 
-/// Registers the photograph, turned by at most 6 degrees, by its content, and compares.
+/// Registers the photograph, at any rotation, by its content, and compares.
 /// errors  kInput: the layer is empty, or the photograph does not show it, or is mirrored
-/// cost    a second for a million pixels
+/// cost    four seconds for a million pixels
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer);
 
 }  // namespace lamina::calibration

@@ -12,8 +12,6 @@
 namespace lamina::calibration {
 namespace {
 
-constexpr double kReportedPixels = 0.1, kErrors = 4;
-
 /// In um, along the scan and across it.
 using Axes = std::array<double, 2>;
 
@@ -21,15 +19,10 @@ Axes axes_of(const Chart& chart, const Spot& mm) {
   return {1000 * along_of(chart, mm) * chart.along_sign, 1000 * across_of(chart, mm) * chart.across_sign};
 }
 
-Measure measured(double um, double error_um, double freedom, double pitch_nm) {
-  return {um, error_um, errors_of_99(freedom) * error_um, kErrors * error_um <= kReportedPixels * 1e-3 * pitch_nm};
-}
-
 /// freedom  degrees of it that the errors have
-Offset offset_of(const Chart& chart, const Axes& um, const Axes& error_um, const Axes& freedom) {
-  const Spot nm{chart.pixel_x_nm, chart.pixel_y_nm};
-  return {measured(um[0], error_um[0], freedom[0], along_of(chart, nm)),
-          measured(um[1], error_um[1], freedom[1], across_of(chart, nm))};
+Offset offset_of(const Axes& um, const Axes& error_um, const Axes& freedom) {
+  return {{um[0], error_um[0], errors_of_99(freedom[0]) * error_um[0]},
+          {um[1], error_um[1], errors_of_99(freedom[1]) * error_um[1]}};
 }
 
 /// The detected dashes of a nozzle. um  distance of each from its position in the swath, along and across
@@ -108,11 +101,11 @@ std::vector<Axes> line_errors(const std::vector<std::optional<Axes>>& nozzles, c
   return line_error;
 }
 
-/// Shifts of swaths against the first one, along the head's line, by a fit. reported  which nozzles make the line
-std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::vector<bool>& reported, std::uint32_t first) {
+/// Shifts of swaths against the first one, along the head's line, by a fit. known  which nozzles make the line
+std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::vector<bool>& known, std::uint32_t first) {
   std::vector<std::optional<Axes>> nozzles(chart.nozzles);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
-    if (reported[n]) nozzles[n] = axes_of(chart, fit.offset[n]);
+    if (known[n]) nozzles[n] = axes_of(chart, fit.offset[n]);
   }
   const std::array<HeadLine, 2> lines = lines_of(nozzles);
   std::vector<Axes> swaths;
@@ -129,7 +122,7 @@ constexpr std::uint32_t kGroups = 9;  // by combs, and thirds of the nozzles
 
 /// Standard errors of swaths_of(), with kGroups - 1 degrees of freedom.
 std::vector<Axes> swath_errors(const Chart& chart, const std::vector<Sighting>& all, const SheetFit& fit,
-                               const std::vector<bool>& reported, std::uint32_t first, bool lens) {
+                               const std::vector<bool>& known, std::uint32_t first, bool lens) {
   std::vector<std::vector<Axes>> without;
   for (std::uint32_t g = 0; g < kGroups; ++g) {
     std::vector<Sighting> rest;
@@ -138,7 +131,7 @@ std::vector<Axes> swath_errors(const Chart& chart, const std::vector<Sighting>& 
     }
     SheetFit other = fit;
     fit_sheet(rest, first, lens, other);
-    without.push_back(swaths_of(chart, other, reported, first));
+    without.push_back(swaths_of(chart, other, known, first));
   }
   std::vector<Axes> errors(chart.swaths);
   for (std::uint32_t s = 0; s < chart.swaths; ++s) {
@@ -184,7 +177,7 @@ HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detect
   head.nozzle.assign(chart.nozzles, std::nullopt);
   const std::vector<NozzleTally> tallies = tallies_of(chart, detected, printed, fit);
   const Axes scatter = scatter_of_dashes(tallies);
-  std::vector<bool> reported(chart.nozzles, false);
+  std::vector<bool> known(chart.nozzles, false);
   std::vector<std::optional<Axes>> offsets(chart.nozzles), errors(chart.nozzles);
   std::vector<Axes> freedom(chart.nozzles);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
@@ -199,7 +192,7 @@ HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detect
       if (tally.absent * 3 > inspected) head.weak.push_back(n);
       head.nozzle[n] = Offset{};
       if (tally.um[0].empty()) continue;  // all of them marred
-      reported[n] = true;
+      known[n] = true;
       offsets[n] = errors[n] = Axes{};
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const SettledMean settled = settled_mean(tally.um[axis], scatter[axis]);
@@ -212,21 +205,21 @@ HeadReading read_head(const Chart& chart, const std::vector<DashReading>& detect
   const std::array<HeadLine, 2> lines = lines_of(offsets);
   const std::vector<Axes> line_error = line_errors(offsets, errors);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
-    if (!reported[n]) continue;
+    if (!known[n]) continue;
     Axes um = *offsets[n], error = *errors[n];
     for (std::size_t axis = 0; axis < 2; ++axis) {
       um[axis] -= lines[axis].at(n);
       error[axis] = std::hypot(error[axis], line_error[n][axis]);
     }
-    head.nozzle[n] = offset_of(chart, um, error, freedom[n]);
+    head.nozzle[n] = offset_of(um, error, freedom[n]);
   }
   const auto first = static_cast<std::uint32_t>(std::ranges::find(printed, true) - printed.begin());
   const std::vector<Sighting> all = sightings_of(chart, detected, fit.view, printed);
-  const std::vector<Axes> swaths = swaths_of(chart, fit, reported, first);
-  const std::vector<Axes> swath_error = swath_errors(chart, all, fit, reported, first, lens);
+  const std::vector<Axes> swaths = swaths_of(chart, fit, known, first);
+  const std::vector<Axes> swath_error = swath_errors(chart, all, fit, known, first, lens);
   head.swath.assign(chart.swaths, std::nullopt);
   for (std::uint32_t s = 0; s < chart.swaths; ++s) {
-    if (printed[s]) head.swath[s] = offset_of(chart, swaths[s], swath_error[s], {kGroups - 1, kGroups - 1});
+    if (printed[s]) head.swath[s] = offset_of(swaths[s], swath_error[s], {kGroups - 1, kGroups - 1});
   }
   return head;
 }

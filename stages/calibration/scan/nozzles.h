@@ -11,11 +11,11 @@
 
 namespace lamina::calibration {
 
-/// A length with its standard error. within_um  99 in 100 of them are nearer to the true value (stages/calibration/robust.h)
-/// reported  four standard errors are at most a tenth of a pixel of the layer
+/// A length with its standard error, 0 where all dashes are marred and nothing is known.
+/// within_um  99 in 100 of them are nearer to the true value (stages/calibration/robust.h)
 struct Measure {
   double um = 0, error_um = 0, within_um = 0;
-  bool reported = false;
+  bool known() const { return error_um > 0; }
 };
 
 /// A shift: along the scan, positive where places rise; across it, positive where lines rise.

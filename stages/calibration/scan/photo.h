@@ -31,8 +31,8 @@ Photo photo_of(cv::Mat grey);
 
 /// Darkness between pixels, bilinear; 0 outside. x, y  pixel centres are whole
 inline double darkness_at(const cv::Mat& darkness, double x, double y) {
+  if (!(x >= 0 && y >= 0 && x < darkness.cols - 1 && y < darkness.rows - 1)) return 0;  // nor is NaN inside
   const int i = static_cast<int>(x), j = static_cast<int>(y);
-  if (x < 0 || y < 0 || i + 1 >= darkness.cols || j + 1 >= darkness.rows) return 0;
   const double u = x - i, v = y - j;
   const float *above = darkness.ptr<float>(j), *below = darkness.ptr<float>(j + 1);
   return (1 - v) * ((1 - u) * static_cast<double>(above[i]) + u * static_cast<double>(above[i + 1])) +

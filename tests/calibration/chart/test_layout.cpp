@@ -218,10 +218,10 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   chart.layer_mm = 0.1;
   const char* reading =
       R"({"pixels_per_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"unreadable":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"along_within_um":2.25,"across_um":null,"across_within_um":80},null],)"
-      R"("nozzles":[{"along_um":-5,"along_detected_um":-5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},)"
-      R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":0,"across_detected_um":0,"across_error_um":0.5},null,)"
-      R"({"along_um":5,"along_detected_um":5,"along_error_um":0.5,"across_um":1,"across_detected_um":1,"across_error_um":0.5},)"
-      R"({"along_um":null,"along_detected_um":-8,"along_error_um":3,"across_um":1,"across_detected_um":1,"across_error_um":0.5},null],)"
+      R"("nozzles":[{"along_um":-5,"along_error_um":0.5,"along_within_um":2,"across_um":0,"across_error_um":0.5,"across_within_um":2},)"
+      R"({"along_um":5,"along_error_um":0.5,"along_within_um":2,"across_um":0,"across_error_um":0.5,"across_within_um":2},null,)"
+      R"({"along_um":5,"along_error_um":0.5,"along_within_um":2,"across_um":1,"across_error_um":0.5,"across_within_um":2},)"
+      R"({"along_um":-8,"along_error_um":3,"along_within_um":11,"across_um":1,"across_error_um":0.5,"across_within_um":2},null],)"
       R"("stitches":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
       R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"detected_percent":61}]})";
   const auto lines = pipeline::take_over(reading, chart, machine);
@@ -231,7 +231,7 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   EXPECT_EQ(machine.head.dot_gain_um, (std::array<double, 2>{31, 12}));
   for (const char* words :
        {"--bleed 31x12", "was not printed", "unreadable across, +30.0 um (within 2.2) along", "stitch 1  shows -41 um across",
-        "1 of 8 nozzle offsets", "4 read, within 8 um along the scan and 1 across", "changed by -10.5 um (within ",
+        "4 read, within 8 um along the scan and 1 across", "median 99 % limits 2.0 and 2.0 um", "change of -10.5 um (within ",
         "50 % of the pixels, 6.2 % saturation: 61 %"})
     EXPECT_EQ(std::ranges::count_if(*lines, [&](const std::string& line) { return line.find(words) != std::string::npos; }), 1)
         << words;

@@ -90,7 +90,7 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
     printing.gain_um = between(0, 30);
     printing.skips = [&](std::uint32_t line) { return line >= gap && line < gap + 3; };
     Camera camera{.pixels_a_mm = between(9.8, 10.2),
-                  .turn_deg = between(-4, 4),
+                  .turn_deg = between(-180, 180),
                   .tilt_x = between(-0.02, 0.02),
                   .tilt_y = between(-0.02, 0.02),
                   .margin_mm = between(3, 8),
@@ -116,6 +116,7 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
       ADD_FAILURE() << "layer " << i << ": " << detected.error().message;
       continue;
     }
+    EXPECT_NEAR(std::remainder(detected->position.rotation_deg - camera.turn_deg, 360), 0, 1) << "layer " << i;
     const double at = (gap + 1.5) * grid->line_nm * 1e-6;
     bool hit = false;
     for (const calibration::MissingBand& band : detected->bands) {
@@ -126,7 +127,7 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
     found += hit;
     if (requested != nullptr && (hit != (gap != UINT32_MAX) || detected->bands.size() > 1))
       printf("layer %d: %zu bands, gap %u, likeness %.3f, ink %.2f, turn %.2f\n", i, detected->bands.size(), gap,
-             detected->likeness, camera.ink, camera.turn_deg);
+             detected->position.likeness, camera.ink, camera.turn_deg);
     extra += detected->extra.size();
     if (gap == UINT32_MAX) {
       double expected = 0, got = 0;
@@ -211,6 +212,37 @@ TEST(ComparedLayer, InkWhereTheLayerHasNoneIsReported) {
   const auto whole = compare_blocks(all, grey);
   ASSERT_TRUE(whole) << whole.error().message;
   EXPECT_TRUE(whole->extra.empty());
+}
+
+TEST(ComparedLayer, AnotherLayerIsRefused) {
+  const SheetOfBlocks all(true);
+  SheetOfBlocks other(true);
+  std::mt19937_64 random(3);
+  other.layer = random_layer(other.grid, random);
+  const auto refused = compare_blocks(other, grey_of_blocks(all, 1));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, Fault::kInput);
+  EXPECT_NE(refused.error().message.find("does not show the layer (correlation 0."), std::string::npos)
+      << refused.error().message;
+}
+
+/// A bar looks the same upside down: the smaller rotation is taken, the other one is reported.
+TEST(ComparedLayer, ASymmetricLayerNamesItsOtherRotation) {
+  SheetOfBlocks bar(false);
+  bar.layer = {bar.layer.columns, {0}, {}};
+  for (std::uint32_t r = 0; r < bar.grid.image.rows(); ++r) {
+    if (r >= 400 && r < 500) bar.layer.change.insert(bar.layer.change.end(), {300, 550});
+    bar.layer.row_offset.push_back(static_cast<std::uint32_t>(bar.layer.change.size()));
+  }
+  const auto detected = compare_blocks(bar, grey_of_blocks(bar, 4));
+  ASSERT_TRUE(detected) << detected.error().message;
+  EXPECT_NEAR(detected->position.rotation_deg, 2, 0.5);
+  ASSERT_EQ(detected->position.also_deg.size(), 1u);
+  EXPECT_NEAR(detected->position.also_deg[0], -178, 0.5);
+  const SheetOfBlocks all(true);
+  const auto unique = compare_blocks(all, grey_of_blocks(all, 4));
+  ASSERT_TRUE(unique) << unique.error().message;
+  EXPECT_TRUE(unique->position.also_deg.empty());
 }
 
 /// Eight in nine pixels are blank: nothing is printed in full.

@@ -154,7 +154,7 @@ struct Beyond {
 
 struct Errors {
   std::vector<double> nozzle, swath, gain_um;  // pixels of the layer
-  Beyond nozzles, swaths, rows;                // also of unreported ones
+  Beyond nozzles, swaths, rows;                // also of imprecise ones
   std::vector<double> row_um, ragged_um;       // of rows, and of gains where rows lie apart
   std::size_t blocked = 0, found = 0, accused = 0, unread = 0;
   std::size_t nozzles_unreadable = 0, swaths_unreadable = 0;
@@ -165,7 +165,7 @@ struct Errors {
 void add_measure(const calibration::Measure& measure, double pitch_um, double truth, std::vector<double>& errors,
                  Beyond& beyond, std::size_t& unreadable) {
   if (measure.error_um > 0) beyond.add(measure.um - truth * pitch_um, measure.within_um);  // else all its dashes are marred
-  if (!measure.reported) {
+  if (!measure.known() || 4 * measure.error_um > 0.1 * pitch_um) {  // sharper photographs determine all within that
     ++unreadable;
     return;
   }
@@ -332,7 +332,7 @@ TEST(ScannedChart, NozzlesAreNotHeldWhereTheyWereDetectedBefore) {
     std::vector<double> off_um;
     for (std::uint32_t n = 0; n < printed.grid.nozzles; ++n) {
       const auto& nozzle = reading->head.nozzle[n];
-      if (nozzle && nozzle->across.reported)
+      if (nozzle && nozzle->across.known())
         off_um.push_back(std::abs(nozzle->across.um - printed.grid.line_nm * 1e-3 *
                                                           (trial.printing.nozzle[n][1] - across.middle - across.slope * n)));
     }
