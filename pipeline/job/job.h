@@ -119,13 +119,13 @@ struct MaterialRange {
 
 /// The properties of images used as a part (docs/howto/plan_images.md) that their files do not state.
 struct PartImages {
-  std::optional<std::array<double, 2>> dpi;        // absent: by the tags of the files
-  std::optional<double> layer_mm;                  // absent: by the manifest next to them, or the job's
-  std::uint32_t threshold = 128;                   // grey below it is dark, 1 .. 255
-  bool invert = false;                             // bright pixels are jetted
-  bool missing_empty = false;                      // numbers that are missing are empty layers
-  bool crop = false;                               // what sticks out of the bed is cut off
-  bool resample = false;                           // another dpi than the job's is brought to it
+  std::optional<std::array<double, 2>> dpi;  // absent: by the tags of the files
+  std::optional<double> layer_mm;            // absent: by the manifest next to them, or the job's
+  std::uint32_t threshold = 128;             // grey below it is dark, 1 .. 255
+  bool invert = false;                       // bright pixels are jetted
+  bool missing_empty = false;                // numbers that are missing are empty layers
+  bool crop = false;                         // what sticks out of the bed is cut off
+  bool resample = false;                     // another dpi than the job's is brought to it
   bool operator==(const PartImages&) const = default;
 };
 
@@ -153,9 +153,9 @@ struct PartRequest {
 /// First the fields that decide the bytes of the output, then the others.
 struct Job {
   std::vector<PartRequest> parts;
-  std::optional<std::array<double, 2>> bed_mm;     // absent: the machine's bed, or kBareBedMm without a machine
-  std::optional<double> margin_mm;                 // absent: the machine's margin of the bed, or none
-  std::optional<std::array<double, 2>> dpi;        // absent: the machine's dpi, or kBareDpi without a machine
+  std::optional<std::array<double, 2>> bed_mm;  // absent: the machine's bed, or kBareBedMm without a machine
+  std::optional<double> margin_mm;              // absent: the machine's margin of the bed, or none
+  std::optional<std::array<double, 2>> dpi;     // absent: the machine's dpi, or kBareDpi without a machine
   double layer_mm = 0.05;
   HeightsRequest heights;
   double gap_mm = 5;  // between automatically arranged parts

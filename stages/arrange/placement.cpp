@@ -13,7 +13,8 @@ std::string size_text(std::int64_t width, std::int64_t depth) { return fmt::form
 
 /// What else to change, behind "use".
 std::string remedy(const BedSpace& bed) {
-  return fmt::format("{}{}", bed.margin > 0 ? "a smaller --margin, " : "", bed.of_machine ? "another machine" : "a larger --bed");
+  return fmt::format("{}{}", bed.margin > 0 ? "a smaller --margin, " : "",
+                     bed.of_machine ? "another machine" : "a larger --bed");
 }
 
 // A box that is wider or deeper than the bed cannot stand anywhere.
@@ -22,21 +23,20 @@ std::optional<Error> too_large(const BoxRequest& box, const BedSpace& bed) {
   if (box.width <= width && box.depth <= depth) return std::nullopt;
   const bool turned = box.depth <= width && box.width <= depth;
   const bool fits = box.width <= bed.width && box.depth <= bed.depth;
-  const std::string beyond =
-      margin == 0 ? fmt::format("is larger than the bed of {}", size_text(bed.width, bed.depth))
-                  : fmt::format("is larger than the bed of {} without its margin of {} mm", size_text(bed.width, bed.depth),
-                                mm(margin));
-  return Error{Fault::kUsage, fmt::format("{}: {} {}; {} {}{} or a smaller --scale", box.name, size_text(box.width, box.depth),
-                                          beyond, turned ? "try --rotate 0,0,90," : "use", remedy(bed),
-                                          margin > 0 && fits ? ", --at" : "")};
+  const std::string beyond = margin == 0 ? fmt::format("is larger than the bed of {}", size_text(bed.width, bed.depth))
+                                         : fmt::format("is larger than the bed of {} without its margin of {} mm",
+                                                       size_text(bed.width, bed.depth), mm(margin));
+  return Error{Fault::kUsage,
+               fmt::format("{}: {} {}; {} {}{} or a smaller --scale", box.name, size_text(box.width, box.depth), beyond,
+                           turned ? "try --rotate 0,0,90," : "use", remedy(bed), margin > 0 && fits ? ", --at" : "")};
 }
 
 Error no_space(const BoxRequest& box, std::uint32_t copy, std::int64_t missing, const BedSpace& bed) {
   const std::string margin = bed.margin > 0 ? fmt::format(" with a margin of {} mm", mm(bed.margin)) : "";
-  return {Fault::kUsage, fmt::format("{}: copy {} of {} finds no room on the bed of {}{}, {} mm of depth are missing; use fewer "
-                                     "--copies, a smaller --gap or {}",
-                                     box.name, copy + 1, box.copies, size_text(bed.width, bed.depth), margin, mm(missing),
-                                     remedy(bed))};
+  return {Fault::kUsage,
+          fmt::format("{}: copy {} of {} finds no room on the bed of {}{}, {} mm of depth are missing; use fewer "
+                      "--copies, a smaller --gap or {}",
+                      box.name, copy + 1, box.copies, size_text(bed.width, bed.depth), margin, mm(missing), remedy(bed))};
 }
 
 }  // namespace

@@ -25,7 +25,8 @@ TEST(Placement, SinglePartIsInTheMiddleRoundedDown) {
 TEST(Placement, PartAsLargeAsTheBedFitsAndOneNanometreMoreDoesNot) {
   EXPECT_TRUE(arrange_boxes(std::vector<BoxRequest>{{.width = 10, .depth = 10}}, {10, 10}, 5).ok());
   for (const auto& [width, depth] : {std::pair{11, 10}, {10, 11}}) {
-    const auto positions = arrange_boxes(std::vector<BoxRequest>{{.width = width, .depth = depth, .name = "a.stl"}}, {10, 10}, 5);
+    const auto positions =
+        arrange_boxes(std::vector<BoxRequest>{{.width = width, .depth = depth, .name = "a.stl"}}, {10, 10}, 5);
     ASSERT_FALSE(positions.ok());
     EXPECT_EQ(positions.error().fault, Fault::kUsage);
     EXPECT_NE(positions.error().message.find("a.stl"), std::string::npos);
@@ -93,7 +94,8 @@ TEST(Placement, NothingIsArrangedInTheMargin) {
   for (const BoxPosition& position : *with) {
     EXPECT_TRUE(position.x >= 3 && position.x + 4 <= 17 && position.y >= 3 && position.y + 3 <= 17);
   }
-  const std::vector<BoxRequest> one{{.width = 14, .depth = 14, .name = "a.stl"}}, larger{{.width = 15, .depth = 2, .name = "a.stl"}};
+  const std::vector<BoxRequest> one{{.width = 14, .depth = 14, .name = "a.stl"}},
+      larger{{.width = 15, .depth = 2, .name = "a.stl"}};
   EXPECT_TRUE(arrange_boxes(one, {20, 20, 3}, 0).ok());
   const auto refused = arrange_boxes(larger, {20, 20, 3'000'000}, 0), tight = arrange_boxes(larger, {20, 20, 3}, 0);
   ASSERT_FALSE(refused.ok() || tight.ok());

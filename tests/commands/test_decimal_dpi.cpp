@@ -52,7 +52,8 @@ TEST_F(DecimalDpi, IsReadBackFromEveryFormat) {
     EXPECT_NEAR(dpi[1].get<double>(), 262.006, exact ? 0 : 0.01) << format;
   }
   using Rational = std::array<std::uint32_t, 2>;
-  for (const char* layer : {"out-tiff-g4/layers/000000.tif", "out-tiff-g4/layers/000003.tif", "out-tiff-none/layers/000001.tif"}) {
+  for (const char* layer :
+       {"out-tiff-g4/layers/000000.tif", "out-tiff-g4/layers/000003.tif", "out-tiff-none/layers/000001.tif"}) {
     EXPECT_EQ(rational_of(read_text(folder / layer), 282), (Rational{54043, 100})) << layer;
     EXPECT_EQ(rational_of(read_text(folder / layer), 283), (Rational{131003, 500})) << layer;
   }
@@ -105,7 +106,8 @@ TEST_F(DecimalDpi, OfAMachineIsThatOfItsHead) {
 TEST_F(DecimalDpi, BeyondWhatIsKeptIsAnError) {
   for (const char* dpi : {"540.43125", "0.5", "25400.5", "1e300"})
     expect_refused(std::string("jet part.stl --dry-run --dpi ") + dpi, 2, "--dpi: ", folder);
-  expect_refused("jet part.stl --dry-run --set bed.dpi=540.43125", 2, "too many digits after the point; give at most 4", folder);
+  expect_refused("jet part.stl --dry-run --set bed.dpi=540.43125", 2, "too many digits after the point; give at most 4",
+                 folder);
 }
 
 }  // namespace

@@ -99,15 +99,15 @@ TEST_F(WrongUse, UnknownNamesAreRefusedWithTheNearestKnownOne) {
 
 TEST_F(WrongUse, ValuesOutOfRangeNameTheirOption) {
   const std::pair<const char*, const char*> values[] = {
-      {"--dpi", "0"},        {"--dpi", "-1"},       {"--dpi", "1e9"},   {"--dpi", "nan"},     {"--dpi", "600x"},
-      {"--dpi", "600.12345"},    {"--layer", "0"},      {"--layer", "-1"},  {"--layer", "NaN"},   {"--layer", "inf"},
-      {"--layer", "1e-9"},   {"--layer", "0.05mm"}, {"--bed", "0x0"},   {"--bed", "-10x10"},  {"--bed", "10"},
-      {"--bed", "2148x100"}, {"--bed", "nanxnan"},  {"--copies", "0"},  {"--copies", "1e10"}, {"--copies", "2.5"},
-      {"--gap", "-1"},       {"--scale", "0"},      {"--scale", "1,2"}, {"--scale", "nan"},   {"--rotate", "90"},
-      {"--shrink", "0"},     {"--shrink", "-1"},    {"--at", "-1,0"},   {"--at", "1"},        {"--unit", "parsec"},
-      {"--engine", "magic"}, {"--isa", "sse9"},     {"--fill", "some"}, {"--mirror", "z"},    {"--layers", "3:3"},
-      {"--layers", "x"},     {"--shard", "0/4"},    {"--shard", "5/4"}, {"--threads", "-1"},  {"--memory", "0"},
-      {"--memory", "lots"},  {"--weld", "-1"},      {"--bottom", "-1"}, {"--dpi", ""},        {"-o", ""},
+      {"--dpi", "0"},         {"--dpi", "-1"},       {"--dpi", "1e9"},   {"--dpi", "nan"},     {"--dpi", "600x"},
+      {"--dpi", "600.12345"}, {"--layer", "0"},      {"--layer", "-1"},  {"--layer", "NaN"},   {"--layer", "inf"},
+      {"--layer", "1e-9"},    {"--layer", "0.05mm"}, {"--bed", "0x0"},   {"--bed", "-10x10"},  {"--bed", "10"},
+      {"--bed", "2148x100"},  {"--bed", "nanxnan"},  {"--copies", "0"},  {"--copies", "1e10"}, {"--copies", "2.5"},
+      {"--gap", "-1"},        {"--scale", "0"},      {"--scale", "1,2"}, {"--scale", "nan"},   {"--rotate", "90"},
+      {"--shrink", "0"},      {"--shrink", "-1"},    {"--at", "-1,0"},   {"--at", "1"},        {"--unit", "parsec"},
+      {"--engine", "magic"},  {"--isa", "sse9"},     {"--fill", "some"}, {"--mirror", "z"},    {"--layers", "3:3"},
+      {"--layers", "x"},      {"--shard", "0/4"},    {"--shard", "5/4"}, {"--threads", "-1"},  {"--memory", "0"},
+      {"--memory", "lots"},   {"--weld", "-1"},      {"--bottom", "-1"}, {"--dpi", ""},        {"-o", ""},
   };
   for (const auto& [option, value] : values)
     refused(2, {"jet", "part.stl", "-o", "out", option, value}, {option + std::strlen(option) - 1});

@@ -131,7 +131,8 @@ TEST_F(LayerImagesTest, InvertedImageIsTheRest) {
 
 TEST(PlacedImage, TakesThePixelThatTheCentreLiesIn) {
   std::mt19937 random(3);
-  for (const auto& [own_dpi, dpi] : {std::pair{600.0, 600.0}, {300, 600}, {600, 250}, {127, 600}, {540.43, 600}, {300, 262.006}}) {
+  for (const auto& [own_dpi, dpi] :
+       {std::pair{600.0, 600.0}, {300, 600}, {600, 250}, {127, 600}, {540.43, 600}, {300, 262.006}}) {
     const PixelGrid grid{PixelAxis(pitch_of_dpi(dpi), 2'000'000), PixelAxis(pitch_of_dpi(dpi), 1'500'000)};
     const std::int64_t own = std::llround(own_dpi * 1000), dots = std::llround(dpi * 1000);
     Runs image;

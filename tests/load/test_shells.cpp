@@ -144,7 +144,7 @@ std::vector<FloatTriangle> sphere_facets(const std::array<double, 3>& centre, do
 double sphere_mm3(double radius) { return 4.0 / 3 * std::numbers::pi * radius * radius * radius; }
 
 /// By list and by blocks.
-std::array<Mesh, 2> both_ways(const std::vector<FloatTriangle>& facets, std::size_t notes) {
+std::array<Mesh, 2> by_list_and_blocks(const std::vector<FloatTriangle>& facets, std::size_t notes) {
   const std::string path = write_file("shells.stl", binary_stl(facets));
   load::LoadOptions options;
   Part list = loaded(path, options);
@@ -164,13 +164,13 @@ std::vector<FloatTriangle> joined(std::vector<FloatTriangle> one, const std::vec
 TEST(Shells, SpheresOfManyBlocksAreTurnedWithTheirHollows) {
   const auto sound = sphere_facets({20, 20, 20}, 12, 60, false);
   const auto overlapping = joined(sphere_facets({30, 20, 20}, 10, 60, true), sphere_facets({30, 21, 20}, 4, 40, false));
-  for (const Mesh& mesh : both_ways(joined(sound, overlapping), 1))
+  for (const Mesh& mesh : by_list_and_blocks(joined(sound, overlapping), 1))
     EXPECT_NEAR(mesh.volume_mm3, sphere_mm3(12) + sphere_mm3(10) - sphere_mm3(4), 0.01 * sphere_mm3(12));
   const auto hollow = sphere_facets({20, 21, 20}, 8, 50, true);
-  for (const Mesh& mesh : both_ways(joined(sound, hollow), 0))
+  for (const Mesh& mesh : by_list_and_blocks(joined(sound, hollow), 0))
     EXPECT_NEAR(mesh.volume_mm3, sphere_mm3(12) - sphere_mm3(8), 0.01 * sphere_mm3(12));
-  EXPECT_NE(both_ways(joined(sound, hollow), 0)[1].blocks, nullptr) << "a hollow is sound";
-  EXPECT_NE(both_ways(sound, 0)[1].blocks, nullptr);
+  EXPECT_NE(by_list_and_blocks(joined(sound, hollow), 0)[1].blocks, nullptr) << "a hollow is sound";
+  EXPECT_NE(by_list_and_blocks(sound, 0)[1].blocks, nullptr);
 }
 
 TEST(Shells, BodiesThatTouchAtACornerOrAnEdgeAreBodiesOfTheirOwn) {
@@ -182,7 +182,7 @@ TEST(Shells, BodiesThatTouchAtACornerOrAnEdgeAreBodiesOfTheirOwn) {
     double expected = 0;
     for (const GridBox& box : {base, other})
       expected += (box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) * (box.hi[2] - box.lo[2]) / 1000.0;
-    for (const Mesh& mesh : both_ways(joined(base.facets(), turned), 1)) EXPECT_NEAR(mesh.volume_mm3, expected, 1e-6 * expected);
+    for (const Mesh& mesh : by_list_and_blocks(joined(base.facets(), turned), 1)) EXPECT_NEAR(mesh.volume_mm3, expected, 1e-6 * expected);
   }
 }
 

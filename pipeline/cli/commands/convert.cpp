@@ -192,8 +192,7 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   std::array<double, 2> given{0, 0};
   std::int64_t threads = 0;
   const Limits resolution{.low = 1, .high = kMaxDpi, .one_for_all = true, .digits = kDpiDigits};
-  for (const Status& status :
-       {arguments.read("--dpi", resolution, given), arguments.read("--threads", {0, 4096}, threads)})
+  for (const Status& status : {arguments.read("--dpi", resolution, given), arguments.read("--threads", {0, 4096}, threads)})
     if (!status) return status;
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));

@@ -103,10 +103,10 @@ class VerticalLines {
 
   /// Whether the winding number is negative somewhere on a line.
   bool any_negative() const {
-    tbb::enumerable_thread_specific<std::vector<Crossing>> found;
+    tbb::enumerable_thread_specific<std::vector<LineCrossing>> found;
     const auto all = static_cast<std::uint32_t>(blocks_.cluster_count());
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, all, 1024), [&](const tbb::blocked_range<std::uint32_t>& range) {
-      std::vector<Crossing>& own = found.local();
+      std::vector<LineCrossing>& own = found.local();
       for (std::uint32_t c = range.begin(); c != range.end(); ++c) {
         const Box& box = blocks_.bounds()[c];
         if (!lines_in(box.lo.x, box.hi.x, box.lo.y, box.hi.y).any()) continue;
@@ -118,11 +118,11 @@ class VerticalLines {
     });
     std::vector<std::uint32_t> end(static_cast<std::size_t>((per_side_ + 2) * (per_side_ + 2)), 0);
     for (const auto& some : found)
-      for (const Crossing& one : some) ++end[one.line];
+      for (const LineCrossing& one : some) ++end[one.line];
     std::partial_sum(end.begin(), end.end(), end.begin());
-    std::vector<Crossing> crossings(end.back());
+    std::vector<LineCrossing> crossings(end.back());
     for (const auto& some : found)
-      for (const Crossing& one : some) crossings[--end[one.line]] = one;
+      for (const LineCrossing& one : some) crossings[--end[one.line]] = one;
     for (std::size_t begin = 0, next = 0; begin < crossings.size(); begin = next) {
       while (next < crossings.size() && crossings[next].line == crossings[begin].line) ++next;
       if (is_negative(std::span(crossings).subspan(begin, next - begin))) return true;
@@ -131,18 +131,18 @@ class VerticalLines {
   }
 
  private:
-  struct Crossing {
+  struct LineCrossing {
     double z;
     std::uint32_t line;
     std::int32_t enters;  // 1, or -1 where it leaves
   };
   /// Downwards from above: a body is entered through its top. Of equal heights those that enter come first.
-  static bool is_negative(std::span<Crossing> of_line) {
-    std::ranges::sort(of_line, [](const Crossing& one, const Crossing& other) {
+  static bool is_negative(std::span<LineCrossing> of_line) {
+    std::ranges::sort(of_line, [](const LineCrossing& one, const LineCrossing& other) {
       return one.z != other.z ? one.z > other.z : one.enters > other.enters;
     });
     std::int32_t winding = 0;
-    for (const Crossing& one : of_line)
+    for (const LineCrossing& one : of_line)
       if ((winding += one.enters) < 0) return true;
     return false;
   }
@@ -199,7 +199,7 @@ class VerticalLines {
     return lanes;
   }
 
-  void cross(const Triangle& t, std::vector<Crossing>& out) const {
+  void cross(const Triangle& t, std::vector<LineCrossing>& out) const {
     const Lines lines = lines_in(std::min({t.a.x, t.b.x, t.c.x}), std::max({t.a.x, t.b.x, t.c.x}),
                                  std::min({t.a.y, t.b.y, t.c.y}), std::max({t.a.y, t.b.y, t.c.y}));
     for (std::int64_t i = std::max(0, lines.x_first); i <= std::min<std::int64_t>(lines.x_last, per_side_ + 1); ++i) {

@@ -243,7 +243,8 @@ TEST_F(InspectedJobs, AWiderMinWallFindsAllThatANarrowerOneFinds) {
   }
   // 0.3 mm are enough where nothing else is requested.
   EXPECT_EQ(codes(inspect(stl("three.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.3, 1}}}))), std::set<std::string>{});
-  EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{"thin"});
+  EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))),
+            std::set<std::string>{"thin"});
   EXPECT_EQ(codes(inspect(part)), std::set<std::string>{"thin"});
 }
 
