@@ -32,11 +32,13 @@ std::optional<Error> too_large(const BoxRequest& box, const BedSpace& bed) {
 }
 
 Error no_space(const BoxRequest& box, std::uint32_t copy, std::int64_t missing, const BedSpace& bed) {
-  const std::string margin = bed.margin > 0 ? fmt::format(" with a margin of {} mm", mm(bed.margin)) : "";
+  const bool margin = bed.margin > 0;
   return {Fault::kUsage,
-          fmt::format("{}: copy {} of {} finds no room on the bed of {}{}, {} mm of depth are missing; use fewer "
-                      "--copies, a smaller --gap or {}",
-                      box.name, copy + 1, box.copies, size_text(bed.width, bed.depth), margin, mm(missing), remedy(bed))};
+          fmt::format("{}: copy {} of {} finds no room on the bed of {}{}, {} mm of depth are missing; use "
+                      "fewer --copies, {}a smaller --gap or {}",
+                      box.name, copy + 1, box.copies, size_text(bed.width, bed.depth),
+                      margin ? fmt::format(" with a margin of {} mm", mm(bed.margin)) : "", mm(missing),
+                      margin ? "a smaller --margin, " : "", bed.of_machine ? "another machine" : "a larger --bed")};
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ TEST_F(LayerLines, ThicknessesOfOtherLayersAreFoundByWhatDistinguishesThem) {
 
 TEST_F(LayerLines, TimesOfAddedSweepsAreThoseOfThePrograms) {
   const std::string slow =
-      "inherits = \"jet1000-grey\"\n[bed]\nsize_mm = [20, 20]\n[head]\nhighest_frequency_hz = 6000\n[machine]\nname = \"slow\"\n";
+      "inherits = \"jet1000-grey\"\n[bed]\nsize_mm = [20, 20]\nmargin_mm = 0\n[head]\nhighest_frequency_hz = 6000\n[machine]\nname = \"slow\"\n";
   const struct {
     const char *dialect, *motion, *maintenance;
   } rows[] = {{"planes", "", ""},
