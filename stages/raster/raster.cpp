@@ -25,6 +25,14 @@ constexpr std::size_t kMaxClusters = 1 << 16;
 /// Segments that a kernel may write behind those of a layer.
 constexpr std::uint64_t kMoreSegments = kClusterSize;
 
+/// The first of the owners with the largest area.
+LevelFace largest(Buffer<LevelFace>& faces) {
+  std::ranges::sort(faces, {}, &LevelFace::owner);
+  LevelFace all;
+  for (const LevelFace& face : faces) all.keep_larger(face);
+  return all;
+}
+
 }  // namespace
 
 struct Rasterizer::State {
@@ -167,8 +175,7 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
     }
   }
   out.row_offset.resize(std::size_t{rows} + 1, static_cast<std::uint32_t>(out.change.size()));
-  std::ranges::sort(scratch.segments.level, {}, &LevelFace::owner);
-  for (const LevelFace& face : scratch.segments.level) report.level.keep_larger(face);
+  report.level = largest(scratch.segments.level);
   report.scratch_bytes = scratch.bytes();
   return report;
 }
