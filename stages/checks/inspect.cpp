@@ -380,18 +380,20 @@ void report(const Findings& findings, std::span<const std::string> part, double 
                     "them; widen the drains, or set a smaller --min-drain",
                     of(drains.count, "hollow", "hollows"), drains.amount, drain_mm, drains.largest, at(drains.spot)));
   }
-  const auto narrow = [&](const char* code, const Found& found, std::string_view one, std::string_view several,
-                          std::string_view advice) {
-    if (found.count == 0) return;
-    warn(code, found.spot,
-         fmt::format("{} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: {}, or set a smaller --min-wall",
-                     of(found.count, one, several), min_mm, found.largest, at(found.spot), advice));
+  const auto narrow = [&](const Found& found, std::string_view one, std::string_view several, std::string_view advice) {
+    return fmt::format("{} narrower than {:.3g} mm, the largest of {:.3g} mm2 {}: {}, or set a smaller --min-wall",
+                       of(found.count, one, several), min_mm, found.largest, at(found.spot), advice);
   };
-  narrow("thin", thin, "wall or pin", "walls or pins", "they may break; make them thicker");
-  narrow("roofs", roofs, "roof or floor", "roofs or floors", "they may break; make them thicker");
-  narrow("gaps", gaps, "gap", "gaps", "they may close, or keep powder; make them wider");
-  narrow("contacts", contacts, "edge, corner or neck that joins two bodies", "edges, corners or necks that join two bodies",
-         "they may break; let the bodies overlap more");
+  const std::string_view breaks = "they may break; make them thicker",
+                         closes = "they may close, or keep powder; make them wider";
+  if (thin.count > 0) warn("thin", thin.spot, narrow(thin, "wall or pin", "walls or pins", breaks));
+  if (roofs.count > 0) warn("roofs", roofs.spot, narrow(roofs, "roof or floor", "roofs or floors", breaks));
+  if (gaps.count > 0) warn("gaps", gaps.spot, narrow(gaps, "gap", "gaps", closes));
+  if (contacts.count > 0) {
+    warn("contacts", contacts.spot,
+         narrow(contacts, "edge, corner or neck that joins two bodies", "edges, corners or necks that join two bodies",
+                "they may break; let the bodies overlap more"));
+  }
   for (const Findings::Touching& pair : touching) {
     const std::string parts = pair.part == pair.other
                                   ? "copies of " + name_of(part, pair.part)
