@@ -123,7 +123,7 @@ std::uint32_t drop_empty_top(const Scene& scene, Containment containment, LayerS
   const auto plane = containment == Containment::kInside ? &ScheduledLayer::high : &ScheduledLayer::low;
   const std::vector<Nm> tops = tops_of(scene);
   const auto dropped = std::erase_if(schedule.layers, [&](const ScheduledLayer& s) {
-    return s.number > 0 && schedule.planes[s.*plane] >= (s.part == kEveryPart ? scene.height : tops[s.part]);
+    return s.number > 0 && schedule.planes[s.*plane] + kPlaneReach >= (s.part == kEveryPart ? scene.height : tops[s.part]);
   });
   for (std::uint32_t i = 0; i < schedule.layers.size(); ++i) schedule.layers[i].layer.index = i;
   return static_cast<std::uint32_t>(dropped);

@@ -72,7 +72,7 @@ Status plan(const Part& part, std::span<const Diagnosis> diagnosis, const Surplu
 /// Nothing is wrong but that facets may be degenerate.
 bool is_sound(const Diagnosis& found) {
   return found.balanced && found.open_edges.count + found.non_manifold_edges.count + found.misoriented_edges.count == 0 &&
-         found.duplicate_facets.count == 0;
+         found.duplicate_facets.count == 0 && found.inverted_shells == 0;
 }
 
 /// Loads a part as it is in the file and diagnoses it. A sound mesh that comes as blocks is diagnosed as such: where shells lie

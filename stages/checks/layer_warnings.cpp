@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "stages/checks/solid_checks.h"
-#include "stages/data/mesh.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::checks {
@@ -72,19 +71,17 @@ void LevelWarnings::add(const Layer& layer, const LevelFace& face) {
   layers_.add(layer);
   if (face.area_um2 <= largest_.area_um2) return;
   largest_ = face;
-  position_ = fmt::format("layer {} is sampled, z {:.4f} mm", layer.index, mm(layer.plane()));
+  position_ = fmt::format("layer {} is sampled, z {:.4f} mm", layer.index, mm(face.plane));
 }
 
 void LevelWarnings::report(const std::string& part, std::vector<Warning>& warnings) const {
-  // All corners have to count as above the plane, or none.
-  const double down_mm = mm(largest_.highest - kPlaneReach), up_mm = mm(kPlaneReach + 1 - largest_.lowest);
-  const auto rounded_up = [](double length_mm) { return fmt::format("{:.4f}", length_mm + 0.00005); };
+  // Then all corners count as above the plane, or none does.
+  constexpr double kAwayMm = (kLevelReach + 2 * kPlaneReach) * 1e-6;
   layers_.warn("horizontal-face",
-               fmt::format("{}: {:.2f} mm2 of a horizontal face lie within 0.001 mm of where {}, and may be printed in part{}; "
-                           "{} the face by {} mm, or choose another layer thickness",
+               fmt::format("{}: {:.2f} mm2 of a horizontal face lie within 0.001 mm of where {}, and may be printed in part{}; move "
+                           "the face up or down by {:.4f} mm, or choose another layer thickness",
                            part, static_cast<double>(largest_.area_um2) / 1e6, position_,
-                           layers_.count > 1 ? fmt::format(" ({} such layers)", layers_.count) : "",
-                           down_mm <= up_mm ? "lower" : "raise", rounded_up(std::min(down_mm, up_mm))),
+                           layers_.count > 1 ? fmt::format(" ({} such layers)", layers_.count) : "", kAwayMm),
                warnings, part);
 }
 
@@ -166,7 +163,7 @@ void warn_of_lost_pixels(std::uint64_t pixels, std::vector<Warning>& warnings) {
 
 void warn_of_open_top(const Layer& last, std::int64_t height, std::vector<Warning>& warnings) {
   const std::int64_t end = std::int64_t{last.bottom} + last.thickness;
-  if (end < height || last.highest_plane() >= height) {
+  if (end < height || last.highest_plane() + kPlaneReach >= height) {
     warnings.push_back(
         {"cover-top", fmt::format("--cover-top: the layer that covers the top is empty with --containment inside, the "
                                   "topmost {:.3f} mm are not built; leave out one of the two",

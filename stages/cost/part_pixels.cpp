@@ -85,7 +85,7 @@ template <class Row>
 std::vector<std::uint64_t> PartPixels::sums(const Layer& layer, std::uint32_t rows, const Row& row_of) const {
   std::vector<std::uint64_t> sums(parts_), weights;
   const auto reaches = [&](const BodyWindow& window) {
-    return window.low <= layer.highest_plane() && window.high >= layer.lowest_plane();
+    return window.low <= layer.highest_plane() + kPlaneReach && window.high >= layer.lowest_plane();
   };
   for (const BodyGroup& group : groups_) {
     if (group.bodies.empty() || !reaches(group.around)) continue;

@@ -1,6 +1,7 @@
 // stages/data/layer.h: one layer of the job, the plane that stands for it, and the binder and powder in it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -47,10 +48,10 @@ struct Layer {
   Nm plane_below(std::int64_t top) const {
     return plane() < top || top <= bottom ? plane() : static_cast<Nm>(bottom + (top - bottom) / 2);
   }
-  /// The planes that see the section at the layer's very bottom and at its very top. Vertices on a plane count as below
-  /// it, so the upper one lies 1 nm under the top: a face that ends the layer is still cut.
+  /// The planes that see the section at the layer's very bottom and at its very top. Vertices up to kPlaneReach above a plane count
+  /// as below it, so the upper one lies 1 nm more under the top: a face that ends the layer is still cut.
   Nm lowest_plane() const { return bottom; }
-  Nm highest_plane() const { return bottom + thickness - 1; }
+  Nm highest_plane() const { return std::max(bottom, bottom + thickness - 1 - kPlaneReach); }
 };
 
 /// Per cent of the powder's voids: a number, or a formula of the position (stages/dose/field.h).

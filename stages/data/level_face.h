@@ -14,17 +14,13 @@ inline constexpr Nm kLevelReach = 1000;
 
 /// What one owner has of such triangles in a layer: all corners within kLevelReach of the plane, which cuts them all the same.
 struct LevelFace {
-  std::uint64_t area_um2 = 0;    // projected on the plane
-  Nm lowest = 0, highest = 0;    // of their corners, above the plane
-  std::uint32_t owner = 0;       // an instance of the scene, or a body
+  std::uint64_t area_um2 = 0;  // projected on the plane
+  Nm plane = 0;                // nm above the bed
+  std::uint32_t owner = 0;     // an instance of the scene, or a body
 
-  /// Heights of a triangle's corners above the plane. double_area  projected, nm2
-  void add(Nm a, Nm b, Nm c, std::uint64_t double_area) {
-    const auto [low, high] = std::minmax({a, b, c});
-    lowest = area_um2 == 0 ? low : std::min(lowest, low);
-    highest = area_um2 == 0 ? high : std::max(highest, high);
-    area_um2 += double_area / 2'000'000;
-  }
+  /// double_area  of a triangle, projected, nm2
+  void add(std::uint64_t double_area) { area_um2 += double_area / 2'000'000; }
+  /// Heights of a triangle's corners above the plane, nm.
   static bool is_level(std::int64_t a, std::int64_t b, std::int64_t c) {
     return std::max({a, b, c}) <= kLevelReach && std::min({a, b, c}) >= -kLevelReach;
   }

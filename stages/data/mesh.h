@@ -59,9 +59,6 @@ inline constexpr std::size_t kTriangleSlack = 32;
 // plane through them would meet half of its triangles. A vertex up to kPlaneReach above a plane therefore counts as in the plane,
 // for this plane alone and in all triangles at once: the mesh stays closed, and no surface moves by more than that.
 
-/// nm; a float in mm has steps of 31 nm from 256 mm on
-inline constexpr Nm kPlaneReach = 100;
-
 constexpr bool is_above_plane(std::int64_t z, std::int64_t plane) { return z > plane + kPlaneReach; }
 
 /// The height at which a vertex counts, nm: above the plane, or at most in it.

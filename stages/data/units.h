@@ -13,6 +13,9 @@ inline constexpr std::int64_t kNmPerMm = 1'000'000;
 inline constexpr std::int64_t kNmPerInch = 25'400'000;
 inline constexpr std::int64_t kNmReach = 2'147'483'647;
 
+/// Up to so many nm above a sampling plane, a vertex counts as in it (mesh.h): a float in mm has steps of 31 nm from 256 mm on.
+inline constexpr Nm kPlaneReach = 100;
+
 /// An angle in millionths of a degree; 0 is +x, anticlockwise. Directions on the bed are whole ones.
 using MicroDegrees = std::int64_t;
 inline constexpr MicroDegrees kTurn = 360'000'000;

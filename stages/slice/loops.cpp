@@ -41,11 +41,10 @@ Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
   return static_cast<Nm>(from + whole - static_cast<std::int64_t>(kPositive));
 }
 
-[[gnu::cold]] void add_level(const Point3* corner, std::int64_t z, LevelFace& level) {
-  const auto above = [&](int k) { return static_cast<Nm>(height_for_plane(corner[k].z, z) - z); };
+[[gnu::cold]] void add_level(const Point3* corner, LevelFace& level) {
   const std::int64_t ux = std::int64_t{corner[1].x} - corner[0].x, uy = std::int64_t{corner[1].y} - corner[0].y;
   const std::int64_t vx = std::int64_t{corner[2].x} - corner[0].x, vy = std::int64_t{corner[2].y} - corner[0].y;
-  level.add(above(0), above(1), above(2), static_cast<std::uint64_t>(std::abs(ux * vy - uy * vx)));
+  level.add(static_cast<std::uint64_t>(std::abs(ux * vy - uy * vx)));
 }
 
 }  // namespace
@@ -93,7 +92,7 @@ void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> fac
     }
     cuts.at[i] = crossing(cuts.from[i], z);
     if (LevelFace::is_level(corner[0].z - z, corner[1].z - z, corner[2].z - z)) [[unlikely]]
-      add_level(corner, z, cuts.level);
+      add_level(corner, cuts.level);
   }
 }
 

@@ -133,7 +133,7 @@ Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch
       append_moved(all, {0, 0}, out.contours);
     }
     out.body.push_back(out.contours.size());
-    report.level.owner = b;
+    report.level.owner = b, report.level.plane = planes_[plane];
     level.keep_larger(report.level);
     report.level = level;
   }

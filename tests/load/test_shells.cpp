@@ -186,6 +186,44 @@ TEST(Shells, BodiesThatTouchAtACornerOrAnEdgeAreBodiesOfTheirOwn) {
   }
 }
 
+/// The facets of a box, each side as cells x cells squares, mm.
+std::vector<FloatTriangle> divided_box(double lo, double hi, int cells, bool turned) {
+  std::vector<FloatTriangle> facets;
+  const auto at = [&](int i) { return lo + (hi - lo) * i / cells; };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const bool upper : {false, true}) {
+      const auto corner = [&](int i, int j) {
+        std::array<double, 3> p{};
+        p[axis] = upper ? hi : lo, p[(axis + 1) % 3] = at(i), p[(axis + 2) % 3] = at(j);
+        return p;
+      };
+      for (int i = 0; i < cells; ++i) {
+        for (int j = 0; j < cells; ++j) {
+          const std::array corners{corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)};
+          for (const auto& [a, b, c] : {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 3}}) {
+            const bool swap = upper == turned;
+            FloatTriangle facet{};
+            for (std::size_t k = 0; k < 3; ++k) {
+              facet[k] = static_cast<float>(corners[a][k]);
+              facet[3 + k] = static_cast<float>(corners[swap ? c : b][k]);
+              facet[6 + k] = static_cast<float>(corners[swap ? b : c][k]);
+            }
+            facets.push_back(facet);
+          }
+        }
+      }
+    }
+  }
+  return facets;
+}
+
+TEST(Shells, BodiesOfSeveralBlocksThatShareOneVertexAreTurned) {
+  // Squares of 0.5 mm on both: vertices of one lie on vertices of the other where the surfaces cross.
+  const auto facets = joined(divided_box(0, 16, 32, false), divided_box(8, 20, 24, true));
+  ASSERT_GT(facets.size(), 4096u);
+  for (const Mesh& mesh : by_list_and_blocks(facets, 1)) EXPECT_NEAR(mesh.volume_mm3, 16 * 16 * 16 + 12 * 12 * 12, 1e-3);
+}
+
 TEST(Shells, StayAsTheyAreUnderOtherRules) {
   std::vector<FloatTriangle> facets = GridBox{{0, 0, 0}, {200, 200, 100}}.facets();
   for (FloatTriangle facet : GridBox{{150, 0, 0}, {250, 200, 100}}.facets()) {

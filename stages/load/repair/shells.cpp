@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -14,6 +15,7 @@
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/repair/census.h"
 #include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/surfaces.h"
 #include "stages/load/repair/topology.h"
@@ -71,6 +73,13 @@ class ShellContainment {
       for (const std::uint32_t f : outer.facets) own.push_back(triangles_[f]);
       outer.tree.emplace(own, origin_);
     }
+    const auto point = [&](const Point3& p) {
+      return WindingTree::Point{static_cast<double>(p.x) - origin_.x, static_cast<double>(p.y) - origin_.y,
+                                static_cast<double>(p.z) - origin_.z};
+    };
+    // No facet of one is near the other: one point decides.
+    if (!outer.tree->meets(point(in.lo), point(in.hi)))
+      return std::fabs(outer.tree->at(point(triangles_[inner.facets.front()].a))) > 0.5;
     return std::ranges::all_of(inner.facets, [&](std::uint32_t f) { return holds(*outer.tree, triangles_[f]); });
   }
 
@@ -129,16 +138,42 @@ Buffer<Triangle> list_of(const MeshBlocks& blocks) {
   return list;
 }
 
+/// Of each shell of negative volume, in order, the shells whose boxes overlap its own.
+std::vector<std::vector<std::uint32_t>> boxes_around(std::span<ClosedShell* const> shells) {
+  std::vector<Box> boxes;
+  for (const ClosedShell* shell : shells) boxes.push_back(shell->box);
+  std::vector<std::vector<std::uint32_t>> around(shells.size());
+  const auto note = [&](std::uint32_t inner, std::uint32_t outer) {
+    if (shells[inner]->sixfold_volume < 0) around[inner].push_back(outer);
+  };
+  const bool all = for_each_overlap(boxes, [&](std::uint32_t i, std::uint32_t j) {
+    note(i, j), note(j, i);
+    return true;
+  });
+  for (std::uint32_t i = 0; i < shells.size(); ++i) {
+    if (!all) {
+      around[i].clear();
+      for (std::uint32_t j = 0; j < shells.size(); ++j)
+        if (j != i) note(i, j);
+    }
+    std::ranges::sort(around[i]);
+  }
+  return around;
+}
+
 }  // namespace
 
 std::uint32_t turn_inverted_shells(Mesh& mesh) {
   std::vector<ClosedShell> shells = shells_of(mesh);
   const ShellContainment contains(mesh.triangles, mesh.bounds.lo);
-  std::vector<ClosedShell*> inverted;
-  for (ClosedShell& shell : shells) {
-    if (shell.sixfold_volume >= 0) continue;
-    const bool is_hollow = std::ranges::any_of(shells, [&](ClosedShell& other) { return &other != &shell && contains(other, shell); });
-    if (!is_hollow) inverted.push_back(&shell);
+  std::vector<ClosedShell*> by_size, inverted;  // the largest contains most hollows
+  for (ClosedShell& shell : shells) by_size.push_back(&shell);
+  std::ranges::stable_sort(by_size, std::ranges::greater(), [](const ClosedShell* shell) { return shell->facets.size(); });
+  const std::vector<std::vector<std::uint32_t>> around = boxes_around(by_size);
+  for (std::size_t i = 0; i < by_size.size(); ++i) {
+    if (by_size[i]->sixfold_volume >= 0) continue;
+    const auto holds = [&](std::uint32_t other) { return contains(*by_size[other], *by_size[i]); };
+    if (std::ranges::none_of(around[i], holds)) inverted.push_back(by_size[i]);
   }
   if (inverted.empty()) return 0;
   for (ClosedShell* outer : inverted) {

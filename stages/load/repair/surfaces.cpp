@@ -329,7 +329,7 @@ bool may_have_negative_surface(const MeshBlocks& blocks) {
   bool by_lines = blocks.block_count() > kJoined;
   for (std::uint32_t b = 0; b < blocks.block_count() && !by_lines; ++b)
     by_lines = blocks.indexed(b * MeshBlocks::kClusters).cluster == nullptr;
-  return by_lines ? VerticalLines(blocks).any_negative() : Surfaces(blocks).may_be_negative();
+  return (!by_lines && Surfaces(blocks).may_be_negative()) || VerticalLines(blocks).any_negative();
 }
 
 }  // namespace lamina::load

@@ -5,8 +5,8 @@
 
 namespace lamina::load {
 
-/// Whether any surface has a negative volume: a hollow, or a body that is inside out. A surface is what vertices join, so bodies that
-/// have a vertex in common are one.
+/// Whether any surface has a negative volume: a hollow, or a body that is inside out. A surface is what vertices join. Bodies that have
+/// a vertex in common are one, and are searched for as follows.
 ///
 /// In meshes of more than 131,072 triangles, and where neighbours are so far apart in the file that blocks do not name their vertices,
 /// vertical lines are searched for a point whose

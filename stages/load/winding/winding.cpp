@@ -107,6 +107,33 @@ double WindingTree::at(const Point& point, std::uint64_t* inspected) const {
   return angles / (2 * std::numbers::pi);
 }
 
+bool WindingTree::meets(const Point& lo, const Point& hi) const {
+  if (nodes_.empty()) return false;
+  std::array<std::uint32_t, 64> stack{};
+  std::size_t height = 1;
+  while (height > 0) {
+    const std::uint32_t index = stack[--height];
+    const Node& node = nodes_[index];
+    double square = 0;  // of the distance from the box
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double off = std::max({lo[k] - node.centre[k], node.centre[k] - hi[k], 0.0});
+      square += off * off;
+    }
+    if (square > node.radius * node.radius * (1 + 1e-9)) continue;
+    for (std::uint32_t i = node.begin; node.second == 0 && i < node.end; ++i) {
+      const Corners& f = facets_[i];
+      bool apart = false;
+      for (std::size_t k = 0; k < 3; ++k)
+        apart = apart || std::max({f.a[k], f.b[k], f.c[k]}) < lo[k] || std::min({f.a[k], f.b[k], f.c[k]}) > hi[k];
+      if (!apart) return true;
+    }
+    if (node.second == 0) continue;
+    stack[height++] = node.second;
+    stack[height++] = index + 1;
+  }
+  return false;
+}
+
 namespace {
 
 constexpr int kBlock = 8, kHalvings = 4;

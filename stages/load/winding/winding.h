@@ -28,6 +28,9 @@ class WindingTree {
   /// inspected  boxes and facets that it took are added to it, if given
   double at(const Point& point, std::uint64_t* inspected = nullptr) const;
 
+  /// Whether the box of any facet meets a box; nm from `origin`.
+  bool meets(const Point& lo, const Point& hi) const;
+
  private:
   struct Node {
     Point centre{}, normal{};  // of all facets by area; normal is their sum, half of its length the area, nm2

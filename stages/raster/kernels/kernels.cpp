@@ -67,8 +67,8 @@ void note_level(const CutTask& task, const Nm* number, std::uint32_t lanes, cons
     const std::int64_t area = of(CutFacets::kLeftX) * right_y - left_y * of(CutFacets::kRightX);
     Buffer<LevelFace>& faces = task.out.level;
     auto face = std::ranges::find(faces, instance[i], &LevelFace::owner);
-    if (face == faces.end()) face = faces.insert(face, LevelFace{0, 0, 0, instance[i]});
-    face->add(static_cast<Nm>(tip), static_cast<Nm>(left), static_cast<Nm>(right), static_cast<std::uint64_t>(std::abs(area)));
+    if (face == faces.end()) face = faces.insert(face, LevelFace{0, task.plane, instance[i]});
+    face->add(static_cast<std::uint64_t>(std::abs(area)));
   }
 }
 

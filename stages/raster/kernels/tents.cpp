@@ -43,7 +43,8 @@ LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, 
     const std::int32_t peak = lesser((middle >> bits) - first, last);
     const std::int32_t rise = greater(peak - begin, 1), fall = greater(last - peak, 1);
     const auto height = static_cast<float>(greater(less(hi, lo), 1));
-    const float top = (area * of_slope + depth * (height * kRounding + kPlaneReach)) * kUp;  // times the facet's height
+    const float steep = area * of_slope + depth * (height * kRounding + kPlaneReach), whole = depth * height;
+    const float top = (steep < whole ? steep : whole) * kUp;  // times the facet's height; no cut is longer than the facet
     const auto rises = static_cast<float>(rise), falls = static_cast<float>(fall);
     const float part = raised(top / (height * (rises * falls)) + kMin) * static_cast<float>(count);
     tents.begin[i] = begin;
