@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -24,27 +23,55 @@
 namespace lamina::load {
 namespace {
 
-/// The shell of each facet, by its first facet. Two bodies may have an edge in common, where four facets meet: facets are joined
-/// across such an edge only where a shell would be open there without that.
+/// Of unit length; none for a facet without area.
+WindingTree::Point normal_of(const Indexed& mesh, std::uint32_t facet) {
+  const auto& [a, b, c] = mesh.facet[facet];
+  const auto normal = doubled_area({mesh.vertex[a], mesh.vertex[b], mesh.vertex[c]});
+  const WindingTree::Point n{static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])};
+  const double length = std::sqrt(dot(n, n));
+  return length > 0 ? WindingTree::Point{n[0] / length, n[1] / length, n[2] / length} : n;
+}
+
+/// Joins the facets at an edge that more than two share, each that is walked forward with one that is walked back: those that are of
+/// one shell already, then those that continue each other most evenly. So each shell stays closed.
+void join_pairs(const Indexed& mesh, const Side* begin, const Side* end, DisjointSets& sets) {
+  struct Pair {
+    double score;
+    std::size_t forward, back;
+  };
+  constexpr std::ptrdiff_t kMany = 64;
+  if (end - begin > kMany) {
+    for (const Side* side = begin + 1; side != end; ++side) sets.join(begin->facet, side->facet);
+    return;
+  }
+  std::vector<WindingTree::Point> normal;
+  for (const Side* side = begin; side != end; ++side) normal.push_back(normal_of(mesh, side->facet));
+  std::vector<Pair> pairs;
+  for (std::size_t f = 0; f < normal.size(); ++f) {
+    for (std::size_t b = 0; b < normal.size(); ++b) {
+      if (!begin[f].forward || begin[b].forward) continue;
+      pairs.push_back({sets.find(begin[f].facet) == sets.find(begin[b].facet) ? 2 : dot(normal[f], normal[b]), f, b});
+    }
+  }
+  std::ranges::stable_sort(pairs, std::ranges::greater(), &Pair::score);
+  std::vector<std::uint8_t> taken(normal.size(), 0);
+  for (const Pair& pair : pairs) {
+    if (taken[pair.forward] != 0 || taken[pair.back] != 0) continue;
+    taken[pair.forward] = taken[pair.back] = 1;
+    sets.join(begin[pair.forward].facet, begin[pair.back].facet);
+  }
+}
+
+/// The shell of each facet, by its first facet.
 Buffer<std::uint32_t> find_shells(const Indexed& mesh) {
   const Buffer<Side> sides = sorted_sides(mesh.facet);
   DisjointSets sets(mesh.facet.size());
-  std::vector<std::pair<const Side*, const Side*>> shared;  // edges with more than two facets
   for_each_edge(std::span(sides), [&](const Side* begin, const Side* end) {
-    if (end - begin > 2) shared.emplace_back(begin, end);
     if (end - begin == 2) sets.join(begin->facet, end[-1].facet);
   });
-  for (bool joined = true; joined;) {
-    joined = false;
-    for (const auto& [begin, end] : shared) {
-      std::map<std::uint32_t, std::int64_t> surplus_of;
-      for (const Side* side = begin; side != end; ++side) surplus_of[sets.find(side->facet)] += side->forward ? 1 : -1;
-      const bool closed = std::ranges::all_of(surplus_of, [](const auto& one) { return one.second == 0; });
-      if (closed || surplus_of.size() == 1) continue;
-      for (const Side* side = begin + 1; side != end; ++side) sets.join(begin->facet, side->facet);
-      joined = true;
-    }
-  }
+  for_each_edge(std::span(sides), [&](const Side* begin, const Side* end) {
+    if (end - begin > 2) join_pairs(mesh, begin, end, sets);
+  });
   Buffer<std::uint32_t> shell(mesh.facet.size());
   for (std::uint32_t f = 0; f < shell.size(); ++f) shell[f] = sets.find(f);
   return shell;
