@@ -495,8 +495,8 @@ std::string as_text(const DesignedJob& found) {
   for (const std::string& line : found.outside) text += fmt::format("beyond    {}\n", line);
   if (found.outside.empty()) text += "beyond    nothing: lengths, gaps and extrusion are those that were measured\n";
   text += warnings_text(found.warnings);
-  return text + fmt::format("checked   by {} forward run{}; the target is met within {:.1f} %\n", found.runs,
-                            found.runs == 1 ? "" : "s", 100 * found.miss);
+  return text + fmt::format("checked   by {} forward run{}; the target is {} {:.1f} %\n", found.runs,
+                            found.runs == 1 ? "" : "s", found.miss > 0.1 ? "missed by" : "met within", 100 * found.miss);
 }
 
 Json as_json(const DesignedJob& found, const std::string& output) {

@@ -111,6 +111,9 @@ Sheet print_sheet(const HeadGrid& grid, const RunsView& layer, const Printing& p
   // Places rise to the right and to the front, or the other way; so do lines.
   const double along_sign = along_x ? (grid.positions_from_end ? -1 : 1) : (grid.positions_from_end ? 1 : -1);
   const double across_sign = grid.lines_from_end ? -1 : 1, gain = printing.gain_um * 1e-3;
+  std::mt19937_64 random(printing.seed);
+  std::normal_distribution<double> jitter(0, printing.jitter_um * 1e-3 + 1e-12);
+  std::uniform_real_distribution<double> unit(0, 1);
   for_each_dot_line(grid, layer, [&](std::uint32_t line, std::uint32_t l, std::uint32_t t, std::uint32_t r, std::uint32_t b) {
     const std::uint32_t swath = line / grid.swath_lines(), nozzle = line % grid.swath_lines() / grid.passes;
     if (printing.blocked.contains(nozzle) || printing.skips(line)) return;
@@ -119,7 +122,17 @@ Sheet print_sheet(const HeadGrid& grid, const RunsView& layer, const Printing& p
     if (!printing.swath.empty()) along += printing.swath[swath][0], across += printing.swath[swath][1];
     along *= along_sign, across *= across_sign;
     const double dx = along_x ? along : across, dy = along_x ? across : along;
-    cover_box(sheet, {(l + dx) * x_mm - gain, (t + dy) * y_mm - gain, (r + dx) * x_mm + gain, (b + dy) * y_mm + gain});
+    if (printing.jitter_um == 0 && printing.satellites == 0) {
+      cover_box(sheet, {(l + dx) * x_mm - gain, (t + dy) * y_mm - gain, (r + dx) * x_mm + gain, (b + dy) * y_mm + gain});
+      return;
+    }
+    for (std::uint32_t k = 0; k < (along_x ? r - l : b - t); ++k) {  // dot by dot
+      const double x = (l + (along_x ? k : 0) + dx) * x_mm + jitter(random), y = (t + (along_x ? 0 : k) + dy) * y_mm + jitter(random);
+      cover_box(sheet, {x - gain, y - gain, x + x_mm + gain, y + y_mm + gain});
+      if (unit(random) >= printing.satellites) continue;
+      const double sx = x + (along_x ? along_sign * 0.06 : 0), sy = y + (along_x ? 0 : along_sign * 0.06);
+      cover_box(sheet, {sx + 0.3 * x_mm, sy + 0.3 * y_mm, sx + 0.7 * x_mm, sy + 0.7 * y_mm});
+    }
   });
   return sheet;
 }
@@ -162,6 +175,14 @@ GreyPicture photograph(const Sheet& sheet, const Camera& camera, std::mt19937_64
         light[static_cast<std::size_t>(j * picture.width + k)] = value;
       }
     }
+  }
+  if (camera.grain > 0) {
+    std::vector<float> grain(light.size());
+    const double spot = 0.05 * scale;  // pixels; blurring white noise divides it by 2 sqrt(pi) times that
+    std::normal_distribution<float> white(0, static_cast<float>(camera.grain * 2 * std::sqrt(std::numbers::pi) * spot));
+    for (float& one : grain) one = white(random);
+    blur(grain, picture.width, picture.height, spot);
+    for (std::size_t i = 0; i < light.size(); ++i) light[i] *= 1 + grain[i];
   }
   blur(light, picture.width, picture.height, camera.blur_pixels);
   std::normal_distribution<float> noise(0, static_cast<float>(camera.noise));

@@ -20,6 +20,9 @@ struct Printing {
   std::vector<std::array<double, 2>> nozzle;  // of each nozzle; empty: none
   std::vector<std::array<double, 2>> swath;   // of each swath from the bed's first; empty: none
   double gain_um = 0;                         // that edges stand out
+  double jitter_um = 0;                       // of each dot, standard deviation in both directions
+  double satellites = 0;                      // share of dots with a smaller one 60 um behind, along the scan
+  std::uint64_t seed = 1;                     // of both
   /// Whether a line of the layer is left out.
   std::function<bool(std::uint32_t)> skips = [](std::uint32_t) { return false; };
 };
@@ -29,6 +32,7 @@ struct Camera {
   double pixels_a_mm = 20, turn_deg = 0, tilt_x = 0, tilt_y = 0, lens = 0;  // tilts: change of scale over half the picture
   double margin_mm = 4;
   double blur_pixels = 1, noise = 3;                 // of the grey values
+  double grain = 0;                                  // of the paper's light, standard deviation in spots of 0.1 mm
   double paper = 0.8, ink = 0.15;                    // light that comes back
   double shade_x = 0, shade_y = 0, vignette = 0;     // of the light
   std::uint32_t dark_specks = 0, bright_specks = 0;  // of 0.03 to 0.25 mm

@@ -319,6 +319,32 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   EXPECT_LE(share_of(errors.ragged_um, 1), 30);
 }
 
+TEST(ScannedChart, OffsetsHoldThroughJitterSatellitesAndGrain) {
+  const PrintedChart printed[2] = {chart_of(false), chart_of(true)};
+  Errors errors;
+  for (const int i : {1000, 1001}) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(i) * 7919 + 1);
+    const PrintedChart& one = printed[i % 2];
+    Trial trial = random_trial(one, random);
+    trial.printing.jitter_um = 8;
+    trial.printing.satellites = 0.3;
+    trial.printing.seed = static_cast<std::uint64_t>(i);
+    trial.camera.grain = 0.03;
+    const auto reading = read_trial(one, trial, random);
+    ASSERT_TRUE(reading) << "scan " << i << ": " << reading.error().message;
+    for (const auto& nozzle : reading->head.nozzle) {
+      if (!nozzle) continue;
+      EXPECT_TRUE(nozzle->along.known() || !(nozzle->along.error_um > 0)) << "an offset along the scan is withheld";
+    }
+    add_errors(one, trial, *reading, errors);
+  }
+  EXPECT_EQ(errors.accused, 0u);
+  EXPECT_EQ(errors.found, errors.blocked);
+  EXPECT_GT(errors.nozzles.all, 400u);
+  EXPECT_LE(static_cast<double>(errors.nozzles.beyond), errors.nozzles.maximum()) << errors.nozzles.all;
+  EXPECT_LE(static_cast<double>(errors.swaths.beyond), errors.swaths.maximum()) << errors.swaths.all;
+}
+
 /// Little noise: what is wrong by more than a tenth of a micrometre or two is the reading's own. Dashes that are searched for
 /// where they were detected before, sample by sample, stay there: 1.5 um.
 TEST(ScannedChart, NozzlesAreNotHeldWhereTheyWereDetectedBefore) {
