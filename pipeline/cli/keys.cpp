@@ -130,9 +130,6 @@ bool turns_lines(Product, const Job& job) {
   return (job.fill.all.pattern != infill::Pattern::kNone && job.fill.all.pattern != infill::Pattern::kContour) ||
          job.segment.any() || varies_filling(job);
 }
-bool shifts_lines(Product product, const Job& job) {
-  return turns_lines(product, job) && (job.fill.all.pattern != infill::Pattern::kContourRaster || varies_filling(job));
-}
 bool has_walls(Product, const Job& job) {
   return job.fill.all.walls > 0 || job.fill.all.pattern == infill::Pattern::kContour ||
          job.fill.all.pattern == infill::Pattern::kContourRaster || varies_filling(job) || !is_named(job, "fill.walls");
@@ -169,8 +166,7 @@ constexpr std::string_view kUniform =
                                "applies to steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "applies to beads, but there are none; add --fill, --pattern or --walls",
                            kLines = "applies to lines, but there is no pattern; add --fill or --pattern",
-                           kTurned = "applies to lines with a direction, but there are none; add --fill raster",
-                           kShifted = "applies to lines of raster, honeycomb and quatrefoil, but there are none; add --fill";
+                           kTurned = "applies to lines with a direction, but there are none; add --fill raster";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
     {"--cusp-of", shrinks, kShrinks, scaled},
@@ -193,7 +189,7 @@ constexpr Need kNeeds[] = {
     {"--gap-formula", deposits_lines, kLines},
     {"--angle", turns_lines, kTurned},
     {"--angle-step", turns_lines, kTurned},
-    {"--stagger", shifts_lines, kShifted},
+    {"--stagger", turns_lines, kTurned},
     {"--print-speed", deposits_lines, "applies to filling lines, but there is no pattern; add --fill, or use --wall-speed"},
     {"--segment-rule", cuts_lines,
      "applies to lines; closed curves are cut by their length under every rule; remove the option"},

@@ -30,7 +30,7 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
       {"jet", "--gap 3", "--copies 2"},
       {"slice", "--angle 30 --pattern contour", "--pattern raster"},
       {"slice", "--angle-step 30 --pattern contour", "--pattern raster"},
-      {"slice", "--stagger 0,0.1 --pattern contour+raster", "--pattern raster"},
+      {"slice", "--stagger 0,0.1 --pattern contour", "--pattern contour+raster"},
       {"slice", "--file-a-layer --format null", "--format svg"},
       {"extrude", "--wall-speed 30 --walls 0 --fill raster --layer 0.2", "--walls 1"},
       {"jet", "--allow-unbound", "--machine hp45 --preset binding.toml"},

@@ -477,7 +477,7 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
     code = position_.motion;
   }
   const bool moves = letter == 'G' && (code == 0 || code == 1 || code == 2 || code == 3),
-             sets = letter == 'G' ? code == 92 : code == 200 || code == 204 || code == 221;
+             sets = letter == 'G' ? code == 92 : code == 200 || code == 221;
   GcodeWords words;
   if (!read_words(scanner, words, repeats || (!moves && !sets))) return false;
   if (repeats && scanner.failed()) return differ(Difference::kText), false;

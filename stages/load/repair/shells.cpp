@@ -112,7 +112,7 @@ class ShellContainment {
 
  private:
   bool holds(const WindingTree& tree, const Triangle& t) const {
-    constexpr double kOutside = 0.06;  // a corner of a box that lies on the outer one's corner has 1/8
+    constexpr double kOutside = 0.25;  // a half where the facet lies on one of the outer shell
     const std::array<Point3, 3> corner{t.a, t.b, t.c};
     const auto inside = [&](const std::array<double, 3>& weight) {
       WindingTree::Point at{};
@@ -123,9 +123,10 @@ class ShellContainment {
       }
       return std::fabs(tree.at(at)) > kOutside;
     };
-    constexpr double kThird = 1.0 / 3;
-    return inside({kThird, kThird, kThird}) && inside({1, 0, 0}) && inside({0, 1, 0}) && inside({0, 0, 1}) &&
-           inside({0.5, 0.5, 0}) && inside({0, 0.5, 0.5}) && inside({0.5, 0, 0.5});
+    // Within the facet: at a sharp edge of the outer shell, on which this one lies, the winding number is anything.
+    constexpr double kThird = 1.0 / 3, kNear = 0.96, kOff = 0.02, kHalf = 0.49;
+    return inside({kThird, kThird, kThird}) && inside({kNear, kOff, kOff}) && inside({kOff, kNear, kOff}) &&
+           inside({kOff, kOff, kNear}) && inside({kHalf, kHalf, kOff}) && inside({kOff, kHalf, kHalf}) && inside({kHalf, kOff, kHalf});
   }
 
   std::span<const Triangle> triangles_;

@@ -14,7 +14,7 @@ namespace lamina::load {
 /// another, their winding numbers would add up to 0, a hole in both. Shells in others stay: they are hollows.
 ///
 /// A shell is what facets join across edges; where more than two meet, those that continue each other. A shell contains another if no
-/// corner, middle of an edge or middle of a facet of that one lies outside, by winding numbers; touching is not outside.
+/// facet of that one lies outside, by winding numbers at seven points of it; touching is not outside.
 ///
 /// mesh.fingerprint and mesh.volume_mm3 follow
 /// mesh     closed, as a list

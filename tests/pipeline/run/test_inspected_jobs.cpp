@@ -286,11 +286,13 @@ TEST_F(InspectedJobs, PartsThatGrowTogetherAreNamed) {
             << "]\nbottom_mm = " << z << "\n";
         return inspect("--job " + (folder_ / "two.toml").string());
       };
-  EXPECT_EQ(codes(job(15.2, 5, 0)), std::set<std::string>{});
+  EXPECT_EQ(codes(job(15.5, 5, 0)), std::set<std::string>{});
   EXPECT_EQ(codes(job(15, 5, 0)), std::set<std::string>{"touching"});   // side by side
   EXPECT_EQ(codes(job(10, 10, 2)), std::set<std::string>{"touching"});  // within each other
   EXPECT_EQ(codes(job(5, 5, 5)), std::set<std::string>{"touching"});    // one upon the other
-  EXPECT_EQ(codes(job(5, 5, 5.2)), std::set<std::string>{});            // powder between them
+  EXPECT_EQ(codes(job(5, 5, 5.5)), std::set<std::string>{});            // powder between them
+  EXPECT_EQ(codes(job(15.2, 5, 0)), std::set<std::string>{"gaps"});     // less than the default minimum of 0.3 mm
+  EXPECT_EQ(codes(job(5, 5, 5.2)), std::set<std::string>{"gaps"});
   const auto neighbour = job(15, 8, 0)["inspection"]["touching"][0]["at"];
   EXPECT_NEAR(neighbour["x_mm"].get<double>(), 15, 0.2) << neighbour.dump();
   EXPECT_NEAR(neighbour["y_mm"].get<double>(), 11.5, 0.2) << "from 8 to 15";
