@@ -279,7 +279,7 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
       (arguments.has("--pattern") || arguments.has("--fill")) && job.fill.all.pattern == infill::Pattern::kNone;
   for (const Need& need : kNeeds) {
     const bool beads =
-        need.met == deposits_lines || need.met == deposits_beads || need.met == turns_lines || need.met == shifts_lines;
+        need.met == deposits_lines || need.met == deposits_beads || need.met == turns_lines;
     const auto met = study ? need.in_study : need.met;
     if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && intended)) continue;
     return at_option(need.flag, std::string(need.unmet));
