@@ -123,16 +123,9 @@ bool arranges(Product, const Job& job) {
   return job.parts.size() > 1 ? !std::ranges::all_of(job.parts, [](const PartRequest& p) { return p.at_mm && p.copies == 1; })
                               : job.parts.empty() || job.parts.front().copies > 1;
 }
-bool arranges_any(Product, const Job& job) {
-  return job.parts.empty() || !std::ranges::all_of(job.parts, [](const PartRequest& part) { return part.at_mm.has_value(); });
-}
 bool turns_lines(Product, const Job& job) {
   return (job.fill.all.pattern != infill::Pattern::kNone && job.fill.all.pattern != infill::Pattern::kContour) ||
          job.segment.any() || varies_filling(job);
-}
-bool has_walls(Product, const Job& job) {
-  return job.fill.all.walls > 0 || job.fill.all.pattern == infill::Pattern::kContour ||
-         job.fill.all.pattern == infill::Pattern::kContourRaster || varies_filling(job) || !is_named(job, "fill.walls");
 }
 bool lacks_unit(Product, const Job& job) {
   const auto states = [](const PartRequest& part) { return lower_case(part.path).ends_with(".3mf"); };
@@ -189,7 +182,7 @@ constexpr Need kNeeds[] = {
     {"--gap-formula", deposits_lines, kLines},
     {"--angle", turns_lines, kTurned},
     {"--angle-step", turns_lines, kTurned},
-    {"--stagger", turns_lines, kTurned},
+    {"--stagger", deposits_lines, kLines},
     {"--print-speed", deposits_lines, "applies to filling lines, but there is no pattern; add --fill, or use --wall-speed"},
     {"--segment-rule", cuts_lines,
      "applies to lines; closed curves are cut by their length under every rule; remove the option"},
@@ -199,13 +192,11 @@ constexpr Need kNeeds[] = {
     {"--title", writes_tiff, "applies to TIFF, other formats have no tag for it; remove it, or add --format tiff-g4"},
     {"--weld", repairs, "applies to repair, which is off; leave out one of the two"},
     {"--gap", arranges, "applies to several parts that are arranged, and here are none; add --copies or another part"},
-    {"--margin", arranges_any, "applies to parts that are arranged, and --at places this one; leave out one of the two"},
     {"--unit", lacks_unit, "applies to STL and OBJ, and 3MF files state their unit; leave it out"},
     {"--first-layers", has_first_bleed, "applies to --first-bleed, but there is none; add it"},
     {"--min-wall", inspects, "applies to --inspect; add it"},
     {"--allow-unbound", has_machine, "applies to the binder that a machine's powder needs; add --machine"},
     {"--vat-rule", mixes_powders, "applies to layers of two powders, but there is one; add --material"},
-    {"--wall-speed", has_walls, "applies to walls, but there are none; add --walls"},
     {"--file-a-layer", writes_files, "applies to files, but --format null writes none; choose another format"},
     {"--empty-first-layer", writes_cli, "applies to CLI files; add --format cli or cli-binary"},
 };
@@ -290,9 +281,11 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
 }
 
 Status check_machine_needs(const Machine& machine, const Arguments& arguments) {
-  if (!arguments.has("--allow-unbound") || machine.powder.min_saturation_percent > 0) return {};
-  return at_option("--allow-unbound", fmt::format("applies to powder.min_saturation_percent, which {} does not state; leave "
-                                                  "it out",
+  constexpr std::string_view kDosed[] = {"--saturation", "--core-saturation", "--core", "--levels", "--job", "--set"};
+  const auto given = [&](std::string_view flag) { return arguments.has(flag); };
+  if (!given("--allow-unbound") || machine.powder.min_saturation_percent > 0 || std::ranges::any_of(kDosed, given)) return {};
+  return at_option("--allow-unbound", fmt::format("applies to a saturation or to powder.min_saturation_percent, which {} does "
+                                                  "not state; add --saturation",
                                                   machine.name));
 }
 

@@ -377,7 +377,7 @@ Result<DesignedJob> search_job(const DesignRequest& request, const std::function
 
 Result<DesignedJob> design_job(const DesignRequest& request, const std::function<bool(double)>& report) {
   auto found = search_job(request, report);
-  if (!found || found->met || !request.target.porosity || segment::out_of_reach(request.target, request.reach)) return found;
+  if (!found || found->met || !request.target.porosity) return found;
   // Slots say too much void where tables of widths do not conserve volume: once more, with what is fed.
   const auto profile = designable_extruder(request.machine);
   const auto limits = profile ? segment::DesignLimits::of(profile->machine, profile->calibration) : profile.error();

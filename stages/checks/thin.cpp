@@ -237,9 +237,9 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
     unmarked(image, grown, scratch, widths->narrow);
   }
   const auto add_narrow = [&](std::uint64_t minimum) {
-    if (widths == nullptr || pick(left, pieces, minimum, UINT64_MAX, chosen) == 0) return;
-    combine(widths->narrow, chosen, SetOperation::kUnion, grown);
-    std::swap(widths->narrow, grown);
+    if (widths == nullptr || pick(scratch.left, scratch.pieces, minimum, UINT64_MAX, scratch.chosen) == 0) return;
+    combine(widths->narrow, scratch.chosen, SetOperation::kUnion, scratch.grown);
+    std::swap(widths->narrow, scratch.grown);
   };
   pieces.find(left, true);
   locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinRegion);
@@ -332,7 +332,7 @@ void Necks::mark(const RunsView& wide, const RunsView& rest, std::uint64_t minim
   }
 }
 
-/// The image with the pixels between two of its pixels, in rows, columns and diagonals.
+/// The image with the pixels between two of its pixels, in rows and columns.
 void Necks::bridge(const RunsView& image) {
   begin_rows(image.columns, bridged_);
   const auto add = [&](std::int64_t begin, std::int64_t end) {
@@ -342,12 +342,11 @@ void Necks::bridge(const RunsView& image) {
     const std::size_t row_begin = bridged_.change.size();
     spans_.clear();
     for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; i += 2) add(image.change[i], image.change[i + 1]);
-    for (std::int64_t shift = -1; r > 0 && r + 1 < image.rows() && shift <= 1; ++shift) {
+    if (r > 0 && r + 1 < image.rows()) {
       const auto above = image.row(r - 1), below = image.row(r + 1);
       for (std::size_t i = 0, j = 0; i < above.size() && j < below.size();) {
-        const std::int64_t end = above[i + 1] + shift, other_end = below[j + 1] - shift;
-        add(std::max(above[i] + shift, below[j] - shift), std::min({end, other_end, std::int64_t{image.columns}}));
-        (end < other_end ? i : j) += 2;
+        add(std::max(above[i], below[j]), std::min(above[i + 1], below[j + 1]));
+        (above[i + 1] < below[j + 1] ? i : j) += 2;
       }
     }
     std::ranges::sort(spans_);

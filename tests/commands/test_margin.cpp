@@ -69,7 +69,7 @@ TEST_F(Margin, DecimalCommasAndNearlyRightNamesGetAHint) {
   EXPECT_TRUE(says("jet part.stl --layer 1 --dry-run --dpi 540,43", "note: --dpi 540,43: is two numbers"));
   expect_refused("jet part.stl --dry-run --format tif", 2, "did you mean 'tiff-g4'?", folder);
   expect_refused("slice part.stl --dry-run --format tif", 2, "is a format of images, which lamina jet writes", folder);
-  expect_refused("extrude part.stl -o new/", 2, "is a directory; name a file in it, as in new/part.gcode", folder);
+  expect_refused("extrude part.stl -o new/", 2, "names a directory; name a file in it, as in new/part.gcode", folder);
   EXPECT_TRUE(says("extrude part.stl -o out", "note: -o out: is written as one file; end its name with .gcode"));
   EXPECT_EQ(done("help jet").out, done("jet --help").out);
 }

@@ -300,7 +300,7 @@ Status complete_extrude(const Arguments&, Job& job) {
   if (job.output.empty() && !job.dry_run) return usage("-o FILE is missing; name the file for the toolpaths, or use --dry-run");
   std::error_code ignored;
   if (job.output.empty() || (!std::filesystem::is_directory(job.output, ignored) && !job.output.ends_with('/'))) return {};
-  return usage("-o {}: is a directory; name a file in it, as in {}", job.output,
+  return usage("-o {}: names a directory; name a file in it, as in {}", job.output,
                (std::filesystem::path(job.output) / "part.gcode").string());
 }
 

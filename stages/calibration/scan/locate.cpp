@@ -96,7 +96,7 @@ std::vector<LayerMatch> different(std::vector<LayerMatch> matches, std::size_t m
   for (const LayerMatch& one : matches) {
     const bool known = std::ranges::any_of(
         kept, [&](const LayerMatch& other) { return angle_between(one.rotation_deg, other.rotation_deg) < kApartDeg; });
-    if (!known && kept.size() < maximum && one.likeness > kWorse * matches[0].likeness) kept.push_back(one);
+    if (!known && kept.size() < maximum && one.likeness >= kWorse * matches[0].likeness) kept.push_back(one);
   }
   return kept;
 }
@@ -251,6 +251,7 @@ LayerPosition locate_layer(const cv::Mat& light, const LayerCells& layer) {
   cv::flip(cells, mirrored, 1);
   const std::vector<LayerPosition> positions = positions_of(blurred_of(photo, cells), photo, cells, layer);
   const std::vector<LayerPosition> flipped = positions_of(blurred_of(photo, mirrored), photo, mirrored, layer);
+  if (positions.empty() || flipped.empty()) return {};  // one grey all over: like nothing
   LayerPosition best = positions.front();
   for (const LayerPosition& one : positions) {
     const bool as_good = one.likeness > positions.front().likeness - kTie;

@@ -112,8 +112,11 @@ class ShellContainment {
 
  private:
   bool holds(const WindingTree& tree, const Triangle& t) const {
-    constexpr double kOutside = 0.25;  // a half where the facet lies on one of the outer shell
+    constexpr double kOutside = 0.25;
     const std::array<Point3, 3> corner{t.a, t.b, t.c};
+    const auto normal = doubled_area(t);
+    const WindingTree::Point n{static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])};
+    const double length = std::sqrt(dot(n, n)), off = length > 0 ? (1 + 1e-3 * std::sqrt(length)) / length : 0;
     const auto inside = [&](const std::array<double, 3>& weight) {
       WindingTree::Point at{};
       for (std::size_t k = 0; k < 3; ++k) {
@@ -121,7 +124,9 @@ class ShellContainment {
         at[1] += weight[k] * (static_cast<double>(corner[k].y) - origin_.y);
         at[2] += weight[k] * (static_cast<double>(corner[k].z) - origin_.z);
       }
-      return std::fabs(tree.at(at)) > kOutside;
+      // On a facet of the outer shell the winding number jumps: one of its sides is inside.
+      const auto beside = [&](double by) { return tree.at({at[0] + by * n[0], at[1] + by * n[1], at[2] + by * n[2]}); };
+      return std::fabs(beside(off)) > kOutside || std::fabs(beside(-off)) > kOutside;
     };
     // Within the facet: at a sharp edge of the outer shell, on which this one lies, the winding number is anything.
     constexpr double kThird = 1.0 / 3, kNear = 0.96, kOff = 0.02, kHalf = 0.49;

@@ -41,12 +41,12 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::string comma_hint(std::string_view text) {
-  constexpr std::string_view kDigits = "0123456789";
+  constexpr std::string_view kDecimals = "0123456789";
   const std::size_t comma = text.find(',');
   if (comma == std::string_view::npos || comma == 0 || text.find(',', comma + 1) != std::string_view::npos) return {};
   const std::string_view before = text.substr(0, comma), after = text.substr(comma + 1);
-  const std::string_view whole = before.substr(before.find_last_not_of(kDigits) + 1);
-  const std::string_view fraction = after.substr(0, after.find_first_not_of(kDigits));
+  const std::string_view whole = before.substr(before.find_last_not_of(kDecimals) + 1);
+  const std::string_view fraction = after.substr(0, after.find_first_not_of(kDecimals));
   if (whole.empty() || fraction.empty()) return {};
   return fmt::format("; decimal numbers have a point, as {}.{}", whole, fraction);
 }
