@@ -56,7 +56,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   answer.say(fmt::format("photo     rotated by {:.1f} degrees, correlation {:.2f}", number(json["rotation_deg"]),
                          number(json["likeness"])));
   for (const Json& rotation : json["also_deg"])
-    answer.say(fmt::format("symmetric the layer fits as well at {:.0f} degrees: positions may be those of the other side",
+    answer.say(fmt::format("symmetric the layer fits as well at {:.0f} degrees: positions may be turned by it, and stripes missed",
                            number(rotation)));
   for (const Json& band : json["missing"])
     answer.say(fmt::format("missing   {:.2f} mm of {:.2f} to {:.2f} mm {}", number(band["missing_mm"]), number(band["from_mm"]),

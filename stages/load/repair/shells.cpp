@@ -125,8 +125,8 @@ class ShellContainment {
         at[2] += weight[k] * (static_cast<double>(corner[k].z) - origin_.z);
       }
       // On a facet of the outer shell the winding number jumps: one of its sides is inside.
-      const auto beside = [&](double by) { return tree.at({at[0] + by * n[0], at[1] + by * n[1], at[2] + by * n[2]}); };
-      return std::fabs(beside(off)) > kOutside || std::fabs(beside(-off)) > kOutside;
+      const auto at_side = [&](double by) { return tree.at({at[0] + by * n[0], at[1] + by * n[1], at[2] + by * n[2]}); };
+      return std::fabs(at_side(off)) > kOutside || std::fabs(at_side(-off)) > kOutside;
     };
     // Within the facet: at a sharp edge of the outer shell, on which this one lies, the winding number is anything.
     constexpr double kThird = 1.0 / 3, kNear = 0.96, kOff = 0.02, kHalf = 0.49;
