@@ -348,38 +348,51 @@ const Findings& Inspection::finish() {
   return findings_;
 }
 
+namespace {
+
+/// Adds warnings to a list.
+struct Warnings {
+  std::span<const std::string> part;
+  std::vector<Warning>& list;
+
+  void operator()(const char* code, const Spot& spot, std::string text, std::string of_part = {}) const {
+    list.push_back({code, std::move(text), std::move(of_part), spot.layer, spot.z_mm});
+  }
+  /// With the part of the largest one, if it is known.
+  void operator()(const char* code, const Found& found, const std::string& text) const {
+    const std::uint32_t number = found.locations.empty() ? UINT32_MAX : found.locations.front().part;
+    const std::string name = number < part.size() ? part[number] : std::string();
+    (*this)(code, found.spot, name.empty() ? text : name + ": " + text, name);
+  }
+};
+
+}  // namespace
+
 void report(const Findings& findings, std::span<const std::string> part, double min_mm, double drain_mm,
             std::vector<Warning>& warnings) {
   const auto& [layers, islands, loose, hollows, drains, thin, roofs, gaps, contacts, touching, bed_edge, stop] = findings;
-  const auto warn = [&](const char* code, const Spot& spot, std::string text, std::string of_part = {}) {
-    warnings.push_back({code, std::move(text), std::move(of_part), spot.layer, spot.z_mm});
-  };
-  const auto warn_of = [&](const char* code, const Found& found, const std::string& text) {
-    const std::uint32_t number = found.locations.empty() ? UINT32_MAX : found.locations.front().part;
-    const std::string name = number < part.size() ? part[number] : std::string();
-    warn(code, found.spot, name.empty() ? text : name + ": " + text, name);
-  };
+  const Warnings warn{part, warnings};
   if (islands.count > 0) {
-    warn_of("islands", islands,
+    warn("islands", islands,
          fmt::format("{} of {} with nothing below, the largest of {:.3g} mm2 {}: only powder supports them until they join a "
                      "part; turn the part, or spread the first layers above them carefully",
                      of(islands.count, "piece", "pieces"), of(islands.layers, "layer", "layers"), islands.largest,
                      at(islands.spot)));
   }
   if (loose.count > 0) {
-    warn_of("loose", loose,
+    warn("loose", loose,
          fmt::format("{} of {:.3g} mm3 that nothing joins to the bottom of a part, the largest {}: they fall off; repair the "
                      "part or take them out of it",
                      of(loose.count, "body", "bodies"), loose.amount, at(loose.spot)));
   }
   if (hollows.count > 0) {
-    warn_of("hollows", hollows,
+    warn("hollows", hollows,
          fmt::format("{} of {:.3g} mm3 that powder cannot leave, the largest of {:.3g} mm3 {}: open them by holes, or let them "
                      "be solid",
                      of(hollows.count, "closed hollow", "closed hollows"), hollows.amount, hollows.largest, at(hollows.spot)));
   }
   if (drains.count > 0) {
-    warn_of("drains", drains,
+    warn("drains", drains,
         fmt::format("{} of about {:.3g} mm3 with drains narrower than {:.3g} mm, the largest of {:.3g} mm3 {}: powder stays in "
                     "them; widen the drains, or set a smaller --min-drain",
                     of(drains.count, "hollow", "hollows"), drains.amount, drain_mm, drains.largest, at(drains.spot)));
@@ -390,11 +403,11 @@ void report(const Findings& findings, std::span<const std::string> part, double 
   };
   const std::string_view breaks = "they may break; make them thicker",
                          closes = "they may close, or keep powder; make them wider";
-  if (thin.count > 0) warn_of("thin", thin, narrow(thin, "wall or pin", "walls or pins", breaks));
-  if (roofs.count > 0) warn_of("roofs", roofs, narrow(roofs, "roof or floor", "roofs or floors", breaks));
-  if (gaps.count > 0) warn_of("gaps", gaps, narrow(gaps, "gap", "gaps", closes));
+  if (thin.count > 0) warn("thin", thin, narrow(thin, "wall or pin", "walls or pins", breaks));
+  if (roofs.count > 0) warn("roofs", roofs, narrow(roofs, "roof or floor", "roofs or floors", breaks));
+  if (gaps.count > 0) warn("gaps", gaps, narrow(gaps, "gap", "gaps", closes));
   if (contacts.count > 0) {
-    warn_of("contacts", contacts,
+    warn("contacts", contacts,
          narrow(contacts, "edge, corner or neck that joins two bodies", "edges, corners or necks that join two bodies",
                 "they may break; let the bodies overlap more"));
   }
