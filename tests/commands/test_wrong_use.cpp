@@ -188,9 +188,9 @@ TEST_F(WrongUse, ReaderThatHasGoneAwayIsNoReasonToCrash) {
 
 TEST_F(WrongUse, ToolpathsToAClosedPipeAreNotSaidToBeKept) {
   const std::string command = "cd '" + directory_.path().string() +
-                              "' && { '" LAMINA_PROGRAM
+                              "' && { while [ ! -e closed ]; do sleep 0.01; done; '" LAMINA_PROGRAM
                               "' extrude part.stl --machine marlin --layer 0.02 --quiet -o - 2> err; "
-                              "echo $? > code; } | head -n 1 > head";
+                              "echo $? > code; } | { exec 0<&-; : > closed; }";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(read_text(directory_ / "code"), "4\n");
   EXPECT_EQ(read_text(directory_ / "err"), "lamina: -: cannot write: Broken pipe\n");
