@@ -1,7 +1,8 @@
-"""bench/growth.py: how time and memory of `lamina jet` grow with a job, and what more cores could give. scripts/bench growth
+"""bench/growth.py: how time and memory of jobs grow with their size, and what more cores could give. scripts/bench growth
 
-    scripts/bench growth                writes bench/growth.md and the slopes in bench/README.md; about four minutes on two cores
-    scripts/bench growth --only NAME    this series only (can be repeated); no page is written
+    scripts/bench growth                writes bench/growth.md and the slopes in bench/README.md; about fifteen minutes on two cores
+    scripts/bench growth --only NAME    this series only (can be repeated); no page is written. Names: triangles, layers, pixels, copies,
+                                        meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs
     --program FILE                      a lamina; else build/release/lamina, built first
     --runs N                            runs of a job; the minimum counts (default 3)
     --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
@@ -31,12 +32,28 @@ from measure import build, busy_and_total, models_default, say, started  # noqa:
 
 STEEPEST = 1.1
 BED, LARGE_BED = ["--bed", "100x100"], ["--bed", "400x400"]
+GAP = ["--gap", "0.5"]  # of several parts
 
 
 def powers(first, last):
     """1, 2, 5, 10 ... from first to last, both included."""
     values = [base * 10**e for e in range(12) for base in (1, 2, 5)]
     return [value for value in values if first <= value <= last]
+
+
+# Options of each product, and the sizes that a series varies. `slice` and `extrude` have no pixels.
+PRODUCTS = {
+    "levels": ("jet", ["--levels", "4"], ["copies", "layers", "triangles", "pixels"]),
+    "saturation": ("jet", ["--saturation", "70"], ["copies", "layers", "triangles", "pixels"]),
+    "program": ("jet", ["--machine", "production-1200", "--margin", "0", "--saturation", "70"], ["copies", "layers"]),
+    "fill": ("jet", ["--fill", "raster", "--walls", "2", "--bead", "0.2"], ["copies", "layers", "triangles", "pixels"]),
+    "inspect": ("jet", ["--inspect"], ["copies", "layers", "triangles", "pixels"]),
+    "slice": ("slice", [], ["copies", "layers", "triangles"]),
+    "extrude": ("extrude", ["--machine", "anet-a8", "--fill", "raster", "--walls", "2"], ["copies", "layers", "triangles"]),
+}
+# Of products: 1-bit jobs go further.
+MAX_SIZE = {"copies": 10_000, "layers": 3000, "triangles": 1e6, "pixels": 10_000}
+MAX_COPIES = {"extrude": 2000, "fill": 3000}
 
 
 class Jobs:
@@ -53,6 +70,23 @@ class Jobs:
         if not os.path.exists(path):
             shapes.write_knot(path, triangles)
         return path, shapes.knot_size(triangles)
+
+    def series(self, name):
+        """Pairs of a size and the words of its job."""
+        if name == "batch-jobs":
+            yield from self.batch()
+        elif "-" not in name:
+            for x, words in getattr(self, name)():
+                yield x, ["jet", *words]
+        else:
+            product, size = name.split("-")
+            command, options, _ = PRODUCTS[product]
+            for x, words in getattr(self, size)():
+                if x > min(MAX_SIZE[size] ** (2 if size == "pixels" else 1), MAX_COPIES.get(product, 1e9) if size == "copies" else 1e9):
+                    break
+                if command != "jet" or "--machine" in options:
+                    words = without(words, "--dpi", *(["--bed"] if "--machine" in options else []))
+                yield x, [command, *words, *options]
 
     def triangles(self):
         """Decades and their thirds of triangles; 236 layers of 22 million pixels."""
@@ -80,7 +114,7 @@ class Jobs:
         path = self.path("small.stl")
         shapes.write_knot(path, 1000, 0.05)
         for count in powers(1, 10_000):
-            yield count, [path, *LARGE_BED, "--dpi", "600", "--layer", "0.06", "--gap", "0.5", "--copies", str(count)]
+            yield count, [path, *LARGE_BED, "--dpi", "600", "--layer", "0.06", *GAP[:2 * (count > 1)], "--copies", str(count)]
 
     def meshes(self):
         """Different files of 1,000 triangles each, no two of one size, on the same bed, 20 layers of 89 million pixels."""
@@ -89,7 +123,7 @@ class Jobs:
             while len(paths) < count:
                 paths.append(self.path(f"mesh{len(paths)}.stl"))
                 shapes.write_knot(paths[-1], 1000, 0.05 - 0.01 * len(paths) / 1000)
-            yield count, [*paths, *LARGE_BED, "--dpi", "600", "--layer", "0.06", "--gap", "0.5"]
+            yield count, [*paths, *LARGE_BED, "--dpi", "600", "--layer", "0.06", *GAP[:2 * (count > 1)]]
 
     def threads(self):
         """Of knot800k's job."""
@@ -98,8 +132,23 @@ class Jobs:
         for count in sorted({1, 2, *(c for c in (4, 8, 16, 32, 64) if c < cores), cores}):
             yield count, [path, *BED, "--dpi", "1200", "--layer", "0.05", "--threads", str(count)]
 
+    def batch(self):
+        """Dry runs of a small part, in one list."""
+        cube, jobs = self.path("cube.stl"), self.path("jobs.txt")
+        shapes.write_box(cube, 2, 2, 2)
+        for count in powers(100, 100_000):
+            with open(jobs, "w", encoding="utf-8") as file:
+                file.writelines(f"jet {cube} --bed 20x20 --dpi 100 --layer 0.5 --dry-run -o {number}\n" for number in range(count))
+            yield count, ["batch", jobs]
 
-SERIES = ["triangles", "layers", "pixels", "copies", "meshes", "threads"]
+
+def without(words, *options):
+    """The words without these options and their values."""
+    return [word for i, word in enumerate(words) if word not in options and (i == 0 or words[i - 1] not in options)]
+
+
+SERIES = ["triangles", "layers", "pixels", "copies", "meshes", "threads",
+          *(f"{product}-{size}" for product, (_, _, sizes) in PRODUCTS.items() for size in sizes), "batch-jobs"]
 MEASURES = ["wall", "processor", "peak"]
 
 
@@ -110,14 +159,17 @@ def run_job(options, words, work):
 
     def once():
         shutil.rmtree(out, ignore_errors=True)
-        return started([options.program, "jet", *words, "--quiet", "-o", out])
+        for name in os.listdir(work):
+            if name.startswith("out."):
+                os.remove(os.path.join(work, name))
+        return started([options.program, *words, "--quiet", "-o", out + ".gcode" if words[0] == "extrude" else out])
 
     first = once()
     runs = [first] if first[0] > 2 else []
     while len(runs) < options.runs:
         runs.append(once())
-    layers = len(os.listdir(os.path.join(out, "layers")))
-    shutil.rmtree(out)
+    layers = len(os.listdir(os.path.join(out, "layers"))) if words[0] == "jet" else 0
+    shutil.rmtree(out, ignore_errors=True)
     return dict(zip(MEASURES, (min(column) for column in zip(*runs))), layers=layers)
 
 
@@ -140,10 +192,10 @@ def slope(entries, measure):
 
 def measure_series(name, options, work):
     entries = []
-    for x, words in getattr(Jobs(work, options.max), name)():
+    for x, words in Jobs(work, options.max).series(name):
         entry = dict(run_job(options, words, work), x=x)
         say(f"  {name} {x:>11,}: {entry['wall']:7.3f} s, processor {entry['processor']:7.3f} s, "
-            f"{entry['peak'] / 2**20:7.1f} MiB, {entry['layers']} layers")
+            f"{entry['peak'] / 2**20:7.1f} MiB")
         entries.append(entry)
     # Threads are no size of a job: their slope has no limit.
     slopes = {} if name == "threads" else {measure: slope(entries, measure) for measure in MEASURES}

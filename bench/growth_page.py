@@ -9,6 +9,18 @@ ABOUT = {
     "meshes": ("different parts", "of 1,000 triangles each in files of their own, 20 layers of 89 million pixels"),
     "threads": ("threads", "knot800k: 800,000 triangles, 472 layers of 22.3 million pixels"),
 }
+PRODUCTS = {"levels": "`--levels 4`", "saturation": "`--saturation 70`", "program": "`--saturation 70` on production-1200", "fill": "`--fill raster`, two walls",
+            "inspect": "`--inspect`", "slice": "`slice`", "extrude": "`extrude`"}
+
+
+def about(name):
+    """Size and job of a series."""
+    if name == "batch-jobs":
+        return "jobs", "of a batch, dry runs of a cube"
+    if "-" not in name:
+        return ABOUT[name]
+    product, size = name.split("-")
+    return ABOUT[size][0], f"{PRODUCTS[product]}, {ABOUT[size][1]}"
 
 
 def slope_text(value):
@@ -25,7 +37,7 @@ def slope_rows(found):
     for name, series in found["series"].items():
         if series["slopes"]:
             entries = series["entries"]
-            yield [ABOUT[name][0], f"{entries[0]['x']:,} to {entries[-1]['x']:,}", ABOUT[name][1],
+            yield [about(name)[0], f"{entries[0]['x']:,} to {entries[-1]['x']:,}", about(name)[1],
                    *(slope_text(series["slopes"][measure]) for measure in ("wall", "processor", "peak"))]
 
 
@@ -61,12 +73,12 @@ def bounds(found):
 
 
 def lines(found):
-    about = found["machine"]
+    where = found["machine"]
     yield "# Growth"
     yield ""
     yield "Written by `scripts/bench growth` (`bench/growth.py`); edits are lost."
     yield ""
-    yield (f"{about['processor']}, {about['cores']} cores, {about['memory_gib']} GiB; {about['system']}, kernel {about['kernel']}. Commit "
+    yield (f"{where['processor']}, {where['cores']} cores, {where['memory_gib']} GiB; {where['system']}, kernel {where['kernel']}. Commit "
            f"{found['commit']} on {found['date']}. The least of {found['runs']} runs of whole processes; parts in the page cache, "
            f"outputs in memory. Other programs used {100 * found['others']:.0f} % of the processors.")
     yield ""
@@ -75,9 +87,10 @@ def lines(found):
     yield ""
     yield from slopes(found)
     for name, series in found["series"].items():
-        yield f"## {ABOUT[name][0].capitalize()}: {ABOUT[name][1]}"
+        size, job = about(name)
+        yield f"## {size.capitalize()}: {job}"
         yield ""
-        yield from table([ABOUT[name][0], "wall, s", "processor, s", "peak, MiB"], [
+        yield from table([size, "wall, s", "processor, s", "peak, MiB"], [
             [f"{entry['x']:,}", seconds(entry["wall"]), seconds(entry["processor"]), f"{entry['peak'] / 2**20:.1f}"]
             for entry in series["entries"]])
     if found["shares"]:

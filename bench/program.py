@@ -14,25 +14,16 @@ import json
 import os
 import shutil
 import statistics
-import struct
 import subprocess
 import sys
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(ROOT, "bench"))
+import shapes  # noqa: E402
+
 LAMINA = os.environ.get("LAMINA_PROGRAM", os.path.join(ROOT, "build/release/lamina"))
 BED, DPI = 400, 1200
-
-
-def write_box(path, x, y, z):
-    corners = [(i & 1, i >> 1 & 1, i >> 2 & 1) for i in range(8)]
-    faces = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2),
-             (1, 3, 7), (1, 7, 5)]
-    with open(path, "wb") as file:
-        file.write(b"box".ljust(80, b"\0") + struct.pack("<I", 12))
-        for face in faces:
-            points = [c for i in face for c in (corners[i][0] * x, corners[i][1] * y, corners[i][2] * z)]
-            file.write(struct.pack("<12fH", 0, 0, 0, *points, 0))
 
 
 def run(arguments, out):
@@ -68,7 +59,7 @@ def raw_write(folder, size, files):
 def memory(out):
     """Peak resident MiB of 20 and of 2000 layers of the same prism."""
     prism = os.path.join(out, "prism.stl")
-    write_box(prism, 20, 20, 100)
+    shapes.write_box(prism, 20, 20, 100)
     peaks = []
     for layers in ("0:20", "0:2000"):
         summary, _ = run([prism, "--machine", "production-1200", "--margin", "0", "--layer", "0.05", "--layers", layers,
@@ -90,7 +81,7 @@ def main(arguments=None):
     options = parser.parse_args(arguments)
     os.makedirs(options.out, exist_ok=True)
     box = os.path.join(options.out, "box.stl")
-    write_box(box, 399.9, 399.9, 0.1 * max(10, options.layers))
+    shapes.write_box(box, 399.9, 399.9, 0.1 * max(10, options.layers))
     crown = os.path.join(options.models, "dental_crown.stl")
     cases = {
         "full bed": [box, "--layer", "0.1", "--layers", f"0:{options.layers}"],

@@ -82,6 +82,13 @@ def write_knot(path, triangles, scale=1.0, position=None):
     return write_facets(path, 2 * around * along, blocks())
 
 
+def write_box(path, x, y, z):
+    """A box with a corner at the origin, sides in mm: 12 triangles."""
+    corners = [struct.pack("<3f", (i & 1) * x, (i >> 1 & 1) * y, (i >> 2 & 1) * z) for i in range(8)]
+    faces = ((0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5))
+    return write_facets(path, 12, (ZERO + b"".join(corners[i] for i in face) + END for face in faces))
+
+
 def write_columns(path, across, sides, size, height):
     """across x across columns with so many sides on size x size mm, a stress of rows; how many triangles."""
     pitch = size / across
