@@ -43,8 +43,8 @@ class Row:
     answer     how answers are compared (real_answers.py)
     """
 
-    def __init__(self, name, about, job, unit=None, target=None, stretch=None, measure="processor", answer="images", first=(), old=True):
-        self.name, self.about, self.job, self.unit, self.target, self.stretch = name, about, job, unit, target, stretch
+    def __init__(self, name, about, job, unit=None, target=None, goal=None, measure="processor", answer="images", first=(), old=True):
+        self.name, self.about, self.job, self.unit, self.target, self.goal = name, about, job, unit, target, goal
         self.measure, self.answer, self.first, self.old = measure, answer, first, old
 
 
@@ -265,7 +265,7 @@ def main(arguments):
             if options.row and row.name not in options.row:
                 continue
             result = real.measure(row)
-            found.append(dict(result, name=row.name, about=row.about, measure=row.measure, target=row.target, stretch=row.stretch,
+            found.append(dict(result, name=row.name, about=row.about, measure=row.measure, target=row.target, goal=row.goal,
                               unit_of=bool(row.unit)))
             say(real_page.line(found[-1]))
     after, ended = busy_and_total(), os.times()

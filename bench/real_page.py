@@ -34,6 +34,6 @@ def lines(result):
            f"{result['runs']} alternating runs, outputs in memory. Other programs used {100 * result['others']:.0f} % of the processors. Ratios are of "
            "processor seconds, or as the row states. Runs: wall seconds / processor seconds / peak MiB.")
     yield ""
-    yield from table(["job", "now", "target", "stretch", "", "the job", "compared with", "older build"], [
-        [row["about"], figure(row, row["value"]), figure(row, row["target"]), figure(row, row["stretch"]), verdict(row), run_text(row.get("new")),
+    yield from table(["job", "now", "target", "goal", "", "the job", "compared with", "older build"], [
+        [row["about"], figure(row, row["value"]), figure(row, row["target"]), figure(row, row["goal"]), verdict(row), run_text(row.get("new")),
          run_text(row.get("unit")), run_text(row.get("old"))] for row in result["rows"]])
