@@ -9,6 +9,7 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/compare.h"
+#include "stages/geometry/drop_rows.h"
 #include "stages/program/dialect.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/version.h"
@@ -128,7 +129,8 @@ Status ImageFiles::start() {
 }
 
 std::uint64_t ImageFiles::FileWork::bytes() const {
-  std::uint64_t total = bytes_held(file) + program.bytes();
+  std::uint64_t total =
+      bytes_held(file) + program.bytes() + bytes_held(plane.row_offset) + bytes_held(plane.change) + levels.bytes();
   for (const formats::Bytes& one : files) total += bytes_held(one);
   return total;
 }
@@ -143,18 +145,17 @@ Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord
     work.level_encoder->tag(tags);
   }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(images.whole, images.levels.data(), work, record, work.file); !status) return status;
+    if (Status status = encode_one(images, 0, work, record, work.file); !status) return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
   }
-  work.files.resize(images.several.size());
-  for (std::size_t m = 0; m < images.several.size(); ++m) {
+  work.files.resize(head_.named_images());
+  for (std::size_t m = 0; m < work.files.size(); ++m) {
     if (!head_.materials.empty()) tags.material = head_.materials[m / head_.drop_images()].name;
     if (work.encoder) work.encoder->tag(tags);
     if (work.level_encoder) work.level_encoder->tag(tags);
-    const Levels* levels = m < images.levels.size() ? &images.levels[m] : nullptr;
-    if (Status status = encode_one(images.several[m], levels, work, record, work.files[m]); !status) return status;
+    if (Status status = encode_one(images, m, work, record, work.files[m]); !status) return status;
     record.images[m].bytes = work.files[m].size();
     record.images[m].hash = hash_bytes(work.files[m]);
     record.bytes += work.files[m].size();
@@ -162,12 +163,25 @@ Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord
   return {};
 }
 
-Status ImageFiles::encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
+Status ImageFiles::encode_one(const LayerImages& images, std::size_t number, FileWork& work, const LayerRecord& record,
                               formats::Bytes& file) const {
   file.clear();
+  if (head_.extension.empty()) return {};
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
-  const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
-                                           : work.level_encoder->encode(*levels, head_.full_level(), x, y, file);
+  const bool several = !head_.materials.empty();
+  const std::size_t material = number / head_.drop_images();
+  Status status;
+  if (levels_ != nullptr) {
+    if (!images.drops.empty()) levels_of(images.drops[several ? 1 + material : 0], work.levels);
+    status = work.level_encoder->encode(images.drops.empty() ? images.shares : work.levels, head_.full_level(), x, y, file);
+  } else {
+    if (!images.drops.empty()) {
+      const auto drop = static_cast<std::uint32_t>(number % head_.drop_images());
+      runs_of(DropPlane(images.drops[several ? 1 + material : 0], drop), work.plane);
+    }
+    const Runs& image = !images.drops.empty() ? work.plane : several ? images.material[material] : images.whole;
+    status = work.encoder->encode(image, x, y, file);
+  }
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
@@ -205,9 +219,9 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
                                                   feeds.error().message)};
   }
   report_unfed(record);
-  std::vector<RunsView> planes{images.whole};
-  if (head_.max_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
-  return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
+  if (images.drops.empty()) return program_->write_layer(record.layer, images.whole, *feeds, work.program, record.program);
+  const PrintProgram::Drops drops{images.drops[0], std::max(1u, head_.max_drops)};
+  return program_->write_layer(record.layer, drops, *feeds, work.program, record.program);
 }
 
 std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
@@ -217,8 +231,12 @@ std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
   // Planes of drops share their changes, images of materials each have all.
   const std::uint64_t of_plane = drops.changes_of_all / planes + 1;
   const std::uint64_t of_file = head_.materials.empty() && levels_ == nullptr ? of_plane : drops.changes;
-  return files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
-         (program_ ? program_->bytes_bound(of_plane, planes) : 0);
+  std::uint64_t total = files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file);
+  // A plane of drops, or their levels, to be encoded.
+  const std::uint64_t rows = head_.grid.rows(), columns = head_.grid.columns();
+  if (drops.runs > 0 && !head_.extension.empty())
+    total += levels_ == nullptr ? 8 * (drops.changes + columns) + 4 * rows + columns / 8 : 18 * drops.changes + 8 * rows;
+  return total + (program_ ? program_->bytes_bound(drops.runs > 0 ? 2 * drops.runs : drops.changes, planes) : 0);
 }
 
 Status ImageFiles::record_kept_below(std::uint32_t layer) {

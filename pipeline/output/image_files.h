@@ -27,10 +27,10 @@ formats::LayerTags tags_of(const Plan& plan, const Layer& layer);
 
 /// The images of a layer that is to be written.
 struct LayerImages {
-  const Runs& whole;               // of all materials, of the first drop
-  std::span<const Runs> planes;    // of all materials, of each drop, if pixels can get several
-  std::span<const Runs> several;   // those that have names (ManifestHead::named_images)
-  std::span<const Levels> levels;  // for formats that carry shares of the voxels, or drops: one, or one a material
+  const Runs& whole;                     // of all materials, before its pixels get their drops
+  std::span<const Runs> material;        // of each, where there are several
+  std::span<const DropImageView> drops;  // of all materials, then of each; none if all get one drop a pixel
+  const Levels& shares;                  // of the voxels, for formats that carry them; without drops
 };
 
 class ImageFiles {
@@ -60,6 +60,8 @@ class ImageFiles {
     std::unique_ptr<formats::LevelEncoder> level_encoder;
     formats::Bytes file;
     std::vector<formats::Bytes> files;  // those that have names
+    Runs plane;                         // of drops
+    Levels levels;                      // drops of each pixel
     ProgramWork program;
     std::uint64_t bytes() const;
   };
@@ -86,7 +88,7 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void report_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
+  Status encode_one(const LayerImages& images, std::size_t number, FileWork& work, const LayerRecord& record,
                     formats::Bytes& file) const;
 
   const Plan& plan_;

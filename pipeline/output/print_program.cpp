@@ -41,8 +41,23 @@ Status PrintProgram::begin() const {
   return status ? write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
 }
 
-Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
+Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
                                  ProgramWork& work, ProgramRecord& record) const {
+  return write(layer, feeds, work, record, [&](const program::EmitSweep& emit) {
+    return program::compile(resolved_.grid, image, work.compile, emit, layer.index);
+  });
+}
+
+Status PrintProgram::write_layer(const Layer& layer, const Drops& drops, const std::vector<std::uint32_t>& feeds,
+                                 ProgramWork& work, ProgramRecord& record) const {
+  return write(layer, feeds, work, record, [&](const program::EmitSweep& emit) {
+    return program::compile(resolved_.grid, drops.image, drops.maximum, work.compile, emit, layer.index);
+  });
+}
+
+template <class Compile>
+Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
+                           ProgramRecord& record, const Compile& compile) const {
   if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   if (!work.timer) work.timer.emplace(*machine_);
@@ -72,19 +87,16 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   };
   maintenance([&] { work.writer->maintenance_of_layer(cycle, work.text); });
   constexpr std::size_t kPiece = 256 << 10;
-  const auto count = program::compile(
-      resolved_.grid, planes, work.compile,
-      [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        maintenance([&] { work.writer->maintenance_before(sweep, vectors, work.text); });
-        if (!dialect_.has_motion) {
-          const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
-          work.timer->sweep(static_cast<double>(program::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
-                            sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
-        }
-        if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
-        return work.text.size() < kPiece ? Status() : flush();
-      },
-      layer.index);
+  const auto count = compile([&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+    maintenance([&] { work.writer->maintenance_before(sweep, vectors, work.text); });
+    if (!dialect_.has_motion) {
+      const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
+      work.timer->sweep(static_cast<double>(program::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
+                        sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
+    }
+    if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
+    return work.text.size() < kPiece ? Status() : flush();
+  });
   if (!count) return count.error();
   maintenance([&] { work.writer->maintenance_after(work.text); });
   work.writer->end_layer(cycle, work.text);
@@ -102,16 +114,16 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   return {};
 }
 
-std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t planes) const {
+std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t drops) const {
   const HeadGrid& grid = resolved_.grid;
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
   const std::uint64_t vectors = grid.steps() * grid.words() * grid.drop_bits * 8;
-  const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
+  const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 9 * changes : 27 * changes;
   // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis: at most 32 bytes a step (m578), twice while the
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
   const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
+  const std::uint64_t sweeps = std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(drops);
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   // Lines of the base, and of shots off the bed: of one nozzle after the other (m578), of a dot a drop (brundlefab).
@@ -119,9 +131,12 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   const std::uint64_t shots = machine.maintenance.spits() ? 1 + (machine.maintenance.spit_seconds > 0 ? sweeps : 0) : 0;
   const std::uint64_t maintenance =
       512 * machine.powder.base_layers + shots * (256 + 16 * std::uint64_t{machine.maintenance.spit_drops});
-  // Lines of the bits of drops, at most twice those of the drops, and their changes sorted.
-  const std::uint64_t bits = grid.drop_bits > 1 ? 16 * changes * grid.sweep_drops + 40 * grid.nozzles : 0;
-  return bits + 4 * maintenance + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
+  // Lines of drops as bits, and what is under the nozzles; a line that blocked nozzles leave to others has a run a position.
+  const std::uint64_t rows =
+      (std::uint64_t{256} << 10) + std::uint64_t{64 * 8 * 4} * grid.words() * grid.drop_bits + 80 * grid.nozzles;
+  const std::uint64_t moved = grid.blocked_rule == BlockedRule::kNeighbour ? 2 * std::uint64_t{grid.max_swaths()} : 0;
+  const std::uint64_t own = 18 * moved * grid.passes * grid.blocked.size() * grid.positions;
+  return rows + own + 4 * maintenance + 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 4 * changes + turned + kept +
          (512 << 10);
 }
 

@@ -55,22 +55,28 @@ class PrintProgram {
   Status begin() const;
 
   /// Compiles a layer, times it and writes its file, sweep by sweep. errors  kOutput
-  /// planes  of the drops of a pixel, each within the one before; one if all get at most one
   /// feeds   the vats that feed the layer
-  Status write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
-                     ProgramWork& work, ProgramRecord& record) const;
-
   Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
-                     ProgramRecord& record) const {
-    return write_layer(layer, std::span(&image, 1), feeds, work, record);
-  }
+                     ProgramRecord& record) const;
+
+  /// The same of pixels that get the drops of an image. maximum  of any pixel of the job
+  struct Drops {
+    DropImageView image;
+    std::uint32_t maximum = 1;
+  };
+  Status write_layer(const Layer& layer, const Drops& drops, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
+                     ProgramRecord& record) const;
 
   std::vector<std::uint32_t> refills;  // layers before which the program pauses for vats to be filled, in order; set first
 
-  /// Upper bound of write_layer's memory, in bytes, for so many images with that many changes.
-  std::uint64_t bytes_bound(std::uint64_t changes, std::uint32_t planes = 1) const;
+  /// Upper bound of write_layer's memory, in bytes, for an image with so many changes, or two for each run of a zone.
+  std::uint64_t bytes_bound(std::uint64_t changes, std::uint32_t drops = 1) const;
 
  private:
+  /// compile(emit)  makes the sweeps
+  template <class Compile>
+  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record,
+               const Compile& compile) const;
   std::string path(std::string_view name) const;
   const ResolvedMachine& resolved_;
   const program::Dialect& dialect_;

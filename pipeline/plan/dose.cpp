@@ -68,7 +68,7 @@ std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones
 
 DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
     : zones_(job, grid),
-      rules_{static_cast<std::uint8_t>(job.levels > 0 ? job.levels - 1 : 0), job.dose.dithered, {}, 0},
+      rules_{static_cast<std::uint8_t>(job.levels > 0 ? job.levels - 1 : 0), job.dose.dithered, {}, 0, job.dose.core < 1},
       core_(job.dose.core),
       grid_(grid),
       mirror_(job.mirror) {
@@ -80,14 +80,11 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
     }
     targets_->own = zones_.targets();
   }
-  if (core_ < 1 || (targets_ && targets_->has_core())) rules_.shell = dose::reach_of(grid, shell, shell);
+  if (thins() || (targets_ && targets_->has_core())) rules_.shell = dose::reach_of(grid, shell, shell);
 }
 
-void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const {
-  if (core_ >= 1) return;
-  if (!rules_.shell.half_width.empty()) dose::erode(image, rules_.shell, third);
-  dose::saturate(image, rules_.shell.half_width.empty() ? image.view() : third.view(), core_, layer, second);
-  std::swap(image, second);
+void DosePlan::thin(std::uint32_t layer, const Runs& image, Runs& second, dose::DropWork& work) const {
+  dose::drops_of_core(rules_, core_, layer, image, second, work);
 }
 
 Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
@@ -160,8 +157,8 @@ bool DosePlan::has_formula(const Layer& layer) const {
   return false;
 }
 
-Result<dose::ZoneSums> DosePlan::saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
-                                                    dose::DropWork& work) const {
+Result<dose::ZoneSums> DosePlan::saturate_deposited(const Layer& layer, std::uint32_t materials, const Runs& image,
+                                                    Runs& second, dose::DropWork& work) const {
   dose::Sheet sheet{grid_, mirror_ == Mirror::kX || mirror_ == Mirror::kXY, mirror_ == Mirror::kY || mirror_ == Mirror::kXY,
                     layer};
   sheet.limit = dose::Drops24{limit_ > 0 ? limit_ : 1} << dose::kDropBits;
@@ -199,7 +196,7 @@ Result<dose::ZoneSums> DosePlan::saturate_deposited(const Layer& layer, std::uin
   return dose::drops_of_deposited(rules_, sheet, requests, materials, image, second, work);
 }
 
-Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool deposited, std::uint32_t materials, Runs& image,
+Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool deposited, std::uint32_t materials, const Runs& image,
                                           std::span<const Runs> zone, Runs& second, dose::DropWork& work) const {
   if (deposited) return saturate_deposited(layer, materials, image, second, work);
   if (has_formula(layer)) {

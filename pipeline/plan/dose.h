@@ -74,7 +74,7 @@ class DosePlan {
   Status check_images(std::string_view format) const;
 
   /// Whether the dose changes any layer.
-  bool any() const { return bleeds() || core_ < 1 || saturates(); }
+  bool any() const { return bleeds() || thins() || saturates(); }
   /// Whether a saturation or shares of voxels decide the drops, and how many a pixel can get; 0 if none does.
   bool saturates() const { return max_drops() > 0; }
   std::uint32_t max_drops() const { return rules_.max_drops; }
@@ -87,15 +87,17 @@ class DosePlan {
   const DoseZones& zones() const { return zones_; }
   bool bleeds() const { return zones_.bleeds().any(); }
 
-  /// Thins the core of an image without bleed. `second` and `third` are scratch.
-  void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
+  /// Whether the core of a layer is thinned.
+  bool thins() const { return core_ < 1; }
+  /// Gives an image without bleed its drops, of a job that thins cores. `second` is scratch.
+  void thin(std::uint32_t layer, const Runs& image, Runs& second, dose::DropWork& work) const;
 
-  /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
+  /// The drops of a layer. `second` is scratch.
   /// deposited  work.deposited has the fill fractions of several solids
   /// materials  of the job, whose drops are distinguished if solids share voxels
   /// zone       the image of each zone, where there are several
   /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
-  Result<dose::ZoneSums> saturate(const Layer& layer, bool deposited, std::uint32_t materials, Runs& image,
+  Result<dose::ZoneSums> saturate(const Layer& layer, bool deposited, std::uint32_t materials, const Runs& image,
                                   std::span<const Runs> zone, Runs& second, dose::DropWork& work) const;
 
   /// Upper bound of the changes of edges that moved.
@@ -104,7 +106,7 @@ class DosePlan {
   }
   /// Of pixels or voxels of a layer those that blue noise may part from the one before them, at most; none of many jobs.
   bool parts_pixels() const {
-    return core_ < 1 || (saturates() && (rules_.dithered ? targets_ || rules_.full > 0 : has_copies()));
+    return thins() || (saturates() && (rules_.dithered ? targets_ || rules_.full > 0 : has_copies()));
   }
   std::uint64_t parted_pixels(const Runs& image, const dose::DropWork& work) const;
   /// What drops make of it. sizes  its edges moved
@@ -114,7 +116,7 @@ class DosePlan {
 
  private:
   bool has_formula(const Layer& layer) const;
-  Result<dose::ZoneSums> saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+  Result<dose::ZoneSums> saturate_deposited(const Layer& layer, std::uint32_t materials, const Runs& image, Runs& second,
                                             dose::DropWork& work) const;
 
   DoseZones zones_;

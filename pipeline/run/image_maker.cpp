@@ -90,8 +90,8 @@ class PartCounter {
 
   const Plan& plan_;
   std::optional<cost::PartPixels> windows_;
-  bool saturates_ = false, several_ = false;  // drops are decided; pixels get more than one
-  std::uint8_t full_ = 0;                     // level of a full voxel; 0: pixels are set or not
+  bool saturates_ = false;  // drops are decided
+  std::uint8_t full_ = 0;   // level of a full voxel; 0: pixels are set or not
 };
 
 Inspector::Inspector(const Plan& plan) : plan_(plan) {
@@ -148,7 +148,6 @@ PartCounter::PartCounter(const Plan& plan) : plan_(plan) {
   const std::size_t parts = reported_parts(plan);
   if (parts < 2) return;
   saturates_ = plan.images->dose.saturates();
-  several_ = plan.images->dose.max_drops() > 1;
   full_ = plan.images->dose.full();
   const std::vector<checks::Solid> solids = solids_from_above(*plan.scene);
   std::vector<Box> boxes;
@@ -180,12 +179,12 @@ void PartCounter::count(const ImageWork& work, const ImageNotes& notes, LayerRec
   if (full_ > 0) {
     const Levels& voxels = saturates_ ? drops.zones : drops.shares;
     record.part_pixels = windows_->share(record.layer, voxels, full_, record.dosed_pixels);
+  } else if (drops.dosed() && !saturates_) {
+    record.part_pixels = windows_->drops(record.layer, drops.drops[0], drops.counter);
   } else {
     record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, work.runs);
   }
-  if (saturates_) {
-    record.part_drops = several_ ? windows_->sum(record.layer, drops.levels) : windows_->count(record.layer, work.runs);
-  }
+  if (saturates_) record.part_drops = windows_->drops(record.layer, drops.drops[0], drops.counter);
 }
 
 void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const {
@@ -198,12 +197,17 @@ void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64
   if (!saturates_ || !zones.several()) return;  // drops are as pixels
   record.part_drops.assign(weights.size(), 0);
   std::vector<std::uint64_t> drops(zones.count(), 0);  // those of shared voxels count for all of theirs
-  for (std::uint32_t zone = 0; full_ == 0 && zone < zones.count(); ++zone)
-    drops[zone] = sum_of_levels(work.drops.levels, work.zones.image[zone]);
+  Levels of_pixels;
+  const auto drops_in = [&](const Runs& pixels) {
+    const DropImageView& all = work.drops.drops[0];
+    dose::within(all.zones, pixels, of_pixels);
+    return DropTotals({of_pixels, all.patterns}, work.drops.counter).drops();
+  };
+  for (std::uint32_t zone = 0; full_ == 0 && zone < zones.count(); ++zone) drops[zone] = drops_in(work.zones.image[zone]);
   for (std::size_t i = 0; full_ > 0 && i < work.drops.deposited.size(); ++i) {
     Runs voxels;
     threshold_levels(work.drops.deposited[i].shares, 1, voxels);
-    drops[work.drops.deposited[i].zone] += sum_of_levels(work.drops.levels, voxels);
+    drops[work.drops.deposited[i].zone] += drops_in(voxels);
   }
   drops = shared(record.drops, drops);
   for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
@@ -386,7 +390,7 @@ class ImageMaker : public Maker {
   }
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, images.drops.planes, imager_.several(images), imager_.levels(images)};
+    return {images.runs, images.materials.image, images.drops.drops, images.drops.shares};
   }
 
   const Plan& plan_;

@@ -244,6 +244,7 @@ dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) 
   sizes.pixels = std::min(pixels, sizes.rows * sizes.columns);
   sizes.zones = images.dose.zones().several() || images.dose.bleeds() || plan_.job.mirror != Mirror::kNone || of_images > 0;
   sizes.materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
+  sizes.doses = images.dose.zones().count();
   if (images.dose.has_copies()) sizes.parts = images.dose.zones().count();
   if (plan_.job.levels == 0) return sizes;
   std::uint64_t voxels = of_images;
@@ -271,9 +272,8 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer, std::uint64_t pixels) co
   if (high != low) total += images.solids.layer_bytes_bound(high);
   // The image, and one more; those of bleed, with what it took away.
   total += image(edges) * (2 + (images.dose.bleeds() ? 6 : 0));
-  if (plan_.job.dose.core < 1) total += image(edges) + 2 * image(drops.changes);
   // Images of each material, of all, of one solid, and one intermediate.
-  if (images.materials.several()) total += (images.materials.used.size() + 3) * image(std::max(edges, drops.changes));
+  if (images.materials.several()) total += (images.materials.used.size() + 3) * image(edges);
   // Images of each dose, before and after they grow, with shells and cores; the whole before it is moved, and scratch.
   if (images.dose.zones().several()) total += (2 * zones + 6) * image(edges);
   // An image as read and as placed; where levels are, 9 bytes a run of those and of both together.
@@ -437,8 +437,10 @@ void LayerImager::add_shares(const Layer& layer, std::uint32_t part, ImageWork& 
 
 Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
+  const bool several = images.materials.several();
+  work.drops.drops.clear();
   if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
-  images.dose.thin(layer.index, work.runs, work.second, work.third);
+  if (images.dose.thins()) images.dose.thin(layer.index, work.runs, work.second, work.drops);
   if (images.dose.saturates()) {
     const auto materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
     const auto sums =
@@ -446,36 +448,36 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (!sums) return sums.error();
     record.dosed_pixels = sums->full_voxels;
     record.requested_drops = sums->requested_drops;
-    record.drops = images.dose.max_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
-    record.max_drops = images.dose.max_drops() > 1 ? highest(work.drops.levels) : record.drops > 0 ? 1 : 0;
-    // Of one drop a pixel the image alone was made.
-    const bool levels = formats::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
-    if (levels && images.dose.max_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
   } else if (plan_.job.levels > 0) {
     threshold_levels(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
-  if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
-  const bool grey = formats::find_level_format(plan_.job.format) != nullptr, drops = images.dose.max_drops() > 1;
-  if (images.materials.several() && (shares_voxels() || drops || grey))
-    dose::drops_of_materials(images.dose.max_drops(), shares_voxels(), work.materials.image, work.drops);
-  const bool counted = images.dose.saturates() && images.dose.max_drops() <= 1;
-  record.set_pixels = counted ? record.drops : set_pixels(work.runs);
-  for (const Runs& image : several(work)) record.images.emplace_back().set_pixels = set_pixels(image);
-  for (std::size_t m = 0; grey && m < record.images.size(); ++m)
-    record.images[m].drops = sum_of_levels(work.drops.of_material[m]);
+  if (several && !work.drops.dosed() && (images.beads || images.dose.bleeds())) work.materials.keep(work.runs);
+  if (several && work.drops.dosed() && !shares_voxels()) dose::separate_materials(work.materials.image, work.drops);
+  count(work, record);
   return {};
 }
 
-std::span<const Runs> LayerImager::several(const ImageWork& work) const {
-  const bool drops = plan_.images->dose.max_drops() > 1 && formats::find_level_format(plan_.job.format) == nullptr;
-  if (!drops) return work.materials.image;
-  return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
-}
-
-std::span<const Levels> LayerImager::levels(const ImageWork& work) const {
-  if (plan_.images->materials.several()) return work.drops.of_material;
-  return {plan_.images->dose.saturates() ? &work.drops.levels : &work.drops.shares, 1};
+void LayerImager::count(ImageWork& work, LayerRecord& record) const {
+  const DosePlan& dose = plan_.images->dose;
+  if (!work.drops.dosed()) {
+    record.set_pixels = set_pixels(work.runs);
+    for (const Runs& image : work.materials.image) record.images.emplace_back().set_pixels = set_pixels(image);
+    return;
+  }
+  const DropTotals totals(work.drops.drops[0], work.drops.counter);
+  record.set_pixels = totals.pixels();
+  if (dose.saturates()) {
+    record.drops = totals.drops();
+    record.max_drops = totals.maximum();
+  }
+  const bool grey = formats::find_level_format(plan_.job.format) != nullptr, several = plan_.images->materials.several();
+  const std::uint32_t planes = grey ? 1 : std::max(1u, dose.max_drops());
+  for (std::size_t m = several ? 1 : 0; m < work.drops.drops.size() && (several || planes > 1); ++m) {
+    const DropTotals own = several ? DropTotals(work.drops.drops[m], work.drops.counter) : totals;
+    for (std::uint32_t drop = 0; drop < planes; ++drop) record.images.emplace_back().set_pixels = own.pixels(drop);
+    if (grey) record.images.back().drops = own.drops();
+  }
 }
 
 }  // namespace lamina::pipeline

@@ -60,14 +60,11 @@ class LayerImager {
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
   Status bleed(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Thins the core, or gives pixels their drops, and counts what remains. errors  kUsage: of DosePlan::saturate
+  /// Gives pixels their drops, in work.drops.drops, where they are not one a pixel, and counts them. errors  kUsage: of
+  /// DosePlan::saturate
   Status dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
-
-  /// The images of a layer that have names, and its levels, of each material if there are several; from then on.
-  std::span<const Runs> several(const ImageWork& work) const;
-  std::span<const Levels> levels(const ImageWork& work) const;
 
   /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
   /// The plan's job requests levels.
@@ -98,6 +95,7 @@ class LayerImager {
   void own_voxels(ImageWork& work) const;
   static void empty_removed(const Runs& before, bool deposited, ImageWork& work);
   std::array<Nm, 2> planes(const Layer& layer) const;
+  void count(ImageWork& work, LayerRecord& record) const;
   dose::DropSizes sizes_of(const Layer& layer, std::uint64_t pixels) const;
   std::uint64_t changes_of_images(Nm plane) const;
 

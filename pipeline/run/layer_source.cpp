@@ -8,6 +8,7 @@
 
 #include "pipeline/plan/layers.h"
 #include "pipeline/run/layer_imager.h"
+#include "stages/geometry/drop_rows.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file.h"
 
@@ -93,8 +94,16 @@ Result<PlannedImages> LayerSource::images(std::uint32_t index) const {
   LayerRecord record;
   ImageNotes notes;
   const Status status = state_->imager->make(state_->plan.layer(index), *work, record, notes);
-  PlannedImages images{work->runs, {}};  // exact-size copies; the scratch keeps its capacity
-  if (state_->plan.images->materials.several()) images.material = work->materials.image;
+  PlannedImages images;
+  const std::vector<DropImageView>& drops = work->drops.drops;
+  const bool several = state_->plan.images->materials.several();
+  if (drops.empty()) {
+    images.whole = work->runs;  // exact-size copies; the scratch keeps its capacity
+    if (several) images.material = work->materials.image;
+  } else if (status) {
+    runs_of(DropPlane(drops[0], 0), images.whole);
+    for (std::size_t m = 1; several && m < drops.size(); ++m) runs_of(DropPlane(drops[m], 0), images.material.emplace_back());
+  }
   state_->give_back(std::move(work));
   if (!status) return status.error();
   return images;

@@ -25,7 +25,8 @@ void reach_voxels(const PixelAxis& axis, std::int32_t& low, std::int32_t& high) 
   high = static_cast<std::int32_t>(floor_div(end * axis.span, axis.dots) - 1);
 }
 
-constexpr auto as_one = [](std::size_t) { return std::uint8_t{1}; };
+/// Of pixels [begin, end) of a run in a row.
+constexpr auto as_one = [](std::size_t, std::uint32_t begin, std::uint32_t end) { return std::uint64_t{end - begin}; };
 
 std::span<const std::uint32_t> changes_of(const LevelsView& image, std::uint32_t row) {
   const std::size_t first = image.row_offset[row];
@@ -70,12 +71,12 @@ template <class Row>
 std::uint64_t PartPixels::sum_in(const BodyWindow& window, std::uint32_t rows, const Row& row_of) {
   std::uint64_t sum = 0;
   for (std::uint32_t r = window.top; r < std::min(window.bottom, rows); ++r) {
-    const auto [row, level_of] = row_of(r);
+    const auto [row, sum_of] = row_of(r);
     // Runs from the first one that ends behind the left side.
     std::size_t i = static_cast<std::size_t>(std::ranges::upper_bound(row, window.left) - row.begin()) / 2 * 2;
     for (; i + 1 < row.size() && row[i] < window.right; i += 2) {
       const std::uint32_t begin = std::max(row[i], window.left), end = std::min(row[i + 1], window.right);
-      if (begin < end) sum += std::uint64_t{end - begin} * level_of(i / 2);
+      if (begin < end) sum += sum_of(i / 2, begin, end);
     }
   }
   return sum;
@@ -113,19 +114,31 @@ std::vector<std::uint64_t> PartPixels::count(const Layer& layer, const LevelsVie
 
 std::vector<std::uint64_t> PartPixels::sum(const Layer& layer, const LevelsView& image) const {
   return sums(layer, image.rows(), [&](std::uint32_t r) {
-    const auto level_of = [&image, first = image.row_offset[r]](std::size_t run) { return image.level[first + run]; };
-    return std::pair(changes_of(image, r), level_of);
+    const auto sum_of = [&image, first = image.row_offset[r]](std::size_t run, std::uint32_t begin, std::uint32_t end) {
+      return std::uint64_t{end - begin} * image.level[first + run];
+    };
+    return std::pair(changes_of(image, r), sum_of);
+  });
+}
+
+std::vector<std::uint64_t> PartPixels::drops(const Layer& layer, const DropImageView& image, const DropCounter& counter) const {
+  const LevelsView& zones = image.zones;
+  return sums(layer, zones.rows(), [&](std::uint32_t r) {
+    const auto sum_of = [&, r, first = zones.row_offset[r]](std::size_t run, std::uint32_t begin, std::uint32_t end) {
+      return counter.drops(zones.level[first + run], r, begin, end);
+    };
+    return std::pair(changes_of(zones, r), sum_of);
   });
 }
 
 std::vector<std::uint64_t> PartPixels::share(const Layer& layer, const LevelsView& image, std::uint8_t full,
                                              std::uint64_t voxels) const {
   std::vector<std::uint64_t> weights = sums(layer, image.rows(), [&](std::uint32_t r) {
-    const auto level_of = [&image, full, first = image.row_offset[r]](std::size_t run) {
+    const auto sum_of = [&image, full, first = image.row_offset[r]](std::size_t run, std::uint32_t begin, std::uint32_t end) {
       const std::uint8_t level = image.level[first + run];
-      return static_cast<std::uint8_t>(level > full ? level - full : level);
+      return (level > full ? level - full : level) * std::uint64_t{end - begin};
     };
-    return std::pair(changes_of(image, r), level_of);
+    return std::pair(changes_of(image, r), sum_of);
   });
   const auto whole = shares(static_cast<std::int64_t>(voxels), weights);
   std::ranges::copy(whole, weights.begin());

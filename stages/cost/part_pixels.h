@@ -10,6 +10,7 @@
 #include "stages/data/levels.h"
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/drop_rows.h"
 
 namespace lamina::cost {
 
@@ -37,9 +38,11 @@ class PartPixels {
   /// The same of shares of voxels, weighed by them: whole ones by the largest remainder. full  the level of a full voxel in
   /// the shell; a core's is twice that (dose/shares.h). voxels  that all come to
   std::vector<std::uint64_t> share(const Layer& layer, const LevelsView& image, std::uint8_t full, std::uint64_t voxels) const;
-  /// The pixels of each part that are of any level, and the sums of its levels: where levels are drops, what it gets.
+  /// The pixels of each part that are of any level, and the sums of its levels.
   std::vector<std::uint64_t> count(const Layer& layer, const LevelsView& image) const;
   std::vector<std::uint64_t> sum(const Layer& layer, const LevelsView& image) const;
+  /// The drops of each part. counter  started with the image's patterns
+  std::vector<std::uint64_t> drops(const Layer& layer, const DropImageView& image, const DropCounter& counter) const;
 
  private:
   struct BodyWindow {

@@ -79,6 +79,7 @@ struct Sweep {
   std::uint32_t drop = 0;             // of a pixel, from 0: the first one that this sweep can fire
   std::uint32_t drops = 1;            // the most of a nozzle at a place
   bool added = false;                 // not needed if nozzles fired all of their drops at the scan's speed
+  bool repeated = false;              // fires what the sweep before it did, of the drops that follow those
 };
 
 /// What the nozzles do in a sweep.

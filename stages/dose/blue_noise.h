@@ -4,21 +4,17 @@
 #include <cstdint>
 #include <vector>
 
+#include "stages/data/drop_image.h"
+
 namespace lamina::dose {
 
-/// Side of the tile, which repeats along columns and rows.
-inline constexpr std::uint32_t kTileSide = 128;
 inline constexpr std::uint32_t kTilePixels = kTileSide * kTileSide;
 
 /// The rank of each pixel of the tile, row by row: each of 0 .. kTilePixels - 1 once. The pixels of rank below n are those
 /// that are set for the share n / kTilePixels.
 ///
-/// Void and cluster: from every 32nd of the pixels, moved from the tightest cluster to the largest void until nothing gets
-/// better, ranks go down from the tightest cluster and up to the largest void. Distances count on the torus. The weights
-/// are integers: (2 + distance^2)^-2 where few pixels, or few gaps, lie far apart, and a Gaussian of 1.5 pixels between,
-/// so that the tile is the same everywhere.
-/// source  R. Ulichney, "The void-and-cluster method for dither array generation" (1993)
-/// cost    some tens of milliseconds at the first call, nothing after it; safe from any thread
+/// They are data (blue_noise_tile.h) of the void-and-cluster method: tests/dose/void_and_cluster.cpp.
+/// cost  some microseconds at the first call, nothing after it; safe from any thread
 const std::vector<std::uint16_t>& blue_noise_ranks();
 
 /// How far the tile is moved from layer to layer. Of all odd steps this one was found to have the least correlation, over 18

@@ -147,12 +147,8 @@ std::uint64_t DropWork::bytes() const {
   for (const DepositedPart& part : deposited) total += part.bytes();
   total += shared.bytes();
   for (const Field& field : fields) total += field.bytes();
-  const auto add = [&](const Runs& plane) { total += bytes_held(plane.row_offset) + bytes_held(plane.change); };
-  std::ranges::for_each(planes, add);
-  std::ranges::for_each(material_planes, add);
-  for (const Levels& drops : of_material) total += drops.bytes();
-  total += up_to.bytes();
-  return total;
+  for (const Levels& of : of_material) total += of.bytes();
+  return total + up_to.bytes() + patterns.bytes() + counter.bytes();
 }
 
 void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work) {
@@ -170,24 +166,24 @@ DropBound bound_of(const DropRules& rules, const DropSizes& sizes) {
   const std::uint64_t maximum = std::max(1u, rules.max_drops), rows = sizes.rows;
   // Of blue noise each pixel may differ from the one before it, by one drop: in one plane. Where it ends there is an edge.
   const std::uint64_t parted = sizes.pixels == 0 ? 0 : sizes.edges + sizes.pixels;
-  DropBound bound{sizes.edges + parted + 2, maximum * sizes.edges + parted + 2, 0};
-  if (rules.full == 0 && rules.max_drops == 0) return bound;
-  const auto image = [&](std::uint64_t changes) { return 8 * changes + 4 * (rows + 1); };
+  DropBound bound{sizes.edges + parted + 2, maximum * sizes.edges + parted + 2, 0, 0};
+  if (rules.full == 0 && rules.max_drops == 0 && !rules.thins) return bound;
   const auto levels = [&](std::uint64_t runs) { return 18 * runs + 8 * (rows + 1); };
   const std::uint64_t core = rules.shell.half_width.empty() ? 0 : sizes.edges;
   const std::uint64_t runs = rules.full > 0 ? sizes.runs : sizes.edges / 2 + 1;
-  bound.bytes = levels(runs) + (core > 0 || sizes.zones ? levels(runs + core) : 0) + image(bound.changes + sizes.columns) +
-                16 * sizes.columns;
+  bound.runs = runs + core;
+  bound.bytes = levels(runs) + (core > 0 || sizes.zones || rules.thins ? levels(bound.runs) : 0);
+  // A tile and the counts of its rows for each zone.
+  bound.bytes += std::uint64_t{2} * std::max<std::uint32_t>(rules.full, sizes.doses) * (kTilePixels + 4096);
+  if (sizes.materials > 1) bound.bytes += sizes.materials * levels(bound.runs);
   if (const std::uint64_t parts = sizes.parts; parts > 0) {
     // Of each part its shares with and without its core, what others leave of it, and its voxels half full.
     bound.bytes += 70 * runs + 18 * core * parts + 32 * parts * (rows + 1);
     bound.bytes += 112 * std::min(sizes.columns, runs) + 36 * sizes.columns + sizeof(std::uint32_t) * kTilePixels;
+    // Drops of each material, and of those up to it.
+    bound.runs = bound.changes;
+    bound.bytes += levels(bound.changes) * (sizes.materials > 1 ? 2 + sizes.materials : 1);
   }
-  if (maximum == 1 && sizes.parts == 0) return bound;
-  // A plane is made with room for all runs of a row.
-  const std::uint64_t planes = 8 * bound.changes_of_all + maximum * (4 * (rows + 1) + 16 * sizes.columns);
-  // Drops and planes of each material, and of those up to it.
-  bound.bytes += (levels(bound.changes) + planes) * (sizes.materials > 1 ? 2 + sizes.materials : 1);
   return bound;
 }
 
@@ -210,26 +206,16 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
   mark_core(work.shares, second, full, work.zones);
 }
 
-/// The planes of work.levels.
-void make_planes(const DropRules& rules, Runs& image, DropWork& work) {
-  work.planes.resize(rules.max_drops);
-  for (std::uint32_t drop = 0; drop < rules.max_drops; ++drop) {
-    threshold_levels(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
-  }
-  image.row_offset = work.planes[0].row_offset;
-  image.change = work.planes[0].change;
-}
-
-/// The planes of work.zones; of one drop a pixel the image alone.
-void dither_zones(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
-  if (rules.max_drops == 1) return dither_one(work.zones, drops, layer, work.dither, image);
-  dither(work.zones, drops, layer, work.dither, work.levels);
-  make_planes(rules, image, work);
+/// What pixels get of the drops of work.zones.
+void dither_zones(std::span<const Drops24> drops, std::uint32_t layer, DropWork& work) {
+  make_zones(drops, layer, work.patterns);
+  work.counter.start(work.patterns);
+  work.drops.assign(1, {work.zones, &work.patterns});
 }
 
 }  // namespace
 
-ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, Runs& image, Runs& second,
+ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, const Runs& image, Runs& second,
                         DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
   const bool core = dose.requested_shell != dose.requested_inside;
@@ -241,12 +227,12 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
   }
   std::vector<Drops24> drops(std::size_t{2} * full + 1);
   drops_of_zones(dose, full, rules.dithered, drops);
-  dither_zones(rules, drops, layer, image, work);
+  dither_zones(drops, layer, work);
   return sums_of(work.zones, full, dose);
 }
 
 ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer,
-                        std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work) {
+                        std::span<const Runs> zone, const Runs& image, Runs& second, DropWork& work) {
   const auto count = static_cast<std::uint8_t>(zone.size());
   join_zones(zone, work.pieces, work.shares);
   mark_shell(rules, image, count, second, work);
@@ -254,7 +240,7 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   for (const LayerDose& dose : doses) drops.push_back(dose.shell), requested.push_back(dose.requested_shell);
   for (const LayerDose& dose : doses) drops.push_back(dose.core), requested.push_back(dose.requested_inside);
   if (!rules.dithered) std::ranges::for_each(drops, [](Drops24& of) { of = rounded(of); });
-  dither_zones(rules, drops, layer, image, work);
+  dither_zones(drops, layer, work);
   unsigned __int128 sum = 0;
   std::uint64_t pixels = 0;
   for (std::size_t i = 0; i < work.zones.level.size(); ++i) {
@@ -266,8 +252,8 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
 }
 
 Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
-                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials, Runs& image,
-                                    Runs& second, DropWork& work) {
+                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials,
+                                    const Runs& image, Runs& second, DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
   const bool shell = !rules.shell.half_width.empty();
   if (shell) erode(image, rules.shell, second);
@@ -289,24 +275,33 @@ Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
     if (materials > 1 && material == 0) work.of_material[0] = work.levels;
     if (material > 0) surplus(work.levels, work.up_to, work.of_material[material]);
     if (last) {
-      make_planes(rules, image, work);
+      // Zone n: n drops.
+      std::vector<Drops24> drops(std::size_t{kMaxDrops} + 1);
+      for (std::size_t n = 0; n < drops.size(); ++n) drops[n] = Drops24{n} << kDropBits;
+      make_zones(drops, sheet.layer.index, work.patterns);
+      work.counter.start(work.patterns);
+      work.drops.assign(1, {work.levels, &work.patterns});
+      for (std::uint32_t m = 0; materials > 1 && m < materials; ++m)
+        work.drops.push_back({work.of_material[m], &work.patterns});
       return sums;
     }
     std::swap(work.levels, work.up_to);
   }
 }
 
-void drops_of_materials(std::uint32_t max_drops, bool shared, std::span<Runs> image, DropWork& work) {
+void drops_of_core(const DropRules& rules, double share, std::uint32_t layer, const Runs& image, Runs& second, DropWork& work) {
+  levels_of(image, 1, work.shares);
+  mark_shell(rules, image, 1, second, work);
+  make_core(share, layer, work.patterns);
+  work.counter.start(work.patterns);
+  work.drops.assign(1, {work.zones, &work.patterns});
+}
+
+void separate_materials(std::span<const Runs> image, DropWork& work) {
   work.of_material.resize(image.size());
-  work.material_planes.resize(image.size() * max_drops);
   for (std::size_t m = 0; m < image.size(); ++m) {
-    Levels& drops = work.of_material[m];
-    if (!shared && max_drops == 1) levels_of(image[m], 1, drops);
-    if (!shared && max_drops > 1) within(work.levels, image[m], drops);
-    Runs* const planes = &work.material_planes[m * max_drops];
-    for (std::uint32_t drop = 0; drop < max_drops; ++drop)
-      threshold_levels(drops, static_cast<std::uint8_t>(drop + 1), planes[drop]);
-    image[m] = planes[0];
+    within(work.drops[0].zones, image[m], work.of_material[m]);
+    work.drops.push_back({work.of_material[m], &work.patterns});
   }
 }
 

@@ -1,4 +1,4 @@
-// stages/dose/layer_drops.h: the image of a layer, or the fill fractions of its voxels, becomes the images of its drops.
+// stages/dose/layer_drops.h: the image of a layer, or the fill fractions of its voxels, becomes a drop image.
 #pragma once
 
 #include <array>
@@ -14,6 +14,7 @@
 #include "stages/dose/field.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
+#include "stages/geometry/drop_rows.h"
 
 namespace lamina::dose {
 
@@ -78,17 +79,21 @@ struct DepositedPart {
 struct DropWork {
   Levels shares;  // fill fractions of voxels, if the job requests them
   Levels zones;
-  Levels levels;  // drops of each pixel, where any of the job gets several
-  DitherScratch dither;
+  Levels levels;  // drops of each pixel, of parts that share voxels or have formulas
   std::vector<ZonePiece> pieces;
-  std::vector<Runs> planes;  // then: the pixels with at least one drop, two, ...: as many as the job has
   std::vector<DepositedPart> deposited;
-  ShareOut shared;                    // of the parts' shares
-  std::vector<Levels> of_material;    // drops of each material, where they are separated
-  std::vector<Runs> material_planes;  // of them: the planes of the first material, of the next, ...
-  Levels up_to;                       // drops of the materials so far; scratch
-  std::vector<Field> fields;          // two a zone: of its shell, of its core
+  ShareOut shared;                  // of the parts' shares
+  std::vector<Levels> of_material;  // zones or drops of each material, where they are separated
+  Levels up_to;                     // drops of the materials so far; scratch
+  std::vector<Field> fields;        // two a zone: of its shell, of its core
   PourScratch pour;
+
+  // --- what pixels get, of the last layer; of other functions than the first three below, none
+  DropPatterns patterns;
+  DropCounter counter;
+  std::vector<DropImageView> drops;  // of all materials; then of each, where they are separated
+  /// Whether there are any.
+  bool dosed() const { return !drops.empty(); }
   std::uint64_t bytes() const;
 };
 
@@ -98,6 +103,7 @@ struct DropRules {
   bool dithered = true;         // else drops are rounded to whole ones
   Reach shell;                  // empty: all is core
   std::uint32_t max_drops = 0;  // of any pixel of the job
+  bool thins = false;           // the core gets a share of its drops
 };
 
 /// Distributes the voxels among the parts in work.deposited, of which each overrides those before: shares.h. After more parts
@@ -107,18 +113,20 @@ void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, Dro
 /// What the images of a layer have at most, before it gets its drops.
 struct DropSizes {
   std::uint64_t rows = 0, columns = 0;
-  std::uint64_t edges = 0;      // changes of the image, or of one of the voxels of some level and more
-  std::uint64_t runs = 0;       // of the shares of voxels of all parts, if there are any
-  std::uint64_t pixels = 0;     // that get drops which are not whole
-  bool zones = false;           // of several doses, or moved edges or axes
+  std::uint64_t edges = 0;   // changes of the image, or of one of the voxels of some level and more
+  std::uint64_t runs = 0;    // of the shares of voxels of all parts, if there are any
+  std::uint64_t pixels = 0;  // that get drops which are not whole
+  bool zones = false;        // of several doses, or moved edges or axes
+  std::uint32_t doses = 1;
   std::uint32_t parts = 0;      // in DropWork::deposited
   std::uint32_t materials = 1;  // whose drops are separated
 };
 
 /// What it has at most with them; buffers double as they grow.
 struct DropBound {
-  std::uint64_t changes = 0;         // of the image, or runs of DropWork::levels
+  std::uint64_t changes = 0;         // of the first plane, or runs of its drops as levels
   std::uint64_t changes_of_all = 0;  // of the planes together
+  std::uint64_t runs = 0;            // of its zones; 0: it has none
   std::uint64_t bytes = 0;           // of DropWork and the image
 };
 DropBound bound_of(const DropRules& rules, const DropSizes& sizes);
@@ -127,30 +135,31 @@ DropBound bound_of(const DropRules& rules, const DropSizes& sizes);
 /// returns  where it was another one: pixels whose centres say something else than their voxels
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work);
 
-/// The drops of a layer in place of its image, which becomes that of the first drop. Of shares, the image is that of
-/// take_half() without its bleed, and the core is measured from its edge. second  scratch; work.shares is lost, and work.zones
-/// has what was dosed
-ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, Runs& image, Runs& second,
+/// The drops of a layer. Of shares, the image is that of take_half() without its bleed, and the core is measured from its edge.
+/// second  scratch; work.shares is lost, and work.zones has what was dosed
+ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, const Runs& image, Runs& second,
                         DropWork& work);
 
 /// The same of parts that get different doses; no shares of voxels.
 /// doses, zone  of each of them; no pixel is in two of the images, and together they are `image`; at most 127
 ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer,
-                        std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work);
+                        std::span<const Runs> zone, const Runs& image, Runs& second, DropWork& work);
 
 /// The same of parts in work.deposited that share voxels, or whose doses are formulas. The image is that of all of them.
 /// requests   of each zone, shell and core; work.zones becomes the levels of all parts together
-/// materials  whose drops are separated in work.of_material: of a voxel's drops the first are those of the first material, so
-///            that each gets them in proportion to its share over many voxels
+/// materials  whose drops are separated: of a voxel's drops the first are those of the first material, so that each gets them
+///            in proportion to its share over many voxels
 /// errors     of pour()
 Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
-                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials, Runs& image,
-                                    Runs& second, DropWork& work);
+                                    std::span<const std::array<DropRequest, 2>> requests, std::uint32_t materials,
+                                    const Runs& image, Runs& second, DropWork& work);
 
-/// The planes of each material's drops, work.material_planes, after any of the functions above.
-/// shared  drops_of_deposited() has separated the drops; else all drops of a pixel are of the material that it is of
-/// image   of each material, its pixels; becomes that of those which get any drop of it
-/// cost    O((runs + rows) x materials x max_drops)
-void drops_of_materials(std::uint32_t max_drops, bool shared, std::span<Runs> image, DropWork& work);
+/// One drop a pixel in the shell, and a share of them in the core. second  scratch
+void drops_of_core(const DropRules& rules, double share, std::uint32_t layer, const Runs& image, Runs& second, DropWork& work);
+
+/// Separates the drops of materials that share no voxel: all drops of a pixel are of the one that it is of.
+/// image  of each material, its pixels
+/// cost   O((runs + rows) x materials)
+void separate_materials(std::span<const Runs> image, DropWork& work);
 
 }  // namespace lamina::dose

@@ -3,37 +3,42 @@
 
 #include <deque>
 #include <functional>
-#include <span>
+#include <map>
 #include <vector>
 
+#include "stages/data/drop_image.h"
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/fire.h"
+#include "stages/program/fire_drops.h"
 #include "stages/program/lines.h"
 
 namespace lamina::program {
 
 /// Kept from layer to layer.
 struct CompileScratch {
-  std::deque<ScanScratch> scan;  // of each plane
+  ScanScratch scan;
   FireScratch fire;
   SweepVectors vectors;
-  Buffer<ColumnChanges> line;              // every line of the layer, plane after plane
-  std::vector<ColumnChanges> nozzle;       // what is under each nozzle of a sweep, bit after bit of the drops
+  Buffer<ColumnChanges> line;              // every line of the layer
+  std::vector<ColumnChanges> nozzle;       // what is under each nozzle of a sweep
   std::deque<Buffer<std::uint32_t>> made;  // lines that are not those of the image: shared or moved ones
   std::size_t made_used = 0;
-  DropBits bits;  // of heads that fire several drops in a sweep
+  // --- of drop images
+  DropScratch drop;
+  std::vector<DropLine> drop_nozzle;
+  DropPatterns whole;                   // zone n: n drops
+  std::map<std::uint32_t, Levels> own;  // lines of whole drops that are not those of the image, by number; of one row
 
   std::uint64_t bytes() const {
     std::uint64_t total = bytes_held(fire.event_offset) + bytes_held(fire.event_bit) + bytes_held(fire.rows) +
                           bytes_held(fire.current) + bytes_held(vectors.bits) + bytes_held(vectors.firing) + bytes_held(line) +
-                          nozzle.capacity() * sizeof(ColumnChanges);
-    for (const ScanScratch& one : scan) {
-      total += bytes_held(one.turned.row_offset) + bytes_held(one.turned.change) + bytes_held(one.next);
-    }
+                          nozzle.capacity() * sizeof(ColumnChanges) + scan.bytes() + drop.bytes() +
+                          drop_nozzle.capacity() * sizeof(DropLine) + whole.bytes();
     for (const Buffer<std::uint32_t>& one : made) total += bytes_held(one);
-    return total + bits.bytes();
+    for (const auto& [number, levels] : own) total += levels.bytes();
+    return total;
   }
 };
 
@@ -58,10 +63,11 @@ using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
 Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit,
                              std::uint32_t layer = 0);
 
-/// The same for pixels of several drops: a sweep fires up to grid.sweep_drops of them, and every sweep of the head is made as
-/// often as the planes take before the next one, so that the drops of a pixel follow each other closely.
-/// planes  at least one; each lies within the one before it
-Result<ProgramCount> compile(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch,
+/// The same for pixels that get the drops of a drop image: a sweep fires up to grid.sweep_drops of them, and every sweep of the
+/// head is made as often as the drops take before the next one, so that the drops of a pixel follow each other closely.
+/// drops  at least as many as any pixel of the job gets
+/// cost   of fire_drops() for each sweep that fires other drops than the one before it
+Result<ProgramCount> compile(const HeadGrid& grid, const DropImageView& image, std::uint32_t drops, CompileScratch& scratch,
                              const EmitSweep& emit, std::uint32_t layer = 0);
 
 }  // namespace lamina::program

@@ -1,12 +1,12 @@
-// stages/program/lines.h: lines of an image as the head passes over them: turned, divided between swaths, as bits of drops.
+// stages/program/lines.h: lines of an image as the head passes over them: turned, divided between swaths.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/drop_image.h"
+#include "stages/data/levels.h"
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
 #include "stages/program/fire.h"
@@ -16,7 +16,12 @@ namespace lamina::program {
 /// Scratch for to_scan_frame; keeps its capacity.
 struct ScanScratch {
   Runs turned;
+  Levels zones;
+  DropPatterns patterns;
   Buffer<std::uint32_t> next;
+  std::uint64_t bytes() const {
+    return bytes_held(turned.row_offset) + bytes_held(turned.change) + bytes_held(next) + zones.bytes() + patterns.bytes();
+  }
 };
 
 /// Rows of the result are lines, its columns places (data/program.h). The image itself where it is so already.
@@ -24,8 +29,12 @@ struct ScanScratch {
 /// cost   nothing, or O(rows + changes), and for a scan along y O(columns + pixels that differ from the one above)
 RunsView to_scan_frame(const HeadGrid& grid, const RunsView& image, ScanScratch& scratch);
 
+/// The same of drops; their patterns are turned with them.
+DropImageView to_scan_frame(const HeadGrid& grid, const DropImageView& image, ScanScratch& scratch);
+
 /// Columns become rows: row c of the result holds, as columns, the rows of column c.
 void transpose(const RunsView& image, Runs& result, Buffer<std::uint32_t>& next);
+void transpose(const LevelsView& image, Levels& result, Buffer<std::uint32_t>& next);
 
 enum class LineOperation : std::uint8_t { kUnion, kDifference };
 
@@ -46,31 +55,7 @@ constexpr bool upper_fires(std::uint64_t line, std::uint32_t position, std::uint
 /// Appends the places of a line that the upper (or the lower) swath fires.
 void divide(ColumnChanges line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result);
 
-// --- lines of drops become lines of the bits of their number.
-
-/// What each nozzle of a sweep fires, as a line for each bit of the number of drops, the lowest first. Flat, kept from sweep to
-/// sweep.
-class DropBits {
- public:
-  /// Most bits of a number of drops.
-  static constexpr std::uint32_t kMax = 4;
-
-  /// bits  1 .. kMax
-  void begin(std::uint32_t bits);
-  /// The next nozzle. drops  line k, from 0, has the places of more than k drops, each within the one before; fewer than
-  /// 2 ^ bits. cost  O(drops x changes)
-  void add(std::span<const ColumnChanges> drops);
-  /// The lines of all nozzles added, those of the lowest bit first; they live until begin().
-  /// nozzle  of nozzles x bits
-  void end(std::span<ColumnChanges> nozzle) const;
-
-  std::uint64_t bytes() const;
-
- private:
-  std::uint32_t bits_ = 1;
-  std::array<Buffer<std::uint32_t>, kMax> change_;  // of all nozzles, for each bit
-  std::array<Buffer<std::uint32_t>, kMax> end_;     // where those of a nozzle end
-  std::vector<std::size_t> next_;
-};
+/// The positions of a line that the upper (or the lower) swath fires, bit p % 64.
+std::uint64_t allowed_positions(std::uint64_t number, std::uint32_t share, bool upper);
 
 }  // namespace lamina::program

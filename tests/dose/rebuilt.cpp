@@ -50,6 +50,7 @@ DropStack::DropStack(const std::vector<Triangle>& part, const DropWay& way, doub
   coverage::CoverageScratch of_voxels;
   Runs image, second;
   dose::DropWork work;
+  Levels drops;
   const std::uint32_t full = way.levels > 0 && !way.dithered ? way.levels - 1 : 1;  // drops of a full voxel
   dose::LayerDose dose = dose::one_drop();
   dose.shell = dose.core = dose.requested_shell = dose.requested_inside = full * dose::kOneDrop;
@@ -58,13 +59,13 @@ DropStack::DropStack(const std::vector<Triangle>& part, const DropWay& way, doub
     rasterizer->layer(raster::Engine::kContours, layer.plane(), of_pixels, image);
     if (way.levels > 0) coverage->layer(layer, of_voxels, work.shares);
     const auto top = static_cast<std::uint8_t>(way.levels > 0 ? way.levels - 1 : 0);
-    dose::drops_of_layer({top, way.dithered, {}, full}, dose, l, image, second, work);
-    if (full == 1) levels_of(image, 1, work.levels);
+    dose::drops_of_layer({top, way.dithered, {}, full, false}, dose, l, image, second, work);
+    levels_of(work.drops[0], drops);
     for (std::uint32_t r = 0; r < grid.rows(); ++r) {
       float* row = share_.data() + (std::size_t{l} * grid.rows() + (grid.rows() - 1 - r)) * grid.columns();
-      for (std::uint32_t i = work.levels.row_offset[r]; i < work.levels.row_offset[r + 1]; ++i) {
-        std::fill(row + work.levels.change[2 * i], row + work.levels.change[2 * i + 1],
-                  static_cast<float>(work.levels.level[i]) / static_cast<float>(full));
+      for (std::uint32_t i = drops.row_offset[r]; i < drops.row_offset[r + 1]; ++i) {
+        std::fill(row + drops.change[2 * i], row + drops.change[2 * i + 1],
+                  static_cast<float>(drops.level[i]) / static_cast<float>(full));
       }
     }
   }

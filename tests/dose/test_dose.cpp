@@ -4,6 +4,8 @@
 
 #include "stages/dose/dither.h"
 #include "stages/dose/edges.h"
+#include "stages/dose/shares.h"
+#include "stages/geometry/drop_rows.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -75,6 +77,30 @@ TEST(Erode, RadiiOfWholePixelsTakeThePixelsAtExactlyThatDistance) {
   EXPECT_EQ(reach_of(grid, 0, 2000).half_width, (std::vector<std::uint32_t>{0, 0, 0}));
 }
 
+/// Whether a pixel of a core is jetted.
+bool core_pixel(std::uint32_t column, std::uint32_t row, std::uint32_t layer, std::uint32_t threshold) {
+  return column * 2'654'435'769u + row * 1'300'411'463u + layer * 1'779'033'705u < threshold;
+}
+
+/// What is jetted of an image whose core gets a share of its pixels.
+Runs thinned(const RunsView& image, const RunsView& core, double share, std::uint32_t layer) {
+  Levels all, zones, levels;
+  levels_of(image, 1, all);
+  mark_core(all, core, 1, zones);
+  DropPatterns patterns;
+  make_core(share, layer, patterns);
+  const DropImageView drops{zones, &patterns};
+  Runs plane, same;
+  runs_of(DropPlane(drops, 0), plane);
+  levels_of(drops, levels);
+  threshold_levels(levels, 1, same);
+  EXPECT_EQ(plane.change, same.change);
+  DropCounter counter;
+  counter.start(patterns);
+  EXPECT_EQ(DropTotals(drops, counter).drops(), set_pixels(plane));
+  return plane;
+}
+
 TEST(Saturate, TheShareOfSetPixelsIsTheRequestedOneWithinATenthOfAPercent) {
   const std::uint32_t side = 1500;
   Runs full;
@@ -83,8 +109,7 @@ TEST(Saturate, TheShareOfSetPixelsIsTheRequestedOneWithinATenthOfAPercent) {
   for (std::uint32_t r = 0; r < side; ++r) full.change.insert(full.change.end(), {0u, side});
   for (const double share : {0.0, 0.03, 0.25, 0.5, 0.6180339887, 2.0 / 3, 0.8, 0.97}) {
     for (const std::uint32_t layer : {0u, 1u, 77u, 5000u}) {
-      Runs result;
-      saturate(full, full, share, layer, result);
+      const Runs result = thinned(full, full, share, layer);
       const double set = static_cast<double>(set_pixels(result)) / side / side;
       EXPECT_NEAR(set, share, 0.001) << share << " layer " << layer;
     }
@@ -121,10 +146,9 @@ TEST(Saturate, TheShellStaysFullAndPatternsDifferFromLayerToLayer) {
     for (std::uint32_t c = 10; c < 170; ++c) image[r][c] = (r - 80) * (r - 80) + (c - 90) * (c - 90) > 400;
   }
   const Runs runs = runs_of(image);
-  Runs core, first, second;
+  Runs core;
   erode(runs, reach_of(grid, 500'000, 500'000), core);
-  saturate(runs, core, 0.4, 10, first);
-  saturate(runs, core, 0.4, 11, second);
+  const Runs first = thinned(runs, core, 0.4, 10), second = thinned(runs, core, 0.4, 11);
   const Image inner = image_of(core), one = image_of(first), other = image_of(second);
   std::uint64_t differ = 0, pixels = 0;
   for (std::uint32_t r = 0; r < grid.rows(); ++r) {

@@ -120,9 +120,10 @@ TEST(Field, ConstantOneIsTheNumber) {
     const double percent = std::stod(number);
     const std::array<Drops24, 2> table{0, drops_for(percent, kForty, kBed, 100'000)};
     EXPECT_EQ(DropScale(kForty, kBed, 100'000).drops(percent), table[1]);
-    DitherScratch scratch;
+    DropPatterns patterns;
+    make_zones(table, 7, patterns);
     Levels plain;
-    dither(image, table, 7, scratch, plain);
+    levels_of(DropImageView{image, &patterns}, plain);
     for (const std::string& formula : {number, number + "+0*x*y"}) {
       const Poured of = poured(sheet_of(7), image, formula);
       EXPECT_TRUE(std::ranges::equal(of.drops.change, plain.change) && std::ranges::equal(of.drops.level, plain.level));

@@ -14,7 +14,9 @@
 #include "stages/dose/dither.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
+#include "stages/geometry/drop_rows.h"
 #include "stages/support/hash/hash.h"
+#include "tests/dose/void_and_cluster.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {
@@ -47,27 +49,47 @@ std::vector<int> levels_by_pixel(const LevelsView& levels) {
   return pixels;
 }
 
-Levels dithered(const RunsView& image, Drops24 drops, std::uint32_t layer) {
-  Levels zones, levels;
-  levels_of(image, 1, zones);
-  DitherScratch scratch;
-  const std::array<Drops24, 2> table{0, drops};
-  dither(zones, table, layer, scratch, levels);
+/// The drops of each pixel of zones that get so many.
+Levels drops_of_pixels(const Levels& zones, std::span<const Drops24> drops, std::uint32_t layer) {
+  DropPatterns patterns;
+  make_zones(drops, layer, patterns);
+  Levels levels;
+  levels_of(DropImageView{zones, &patterns}, levels);
   return levels;
 }
 
-/// By the way of several drops a pixel, and by that of one.
-void expect_one_drop(const Levels& shares, std::span<const Drops24> drops, std::uint32_t layer) {
-  DitherScratch scratch;
-  Levels levels;
-  Runs plane, image{7, {0, 1}, {3}};
-  dither(shares, drops, layer, scratch, levels);
-  threshold_levels(levels, 1, plane);
-  EXPECT_EQ(set_pixels(plane), sum_of_levels(levels));
-  dither_one(shares, drops, layer, scratch, image);
-  EXPECT_EQ(image.columns, plane.columns);
-  EXPECT_EQ(image.row_offset, plane.row_offset);
-  EXPECT_EQ(image.change, plane.change);
+Levels dithered(const RunsView& image, Drops24 drops, std::uint32_t layer) {
+  Levels zones;
+  levels_of(image, 1, zones);
+  const std::array<Drops24, 2> table{0, drops};
+  return drops_of_pixels(zones, table, layer);
+}
+
+/// Rows of words, runs and counts of a drop image, against the drops of its pixels.
+void expect_rows_and_counts(const DropImageView& image, const Levels& levels, std::uint32_t maximum) {
+  DropCounter counter;
+  counter.start(*image.patterns);
+  const DropTotals totals(image, counter);
+  EXPECT_EQ(totals.drops(), sum_of_levels(levels));
+  EXPECT_EQ(totals.maximum(), highest(levels));
+  for (std::uint32_t drop = 0; drop < maximum; ++drop) {
+    Runs plane, found{7, {0, 1}, {3}};
+    threshold_levels(levels, static_cast<std::uint8_t>(drop + 1), plane);
+    runs_of(DropPlane(image, drop), found);
+    EXPECT_EQ(found.columns, plane.columns);
+    EXPECT_EQ(found.row_offset, plane.row_offset);
+    EXPECT_EQ(found.change, plane.change);
+    EXPECT_EQ(totals.pixels(drop), set_pixels(plane));
+  }
+  for (std::uint32_t row = 0; row < image.zones.rows(); ++row) {
+    for (std::size_t i = image.zones.row_offset[row]; i < image.zones.row_offset[row + 1]; ++i) {
+      const std::uint32_t middle = (image.zones.change[2 * i] + image.zones.change[2 * i + 1]) / 2;
+      const std::uint8_t zone = image.zones.level[i];
+      EXPECT_EQ(counter.drops(zone, row, image.zones.change[2 * i], middle) +
+                    counter.drops(zone, row, middle, image.zones.change[2 * i + 1]),
+                counter.drops(zone, row, image.zones.change[2 * i], image.zones.change[2 * i + 1]));
+    }
+  }
 }
 
 std::vector<int> tile_pattern(double share, std::uint32_t layer) {
@@ -106,6 +128,7 @@ TEST(Saturation, FollowsItsFormulaOnAnyGrid) {
 TEST(BlueNoise, HasEachRankOnceAndIsTheSameEverywhere) {
   std::vector<std::uint16_t> ranks = blue_noise_ranks();
   EXPECT_EQ(hex(hash_bytes(std::as_bytes(std::span(ranks)))), "4e5060a14e10a4ffe9260c58414b2633");
+  EXPECT_EQ(ranks, void_and_cluster_ranks()) << "make stages/dose/blue_noise_tile.h again";
   std::ranges::sort(ranks);
   for (std::uint32_t i = 0; i < kTilePixels; ++i) ASSERT_EQ(ranks[i], i);
 }
@@ -217,21 +240,19 @@ TEST(Dither, TakesSharesOfVoxelsInProportion) {
   EXPECT_EQ(drops, (std::array<Drops24, 7>{0, kOneDrop, 2 * kOneDrop, 3 * kOneDrop, 0, kOneDrop, kOneDrop}));
   drops_of_zones(dose, 3, true, drops);
   EXPECT_EQ(drops, (std::array<Drops24, 7>{0, kOneDrop, 2 * kOneDrop, 3 * kOneDrop, kOneDrop / 3, 2 * kOneDrop / 3, kOneDrop}));
-  Levels coverage, levels;
+  Levels coverage;
   coverage.start(9);
   coverage.append(0, 3, 1);
   coverage.append(4, 6, 3);
   coverage.append(6, 9, 2);
   coverage.end_row();
-  DitherScratch scratch;
-  dither(coverage, drops, 0, scratch, levels);
-  EXPECT_EQ(levels_by_pixel(levels), (std::vector<int>{1, 1, 1, 0, 3, 3, 2, 2, 2}));
+  EXPECT_EQ(levels_by_pixel(drops_of_pixels(coverage, drops, 0)), (std::vector<int>{1, 1, 1, 0, 3, 3, 2, 2, 2}));
 }
 
 // Rows of single pixels, of runs longer than words and tiles, that touch or do not, from the first column to the last.
-TEST(Dither, OfOneDropIsThatOfSeveral) {
+TEST(Dither, RowsAndCountsAreThoseOfThePixels) {
   program::testing::Random random(11);
-  const std::array<Drops24, 6> drops{0, kOneDrop, kOneDrop / 3, 5 * kOneDrop / 7, 0, 3};
+  const std::array<Drops24, 8> drops{0, kOneDrop, kOneDrop / 3, 5 * kOneDrop / 7, 0, 3, 5 * kOneDrop / 2, 3 * kOneDrop};
   for (const std::uint32_t columns : {1u, 5u, 63u, 64u, 65u, 129u, 700u}) {
     Levels shares;
     shares.start(columns);
@@ -244,7 +265,22 @@ TEST(Dither, OfOneDropIsThatOfSeveral) {
       }
       shares.end_row();
     }
-    for (const std::uint32_t layer : {0u, 1u, 77u, 1000u}) expect_one_drop(shares, drops, layer);
+    for (const std::uint32_t layer : {0u, 1u, 77u, 1000u}) {
+      DropPatterns patterns;
+      make_zones(drops, layer, patterns);
+      // Each pixel by itself, by the thresholds of the layer.
+      Thresholds thresholds;
+      thresholds.start(layer);
+      Levels levels;
+      levels.start(columns);
+      for (std::uint32_t r = 0; r < 150; ++r) {
+        for (std::uint32_t i = shares.row_offset[r]; i < shares.row_offset[r + 1]; ++i)
+          thresholds.append(shares.change[2 * i], shares.change[2 * i + 1], r, drops[shares.level[i]], levels);
+        levels.end_row();
+      }
+      expect_rows_and_counts({shares, &patterns}, levels, 4);
+      EXPECT_EQ(levels_by_pixel(drops_of_pixels(shares, drops, layer)), levels_by_pixel(levels));
+    }
   }
 }
 

@@ -126,7 +126,11 @@ TEST(Shares, BecomeDropsInProportionOrRounded) {
     take_half(3, image = random_mask(9), second, work);
     const std::vector<int> half = share_pixels(image.view());
     const ZoneSums sums = drops_of_layer({3, dithered, {}, 4}, dose, 5, image, second, work);
-    const std::vector<int> drops = share_pixels(work.levels.view()), first = share_pixels(image.view());
+    Levels of_pixels;
+    Runs plane;
+    levels_of(work.drops[0], of_pixels);
+    runs_of(DropPlane(work.drops[0], 0), plane);
+    const std::vector<int> drops = share_pixels(of_pixels.view()), first = share_pixels(plane.view());
     std::uint64_t sum = 0;
     for (std::size_t i = 0; i < levels.size(); ++i) {
       sum += static_cast<std::uint64_t>(levels[i]);
@@ -192,19 +196,18 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
                                                              {DropRequest{kOneDrop * 2}, DropRequest{kOneDrop * 2}}};
       Runs image, second;
       ASSERT_TRUE(drops_of_deposited(rules, limited, requests, 3, image, second, work).ok());
-      std::vector<Runs> own(3);
-      drops_of_materials(4, true, own, work);
+      ASSERT_EQ(work.drops.size(), 4u);
       std::vector<int> sum(std::size_t{kWide} * kHigh, 0);
       for (std::size_t m = 0; m < 3; ++m) {
-        std::vector<int> drops(sum.size(), 0);
-        for (int k = 0; k < 4; ++k) {
-          const std::vector<int> plane = share_pixels(work.material_planes[4 * m + static_cast<std::size_t>(k)].view());
-          for (std::size_t p = 0; p < plane.size(); ++p) {
-            EXPECT_TRUE(plane[p] == 0 || drops[p] == k) << "not nested";
-            drops[p] += plane[p];
-          }
+        Levels of_pixels;
+        levels_of(work.drops[1 + m], of_pixels);
+        const std::vector<int> drops = share_pixels(of_pixels.view());
+        for (std::uint32_t k = 0; k < 4; ++k) {
+          Runs own;
+          runs_of(DropPlane(work.drops[1 + m], k), own);
+          const std::vector<int> plane = share_pixels(own.view());
+          for (std::size_t p = 0; p < plane.size(); ++p) EXPECT_EQ(plane[p], drops[p] > static_cast<int>(k) ? 1 : 0);
         }
-        EXPECT_EQ(share_pixels(own[m].view()), share_pixels(work.material_planes[4 * m].view()));
         for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += drops[p];
       }
       EXPECT_EQ(sum, share_pixels(work.levels.view())) << seed;

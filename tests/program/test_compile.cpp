@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -303,6 +305,179 @@ TEST(Compile, WithBlockedNozzlesTheDifferenceIsExactlyWhatIsReported) {
     }
     if (rule == BlockedRule::kSecondPass) {
       EXPECT_EQ(missing, 0u) << "seed " << seed;
+    }
+  }
+}
+
+/// Random zones of whole drops, of tiles and of a core.
+struct RandomDrops {
+  Levels zones;
+  DropPatterns patterns;
+  std::vector<std::vector<int>> drops;  // of each pixel, by itself
+  int maximum = 0;
+
+  DropImageView view() const { return {zones, &patterns}; }
+  RandomDrops(testing::Random& random, std::uint32_t columns, std::uint32_t rows, std::uint32_t max_base) {
+    patterns.zone.emplace_back();
+    for (std::uint8_t tile = 0; tile < 3; ++tile) {
+      const unsigned rarity = 1 + random() % 20;
+      for (std::uint32_t word = 0; word < kTileWords; ++word) {
+        std::uint64_t bits = 0;
+        for (unsigned bit = 0; bit < 64; ++bit) bits |= std::uint64_t{random() % rarity == 0} << bit;
+        patterns.tile.push_back(bits);
+      }
+      patterns.zone.push_back({static_cast<std::uint8_t>(random() % (max_base + 1)), DropZone::Extra::kTile, tile});
+      patterns.zone.push_back({static_cast<std::uint8_t>(random() % (max_base + 1))});
+    }
+    patterns.core = {random(), random(), random(), random() % 3 == 0 ? 1u << 22 : random()};
+    patterns.zone.push_back({0, DropZone::Extra::kCore});
+    zones.start(columns);
+    const std::uint32_t longest = 1u << (random() % 9);
+    const bool some_rows = random() % 2 != 0;
+    for (std::uint32_t r = 0; r < rows; ++r) {
+      for (std::uint32_t c = 0; c < columns && !(some_rows && r % 7 > 2);) {
+        const std::uint32_t end = std::min(columns, c + 1 + static_cast<std::uint32_t>(random()) % longest);
+        zones.append(c, end, static_cast<std::uint8_t>(random() % 9 % 8));
+        c = end;
+      }
+      zones.end_row();
+    }
+    count(columns, rows);
+  }
+
+ private:
+  void count(std::uint32_t columns, std::uint32_t rows) {
+    drops.assign(rows, std::vector<int>(columns, 0));
+    for (std::uint32_t r = 0; r < rows; ++r) {
+      for (std::uint32_t i = zones.row_offset[r]; i < zones.row_offset[r + 1]; ++i) {
+        const DropZone& zone = patterns.zone[zones.level[i]];
+        for (std::uint32_t c = zones.change[2 * i]; c < zones.change[2 * i + 1]; ++c) {
+          bool more = false;
+          if (zone.extra == DropZone::Extra::kTile)
+            more = (patterns.tile[zone.tile * kTileWords + 2 * (r % 128) + c % 128 / 64] >> (c % 64) & 1) != 0;
+          const CorePattern& core = patterns.core;
+          if (zone.extra == DropZone::Extra::kCore)
+            more = c * core.column_step + r * core.row_step + core.first < core.threshold;
+          maximum = std::max(maximum, drops[r][c] = zone.base + (more ? 1 : 0));
+        }
+      }
+    }
+  }
+};
+
+TEST(Compile, EveryDropOfADropImageIsFiredOnceRegardlessOfTheMounting) {
+  for (std::uint32_t seed = 0; seed < 90; ++seed) {
+    RandomMachine setup(5000 + seed);
+    const HeadGrid grid = grid_of(setup.machine);
+    const RandomDrops image(setup.random, grid.image.columns(), grid.image.rows(), seed % 4);
+    SlowHead head(setup.machine, grid);
+    CompileScratch scratch;
+    std::uint64_t steps = 0;
+    const auto count = compile(
+        grid, image.view(), 5, scratch,
+        [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+          head.sweep(sweep, vectors);
+          // The first and the last step fire, and the listed ones are those that fire.
+          std::vector<bool> fires(vectors.steps);
+          for (std::size_t w = 0; w < vectors.bits.size(); ++w)
+            fires[w / vectors.words] = fires[w / vectors.words] || vectors.bits[w] != 0;
+          EXPECT_TRUE(fires.front() && fires.back());
+          std::vector<bool> listed(vectors.steps);
+          for (std::size_t k = 0; k + 1 < vectors.firing.size(); k += 2) {
+            for (std::uint32_t s = vectors.firing[k]; s < vectors.firing[k + 1]; ++s) listed[s] = true;
+            EXPECT_TRUE(k == 0 || vectors.firing[k] > vectors.firing[k - 1]);
+          }
+          EXPECT_EQ(fires, listed);
+          steps += static_cast<std::uint64_t>(std::ranges::count(fires, true));
+          return {};
+        },
+        seed);
+    ASSERT_TRUE(count.ok());
+    ASSERT_EQ(head.fired, image.drops) << "seed " << seed;
+    EXPECT_EQ(head.outside, 0u);
+    EXPECT_EQ(count->drops, head.drops);
+    EXPECT_EQ(count->vectors, steps);
+    EXPECT_EQ(count->moved + count->lost, 0u);
+  }
+}
+
+TEST(Compile, WithBlockedNozzlesDropsDifferByExactlyWhatIsReported) {
+  for (std::uint32_t seed = 0; seed < 90; ++seed) {
+    RandomMachine setup(7000 + seed);
+    auto& head_profile = setup.machine.head;
+    if (head_profile.nozzles < 2) continue;
+    for (unsigned i = 0; i < 1 + setup.random() % 6 && head_profile.blocked.size() + 1 < head_profile.nozzles; ++i) {
+      head_profile.blocked.push_back(setup.random() % head_profile.nozzles);
+    }
+    const auto rule = static_cast<BlockedRule>(seed % 3);
+    head_profile.blocked_rule = rule;
+    const HeadGrid grid = grid_of(setup.machine);
+    const RandomDrops image(setup.random, grid.image.columns(), grid.image.rows(), seed % 4);
+    SlowHead head(setup.machine, grid);
+    CompileScratch scratch;
+    const auto count = compile(
+        grid, image.view(), 5, scratch,
+        [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+          head.sweep(sweep, vectors);
+          return {};
+        },
+        seed);
+    ASSERT_TRUE(count.ok());
+    std::uint64_t missing = 0, added = 0;
+    int highest = 0;
+    for (std::size_t r = 0; r < image.drops.size(); ++r) {
+      for (std::size_t c = 0; c < image.drops[r].size(); ++c) {
+        const int wanted = image.drops[r][c], fired = head.fired[r][c];
+        missing += static_cast<std::uint64_t>(std::max(0, wanted - fired));
+        added += static_cast<std::uint64_t>(std::max(0, fired - wanted));
+        highest = std::max(highest, fired);
+      }
+    }
+    EXPECT_EQ(head.blocked_drops, 0u) << "seed " << seed;
+    EXPECT_EQ(head.outside, 0u);
+    EXPECT_LE(highest, image.maximum);
+    EXPECT_EQ(added, count->moved) << "seed " << seed;
+    EXPECT_EQ(missing, count->moved + count->lost) << "seed " << seed;
+    if (rule == BlockedRule::kReport) {
+      EXPECT_EQ(added, 0u);
+    }
+    if (rule == BlockedRule::kSecondPass) {
+      EXPECT_EQ(missing, 0u) << "seed " << seed;
+    }
+  }
+}
+
+// Each plane of a drop image as an image of one drop gives the vectors of the sweeps of that drop.
+TEST(Compile, SweepsOfADropAreThoseOfItsPlane) {
+  for (std::uint32_t seed = 0; seed < 30; ++seed) {
+    RandomMachine setup(9000 + seed);
+    setup.machine.mounting.first_swath = FirstSwath::kBed;
+    const HeadGrid grid = grid_of(setup.machine);
+    const RandomDrops image(setup.random, grid.image.columns(), grid.image.rows(), 2);
+    std::map<std::array<std::uint32_t, 3>, SweepVectors> of_drops, of_planes;
+    std::uint32_t drop = 0;
+    const auto keep = [&](auto& all) {
+      return [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+        all[{drop + sweep.drop, sweep.swath, sweep.pass}] = vectors;
+        return {};
+      };
+    };
+    CompileScratch scratch;
+    ASSERT_TRUE(compile(grid, image.view(), 4, scratch, keep(of_drops), seed).ok());
+    for (; drop < 4; ++drop) {
+      Image plane = image.drops;
+      for (auto& row : plane) {
+        for (int& pixel : row) pixel = pixel > static_cast<int>(drop) ? 1 : 0;
+      }
+      ASSERT_TRUE(compile(grid, runs_of(plane), scratch, keep(of_planes), seed).ok());
+    }
+    ASSERT_EQ(of_drops.size(), of_planes.size()) << seed;
+    for (const auto& [key, vectors] : of_planes) {
+      ASSERT_TRUE(of_drops.contains(key));
+      const SweepVectors& same = of_drops[key];
+      EXPECT_EQ(same.first_step, vectors.first_step);
+      EXPECT_EQ(same.bits, vectors.bits) << seed;
+      EXPECT_EQ(same.firing, vectors.firing);
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "pipeline/report/machine_text.h"
+#include "stages/geometry/drop_rows.h"
 #include "stages/program/compile.h"
 #include "stages/program/dialect.h"
 #include "tests/program/machines.h"
@@ -31,18 +32,21 @@ HeadGrid grid_of_head(const Machine& machine) {
   return *grid;
 }
 
-/// The pixels of more than k drops, for each k, of rows of digits.
-std::vector<Runs> planes_of(const std::vector<std::string>& rows, std::uint32_t maximum) {
-  std::vector<Runs> planes;
-  for (std::uint32_t k = 0; k < maximum; ++k) {
-    testing::Image image;
-    for (const std::string& row : rows) {
-      image.emplace_back();
-      for (const char c : row) image.back().push_back(static_cast<std::uint32_t>(c - '0') > k ? 1 : 0);
-    }
-    planes.push_back(testing::runs_of(image));
+/// Rows of digits. maximum  of any pixel of the job
+struct DigitDrops {
+  Levels levels;
+  DropPatterns patterns;  // zone n: n drops
+  std::uint32_t maximum;
+};
+DigitDrops drops_of(const std::vector<std::string>& rows, std::uint32_t maximum) {
+  DigitDrops drops{{}, {}, maximum};
+  drops.levels.start(static_cast<std::uint32_t>(rows[0].size()));
+  for (const std::string& row : rows) {
+    for (std::uint32_t c = 0; c < row.size(); ++c) drops.levels.append(c, c + 1, static_cast<std::uint8_t>(row[c] - '0'));
+    drops.levels.end_row();
   }
-  return planes;
+  for (std::uint8_t n = 0; n < 10; ++n) drops.patterns.zone.push_back({n});
+  return drops;
 }
 
 struct FiredSweeps {
@@ -51,25 +55,27 @@ struct FiredSweeps {
   ProgramCount count;
 };
 
-FiredSweeps sweeps_fired_by(const HeadGrid& grid, const std::vector<Runs>& planes) {
+FiredSweeps sweeps_fired_by(const HeadGrid& grid, const DigitDrops& drops) {
   FiredSweeps fired;
   CompileScratch scratch;
-  const std::vector<RunsView> views(planes.begin(), planes.end());
-  const auto count = compile(grid, views, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-    fired.sweeps.push_back(sweep);
-    std::vector<std::string> rows(grid.nozzles, std::string(grid.steps(), '0'));
-    EXPECT_EQ(vectors.words, grid.words() * grid.drop_bits);
-    for (std::uint32_t s = 0; s < vectors.steps; ++s) {
-      for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
-        for (std::uint32_t bit = 0; bit < grid.drop_bits; ++bit) {
-          const std::uint64_t word = vectors.bits[std::size_t{s} * vectors.words + bit * grid.words() + i / 64];
-          rows[i][vectors.first_step + s] = static_cast<char>(rows[i][vectors.first_step + s] + ((word >> i % 64 & 1) << bit));
+  const DropImageView image{drops.levels, &drops.patterns};
+  const auto count =
+      compile(grid, image, drops.maximum, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+        fired.sweeps.push_back(sweep);
+        std::vector<std::string> rows(grid.nozzles, std::string(grid.steps(), '0'));
+        EXPECT_EQ(vectors.words, grid.words() * grid.drop_bits);
+        for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+          for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
+            for (std::uint32_t bit = 0; bit < grid.drop_bits; ++bit) {
+              const std::uint64_t word = vectors.bits[std::size_t{s} * vectors.words + bit * grid.words() + i / 64];
+              rows[i][vectors.first_step + s] =
+                  static_cast<char>(rows[i][vectors.first_step + s] + ((word >> i % 64 & 1) << bit));
+            }
+          }
         }
-      }
-    }
-    fired.drops.push_back(std::move(rows));
-    return {};
-  });
+        fired.drops.push_back(std::move(rows));
+        return {};
+      });
   EXPECT_TRUE(count.ok());
   fired.count = *count;
   return fired;
@@ -105,7 +111,7 @@ TEST(DropSweeps, TakeAsManyBitsAsTheHeadHasDrops) {
 
 TEST(DropSweeps, FireEachPixelsNumberOfDrops) {
   const std::vector<std::string> image{"01234567", "70000007", "00000000", "11111111"};
-  const FiredSweeps fired = sweeps_fired_by(grid_of_head(head_of(7, 700)), planes_of(image, 7));
+  const FiredSweeps fired = sweeps_fired_by(grid_of_head(head_of(7, 700)), drops_of(image, 7));
   ASSERT_EQ(fired.drops.size(), 1u);
   EXPECT_EQ(fired.drops[0], image);
   EXPECT_EQ(fired.count.drops, 28u + 14u + 8u);
@@ -113,10 +119,65 @@ TEST(DropSweeps, FireEachPixelsNumberOfDrops) {
   EXPECT_EQ(fired.count.added, 0u);
 }
 
+// Of a pattern some pixels get a drop more: bits of both numbers, of heads of any number of bits, within and beyond a sweep.
+TEST(DropSweeps, FireTheDropsOfPatterns) {
+  for (const auto& [maximum, allowed] : {std::pair{1u, 1u}, {2u, 2u}, {3u, 2u}, {7u, 3u}, {15u, 15u}}) {
+    testing::Random random(maximum);
+    Machine machine = head_of(maximum, 100.0 * allowed + 50, 70);
+    machine.bed.size_mm[0] = 30;
+    const HeadGrid grid = grid_of_head(machine);
+    ASSERT_EQ(grid.sweep_drops, allowed);
+    Levels zones;
+    DropPatterns patterns;
+    patterns.zone.emplace_back();
+    for (std::uint8_t base = 0; base < 9; ++base) patterns.zone.push_back({base, DropZone::Extra::kTile, 0});
+    for (std::uint32_t word = 0; word < kTileWords; ++word) patterns.tile.push_back(random() * std::uint64_t{0x100000001});
+    zones.start(grid.image.columns());
+    for (std::uint32_t r = 0; r < grid.image.rows(); ++r) {
+      for (std::uint32_t c = 0; c < grid.image.columns();) {
+        const std::uint32_t end = std::min(grid.image.columns(), c + 1 + random() % 90);
+        zones.append(c, end, static_cast<std::uint8_t>(random() % 10));
+        c = end;
+      }
+      zones.end_row();
+    }
+    std::vector<std::vector<int>> fired(grid.image.rows(), std::vector<int>(grid.image.columns(), 0));
+    CompileScratch scratch;
+    const auto count = compile(
+        grid, DropImageView{zones, &patterns}, 9, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+          std::uint32_t maximal = 0;
+          for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+            for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
+              std::uint32_t drops = 0;
+              for (std::uint32_t b = 0; b < grid.drop_bits; ++b) {
+                const std::uint64_t word = vectors.bits[std::size_t{s} * vectors.words + b * grid.words() + i / 64];
+                drops += static_cast<std::uint32_t>(word >> (i % 64) & 1) << b;
+              }
+              maximal = std::max(maximal, drops);
+              if (drops > 0)
+                fired[static_cast<std::size_t>(sweep.first_line + i)][vectors.first_step + s] += static_cast<int>(drops);
+            }
+          }
+          EXPECT_EQ(sweep.drops, maximal);
+          return {};
+        });
+    ASSERT_TRUE(count.ok());
+    Levels wanted;
+    levels_of(DropImageView{zones, &patterns}, wanted);
+    EXPECT_EQ(count->drops, sum_of_levels(wanted));
+    for (std::uint32_t r = 0; r < grid.image.rows(); ++r) {
+      std::vector<int> row(grid.image.columns(), 0);
+      for (std::uint32_t i = wanted.row_offset[r]; i < wanted.row_offset[r + 1]; ++i)
+        std::fill(row.begin() + wanted.change[2 * i], row.begin() + wanted.change[2 * i + 1], wanted.level[i]);
+      ASSERT_EQ(fired[r], row) << maximum << " " << r;
+    }
+  }
+}
+
 // Of 350 Hz 3 drops fit: 7 drops are 3 + 3 + 1. The head would have fired them in one sweep, so two are added.
 TEST(DropSweeps, AreAddedWhereDropsComeTooFast) {
   const std::vector<std::string> image{"01234567", "00000000", "00000000", "00000002"};
-  const FiredSweeps fired = sweeps_fired_by(grid_of_head(head_of(7, 350)), planes_of(image, 7));
+  const FiredSweeps fired = sweeps_fired_by(grid_of_head(head_of(7, 350)), drops_of(image, 7));
   ASSERT_EQ(fired.drops.size(), 3u);
   EXPECT_EQ(fired.drops[0], (std::vector<std::string>{"01233333", "00000000", "00000000", "00000002"}));
   EXPECT_EQ(fired.drops[1], (std::vector<std::string>{"00001233", "00000000", "00000000", "00000000"}));
@@ -140,7 +201,7 @@ TEST(DropSweeps, AddedOnesAreThoseBeyondTheHeadsOwn) {
       for (std::uint32_t drops = 1; drops <= 9; ++drops) {
         const std::string row = std::string("00") + static_cast<char>('0' + drops) + "00000";
         // Planes are those of the job, regardless of the layer.
-        const FiredSweeps fired = sweeps_fired_by(grid, planes_of({row, "00000000", "00000000", "00000000"}, 12));
+        const FiredSweeps fired = sweeps_fired_by(grid, drops_of({row, "00000000", "00000000", "00000000"}, 12));
         const std::uint32_t sweeps = (drops + allowed - 1) / allowed, own = (drops + maximum - 1) / maximum;
         EXPECT_EQ(fired.sweeps.size(), sweeps);
         EXPECT_EQ(fired.count.added, sweeps - own) << maximum << " " << allowed << " " << drops;

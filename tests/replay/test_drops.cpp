@@ -26,7 +26,7 @@ Levels random_drops(const PixelGrid& grid, std::uint32_t seed) {
   return levels;
 }
 
-printed_parts::Program program_of_drops(const pipeline::ResolvedMachine& resolved, std::span<const RunsView> planes,
+printed_parts::Program program_of_drops(const pipeline::ResolvedMachine& resolved, const Levels& levels, std::uint32_t drops,
                                         std::vector<std::uint32_t>& numbers) {
   const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
   LayerCycle cycle;
@@ -37,8 +37,11 @@ printed_parts::Program program_of_drops(const pipeline::ResolvedMachine& resolve
   program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   program::CompileScratch scratch;
+  DropPatterns patterns;
+  for (std::uint8_t n = 0; n < 10; ++n) patterns.zone.push_back({n});
+  const DropImageView image{levels, &patterns};
   const auto count =
-      program::compile(resolved.grid, planes, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+      program::compile(resolved.grid, image, drops, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
         numbers.push_back(sweep.number);
         writer->sweep(sweep, vectors, bytes);
         return {};
@@ -61,7 +64,7 @@ TEST_P(Drops, AreReplayedDropForDrop) {
     for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
-    const auto program = program_of_drops(resolved, views, numbers);
+    const auto program = program_of_drops(resolved, levels, 3, numbers);
     std::ranges::sort(numbers);
     EXPECT_EQ(std::ranges::adjacent_find(numbers), numbers.end());
     EXPECT_EQ(program.count.drops + program.count.lost, sum_of_levels(levels));
@@ -103,7 +106,7 @@ TEST_P(GreyDrops, AreReplayedDropForDrop) {
     for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
-    const auto program = program_of_drops(resolved, views, numbers);
+    const auto program = program_of_drops(resolved, levels, 3, numbers);
     EXPECT_EQ(program.count.drops, sum_of_levels(levels));
     const auto replay = [&](const Machine& of, std::span<const RunsView> wanted) {
       const auto machine = replay::VirtualMachine::build(of, resolved.grid.image.columns(), resolved.grid.image.rows());
@@ -151,7 +154,7 @@ TEST_P(GreyDrops, OfBlockedNozzlesAreMovedAndMadeUp) {
     for (std::uint8_t k = 0; k < 3; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
     const std::vector<RunsView> views(planes.begin(), planes.end());
     std::vector<std::uint32_t> numbers;
-    const auto program = program_of_drops(resolved, views, numbers);
+    const auto program = program_of_drops(resolved, levels, 3, numbers);
     std::ranges::sort(numbers);
     EXPECT_EQ(std::ranges::adjacent_find(numbers), numbers.end());
     EXPECT_EQ(program.count.drops + program.count.lost, sum_of_levels(levels));
@@ -195,7 +198,7 @@ std::string five_and_six(const pipeline::ResolvedMachine& resolved) {
   for (std::uint8_t k = 0; k < 6; ++k) threshold_levels(levels, static_cast<std::uint8_t>(k + 1), planes[k]);
   const std::vector<RunsView> views(planes.begin(), planes.end());
   std::vector<std::uint32_t> numbers;
-  return program_of_drops(resolved, views, numbers).text;
+  return program_of_drops(resolved, levels, 6, numbers).text;
 }
 
 std::uint32_t word_at(const std::string& text, std::size_t at) {

@@ -110,7 +110,13 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
     const PrintProgram written(changed, "", 1, {});
     ProgramWork work;
     ProgramRecord record;
-    const Status status = written.write_layer(layer, std::vector<RunsView>(drops, of.view()), {0}, work, record);
+    Levels zones;
+    levels_of(of, 1, zones);
+    DropPatterns patterns;
+    patterns.zone = {{}, {static_cast<std::uint8_t>(drops)}};
+    const Status status = drops == 1
+                              ? written.write_layer(layer, of, {0}, work, record)
+                              : written.write_layer(layer, PrintProgram::Drops{{zones, &patterns}, drops}, {0}, work, record);
     return status ? Result<ProgramRecord>(record) : Result<ProgramRecord>(status.error());
   };
   for (const MaintenanceCase& one : maintenance_cases(resolved.machine)) {

@@ -1,0 +1,264 @@
+#include "stages/geometry/drop_rows.h"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include <algorithm>
+#include <bit>
+
+#include "stages/geometry/isa.h"
+#include "stages/geometry/targets.h"
+
+namespace lamina {
+namespace {
+
+/// A piece of a row of a core: bits [begin, end), of which bit b has the value first + b * step.
+struct CoreTask {
+  std::uint64_t begin, end;
+  std::uint32_t first, step, threshold;
+};
+
+/// Bit i: whether value + i * step is below the threshold.
+LAMINA_BODY std::uint64_t core_word(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
+  std::uint64_t bits = 0;
+  for (std::uint32_t i = 0; i < 64; ++i, value += step) bits |= std::uint64_t{value < threshold} << i;
+  return bits;
+}
+
+#if defined(LAMINA_WIDE_KERNELS)
+LAMINA_AVX2 inline std::uint64_t core_word_avx2(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
+  const __m256i sign = _mm256_set1_epi32(INT32_MIN);
+  const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+  __m256i values = _mm256_add_epi32(_mm256_mullo_epi32(lane, _mm256_set1_epi32(static_cast<int>(step))),
+                                    _mm256_set1_epi32(static_cast<int>(value)));
+  const __m256i limit = _mm256_xor_si256(_mm256_set1_epi32(static_cast<int>(threshold)), sign),
+                by = _mm256_set1_epi32(static_cast<int>(8 * step));
+  std::uint64_t bits = 0;
+  for (int i = 0; i < 64; i += 8) {
+    const __m256i below = _mm256_cmpgt_epi32(limit, _mm256_xor_si256(values, sign));
+    bits |= std::uint64_t{static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(below)))} << i;
+    values = _mm256_add_epi32(values, by);
+  }
+  return bits;
+}
+
+LAMINA_AVX512_BEGIN
+LAMINA_AVX512 inline std::uint64_t core_word_avx512(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
+  const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  __m512i values = _mm512_add_epi32(_mm512_mullo_epi32(lane, _mm512_set1_epi32(static_cast<int>(step))),
+                                    _mm512_set1_epi32(static_cast<int>(value)));
+  const __m512i limit = _mm512_set1_epi32(static_cast<int>(threshold)), by = _mm512_set1_epi32(static_cast<int>(16 * step));
+  std::uint64_t bits = 0;
+  for (int i = 0; i < 64; i += 16) {
+    bits |= std::uint64_t{_mm512_cmplt_epu32_mask(values, limit)} << i;
+    values = _mm512_add_epi32(values, by);
+  }
+  return bits;
+}
+LAMINA_AVX512_END
+#endif
+
+/// Calls take(word, bits) for the words of a piece.
+template <class Word, class Take>
+LAMINA_BODY void for_core_words(const CoreTask& task, Word word_of, Take take) {
+  const std::uint64_t first = task.begin / 64, last = (task.end - 1) / 64;
+  const std::uint64_t head = ~std::uint64_t{0} << (task.begin % 64), tail = ~std::uint64_t{0} >> (63 - (task.end - 1) % 64);
+  for (std::uint64_t word = first; word <= last; ++word) {
+    std::uint64_t bits = word_of(task.first + static_cast<std::uint32_t>(64 * word) * task.step, task.step, task.threshold);
+    if (word == first) bits &= head;
+    if (word == last) bits &= tail;
+    take(word, bits);
+  }
+}
+
+template <class Word>
+LAMINA_BODY void set_body(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed, Word word_of) {
+  for_core_words(task, word_of, [&](std::uint64_t word, std::uint64_t bits) { row[word] |= bits & allowed; });
+}
+template <class Word>
+LAMINA_BODY std::uint64_t count_body(const CoreTask& task, Word word_of) {
+  std::uint64_t count = 0;
+  for_core_words(task, word_of,
+                 [&](std::uint64_t, std::uint64_t bits) { count += static_cast<std::uint64_t>(std::popcount(bits)); });
+  return count;
+}
+
+struct CoreKernels {
+  void (*set)(const CoreTask&, std::uint64_t*, std::uint64_t);
+  std::uint64_t (*count)(const CoreTask&);
+  std::uint64_t (*word)(std::uint32_t, std::uint32_t, std::uint32_t);
+};
+
+std::uint64_t word_plain(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
+  return core_word(value, step, threshold);
+}
+void set_plain(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed) { set_body(task, row, allowed, word_plain); }
+std::uint64_t count_plain(const CoreTask& task) { return count_body(task, word_plain); }
+#if defined(LAMINA_WIDE_KERNELS)
+LAMINA_AVX2 void set_avx2(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed) {
+  set_body(task, row, allowed, core_word_avx2);
+}
+LAMINA_AVX2 std::uint64_t count_avx2(const CoreTask& task) { return count_body(task, core_word_avx2); }
+LAMINA_AVX512 void set_avx512(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed) {
+  set_body(task, row, allowed, core_word_avx512);
+}
+LAMINA_AVX512 std::uint64_t count_avx512(const CoreTask& task) { return count_body(task, core_word_avx512); }
+#endif
+
+const CoreKernels& core_kernels() {
+  static const CoreKernels kKernels = [] {
+#if defined(LAMINA_WIDE_KERNELS)
+    if (widest_isa() == Isa::kAvx512) return CoreKernels{set_avx512, count_avx512, core_word_avx512};
+    if (widest_isa() == Isa::kAvx2) return CoreKernels{set_avx2, count_avx2, core_word_avx2};
+#endif
+    return CoreKernels{set_plain, count_plain, word_plain};
+  }();
+  return kKernels;
+}
+
+}  // namespace
+
+void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, std::uint32_t step,
+              std::uint32_t threshold, std::uint64_t allowed) {
+  if (begin < end) core_kernels().set({begin, end, first, step, threshold}, row, allowed);
+}
+
+std::uint64_t extra_bits(const DropPatterns& patterns, const DropZone& zone, std::uint32_t row, std::uint32_t word) {
+  if (zone.extra == DropZone::Extra::kNone) return 0;
+  if (zone.extra == DropZone::Extra::kTile) return patterns.tile_row(zone, row)[word % 2];
+  const CorePattern& core = patterns.core;
+  return core_kernels().word(core.of_row(row) + 64 * word * core.column_step, core.column_step, core.threshold);
+}
+
+void DropPlane::row(std::uint32_t number, std::span<std::uint64_t> words) const {
+  const LevelsView& zones = image_.zones;
+  const DropPatterns& patterns = *image_.patterns;
+  std::ranges::fill(words, 0);
+  for (std::uint32_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i) {
+    const DropZone& zone = patterns.zone[zones.level[i]];
+    const std::uint32_t begin = zones.change[2 * std::size_t{i}], end = zones.change[2 * std::size_t{i} + 1];
+    if (zone.base > drop_) {
+      set_pattern(words.data(), begin, end, ~std::uint64_t{0}, ~std::uint64_t{0});
+    } else if (zone.base == drop_ && zone.extra == DropZone::Extra::kTile) {
+      const std::uint64_t* const tile = patterns.tile_row(zone, number);
+      set_pattern(words.data(), begin, end, tile[0], tile[1]);
+    } else if (zone.base == drop_ && zone.extra == DropZone::Extra::kCore) {
+      const CorePattern& core = patterns.core;
+      set_core(words.data(), begin, end, core.of_row(number), core.column_step, core.threshold, ~std::uint64_t{0});
+    }
+  }
+}
+
+void runs_of(const BitRows& image, Runs& result) {
+  const std::uint32_t rows = image.rows();
+  result.columns = image.columns();
+  result.row_offset.assign(1, 0);
+  std::vector<std::uint64_t> words(image.words());
+  std::size_t used = 0;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    image.row(r, words);
+    const std::size_t maximum = used + image.columns() + 2;
+    if (result.change.size() < maximum) result.change.resize(std::max(2 * result.change.size(), maximum));
+    std::uint32_t* change = result.change.data() + used;
+    std::uint64_t before = 0;
+    for (std::size_t w = 0; w < words.size(); ++w) {
+      for (std::uint64_t turns = words[w] ^ (words[w] << 1 | before); turns != 0; turns &= turns - 1)
+        *change++ = static_cast<std::uint32_t>(64 * w) + static_cast<std::uint32_t>(std::countr_zero(turns));
+      before = words[w] >> 63;
+    }
+    if (before != 0) *change++ = image.columns();
+    used = static_cast<std::size_t>(change - result.change.data());
+    result.row_offset.push_back(static_cast<std::uint32_t>(used));
+  }
+  result.change.resize(used);
+}
+
+void levels_of(const DropImageView& image, Levels& result) {
+  const LevelsView& zones = image.zones;
+  result.start(zones.columns);
+  for (std::uint32_t row = 0; row < zones.rows(); ++row) {
+    for (std::uint32_t i = zones.row_offset[row]; i < zones.row_offset[row + 1]; ++i) {
+      const DropZone& zone = image.patterns->zone[zones.level[i]];
+      std::uint32_t begin = zones.change[2 * std::size_t{i}];
+      const std::uint32_t end = zones.change[2 * std::size_t{i} + 1];
+      if (zone.extra == DropZone::Extra::kNone) {
+        result.append(begin, end, zone.base);
+        continue;
+      }
+      while (begin < end) {
+        const std::uint64_t left = extra_bits(*image.patterns, zone, row, begin / 64) >> (begin % 64);
+        const bool more = (left & 1) != 0;
+        const auto same = static_cast<std::uint32_t>(more ? std::countr_one(left) : std::countr_zero(left));
+        const std::uint32_t stop = std::min({end, begin + same, (begin / 64 + 1) * 64});
+        result.append(begin, stop, static_cast<std::uint8_t>(zone.base + (more ? 1 : 0)));
+        begin = stop;
+      }
+    }
+    result.end_row();
+  }
+}
+
+void DropCounter::start(const DropPatterns& patterns) {
+  patterns_ = &patterns;
+  const std::size_t rows = patterns.tile.size() / 2;
+  before_.resize(rows * kRow);
+  for (std::size_t row = 0; row < rows; ++row) {
+    std::uint8_t* const before = before_.data() + row * kRow;
+    std::uint8_t count = 0;
+    for (std::uint32_t c = 0; c < kTileSide; ++c) {
+      before[c] = count;
+      count = static_cast<std::uint8_t>(count + (patterns.tile[2 * row + c / 64] >> (c % 64) & 1));
+    }
+    before[kTileSide] = count;
+  }
+}
+
+std::uint64_t DropCounter::extra(std::uint8_t zone, std::uint32_t row, std::uint32_t begin, std::uint32_t end) const {
+  const DropZone& of = patterns_->zone[zone];
+  if (of.extra == DropZone::Extra::kNone || begin >= end) return 0;
+  if (of.extra == DropZone::Extra::kCore) {
+    const CorePattern& core = patterns_->core;
+    return core_kernels().count({begin, end, core.of_row(row), core.column_step, core.threshold});
+  }
+  const std::uint8_t* const before = before_.data() + (of.tile * std::size_t{kTileSide} + row % kTileSide) * kRow;
+  const auto up_to = [&](std::uint32_t column) {
+    return std::uint64_t{column / kTileSide} * before[kTileSide] + before[column % kTileSide];
+  };
+  return up_to(end) - up_to(begin);
+}
+
+DropTotals::DropTotals(const DropImageView& image, const DropCounter& counter) {
+  for (const DropZone& zone : image.patterns->zone) zones_.push_back({zone});
+  const LevelsView& zones = image.zones;
+  for (std::uint32_t row = 0; row < zones.rows(); ++row) {
+    for (std::size_t i = zones.row_offset[row]; i < zones.row_offset[row + 1]; ++i) {
+      const std::uint32_t begin = zones.change[2 * i], end = zones.change[2 * i + 1];
+      ZoneTotal& total = zones_[zones.level[i]];
+      total.pixels += end - begin;
+      total.extra += counter.extra(zones.level[i], row, begin, end);
+    }
+  }
+}
+
+std::uint64_t DropTotals::drops() const {
+  std::uint64_t drops = 0;
+  for (const ZoneTotal& of : zones_) drops += of.zone.base * of.pixels + of.extra;
+  return drops;
+}
+
+std::uint64_t DropTotals::pixels(std::uint32_t drop) const {
+  std::uint64_t pixels = 0;
+  for (const ZoneTotal& of : zones_) pixels += of.zone.base > drop ? of.pixels : of.zone.base == drop ? of.extra : 0;
+  return pixels;
+}
+
+std::uint32_t DropTotals::maximum() const {
+  std::uint32_t maximum = 0;
+  for (const ZoneTotal& of : zones_) {
+    if (of.pixels > 0) maximum = std::max(maximum, of.zone.base + (of.extra > 0 ? 1u : 0u));
+  }
+  return maximum;
+}
+
+}  // namespace lamina
