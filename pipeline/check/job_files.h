@@ -22,7 +22,7 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
 std::string sweeps_of_job(const std::string& directory, const Manifest& manifest);
 
 /// The text of a layer's print program, unchecked; "" if it cannot be read.
-std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
+std::string program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
 
 /// The images of a layer's drops, of all materials, each within the one before; one where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;

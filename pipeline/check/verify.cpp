@@ -19,6 +19,7 @@
 #include "stages/formats/images/image.h"
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
@@ -76,12 +77,14 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   const std::string path = (fs::path(inspection.directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path, record.program.bytes);
+  const Result<FileDigest> digest = digest_content(path, record.program.bytes);
   if (!digest) return digest.error().message;
+  if (is_compressed(name) && digest->bytes != record.program.bytes)
+    return fmt::format("{}: expands to {} bytes, the manifest says {}", name, digest->bytes, record.program.bytes);
   const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   if (image != nullptr && inspection.machine) {
     const std::vector<RunsView> planes(image->begin(), image->end());
-    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
+    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record),
                                                    record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
@@ -170,7 +173,7 @@ void check_frame(const Verification& inspection, VerifyReport& report) {
                                           std::tuple{"end", head.program_end, &replay::check_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
     std::string fault = fault_of_file(inspection.directory, name, hash);
-    const auto text = read_file((fs::path(inspection.directory) / name).string(), {.max_bytes = kMaxTomlBytes});
+    const auto text = read_content((fs::path(inspection.directory) / name).string(), kMaxTomlBytes);
     if (inspection.machine && !inspection.quick && text) {
       if (const Status status = check(*inspection.machine, *text); !status)
         fault = fmt::format("{}: {}", name, status.error().message);

@@ -173,6 +173,7 @@ struct Job {
   bool drop_bad = false;
   double weld_um = 5;
   MachineRequest machine;
+  bool compress_programs = true;  // of dialects that are lamina's own
   DoseRequest dose;
 
   // --- no effect on the bytes of any layer

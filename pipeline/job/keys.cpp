@@ -182,7 +182,7 @@ const JobKey kImageKeys[] = {
         image_key("title", "--title", "NAME", "job title, written to TIFF tags with layer and height")),
 };
 
-// --- [machine], [dose]
+// --- [machine], [program], [dose]
 
 /// A target of which each component is optional.
 struct RangeTarget {
@@ -253,6 +253,9 @@ const JobKey kMachineKeys[] = {
         printer_key("vat_rule", "--vat-rule", "RULE", "vat for layers of two powders: first, second, majority, both or refuse"),
         Form::kString)
         .with_words(vat_rule_words),
+    field<&Job::compress_programs>(
+        {"program", "compress", "", "", "compress print programs of the dialects planes and raw", decides::images})
+        .shown_if([](const Job& job) { return !job.compress_programs; }),
 };
 
 const JobKey kDoseKeys[] = {

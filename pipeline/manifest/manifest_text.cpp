@@ -12,6 +12,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/program/dialect.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
@@ -80,7 +81,9 @@ std::string fault_of_images(const ManifestHead& head) {
   }
   const auto* dialect = program::find_dialect(head.dialect);
   if (dialect == nullptr) return no_such("dialect", head.dialect);
-  return head.program_extension == dialect->extension ? "" : no_such("program_extension", head.program_extension);
+  std::string_view end = head.program_extension;
+  if (dialect->compressed && is_compressed(end)) end.remove_suffix(kCompressedEnd.size());
+  return end == dialect->extension ? "" : no_such("program_extension", head.program_extension);
 }
 
 std::string fault_of_contours(const ManifestHead& head) {

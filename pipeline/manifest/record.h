@@ -14,8 +14,9 @@ namespace lamina {
 
 /// The print program of a layer, for a job with a machine.
 struct ProgramRecord {
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = 0;  // expanded, as the hash
   Hash128 hash;
+  std::uint64_t stored = 0;  // bytes of the file as it was just written; in no manifest, since they depend on libzstd
   std::uint32_t sweeps = 0;  // that fire
   std::uint64_t drops = 0;
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)

@@ -41,7 +41,7 @@ ManifestHead image_head(const Plan& plan) {
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
-  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
+  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = program_extension(*dialect, job.compress_programs);
   const std::string profile = pipeline::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
@@ -67,7 +67,7 @@ ImageFiles::ImageFiles(const Plan& plan)
       levels_(formats::find_level_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
-                     layer_file_options(plan.job));
+                     layer_file_options(plan.job), plan.job.compress_programs);
 }
 
 Status ImageFiles::open() {
@@ -231,7 +231,7 @@ Status ImageFiles::record_kept_below(std::uint32_t layer) {
 Status ImageFiles::record(const LayerRecord& record) {
   if (Status status = record_kept_below(record.layer.index); !status) return status;
   Status status = manifest_->append(record);
-  return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.bytes) : status;
+  return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.stored) : status;
 }
 
 Status ImageFiles::finish() {

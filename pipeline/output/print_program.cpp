@@ -8,6 +8,10 @@
 
 namespace lamina::pipeline {
 
+std::string program_extension(const program::Dialect& dialect, bool compress) {
+  return fmt::format("{}{}", dialect.extension, compress && dialect.compressed ? kCompressedEnd : "");
+}
+
 std::string program_file_name(std::uint32_t index, std::string_view extension) {
   return extension.empty() ? std::string() : fmt::format("program/{:06}{}", index, extension);
 }
@@ -21,10 +25,11 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 }
 
 PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers,
-                           const FileOptions& files)
+                           const FileOptions& files, bool compress)
     : resolved_(resolved),
       dialect_(*program::find_dialect(resolved.machine.dialect)),
       directory_(std::move(directory)),
+      extension_(program_extension(dialect_, compress)),
       layers_(layers),
       files_(files),
       machine_(replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows())) {}
@@ -37,8 +42,8 @@ Status PrintProgram::begin() const {
     return status;
   }
   const ProgramFrame frame = program_frame(resolved_, layers_);
-  const Status status = write_file(path(fmt::format("start{}", dialect_.extension)), frame.start, files_);
-  return status ? write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
+  const Status status = write_content(path("start" + extension_), frame.start, files_);
+  return status ? write_content(path("end" + extension_), frame.end, files_) : status;
 }
 
 Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
@@ -46,19 +51,16 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   if (!work.timer) work.timer.emplace(*machine_);
-  std::optional<File> file;  // none: the layer is only timed
-  if (!directory_.empty()) {
-    FileOptions how = files_;
-    how.hash = true;
-    auto opened = File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
-    if (!opened) return opened.error();
-    file.emplace(std::move(*opened));
+  const bool writes = !directory_.empty();  // else the layer is only timed
+  if (writes) {
+    const std::string name = directory_ + "/" + program_file_name(layer.index, extension_);
+    if (Status status = work.file.open(name, files_); !status) return status;
   }
   const LayerCycle cycle{layer.index,     layers_, layer.bottom,
                          layer.thickness, feeds,   std::ranges::binary_search(refills, layer.index)};
   const auto flush = [&]() -> Status {
     if (dialect_.has_motion) work.timer->read(work.text);
-    Status status = file ? file->append(work.text) : Status();
+    Status status = writes ? work.file.append(work.text) : Status();
     work.text.clear();
     return status;
   };
@@ -81,7 +83,7 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
           work.timer->sweep(static_cast<double>(program::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
                             sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
         }
-        if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
+        if (writes || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
         return work.text.size() < kPiece ? Status() : flush();
       },
       layer.index);
@@ -91,14 +93,15 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   if (Status status = flush(); !status) return status;
   const auto taken = work.timer->end();
   if (!taken) return taken.error();
-  record = {0, {}, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
+  record = {0, {}, 0, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
   record.added_sweeps = count->added;
   record.added_microseconds = work.timer->added_microseconds();
-  if (!file) return {};
-  const auto digest = file->finish();
+  if (!writes) return {};
+  const auto digest = work.file.finish();
   if (!digest) return digest.error();
   record.bytes = digest->bytes;
   record.hash = digest->hash;
+  record.stored = work.file.stored_bytes();
   return {};
 }
 
@@ -122,7 +125,7 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   // Lines of the bits of drops, at most twice those of the drops, and their changes sorted.
   const std::uint64_t bits = grid.drop_bits > 1 ? 16 * changes * grid.sweep_drops + 40 * grid.nozzles : 0;
   return bits + 4 * maintenance + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
-         (512 << 10);
+         (is_compressed(extension_) && !directory_.empty() ? ContentWriter::kMaxBytes : 0) + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

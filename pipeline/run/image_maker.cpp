@@ -332,7 +332,7 @@ class ImageMaker : public Maker {
     observers_.layer(made.record, &made.notes);
     checks_.record(made.record.layer.index, made.record.set_pixels > 0);
     crossings_ += made.notes.report.crossings;
-    bytes_written_ += made.record.bytes + made.record.program.bytes;
+    bytes_written_ += made.record.bytes + made.record.program.stored;
     return {};
   }
   void add_kept(const LayerRecord& record) override {

@@ -56,7 +56,7 @@ Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead
 /// Machine time of a layer, from replaying its program as lamina verify does.
 Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
                                 const LayerRecord& record, const LayerPicture& picture) {
-  const std::string program = program_of_layer(directory, head, record.layer.index);
+  const std::string program = program_of_layer(directory, head, record);
   if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
     const std::vector<RunsView> planes(picture.begin(), picture.end());
     const auto replay = machine.replay(program, record.layer, planes, record.program.moved, record.program.lost);

@@ -128,7 +128,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   if (!image) return image.error();
   replay::StepChoice step = choice;
   step.planes = std::max(1u, head.max_drops);
-  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), step, head.grid);
+  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, *record), step, head.grid);
   if (!jetting) return jetting.error();
   view::picture::SwathView view;
   view.grid = head.grid;
