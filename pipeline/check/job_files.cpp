@@ -84,7 +84,8 @@ Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, L
   return status;
 }
 
-Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
+                                      const ExpectedDrops& expected) {
   raster::DropPlanes picture = planes_of(head);
   const auto files = layer_images(head, record);
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -99,6 +100,7 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
     if (!added)
       return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, added.error().message)};
   }
+  expected.apply(record.layer, picture.planes);
   return std::move(picture.planes);
 }
 

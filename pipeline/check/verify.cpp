@@ -34,6 +34,7 @@ struct Verification {
   bool quick;
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
   std::optional<DoseCheck> doses;
+  ExpectedDrops expected;
   VerifyReport& report;
 };
 
@@ -152,6 +153,8 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
     if (std::string what = fault_of_image(inspection, record.layer, i, file, picture, levels); !what.empty()) return what;
   }
   if (!inspection.quick) {
+    inspection.expected.apply(record.layer, picture.planes);
+    if (std::string what = ExpectedDrops::fault(inspection.head, record, picture.planes); !what.empty()) return what;
     if (std::string what = fault_of_drops(inspection.head, record, picture.planes); !what.empty()) return what;
     if (std::string what = inspection.doses->fault(record, picture.planes, levels); !what.empty()) return what;
   }
@@ -164,6 +167,9 @@ void prepare_replay(Verification& inspection) {
   if (!built) return inspection.report.add(built.error().message);
   inspection.machine = std::move(*built);
   inspection.report.machine = inspection.machine->profile().name;
+  auto expected = ExpectedDrops::of(inspection.head, inspection.machine->profile());
+  if (!expected) return inspection.report.add(expected.error().message);
+  inspection.expected = std::move(*expected);
 }
 
 // Checks the programs before the first and after the last layer.
@@ -202,7 +208,7 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
+  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, {}, report};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);

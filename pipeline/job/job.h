@@ -29,6 +29,8 @@ namespace lamina::pipeline {
 
 enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
+/// What layer images have where a dose follows the image of the solids.
+enum class ImageContent { kAuto, kGeometry, kDrops };
 constexpr bool mirrors_x(Mirror mirror) { return mirror == Mirror::kX || mirror == Mirror::kXY; }
 constexpr bool mirrors_y(Mirror mirror) { return mirror == Mirror::kY || mirror == Mirror::kXY; }
 
@@ -163,6 +165,7 @@ struct Job {
   Mirror mirror = Mirror::kNone;
   std::uint32_t levels = 0;  // of shares of voxels, 2, 4 or 16; 0: pixels are set or not
   std::string format = "tiff-g4";
+  ImageContent image_content = ImageContent::kAuto;  // kAuto: geometry where drops follow from it, the job and the machine
   std::string title;  // of the job, in tags of its images
   SliceRequest slice;
   FillRequest fill;

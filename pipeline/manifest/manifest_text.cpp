@@ -71,6 +71,8 @@ std::string fault_of_images(const ManifestHead& head) {
     return no_such("levels", fmt::format("{}", head.levels));
   }
   if (grey && (drops == head.machine.empty() || (!drops && !head.materials.empty()))) return no_such("format", head.format);
+  if (head.geometry && (grey || head.levels > 0 || !head.materials.empty() || head.machine.empty()))
+    return no_such("images_of", "geometry");
   constexpr std::uint32_t kMaxHeadDrops = 15;
   if (head.head_drops > kMaxHeadDrops || head.sweep_drops < 1 || head.sweep_drops > head.head_drops) {
     return no_such("sweep_drops", fmt::format("{}", head.sweep_drops));
@@ -182,6 +184,7 @@ void add_images(const ManifestHead& head, Json& json) {
     for (const JobMaterial& material : head.materials) materials.push_back({{"name", material.name}, {"vat", material.vat}});
   }
   if (head.max_drops > 0) json["max_drops"] = head.max_drops;
+  if (head.geometry) json["images_of"] = "geometry";
   if (head.levels > 0) json["levels"] = head.levels;
   if (head.machine.empty()) return;
   json["dialect"] = head.dialect;
@@ -203,6 +206,7 @@ void read_images(const Json& json, ManifestHead& head) {
       head.materials.push_back({entry.at("name").text(), entry.at("vat").get<decltype(JobMaterial::vat)>()});
   }
   if (json.contains("max_drops")) json.at("max_drops").get_to(head.max_drops);
+  if (json.contains("images_of")) head.geometry = json.at("images_of").text() == "geometry";
   if (json.contains("levels")) json.at("levels").get_to(head.levels);
   if (head.machine.empty()) return;
   json.at("dialect").get_to(head.dialect);

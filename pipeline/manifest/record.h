@@ -88,6 +88,7 @@ struct LayerRecord {
   std::uint64_t requested_drops = 0;      // by the target saturation, rounded
   std::uint32_t max_drops = 0;            // of any pixel
   std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
+  std::uint64_t geometry_pixels = 0;      // set in the image, of a job whose images are of the geometry
   std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
   std::uint64_t half_far = 0;             // of them, those that are not adjacent to a boundary of the image
 

@@ -36,6 +36,7 @@ ManifestHead image_head(const Plan& plan) {
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
   head.max_drops = plan.images->dose.max_drops();
+  head.geometry = plan.images->geometry;
   head.levels = job.levels;
   if (!plan.images->machine) return head;
   const Machine& machine = plan.images->machine->machine;
@@ -143,7 +144,7 @@ Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord
     work.level_encoder->tag(tags);
   }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(images.whole, images.levels.data(), work, record, work.file); !status) return status;
+    if (Status status = encode_one(head_.geometry ? images.geometry : images.whole, images.levels.data(), work, record, work.file); !status) return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
@@ -210,13 +211,14 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
   return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }
 
-std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
+std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const {
   const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
   const std::uint32_t planes = std::max(1u, head_.max_drops);
   const auto max_bytes = levels_ == nullptr ? format_->max_bytes : levels_->max_bytes;
   // Planes of drops share their changes, images of materials each have all.
   const std::uint64_t of_plane = drops.changes_of_all / planes + 1;
-  const std::uint64_t of_file = head_.materials.empty() && levels_ == nullptr ? of_plane : drops.changes;
+  const bool one = head_.materials.empty() && levels_ == nullptr;
+  const std::uint64_t of_file = head_.geometry ? edges : one ? of_plane : drops.changes;
   return files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
          (program_ ? program_->bytes_bound(of_plane, planes) : 0);
 }

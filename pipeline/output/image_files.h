@@ -28,6 +28,7 @@ formats::LayerTags tags_of(const Plan& plan, const Layer& layer);
 /// The images of a layer that is to be written.
 struct LayerImages {
   const Runs& whole;               // of all materials, of the first drop
+  const Runs& geometry;            // before the dose, of a plan whose images are that
   std::span<const Runs> planes;    // of all materials, of each drop, if pixels can get several
   std::span<const Runs> several;   // those that have names (ManifestHead::named_images)
   std::span<const Levels> levels;  // for formats that carry shares of the voxels, or drops: one, or one a material
@@ -70,8 +71,8 @@ class ImageFiles {
   Status store(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
   Status program(const LayerImages& images, FileWork& work, LayerRecord& record) const;
-  /// Upper bound of the bytes for a layer whose images have that many changes.
-  std::uint64_t bytes_bound(const dose::DropBound& drops) const;
+  /// Upper bound of the bytes for a layer whose images have that many changes. edges  those before the dose
+  std::uint64_t bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const;
 
   // --- from one thread at a time
   /// In layer order; kept layers are recorded in their place.

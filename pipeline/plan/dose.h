@@ -75,6 +75,11 @@ class DosePlan {
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }
+  /// Whether the dose, but for bleed, makes drops of a layer by its image alone, and whether these are not that image.
+  bool follows_image() const;
+  bool changes_image() const { return core_ < 1 || saturates(); }
+  /// In place of decide(), of a job on record.
+  void restore(const Machine& machine, std::uint32_t sweep_drops, std::uint32_t max_drops);
   /// Whether a saturation or shares of voxels decide the drops, and how many a pixel can get; 0 if none does.
   bool saturates() const { return max_drops() > 0; }
   std::uint32_t max_drops() const { return rules_.max_drops; }
@@ -114,6 +119,7 @@ class DosePlan {
 
  private:
   bool has_formula(const Layer& layer) const;
+  void set_limits(const Machine& machine, std::uint32_t sweep_drops);
   Result<dose::ZoneSums> saturate_deposited(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
                                             dose::DropWork& work) const;
 

@@ -287,10 +287,25 @@ class Planner {
         !status)
       return status;
     if (Status status = dose.check_images(job().format); !status) return status;
+    const auto geometry = images_of_geometry(dose);
+    if (!geometry) return geometry.error();
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
-                                   std::move(dose), std::move(beads)});
+                                   std::move(dose), std::move(beads), *geometry});
     end_indexing();
     return {};
+  }
+
+  /// Whether layer images are those before the dose. errors  kUsage: requested where drops do not follow from one
+  Result<bool> images_of_geometry(const DosePlan& dose) {
+    const bool follow = machine() != nullptr && !materials_.several() && dose.follows_image() &&
+                        formats::find_level_format(job().format) == nullptr;
+    if (job().image_content == ImageContent::kGeometry && !follow) {
+      return usage("--images geometry: {}; use --images drops",
+                   machine() == nullptr ? "without a machine nothing but the images has the drops"
+                                        : "the drops do not follow from one 1-bit image a layer (formulas, doses of parts, "
+                                          "levels, several materials)");
+    }
+    return follow && dose.changes_image() && job().image_content != ImageContent::kDrops && job().format != "null";
   }
 
   /// What can be reported about the beads before any is deposited.

@@ -382,11 +382,11 @@ class ImageMaker : public Maker {
   };
 
   std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const {
-    return imager_.bytes_of(layer, pixels) + files_.bytes_bound(imager_.drops_bound(layer, pixels));
+    return imager_.bytes_of(layer, pixels) + files_.bytes_bound(imager_.drops_bound(layer, pixels), imager_.edges_bound(layer));
   }
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, images.drops.planes, imager_.several(images), imager_.levels(images)};
+    return {images.runs, images.geometry, images.drops.planes, imager_.several(images), imager_.levels(images)};
   }
 
   const Plan& plan_;

@@ -29,7 +29,7 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
 std::uint64_t ImageWork::bytes() const {
   std::uint64_t total = scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() + coverage.bytes() +
                         vanish.bytes() + (beads ? beads->bytes() : 0);
-  for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
+  for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &geometry, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
   return total;
@@ -270,7 +270,7 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer, std::uint64_t pixels) co
   std::uint64_t total = drops.bytes + images.solids.layer_bytes_bound(low);
   if (high != low) total += images.solids.layer_bytes_bound(high);
   // The image, and one more; those of bleed, with what it took away.
-  total += image(edges) * (2 + (images.dose.bleeds() ? 6 : 0));
+  total += image(edges) * (2 + (images.dose.bleeds() ? 6 : 0) + (images.geometry ? 1 : 0));
   if (plan_.job.dose.core < 1) total += image(edges) + 2 * image(drops.changes);
   // Images of each material, of all, of one solid, and one intermediate.
   if (images.materials.several()) total += (images.materials.used.size() + 3) * image(std::max(edges, drops.changes));
@@ -438,6 +438,10 @@ void LayerImager::add_shares(const Layer& layer, std::uint32_t part, ImageWork& 
 Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
+  if (images.geometry) {
+    work.geometry = work.runs;
+    record.geometry_pixels = set_pixels(work.geometry);
+  }
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.dose.saturates()) {
     const auto materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
@@ -468,7 +472,7 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
 }
 
 std::span<const Runs> LayerImager::several(const ImageWork& work) const {
-  const bool drops = plan_.images->dose.max_drops() > 1 && formats::find_level_format(plan_.job.format) == nullptr;
+  const bool drops = plan_.images->dose.max_drops() > 1 && !plan_.images->geometry && formats::find_level_format(plan_.job.format) == nullptr;
   if (!drops) return work.materials.image;
   return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
 }

@@ -22,6 +22,7 @@ struct ImageWork {
   Runs second;           // of the other engine, mirrored, or before the dose
   Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
+  Runs geometry;         // before the dose, of a plan whose images are that
   Runs section;          // of one solid of a layer with several materials
   dose::DropWork drops;  // if a saturation or fill fractions of voxels are requested
   coverage::CoverageScratch coverage;
@@ -81,6 +82,8 @@ class LayerImager {
   dose::DropBound drops_bound(const Layer& layer, std::uint64_t pixels) const {
     return plan_.images->dose.bound(sizes_of(layer, pixels));
   }
+  /// The same before the dose.
+  std::uint64_t edges_bound(const Layer& layer) const { return sizes_of(layer, 0).edges; }
 
  private:
   Nm plane(const Layer& layer) const { return plane_of(plan_.job, layer, plan_.scene->height); }
