@@ -25,7 +25,7 @@ Result<ExpectedDrops> ExpectedDrops::of(const ManifestHead& head, const Machine&
     return Error{Fault::kVerification, status.error().message};
   auto dose = std::make_unique<DosePlan>(job, head.grid);
   dose->restore(machine, head.sweep_drops, head.max_drops);
-  if (!dose->follows_image())
+  if (!drops_follow_image(job))
     return Error{Fault::kVerification, "manifest.json: the drops of its job do not follow from images of the geometry"};
   expected.dose_ = std::move(dose);
   return expected;

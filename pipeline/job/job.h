@@ -242,6 +242,10 @@ std::vector<std::array<double, 2>> bleeds_of(const Job& job);
 /// Whether any layer of any part has walls, a filling or segmented lines.
 bool fills(const Job& job);
 
+/// Whether drops of a job with a machine follow from the image of a layer before the dose: one material, one dose that is no
+/// formula, no levels.
+bool drops_follow_image(const Job& job);
+
 /// Whether pixels of an image can differ from those of its parts' sections on purpose, but for bleed.
 bool thins(const Job& job);
 

@@ -199,6 +199,15 @@ void ImageFiles::report_unfed(LayerRecord& record) const {
 }
 
 Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  return program(images, work, record, false);
+}
+
+Status ImageFiles::measure(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  const Status status = encode(images, work, record);
+  return status ? program(images, work, record, true) : status;
+}
+
+Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecord& record, bool measures) const {
   if (!program_) return {};
   const auto feeds = feeds_of(record);
   if (!feeds) {
@@ -208,7 +217,7 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
   report_unfed(record);
   std::vector<RunsView> planes{images.whole};
   if (head_.max_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
-  return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
+  return program_->write_layer(record.layer, planes, *feeds, work.program, record.program, measures);
 }
 
 std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const {

@@ -71,6 +71,8 @@ class ImageFiles {
   Status store(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
   Status program(const LayerImages& images, FileWork& work, LayerRecord& record) const;
+  /// Encodes images and program of a layer and drops them; their sizes go to the record. Of a dry run.
+  Status measure(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// Upper bound of the bytes for a layer whose images have that many changes. edges  those before the dose
   std::uint64_t bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const;
 
@@ -87,6 +89,7 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void report_unfed(LayerRecord& record) const;
+  Status program(const LayerImages& images, FileWork& work, LayerRecord& record, bool measures) const;
   Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
                     formats::Bytes& file) const;
 

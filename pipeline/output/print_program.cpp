@@ -47,12 +47,14 @@ Status PrintProgram::begin() const {
 }
 
 Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
-                                 ProgramWork& work, ProgramRecord& record) const {
+                                 ProgramWork& work, ProgramRecord& record, bool measures) const {
   if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   if (!work.timer) work.timer.emplace(*machine_);
-  const bool writes = !directory_.empty();  // else the layer is only timed
-  if (writes) {
+  const bool writes = measures || !directory_.empty();  // else the layer is only timed
+  if (measures) {
+    if (Status status = work.file.open_nowhere(is_compressed(extension_)); !status) return status;
+  } else if (writes) {
     const std::string name = directory_ + "/" + program_file_name(layer.index, extension_);
     if (Status status = work.file.open(name, files_); !status) return status;
   }
@@ -105,6 +107,19 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   return {};
 }
 
+std::uint64_t PrintProgram::max_sweeps(std::uint32_t planes) const {
+  const HeadGrid& grid = resolved_.grid;
+  const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
+  return std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
+}
+
+std::uint64_t PrintProgram::file_bound(std::uint32_t planes) const {
+  const HeadGrid& grid = resolved_.grid;
+  const std::uint64_t vectors = grid.steps() * grid.words() * grid.drop_bits * 8;
+  const std::uint64_t of_sweep = dialect_.has_motion ? 4 * vectors + 32 * grid.steps() : vectors + vectors / 4;
+  return max_sweeps(planes) * (of_sweep + 4096) + (64 << 10);
+}
+
 std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t planes) const {
   const HeadGrid& grid = resolved_.grid;
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
@@ -113,8 +128,7 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis: at most 32 bytes a step (m578), twice while the
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
-  const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
+  const std::uint64_t sweeps = max_sweeps(planes);
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   // Lines of the base, and of shots off the bed: of one nozzle after the other (m578), of a dot a drop (brundlefab).

@@ -64,8 +64,9 @@ class PrintProgram {
   /// Compiles a layer, times it and writes its file, sweep by sweep. errors  kOutput
   /// planes  of the drops of a pixel, each within the one before; one if all get at most one
   /// feeds   the vats that feed the layer
+  /// measures  without a directory: the file is made and dropped
   Status write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
-                     ProgramWork& work, ProgramRecord& record) const;
+                     ProgramWork& work, ProgramRecord& record, bool measures = false) const;
 
   Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
                      ProgramRecord& record) const {
@@ -76,9 +77,13 @@ class PrintProgram {
 
   /// Upper bound of write_layer's memory, in bytes, for so many images with that many changes.
   std::uint64_t bytes_bound(std::uint64_t changes, std::uint32_t planes = 1) const;
+  /// Bytes that the file of a layer hardly exceeds: all sweeps over the whole bed, before it is compressed.
+  std::uint64_t file_bound(std::uint32_t planes) const;
 
  private:
   std::string path(std::string_view name) const;
+  /// Of a layer.
+  std::uint64_t max_sweeps(std::uint32_t planes) const;
   const ResolvedMachine& resolved_;
   const program::Dialect& dialect_;
   std::string directory_, extension_;

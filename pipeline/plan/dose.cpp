@@ -140,10 +140,6 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   return budget_->check(job.allow_unbound, warnings);
 }
 
-bool DosePlan::follows_image() const {
-  return !zones_.several() && rules_.full == 0 && !(targets_ && targets_->has_formula());
-}
-
 void DosePlan::set_limits(const Machine& machine, std::uint32_t sweep_drops) {
   if (machine.head.max_drop_sweeps > 0) limit_ = std::min(limit_, machine.head.max_drop_sweeps * sweep_drops);
   binder_ = {machine.head.drop_pl, machine.powder.evaporates_percent / 100, machine.powder.packing};

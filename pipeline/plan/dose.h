@@ -75,8 +75,7 @@ class DosePlan {
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }
-  /// Whether the dose, but for bleed, makes drops of a layer by its image alone, and whether these are not that image.
-  bool follows_image() const;
+  /// Whether drops are not those of the image without bleed.
   bool changes_image() const { return core_ < 1 || saturates(); }
   /// In place of decide(), of a job on record.
   void restore(const Machine& machine, std::uint32_t sweep_drops, std::uint32_t max_drops);

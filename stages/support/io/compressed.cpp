@@ -93,6 +93,12 @@ ContentWriter& ContentWriter::operator=(ContentWriter&&) noexcept = default;
 ContentWriter::~ContentWriter() = default;
 
 Status ContentWriter::open(const std::string& path, const FileOptions& options) {
+  return begin(path, options, is_compressed(path));
+}
+
+Status ContentWriter::open_nowhere(bool compressed) { return begin("/dev/null", {.stream = true}, compressed); }
+
+Status ContentWriter::begin(const std::string& path, const FileOptions& options, bool compressed) {
   State& state = *state_;
   FileOptions how = options;
   how.hash = false;
@@ -102,7 +108,7 @@ Status ContentWriter::open(const std::string& path, const FileOptions& options) 
   state.file.emplace(std::move(*file));
   state.content = 0;
   XXH3_128bits_reset(state.hash.get());
-  state.compresses = is_compressed(path);
+  state.compresses = compressed;
   if (!state.compresses) return {};
   state.filled = kSizeBytes;
   if (state.context) {

@@ -34,6 +34,8 @@ class ContentWriter {
 
   /// Begins a file; one that was not finished is removed. errors  of File::open
   Status open(const std::string& path, const FileOptions& options);
+  /// Begins a content that is only measured.
+  Status open_nowhere(bool compressed);
   /// errors  of File::append; kMemory
   Status append(std::span<const std::byte> bytes);
   /// Gives the file its name. returns  the size and the hash of the content
@@ -47,6 +49,7 @@ class ContentWriter {
 
  private:
   struct State;
+  Status begin(const std::string& path, const FileOptions& options, bool compressed);
   std::unique_ptr<State> state_;
 };
 
