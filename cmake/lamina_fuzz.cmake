@@ -13,7 +13,7 @@ endforeach()
 lamina_sources(fuzz_sources "tests/fuzz/*.cpp")
 list(REMOVE_ITEM fuzz_sources ${PROJECT_SOURCE_DIR}/tests/fuzz/test_corpus.cpp)
 add_executable(fuzz_readers ${fuzz_sources})
-target_link_libraries(fuzz_readers PRIVATE lamina::pipeline PNG::PNG ZLIB::ZLIB TIFF::TIFF PkgConfig::LIBZIP PkgConfig::XXHASH
+target_link_libraries(fuzz_readers PRIVATE lamina::pipeline PNG::PNG ZLIB::ZLIB TIFF::TIFF PkgConfig::LIBZIP PkgConfig::XXHASH PkgConfig::ZSTD
                       nlohmann_json::nlohmann_json)
 target_link_options(fuzz_readers PRIVATE -fsanitize=fuzzer)
 lamina_libraries_first(fuzz_readers)

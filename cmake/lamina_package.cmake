@@ -66,7 +66,7 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "lamina-scan")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME liblamina-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-    "pkg-config, libtbb-dev, libeigen3-dev, libembree-dev, libfmt-dev, libtiff-dev, libpng-dev, zlib1g-dev, nlohmann-json3-dev, libxxhash-dev, libzip-dev, libexpat1-dev, libpolyclipping-dev, libmuparser-dev, libgmp-dev")
+    "pkg-config, libtbb-dev, libeigen3-dev, libembree-dev, libfmt-dev, libtiff-dev, libpng-dev, zlib1g-dev, nlohmann-json3-dev, libxxhash-dev, libzstd-dev, libzip-dev, libexpat1-dev, libpolyclipping-dev, libmuparser-dev, libgmp-dev")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-lamina)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), python3-numpy, ${late_packages}")

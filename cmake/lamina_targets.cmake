@@ -84,7 +84,7 @@ foreach(library lamina_stages lamina_stages_once_a_job)
                                                $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
   target_link_libraries(${library} PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt
                         PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::GMPXX
-                                PkgConfig::XXHASH nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
+                                PkgConfig::XXHASH PkgConfig::ZSTD nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 endforeach()
 
 # Embree, libtiff and libzip are loaded when a job first needs them (stages/support/late/late.h), by the names that linking

@@ -62,7 +62,7 @@ foreach(folder run pores_of_jobs ${folders})
   endif()
   add_executable(test_${folder} ${test_sources})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
-                        PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
+                        PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH PkgConfig::ZSTD)
   lamina_libraries_first(test_${folder})
   if(LAMINA_SANITIZE AND folder IN_LIST lamina_test_optimised)
     set_target_properties(test_${folder} PROPERTIES LAMINA_OPTIMISED ON)
@@ -118,7 +118,7 @@ if(LAMINA_SANITIZE STREQUAL "thread")
   target_include_directories(test_threads PRIVATE ${PROJECT_SOURCE_DIR})
   target_include_directories(test_threads SYSTEM PRIVATE ${lamina_late_headers})
   target_link_libraries(test_threads PRIVATE TBB::tbb Eigen3::Eigen fmt::fmt PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING
-                        PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH nlohmann_json::nlohmann_json TIFF::TIFF GTest::gtest_main
+                        PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH PkgConfig::ZSTD nlohmann_json::nlohmann_json TIFF::TIFF GTest::gtest_main
                         ${CMAKE_DL_LIBS})
   target_compile_definitions(test_threads PRIVATE $<TARGET_PROPERTY:lamina_test_support,INTERFACE_COMPILE_DEFINITIONS>)
   list(FILTER thread_sources EXCLUDE REGEX "/(cli/commands/plan|job/profiles/printer)\\.cpp$")  # names of their own

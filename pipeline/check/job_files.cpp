@@ -10,6 +10,7 @@
 #include "pipeline/report/machine_text.h"
 #include "stages/data/levels.h"
 #include "stages/program/head_grid.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
@@ -49,8 +50,11 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
   return program::sweeps_text(machine->profile(), *grid, sweeps);
 }
 
-std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {
-  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMaxProgramBytes);
+std::string program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  const std::string name = program_file_name(record.layer.index, head.program_extension);
+  auto text =
+      read_content((fs::path(directory) / name).string(), is_compressed(name) ? record.program.bytes : kMaxProgramBytes);
+  return text ? std::move(*text) : std::string();
 }
 
 Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,
@@ -80,7 +84,8 @@ Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, L
   return status;
 }
 
-Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
+                                      const ExpectedDrops& expected) {
   raster::DropPlanes picture = planes_of(head);
   const auto files = layer_images(head, record);
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -95,6 +100,7 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
     if (!added)
       return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, added.error().message)};
   }
+  expected.apply(record.layer, picture.planes);
   return std::move(picture.planes);
 }
 

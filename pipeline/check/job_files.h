@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/check/expected_drops.h"
 #include "pipeline/manifest/compare.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/runs.h"
@@ -22,7 +23,7 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
 std::string sweeps_of_job(const std::string& directory, const Manifest& manifest);
 
 /// The text of a layer's print program, unchecked; "" if it cannot be read.
-std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
+std::string program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
 
 /// The images of a layer's drops, of all materials, each within the one before; one where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;
@@ -41,6 +42,8 @@ Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, L
 
 /// A layer on the manifest's grid; at least one image.
 /// errors  kVerification, with the file: of formats::image; wrong size; two materials in one pixel; drops without the first
-Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
+/// expected  the drops of an image of the geometry; as made for no job: images as they are
+Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
+                                      const ExpectedDrops& expected);
 
 }  // namespace lamina::pipeline

@@ -19,6 +19,7 @@
 #include "stages/formats/images/image.h"
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
@@ -33,6 +34,7 @@ struct Verification {
   bool quick;
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
   std::optional<DoseCheck> doses;
+  ExpectedDrops expected;
   VerifyReport& report;
 };
 
@@ -76,12 +78,14 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   const std::string path = (fs::path(inspection.directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path, record.program.bytes);
+  const Result<FileDigest> digest = digest_content(path, record.program.bytes);
   if (!digest) return digest.error().message;
+  if (is_compressed(name) && digest->bytes != record.program.bytes)
+    return fmt::format("{}: expands to {} bytes, the manifest says {}", name, digest->bytes, record.program.bytes);
   const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   if (image != nullptr && inspection.machine) {
     const std::vector<RunsView> planes(image->begin(), image->end());
-    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
+    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record),
                                                    record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
@@ -149,6 +153,8 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
     if (std::string what = fault_of_image(inspection, record.layer, i, file, picture, levels); !what.empty()) return what;
   }
   if (!inspection.quick) {
+    inspection.expected.apply(record.layer, picture.planes);
+    if (std::string what = ExpectedDrops::fault(inspection.head, record, picture.planes); !what.empty()) return what;
     if (std::string what = fault_of_drops(inspection.head, record, picture.planes); !what.empty()) return what;
     if (std::string what = inspection.doses->fault(record, picture.planes, levels); !what.empty()) return what;
   }
@@ -161,6 +167,9 @@ void prepare_replay(Verification& inspection) {
   if (!built) return inspection.report.add(built.error().message);
   inspection.machine = std::move(*built);
   inspection.report.machine = inspection.machine->profile().name;
+  auto expected = ExpectedDrops::of(inspection.head, inspection.machine->profile());
+  if (!expected) return inspection.report.add(expected.error().message);
+  inspection.expected = std::move(*expected);
 }
 
 // Checks the programs before the first and after the last layer.
@@ -170,7 +179,7 @@ void check_frame(const Verification& inspection, VerifyReport& report) {
                                           std::tuple{"end", head.program_end, &replay::check_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
     std::string fault = fault_of_file(inspection.directory, name, hash);
-    const auto text = read_file((fs::path(inspection.directory) / name).string(), {.max_bytes = kMaxTomlBytes});
+    const auto text = read_content((fs::path(inspection.directory) / name).string(), kMaxTomlBytes);
     if (inspection.machine && !inspection.quick && text) {
       if (const Status status = check(*inspection.machine, *text); !status)
         fault = fmt::format("{}: {}", name, status.error().message);
@@ -199,7 +208,7 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
+  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, {}, report};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);

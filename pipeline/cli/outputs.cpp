@@ -58,6 +58,7 @@ constexpr OwnFile kOwnFiles[] = {
     {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},
     {"design", "-o,--output", false, {"Made by lamina design."}},
     {"machines", "--target", false, {"^orientation target"}},
+    {"stream", "-o,--output", true, {}},
 };
 
 /// The folder of a file, or of what a link leads to.
@@ -192,6 +193,7 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
   const std::string_view operands = command == "batch"          ? "a list"
                                     : command == "permeability" ? "what is measured"
                                     : command == "preview"      ? "what is drawn"
+                                    : command == "stream"       ? "the job"
                                                                 : "a part";
   std::vector<std::string> outputs = outputs_of(arguments);
   if (command == "batch") {

@@ -102,6 +102,19 @@ bool fills(const Job& job) {
   });
 }
 
+bool drops_follow_image(const Job& job) {
+  const auto is_formula = [](const std::optional<Saturation>& target) { return target && !target->formula.empty(); };
+  const DoseRequest& dose = job.dose;
+  if (job.levels > 0 || is_formula(dose.saturation_percent) || is_formula(dose.core_saturation_percent)) return false;
+  const bool plain = std::ranges::none_of(dose.saturation_ranges, [&](const SaturationRange& range) {
+    return is_formula(range.percent) || is_formula(range.core_percent);
+  });
+  return plain && std::ranges::all_of(job.parts, [&](const PartRequest& part) {
+           return part.material == job.parts.front().material && part.material_ranges.empty() && !part.bleed_um &&
+                  !part.hole_bleed_um && !part.saturation_percent;
+         });
+}
+
 bool thins(const Job& job) { return fills(job) || job.dose.core < 1 || job.dose.saturation_percent || job.levels > 0; }
 
 Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count) {

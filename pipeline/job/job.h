@@ -29,6 +29,8 @@ namespace lamina::pipeline {
 
 enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
+/// What layer images have where a dose follows the image of the solids.
+enum class ImageContent { kAuto, kGeometry, kDrops };
 constexpr bool mirrors_x(Mirror mirror) { return mirror == Mirror::kX || mirror == Mirror::kXY; }
 constexpr bool mirrors_y(Mirror mirror) { return mirror == Mirror::kY || mirror == Mirror::kXY; }
 
@@ -163,6 +165,7 @@ struct Job {
   Mirror mirror = Mirror::kNone;
   std::uint32_t levels = 0;  // of shares of voxels, 2, 4 or 16; 0: pixels are set or not
   std::string format = "tiff-g4";
+  ImageContent image_content = ImageContent::kAuto;  // kAuto: geometry where drops follow from it, the job and the machine
   std::string title;  // of the job, in tags of its images
   SliceRequest slice;
   FillRequest fill;
@@ -173,6 +176,7 @@ struct Job {
   bool drop_bad = false;
   double weld_um = 5;
   MachineRequest machine;
+  bool compress_programs = true;  // of dialects that are lamina's own
   DoseRequest dose;
 
   // --- no effect on the bytes of any layer
@@ -237,6 +241,10 @@ std::vector<std::array<double, 2>> bleeds_of(const Job& job);
 
 /// Whether any layer of any part has walls, a filling or segmented lines.
 bool fills(const Job& job);
+
+/// Whether drops of a job with a machine follow from the image of a layer before the dose: one material, one dose that is no
+/// formula, no levels.
+bool drops_follow_image(const Job& job);
 
 /// Whether pixels of an image can differ from those of its parts' sections on purpose, but for bleed.
 bool thins(const Job& job);

@@ -156,6 +156,8 @@ const JobKey kHeightsKeys[] = {
 
 constexpr Word<FillRule> kFillRules[] = {
     {"nonzero", FillRule::kNonzero}, {"positive", FillRule::kPositive}, {"evenodd", FillRule::kEvenOdd}};
+constexpr Word<ImageContent> kImageContents[] = {
+    {"auto", ImageContent::kAuto}, {"geometry", ImageContent::kGeometry}, {"drops", ImageContent::kDrops}};
 constexpr Word<Mirror> kMirrors[] = {{"none", Mirror::kNone}, {"x", Mirror::kX}, {"y", Mirror::kY}, {"xy", Mirror::kXY}};
 
 std::vector<std::string_view> image_formats() {
@@ -178,11 +180,14 @@ const JobKey kImageKeys[] = {
                                        "solid regions of overlapping shells: nonzero, positive or evenodd", decides::all}),
     word<kMirrors, &Job::mirror>(
         image_key("mirror", "--mirror", "x|y|xy|none", "mirror images: x swaps left and right, y front and back")),
+    word<kImageContents, &Job::image_content>(
+        image_key("content", "--images", "geometry|drops|auto", "with a machine: images of the geometry, or of its drops"))
+        .shown_if([](const Job& job) { return job.image_content != ImageContent::kAuto; }),
     text<check_title, &Job::title>(
         image_key("title", "--title", "NAME", "job title, written to TIFF tags with layer and height")),
 };
 
-// --- [machine], [dose]
+// --- [machine], [program], [dose]
 
 /// A target of which each component is optional.
 struct RangeTarget {
@@ -253,6 +258,9 @@ const JobKey kMachineKeys[] = {
         printer_key("vat_rule", "--vat-rule", "RULE", "vat for layers of two powders: first, second, majority, both or refuse"),
         Form::kString)
         .with_words(vat_rule_words),
+    field<&Job::compress_programs>(
+        {"program", "compress", "", "", "compress print programs of the dialects planes and raw", decides::images})
+        .shown_if([](const Job& job) { return !job.compress_programs; }),
 };
 
 const JobKey kDoseKeys[] = {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/compressed.h"
 
 namespace lamina {
 namespace {
@@ -102,7 +103,7 @@ std::string fault_of_file(const std::string& directory, const std::string& name,
   const std::string path = (fs::path(directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path, bytes);
+  const Result<FileDigest> digest = digest_content(path, bytes);
   if (!digest) return digest.error().message;
   if (bytes && digest->bytes != *bytes) return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, *bytes);
   return digest->hash == hash ? "" : fmt::format("{}: its content is not what was written", name);

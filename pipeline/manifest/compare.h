@@ -13,7 +13,7 @@
 
 namespace lamina {
 
-/// "", or how a file of the directory differs from its record, as in "NAME: is missing".
+/// "", or how the content of a file of the directory differs from its record, as in "NAME: is missing".
 /// cost  reads the file once
 std::string fault_of_file(const std::string& directory, const std::string& name, const Hash128& hash,
                           std::optional<std::uint64_t> bytes = {});

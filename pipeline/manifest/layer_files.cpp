@@ -9,6 +9,7 @@
 
 #include "stages/formats/image_format.h"
 #include "stages/program/dialect.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/temporary.h"
 #include "stages/support/text/number_text.h"
 
@@ -52,6 +53,14 @@ void for_each_entry(const fs::path& directory, Visit visit) {
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) visit(*entry);
 }
 
+/// Whether a name is that stem with the end of a dialect's files.
+bool is_program_file(std::string_view stem, std::string_view name, const program::Dialect& dialect) {
+  if (!name.starts_with(stem)) return false;
+  name.remove_prefix(stem.size());
+  if (dialect.compressed && is_compressed(name)) name.remove_suffix(kCompressedEnd.size());
+  return name == dialect.extension;
+}
+
 // The other files in program/, of any dialect, and their temporary ones.
 std::vector<fs::path> program_frames(const std::string& directory) {
   std::vector<fs::path> found;
@@ -59,7 +68,7 @@ std::vector<fs::path> program_frames(const std::string& directory) {
     const std::string file = entry.path().filename().string();
     const std::string_view named = named_by_temporary(file), name = named.empty() ? file : named;
     const bool frame = std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) {
-      return name == fmt::format("start{}", one.extension) || name == fmt::format("end{}", one.extension);
+      return is_program_file("start", name, one) || is_program_file("end", name, one);
     });
     if (frame || name == "machine.toml") found.push_back(entry.path());
   });
@@ -129,7 +138,7 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
   partial = take_temporary_end(name);
   return take_layer_index(name, index) &&
-         std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) { return name == one.extension; });
+         std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) { return is_program_file("", name, one); });
 }
 
 bool holds_layers(const std::string& directory) {

@@ -55,6 +55,7 @@ struct ManifestHead {
   std::vector<JobMaterial> materials;      // if there are several
   std::uint32_t max_drops = 0;             // of a pixel; 0: no saturation was requested, and set pixels get one
 
+  bool geometry = false;  // images are those before the dose, by which the job makes the drops of each (check/expected_drops.h)
   std::uint32_t levels = 0;  // of shares of voxels; 0: pixels are set or not
   /// That a nozzle can fire on a pixel in one sweep, and does at the scan's speed.
   std::uint32_t head_drops = 1, sweep_drops = 1;
@@ -69,7 +70,7 @@ struct ManifestHead {
   std::uint8_t max_of_pixel() const;
 
   /// Images of a material in a layer: one a drop of a pixel, if there can be several and the images are of one bit.
-  std::uint32_t drop_images() const { return max_drops > 1 && !grey_drops() ? max_drops : 1; }
+  std::uint32_t drop_images() const { return max_drops > 1 && !grey_drops() && !geometry ? max_drops : 1; }
   /// Images of a layer that have names and records of their own: those of the first material, of the next, ... 0: the one
   /// image that the layer's own record is of.
   std::size_t named_images() const {

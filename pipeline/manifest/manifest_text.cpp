@@ -12,6 +12,7 @@
 #include "stages/formats/image_format.h"
 #include "stages/formats/slice_format.h"
 #include "stages/program/dialect.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
@@ -70,6 +71,8 @@ std::string fault_of_images(const ManifestHead& head) {
     return no_such("levels", fmt::format("{}", head.levels));
   }
   if (grey && (drops == head.machine.empty() || (!drops && !head.materials.empty()))) return no_such("format", head.format);
+  if (head.geometry && (grey || head.levels > 0 || !head.materials.empty() || head.machine.empty()))
+    return no_such("images_of", "geometry");
   constexpr std::uint32_t kMaxHeadDrops = 15;
   if (head.head_drops > kMaxHeadDrops || head.sweep_drops < 1 || head.sweep_drops > head.head_drops) {
     return no_such("sweep_drops", fmt::format("{}", head.sweep_drops));
@@ -80,7 +83,9 @@ std::string fault_of_images(const ManifestHead& head) {
   }
   const auto* dialect = program::find_dialect(head.dialect);
   if (dialect == nullptr) return no_such("dialect", head.dialect);
-  return head.program_extension == dialect->extension ? "" : no_such("program_extension", head.program_extension);
+  std::string_view end = head.program_extension;
+  if (dialect->compressed && is_compressed(end)) end.remove_suffix(kCompressedEnd.size());
+  return end == dialect->extension ? "" : no_such("program_extension", head.program_extension);
 }
 
 std::string fault_of_contours(const ManifestHead& head) {
@@ -179,6 +184,7 @@ void add_images(const ManifestHead& head, Json& json) {
     for (const JobMaterial& material : head.materials) materials.push_back({{"name", material.name}, {"vat", material.vat}});
   }
   if (head.max_drops > 0) json["max_drops"] = head.max_drops;
+  if (head.geometry) json["images_of"] = "geometry";
   if (head.levels > 0) json["levels"] = head.levels;
   if (head.machine.empty()) return;
   json["dialect"] = head.dialect;
@@ -200,6 +206,7 @@ void read_images(const Json& json, ManifestHead& head) {
       head.materials.push_back({entry.at("name").text(), entry.at("vat").get<decltype(JobMaterial::vat)>()});
   }
   if (json.contains("max_drops")) json.at("max_drops").get_to(head.max_drops);
+  if (json.contains("images_of")) head.geometry = json.at("images_of").text() == "geometry";
   if (json.contains("levels")) json.at("levels").get_to(head.levels);
   if (head.machine.empty()) return;
   json.at("dialect").get_to(head.dialect);

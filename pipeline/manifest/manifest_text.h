@@ -271,8 +271,9 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   if (head.max_drops > 0) {
     io.number("drops", record.drops);
     io.number("requested_drops", record.requested_drops);
-    if (head.grey_drops() || head.drops_of_materials()) io.number("max_drops", record.max_drops);
+    if (head.grey_drops() || head.drops_of_materials() || head.geometry) io.number("max_drops", record.max_drops);
   }
+  if (head.geometry) io.number("geometry_pixels", record.geometry_pixels);
   if (head.levels > 0) {
     io.number("half_differs", record.half_differs);
     io.number("half_far", record.half_far);

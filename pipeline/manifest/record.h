@@ -14,8 +14,9 @@ namespace lamina {
 
 /// The print program of a layer, for a job with a machine.
 struct ProgramRecord {
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = 0;  // expanded, as the hash
   Hash128 hash;
+  std::uint64_t stored = 0;  // bytes of the file as it was just written; in no manifest, since they depend on libzstd
   std::uint32_t sweeps = 0;  // that fire
   std::uint64_t drops = 0;
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
@@ -87,6 +88,7 @@ struct LayerRecord {
   std::uint64_t requested_drops = 0;      // by the target saturation, rounded
   std::uint32_t max_drops = 0;            // of any pixel
   std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
+  std::uint64_t geometry_pixels = 0;      // set in the image, of a job whose images are of the geometry
   std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
   std::uint64_t half_far = 0;             // of them, those that are not adjacent to a boundary of the image
 

@@ -14,6 +14,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/output/print_program.h"
 #include "stages/support/hash/hash.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
@@ -198,7 +199,7 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
     const LayerRecord& record = recorded[i];
     const auto hold = [&](const std::string& file, std::uint64_t bytes, const Hash128& hash) {
       if (file.empty()) return true;  // a format without files, a job without a machine
-      const auto digest = digest_file(directory + "/" + file, bytes);
+      const auto digest = digest_content(directory + "/" + file, bytes);
       return digest.ok() && digest->bytes == bytes && digest->hash == hash;
     };
     holds[i] = std::ranges::all_of(

@@ -37,12 +37,13 @@ ManifestHead image_head(const Plan& plan) {
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
   head.max_drops = plan.images->dose.max_drops();
+  head.geometry = plan.images->geometry;
   head.levels = job.levels;
   if (!plan.images->machine) return head;
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
-  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
+  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = program_extension(*dialect, job.compress_programs);
   const std::string profile = pipeline::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
@@ -68,7 +69,7 @@ ImageFiles::ImageFiles(const Plan& plan)
       levels_(formats::find_level_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
-                     layer_file_options(plan.job));
+                     layer_file_options(plan.job), plan.job.compress_programs);
 }
 
 Status ImageFiles::open() {
@@ -129,8 +130,7 @@ Status ImageFiles::start() {
 }
 
 std::uint64_t ImageFiles::FileWork::bytes() const {
-  std::uint64_t total =
-      bytes_held(file) + program.bytes() + bytes_held(plane.row_offset) + bytes_held(plane.change) + levels.bytes();
+  std::uint64_t total = bytes_held(file) + program.bytes() + levels.bytes();
   for (const formats::Bytes& one : files) total += bytes_held(one);
   return total;
 }
@@ -174,13 +174,11 @@ Status ImageFiles::encode_one(const LayerImages& images, std::size_t number, Fil
   if (levels_ != nullptr) {
     if (!images.drops.empty()) levels_of(images.drops[several ? 1 + material : 0], work.levels);
     status = work.level_encoder->encode(images.drops.empty() ? images.shares : work.levels, head_.full_level(), x, y, file);
+  } else if (images.drops.empty() || head_.geometry) {
+    status = work.encoder->encode(several ? images.material[material] : images.whole, x, y, file);
   } else {
-    if (!images.drops.empty()) {
-      const auto drop = static_cast<std::uint32_t>(number % head_.drop_images());
-      runs_of(DropPlane(images.drops[several ? 1 + material : 0], drop), work.plane);
-    }
-    const Runs& image = !images.drops.empty() ? work.plane : several ? images.material[material] : images.whole;
-    status = work.encoder->encode(image, x, y, file);
+    const auto drop = static_cast<std::uint32_t>(number % head_.drop_images());
+    status = work.encoder->encode_rows(DropPlane(images.drops[several ? 1 + material : 0], drop), x, y, file);
   }
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
@@ -212,6 +210,15 @@ void ImageFiles::report_unfed(LayerRecord& record) const {
 }
 
 Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  return program(images, work, record, false);
+}
+
+Status ImageFiles::measure(const LayerImages& images, FileWork& work, LayerRecord& record) const {
+  const Status status = encode(images, work, record);
+  return status ? program(images, work, record, true) : status;
+}
+
+Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecord& record, bool measures) const {
   if (!program_) return {};
   const auto feeds = feeds_of(record);
   if (!feeds) {
@@ -219,22 +226,23 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
                                                   feeds.error().message)};
   }
   report_unfed(record);
-  if (images.drops.empty()) return program_->write_layer(record.layer, images.whole, *feeds, work.program, record.program);
+  if (images.drops.empty()) return program_->write_layer(record.layer, images.whole, *feeds, work.program, record.program, measures);
   const PrintProgram::Drops drops{images.drops[0], std::max(1u, head_.max_drops)};
-  return program_->write_layer(record.layer, drops, *feeds, work.program, record.program);
+  return program_->write_layer(record.layer, drops, *feeds, work.program, record.program, measures);
 }
 
-std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
+std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const {
   const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
   const std::uint32_t planes = std::max(1u, head_.max_drops);
   const auto max_bytes = levels_ == nullptr ? format_->max_bytes : levels_->max_bytes;
   // Planes of drops share their changes, images of materials each have all.
   const std::uint64_t of_plane = drops.changes_of_all / planes + 1;
-  const std::uint64_t of_file = head_.materials.empty() && levels_ == nullptr ? of_plane : drops.changes;
+  const bool one = head_.materials.empty() && levels_ == nullptr;
+  const std::uint64_t of_file = head_.geometry ? edges : one ? of_plane : drops.changes;
   std::uint64_t total = files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file);
   // A plane of drops, or their levels, to be encoded.
   const std::uint64_t rows = head_.grid.rows(), columns = head_.grid.columns();
-  if (drops.runs > 0 && !head_.extension.empty())
+  if (drops.runs > 0 && !head_.extension.empty() && !head_.geometry)
     total += levels_ == nullptr ? 8 * (drops.changes + columns) + 4 * rows + columns / 8 : 18 * drops.changes + 8 * rows;
   return total + (program_ ? program_->bytes_bound(drops.runs > 0 ? 2 * drops.runs : drops.changes, planes) : 0);
 }
@@ -249,7 +257,7 @@ Status ImageFiles::record_kept_below(std::uint32_t layer) {
 Status ImageFiles::record(const LayerRecord& record) {
   if (Status status = record_kept_below(record.layer.index); !status) return status;
   Status status = manifest_->append(record);
-  return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.bytes) : status;
+  return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.stored) : status;
 }
 
 Status ImageFiles::finish() {

@@ -60,7 +60,6 @@ class ImageFiles {
     std::unique_ptr<formats::LevelEncoder> level_encoder;
     formats::Bytes file;
     std::vector<formats::Bytes> files;  // those that have names
-    Runs plane;                         // of drops
     Levels levels;                      // drops of each pixel
     ProgramWork program;
     std::uint64_t bytes() const;
@@ -72,8 +71,10 @@ class ImageFiles {
   Status store(const LayerImages& images, FileWork& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
   Status program(const LayerImages& images, FileWork& work, LayerRecord& record) const;
-  /// Upper bound of the bytes for a layer whose images have that many changes.
-  std::uint64_t bytes_bound(const dose::DropBound& drops) const;
+  /// Encodes images and program of a layer and drops them; their sizes go to the record. Of a dry run.
+  Status measure(const LayerImages& images, FileWork& work, LayerRecord& record) const;
+  /// Upper bound of the bytes for a layer whose images have that many changes. edges  those before the dose
+  std::uint64_t bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const;
 
   // --- from one thread at a time
   /// In layer order; kept layers are recorded in their place.
@@ -88,6 +89,7 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void report_unfed(LayerRecord& record) const;
+  Status program(const LayerImages& images, FileWork& work, LayerRecord& record, bool measures) const;
   Status encode_one(const LayerImages& images, std::size_t number, FileWork& work, const LayerRecord& record,
                     formats::Bytes& file) const;
 

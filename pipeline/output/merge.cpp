@@ -12,6 +12,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "stages/checks/layer_warnings.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/sync.h"
 
@@ -94,6 +95,13 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
   return {};
 }
 
+Status check_file(const std::string& file, std::uint64_t bytes) {
+  if (!is_compressed(file)) return check_plain(file, bytes);
+  if (Status status = check_plain(file); !status) return status;
+  const std::string fault = fault_of_stored(file, bytes);
+  return fault.empty() ? Status() : Status(unmatched(fault + "; run its shard again with --resume"));
+}
+
 // Links every file of a shard into `output`.
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
   const bool in_place = same_file(shard.directory, output);
@@ -101,7 +109,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
-    if (Status status = check_plain(from.string(), bytes); !status) return status;
+    if (Status status = check_file(from.string(), bytes); !status) return status;
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
   for (const LayerRecord& record : shard.manifest.layers) {

@@ -8,6 +8,10 @@
 
 namespace lamina::pipeline {
 
+std::string program_extension(const program::Dialect& dialect, bool compress) {
+  return fmt::format("{}{}", dialect.extension, compress && dialect.compressed ? kCompressedEnd : "");
+}
+
 std::string program_file_name(std::uint32_t index, std::string_view extension) {
   return extension.empty() ? std::string() : fmt::format("program/{:06}{}", index, extension);
 }
@@ -21,10 +25,11 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 }
 
 PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers,
-                           const FileOptions& files)
+                           const FileOptions& files, bool compress)
     : resolved_(resolved),
       dialect_(*program::find_dialect(resolved.machine.dialect)),
       directory_(std::move(directory)),
+      extension_(program_extension(dialect_, compress)),
       layers_(layers),
       files_(files),
       machine_(replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows())) {}
@@ -37,43 +42,42 @@ Status PrintProgram::begin() const {
     return status;
   }
   const ProgramFrame frame = program_frame(resolved_, layers_);
-  const Status status = write_file(path(fmt::format("start{}", dialect_.extension)), frame.start, files_);
-  return status ? write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
+  const Status status = write_content(path("start" + extension_), frame.start, files_);
+  return status ? write_content(path("end" + extension_), frame.end, files_) : status;
 }
 
 Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
-                                 ProgramWork& work, ProgramRecord& record) const {
-  return write(layer, feeds, work, record, [&](const program::EmitSweep& emit) {
+                                 ProgramWork& work, ProgramRecord& record, bool measures) const {
+  return write(layer, feeds, work, record, measures, [&](const program::EmitSweep& emit) {
     return program::compile(resolved_.grid, image, work.compile, emit, layer.index);
   });
 }
 
 Status PrintProgram::write_layer(const Layer& layer, const Drops& drops, const std::vector<std::uint32_t>& feeds,
-                                 ProgramWork& work, ProgramRecord& record) const {
-  return write(layer, feeds, work, record, [&](const program::EmitSweep& emit) {
+                                 ProgramWork& work, ProgramRecord& record, bool measures) const {
+  return write(layer, feeds, work, record, measures, [&](const program::EmitSweep& emit) {
     return program::compile(resolved_.grid, drops.image, drops.maximum, work.compile, emit, layer.index);
   });
 }
 
 template <class Compile>
 Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
-                           ProgramRecord& record, const Compile& compile) const {
+                           ProgramRecord& record, bool measures, const Compile& compile) const {
   if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   if (!work.timer) work.timer.emplace(*machine_);
-  std::optional<File> file;  // none: the layer is only timed
-  if (!directory_.empty()) {
-    FileOptions how = files_;
-    how.hash = true;
-    auto opened = File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
-    if (!opened) return opened.error();
-    file.emplace(std::move(*opened));
+  const bool writes = measures || !directory_.empty();  // else the layer is only timed
+  if (measures) {
+    if (Status status = work.file.open_nowhere(is_compressed(extension_)); !status) return status;
+  } else if (writes) {
+    const std::string name = directory_ + "/" + program_file_name(layer.index, extension_);
+    if (Status status = work.file.open(name, files_); !status) return status;
   }
   const LayerCycle cycle{layer.index,     layers_, layer.bottom,
                          layer.thickness, feeds,   std::ranges::binary_search(refills, layer.index)};
   const auto flush = [&]() -> Status {
     if (dialect_.has_motion) work.timer->read(work.text);
-    Status status = file ? file->append(work.text) : Status();
+    Status status = writes ? work.file.append(work.text) : Status();
     work.text.clear();
     return status;
   };
@@ -94,7 +98,7 @@ Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>&
       work.timer->sweep(static_cast<double>(program::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
                         sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
     }
-    if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
+    if (writes || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
     return work.text.size() < kPiece ? Status() : flush();
   });
   if (!count) return count.error();
@@ -103,15 +107,29 @@ Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>&
   if (Status status = flush(); !status) return status;
   const auto taken = work.timer->end();
   if (!taken) return taken.error();
-  record = {0, {}, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
+  record = {0, {}, 0, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
   record.added_sweeps = count->added;
   record.added_microseconds = work.timer->added_microseconds();
-  if (!file) return {};
-  const auto digest = file->finish();
+  if (!writes) return {};
+  const auto digest = work.file.finish();
   if (!digest) return digest.error();
   record.bytes = digest->bytes;
   record.hash = digest->hash;
+  record.stored = work.file.stored_bytes();
   return {};
+}
+
+std::uint64_t PrintProgram::max_sweeps(std::uint32_t drops) const {
+  const HeadGrid& grid = resolved_.grid;
+  const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
+  return std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(drops);
+}
+
+std::uint64_t PrintProgram::file_bound(std::uint32_t drops) const {
+  const HeadGrid& grid = resolved_.grid;
+  const std::uint64_t vectors = grid.steps() * grid.words() * grid.drop_bits * 8;
+  const std::uint64_t of_sweep = dialect_.has_motion ? 4 * vectors + 32 * grid.steps() : vectors + vectors / 4;
+  return max_sweeps(drops) * (of_sweep + 4096) + (64 << 10);
 }
 
 std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t drops) const {
@@ -122,8 +140,7 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t dro
   // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis: at most 32 bytes a step (m578), twice while the
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
-  const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.max_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(drops);
+  const std::uint64_t sweeps = max_sweeps(drops);
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   // Lines of the base, and of shots off the bed: of one nozzle after the other (m578), of a dot a drop (brundlefab).
@@ -137,7 +154,7 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t dro
   const std::uint64_t moved = grid.blocked_rule == BlockedRule::kNeighbour ? 2 * std::uint64_t{grid.max_swaths()} : 0;
   const std::uint64_t own = 18 * moved * grid.passes * grid.blocked.size() * grid.positions;
   return rows + own + 4 * maintenance + 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 4 * changes + turned + kept +
-         (512 << 10);
+         (is_compressed(extension_) && !directory_.empty() ? ContentWriter::kMaxBytes : 0) + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

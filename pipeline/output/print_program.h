@@ -4,7 +4,8 @@
 //             start.<ext>    text before the first layer
 //             end.<ext>      text after the last layer
 //             000000.<ext>   a layer, independent of all others, so that jobs can be resumed, sharded and merged
-// The whole program is the concatenation: start, layers in order, end.
+// The whole program is the concatenation: start, layers in order, end. Of dialects of lamina's own each file is compressed, and
+// <ext> ends in .zst, unless the job turns it off.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +24,7 @@
 #include "stages/program/compile.h"
 #include "stages/program/dialect.h"
 #include "stages/replay/time/timer.h"
+#include "stages/support/io/compressed.h"
 #include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
@@ -32,11 +34,14 @@ struct ProgramWork {
   program::CompileScratch compile;
   std::unique_ptr<program::ProgramWriter> writer;
   program::ProgramBytes text;
+  ContentWriter file;
   std::optional<replay::Timer> timer;
 
-  std::uint64_t bytes() const { return compile.bytes() + bytes_held(text) + (timer ? timer->bytes() : 0); }
+  std::uint64_t bytes() const { return compile.bytes() + bytes_held(text) + file.bytes() + (timer ? timer->bytes() : 0); }
 };
 
+/// The end of the names of a dialect's files.
+std::string program_extension(const program::Dialect& dialect, bool compress);
 /// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.
 std::string program_file_name(std::uint32_t index, std::string_view extension);
 
@@ -49,15 +54,18 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 class PrintProgram {
  public:
   /// directory  of the job, empty to time layers without writing them; the machine must outlive this object
-  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const FileOptions& files);
+  /// compress   files of dialects that are compressed
+  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const FileOptions& files,
+               bool compress = false);
 
   /// Writes machine.toml, start and end. errors  kOutput
   Status begin() const;
 
   /// Compiles a layer, times it and writes its file, sweep by sweep. errors  kOutput
   /// feeds   the vats that feed the layer
+  /// measures  without a directory: the file is made and dropped
   Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
-                     ProgramRecord& record) const;
+                     ProgramRecord& record, bool measures = false) const;
 
   /// The same of pixels that get the drops of an image. maximum  of any pixel of the job
   struct Drops {
@@ -65,22 +73,26 @@ class PrintProgram {
     std::uint32_t maximum = 1;
   };
   Status write_layer(const Layer& layer, const Drops& drops, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
-                     ProgramRecord& record) const;
+                     ProgramRecord& record, bool measures = false) const;
 
   std::vector<std::uint32_t> refills;  // layers before which the program pauses for vats to be filled, in order; set first
 
   /// Upper bound of write_layer's memory, in bytes, for an image with so many changes, or two for each run of a zone.
   std::uint64_t bytes_bound(std::uint64_t changes, std::uint32_t drops = 1) const;
+  /// Bytes that the file of a layer hardly exceeds: all sweeps over the whole bed, before it is compressed.
+  std::uint64_t file_bound(std::uint32_t drops) const;
 
  private:
   /// compile(emit)  makes the sweeps
   template <class Compile>
-  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record,
+  Status write(const Layer& layer, const std::vector<std::uint32_t>& feeds, ProgramWork& work, ProgramRecord& record, bool measures,
                const Compile& compile) const;
   std::string path(std::string_view name) const;
+  /// Of a layer.
+  std::uint64_t max_sweeps(std::uint32_t drops) const;
   const ResolvedMachine& resolved_;
   const program::Dialect& dialect_;
-  std::string directory_;
+  std::string directory_, extension_;
   std::uint32_t layers_;
   FileOptions files_;
   Result<replay::VirtualMachine> machine_;  // computes the time

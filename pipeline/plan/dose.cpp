@@ -105,8 +105,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
     full_drops_ = rules_.full;
   rules_.max_drops *= full_drops_;
   limit_ = dose::kMaxDrops;
-  if (machine != nullptr && machine->head.max_drop_sweeps > 0)
-    limit_ = std::min(limit_, machine->head.max_drop_sweeps * sweep_drops);
+  if (machine != nullptr) set_limits(*machine, sweep_drops);
   if (full_drops_ > limit_) {
     return Error{Fault::kUsage,
                  fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.max_drop_sweeps of {} in "
@@ -120,7 +119,6 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
                                                                     : "head.drop_pl of the machine is 0; set its drop volume")};
   }
   const auto& powder = machine->powder;
-  binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
   if (!job.allow_unbound) min_percent_ = powder.min_saturation_percent;
   const auto pitch = static_cast<std::int64_t>(std::ceil(1 / std::min(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm())));
   std::vector<dose::ZoneBox> boxes = zone_boxes(scene, zones_, grid_);
@@ -137,6 +135,17 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i), i >= range[0] && i < range[1]);
   if (requested) rules_.max_drops = std::max(1u, budget_->max_drops());
   return budget_->check(job.allow_unbound, warnings);
+}
+
+void DosePlan::set_limits(const Machine& machine, std::uint32_t sweep_drops) {
+  if (machine.head.max_drop_sweeps > 0) limit_ = std::min(limit_, machine.head.max_drop_sweeps * sweep_drops);
+  binder_ = {machine.head.drop_pl, machine.powder.evaporates_percent / 100, machine.powder.packing};
+}
+
+void DosePlan::restore(const Machine& machine, std::uint32_t sweep_drops, std::uint32_t max_drops) {
+  limit_ = dose::kMaxDrops;
+  set_limits(machine, sweep_drops);
+  rules_.max_drops = max_drops;
 }
 
 void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {

@@ -75,6 +75,10 @@ class DosePlan {
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || thins() || saturates(); }
+  /// Whether drops are not those of the image without bleed.
+  bool changes_image() const { return thins() || saturates(); }
+  /// In place of decide(), of a job on record.
+  void restore(const Machine& machine, std::uint32_t sweep_drops, std::uint32_t max_drops);
   /// Whether a saturation or shares of voxels decide the drops, and how many a pixel can get; 0 if none does.
   bool saturates() const { return max_drops() > 0; }
   std::uint32_t max_drops() const { return rules_.max_drops; }
@@ -116,6 +120,7 @@ class DosePlan {
 
  private:
   bool has_formula(const Layer& layer) const;
+  void set_limits(const Machine& machine, std::uint32_t sweep_drops);
   Result<dose::ZoneSums> saturate_deposited(const Layer& layer, std::uint32_t materials, const Runs& image, Runs& second,
                                             dose::DropWork& work) const;
 

@@ -24,6 +24,12 @@
 namespace lamina::pipeline {
 namespace {
 
+/// Whether layer images are those before the dose, where there is one.
+bool has_images_of_geometry(const Job& job, bool machine) {
+  return machine && drops_follow_image(job) && job.image_content != ImageContent::kDrops &&
+         formats::find_level_format(job.format) == nullptr;
+}
+
 /// Builds a plan step by step.
 class Planner {
  public:
@@ -287,8 +293,9 @@ class Planner {
         !status)
       return status;
     if (Status status = dose.check_images(job().format); !status) return status;
+    const bool geometry = has_images_of_geometry(job(), machine() != nullptr) && dose.changes_image() && job().format != "null";
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
-                                   std::move(dose), std::move(beads)});
+                                   std::move(dose), std::move(beads), geometry});
     end_indexing();
     return {};
   }
@@ -319,6 +326,24 @@ class Planner {
 
 }  // namespace
 
+namespace {
+
+/// G4 is for areas. A dithered image gets another format, unless the job names one.
+Status choose_images(bool machine, Job& job) {
+  const bool geometry = has_images_of_geometry(job, machine);
+  if (job.image_content == ImageContent::kGeometry && !geometry) {
+    return usage("--images geometry: {}; use --images drops",
+                 machine ? "the drops do not follow from one 1-bit image a layer (several materials or doses, formulas, levels)"
+                         : "without a machine no other file has the drops");
+  }
+  const bool dithers = job.dose.core < 1 || (job.dose.dithered && (job.levels > 0 || job.dose.saturation_percent));
+  const bool named = std::ranges::find(job.named, "image.format") != job.named.end();
+  if (job.format == Job().format && !named && dithers && !geometry) job.format = "tiff-deflate";
+  return {};
+}
+
+}  // namespace
+
 Result<Resolved> resolve(const Job& job, Product product) {
   Resolved resolved{job, product, bare_bed(job), std::nullopt, std::nullopt};
   if (product == Product::kImages) {
@@ -337,6 +362,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
           "--levels 2, 4 or 16, or --machine and --saturation",
           job.format);
     }
+    if (Status status = choose_images(resolved.printer->machine.has_value(), resolved.job); !status) return status.error();
     return resolved;
   }
   if (job.shard) return usage("run.shard: {}", kNoShards);

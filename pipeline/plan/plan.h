@@ -38,6 +38,7 @@ struct ImagePlan {
   Solids solids;
   DosePlan dose;
   std::optional<Beads> beads;  // set if parts consist of beads
+  bool geometry = false;       // layer images are those before the dose, which follows from them
 };
 
 /// Data for toolpaths only.

@@ -77,7 +77,7 @@ Status check_all_filled(const std::string& folder, const Manifest& manifest) {
 
 /// The solid of a layer: of shares of voxels those that are half full or more.
 Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head, const LayerRecord& record) {
-  auto picture = picture_of_layer(folder, head, record);
+  auto picture = picture_of_layer(folder, head, record, ExpectedDrops());
   if (!picture) return picture.error();
   const std::uint8_t full = head.full_level();
   if (full == 0 || head.grey_drops()) return std::move(picture->front());

@@ -46,6 +46,7 @@ void add_dry_run(const Summary& s, std::vector<NamedText>& lines) {
                                            readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes)));
   lines.emplace_back("time",
                      fmt::format("load {}, index {}", readable_seconds(s.load_seconds), readable_seconds(s.index_seconds)));
+  if (!s.estimate_text.empty()) lines.emplace_back("files", s.estimate_text);
   lines.emplace_back("dry run", "nothing was written");
 }
 

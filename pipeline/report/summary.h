@@ -38,6 +38,7 @@ struct Summary {
 
   // --- specific to the product
   using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
+  std::string estimate_text;                                       // of the bytes to be written, of a dry run; or empty
   Lines head, results, end;                                        // before the layers, after them, after memory
   Json facts = Json::object();                                     // names and values of the product
   std::vector<std::vector<std::string>> quote;                     // rows of a table of costs; empty for none

@@ -336,7 +336,7 @@ class ImageMaker : public Maker {
     observers_.layer(made.record, &made.notes);
     checks_.record(made.record.layer.index, made.record.set_pixels > 0);
     crossings_ += made.notes.report.crossings;
-    bytes_written_ += made.record.bytes + made.record.program.bytes;
+    bytes_written_ += made.record.bytes + made.record.program.stored;
     return {};
   }
   void add_kept(const LayerRecord& record) override {
@@ -386,7 +386,7 @@ class ImageMaker : public Maker {
   };
 
   std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const {
-    return imager_.bytes_of(layer, pixels) + files_.bytes_bound(imager_.drops_bound(layer, pixels));
+    return imager_.bytes_of(layer, pixels) + files_.bytes_bound(imager_.drops_bound(layer, pixels), imager_.edges_bound(layer));
   }
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;

@@ -440,6 +440,7 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
   const bool several = images.materials.several();
   work.drops.drops.clear();
   if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
+  if (images.geometry) record.geometry_pixels = set_pixels(work.runs);
   if (images.dose.thins()) images.dose.thin(layer.index, work.runs, work.second, work.drops);
   if (images.dose.saturates()) {
     const auto materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
@@ -472,7 +473,7 @@ void LayerImager::count(ImageWork& work, LayerRecord& record) const {
     record.max_drops = totals.maximum();
   }
   const bool grey = formats::find_level_format(plan_.job.format) != nullptr, several = plan_.images->materials.several();
-  const std::uint32_t planes = grey ? 1 : std::max(1u, dose.max_drops());
+  const std::uint32_t planes = grey || plan_.images->geometry ? 1 : std::max(1u, dose.max_drops());
   for (std::size_t m = several ? 1 : 0; m < work.drops.drops.size() && (several || planes > 1); ++m) {
     const DropTotals own = several ? DropTotals(work.drops.drops[m], work.drops.counter) : totals;
     for (std::uint32_t drop = 0; drop < planes; ++drop) record.images.emplace_back().set_pixels = own.pixels(drop);

@@ -78,6 +78,8 @@ class LayerImager {
   dose::DropBound drops_bound(const Layer& layer, std::uint64_t pixels) const {
     return plan_.images->dose.bound(sizes_of(layer, pixels));
   }
+  /// The same before the dose.
+  std::uint64_t edges_bound(const Layer& layer) const { return sizes_of(layer, 0).edges; }
 
  private:
   Nm plane(const Layer& layer) const { return plane_of(plan_.job, layer, plan_.scene->height); }

@@ -18,6 +18,7 @@
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/job_checks.h"
 #include "pipeline/run/path_makers.h"
+#include "pipeline/run/space.h"
 #include "stages/checks/layer_warnings.h"
 
 namespace lamina::pipeline {
@@ -248,6 +249,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (product != Product::kImages) limits.max_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
   if (job.timing) summary.timing = timing_of(*plan, {before, before});
+  if (Status status = check_space(*plan, summary); !status) return status.error();
   JobChecks checks(*plan, cancel);
   const std::unique_ptr<Maker> maker = make_maker(*plan, checks, limits);
   if (job.dry_run && !maker->times_dry_runs()) {

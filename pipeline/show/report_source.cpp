@@ -41,14 +41,15 @@ Result<Manifest> finished_manifest(const std::string& position, const std::strin
 }
 
 /// Reads a layer's files into runs if they match the manifest.
-Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
+                                const ExpectedDrops& expected) {
   for (const LayerImageFile& file : layer_images(head, record)) {
     const std::string path = directory + "/" + file.name;
     const Result<FileDigest> digest = digest_file(path, file.record.bytes);
     if (!digest) return digest.error();
     if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
   }
-  auto picture = picture_of_layer(directory, head, record);
+  auto picture = picture_of_layer(directory, head, record, expected);
   if (picture || !picture.error().message.starts_with("layers/")) return picture;
   return Error{Fault::kVerification, fmt::format("{}/{}; run lamina verify for details", directory, picture.error().message)};
 }
@@ -56,7 +57,7 @@ Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead
 /// Machine time of a layer, from replaying its program as lamina verify does.
 Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
                                 const LayerRecord& record, const LayerPicture& picture) {
-  const std::string program = program_of_layer(directory, head, record.layer.index);
+  const std::string program = program_of_layer(directory, head, record);
   if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
     const std::vector<RunsView> planes(picture.begin(), picture.end());
     const auto replay = machine.replay(program, record.layer, planes, record.program.moved, record.program.lost);
@@ -80,10 +81,13 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
     machine.emplace(std::move(*built));
     source.machine = machine->profile();
   }
+  auto drops = machine ? ExpectedDrops::of(head, machine->profile()) : ExpectedDrops();
+  if (!drops) return Error{drops.error().fault, fmt::format("{}/{}", directory, drops.error().message)};
+  const auto expected = std::make_shared<const ExpectedDrops>(std::move(*drops));
   const auto manifest = std::make_shared<const Manifest>(source.manifest);
-  source.layer = [directory, manifest, machine](std::uint32_t position, bool timed) -> Result<ReportLayer> {
+  source.layer = [directory, manifest, machine, expected](std::uint32_t position, bool timed) -> Result<ReportLayer> {
     const LayerRecord& record = manifest->layers[position];
-    auto runs = read_layer(directory, manifest->head, record);
+    auto runs = read_layer(directory, manifest->head, record, *expected);
     if (!runs) return runs.error();
     if (!machine || !timed) return ReportLayer{std::move(runs->front())};
     const auto seconds = seconds_of_layer(directory, manifest->head, *machine, record, *runs);

@@ -124,11 +124,13 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   }
   const auto machine = machine_of_job(directory, head);
   if (!machine) return machine.error();
-  const auto image = picture_of_layer(directory, head, *record);
+  const auto expected = ExpectedDrops::of(head, machine->profile());
+  if (!expected) return expected.error();
+  const auto image = picture_of_layer(directory, head, *record, *expected);
   if (!image) return image.error();
   replay::StepChoice step = choice;
   step.planes = std::max(1u, head.max_drops);
-  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), step, head.grid);
+  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, *record), step, head.grid);
   if (!jetting) return jetting.error();
   view::picture::SwathView view;
   view.grid = head.grid;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "stages/formats/bmp/bmp.h"
 #include "stages/formats/pbm/pbm.h"
@@ -29,12 +30,28 @@ Status check_size(std::string_view format, std::uint32_t columns, std::uint32_t 
   return {};
 }
 
+Status ImageEncoder::encode_rows(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) {
+  RunsBuilder builder(rows.columns());
+  std::vector<std::uint64_t> words(rows.words());
+  std::vector<std::byte> bits(row_bytes(rows.columns()));
+  for (std::uint32_t r = 0; r < rows.rows(); ++r) {
+    rows.row(r, words);
+    put_words(words, bits);
+    if (!builder.add_row(bits, false)) return cannot_hold("a file", rows.columns(), rows.rows(), "it has too many changes");
+  }
+  return encode(builder.finish(), dpi_x, dpi_y, file);
+}
+
 namespace {
 
 /// No file at all, for timing what comes before it.
 class NullEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView&, double, double, Bytes& file) override {
+    file.clear();
+    return {};
+  }
+  Status encode_rows(const BitRows&, double, double, Bytes& file) override {
     file.clear();
     return {};
   }
@@ -70,8 +87,12 @@ constexpr Count max_png(Count columns, Count rows, Count changes) {
 constexpr Count max_bmp(Count columns, Count rows, Count) { return kFileOverhead + (columns + 31) / 32 * 4 * rows; }
 constexpr Count max_null(Count, Count, Count) { return 0; }
 
-constexpr std::array<ImageFormat, 7> kFormats = {{
+/// A strip in addition to the file, as bits and as deflate (DitherDeflate::bound).
+constexpr Count max_deflate(Count columns, Count rows, Count changes) { return max_strips(columns, rows, changes) * 5 / 4 + 512 * 1024; }
+
+constexpr std::array<ImageFormat, 8> kFormats = {{
     {"tiff-g4", ".tif", "TIFF, CCITT Group 4: small and fast, read by every RIP", tiff::make_g4_encoder, max_g4},
+    {"tiff-deflate", ".tif", "TIFF, deflate: for dithered images", tiff::make_deflate_encoder, max_deflate},
     {"tiff-packbits", ".tif", "TIFF, PackBits: for readers without CCITT", tiff::make_packbits_encoder, max_packbits},
     {"tiff-none", ".tif", "TIFF, uncompressed", tiff::make_uncompressed_encoder, max_strips},
     {"png", ".png", "PNG, 1 bit", png::make_encoder, max_png},

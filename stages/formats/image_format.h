@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "stages/data/bit_rows.h"
 #include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
@@ -40,6 +41,9 @@ class ImageEncoder {
   /// errors        kOutput if the format cannot hold the image (its limits are named in the message)
   /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
   virtual Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) = 0;
+
+  /// The same of rows that are made on demand. Formats that have no use for bits collect them as runs first.
+  virtual Status encode_rows(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file);
 
   /// The widest instructions to use, if the processor has them; the bytes are the same with any. Else it chooses itself.
   virtual void use(Isa) {}

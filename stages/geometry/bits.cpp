@@ -34,6 +34,18 @@ void expand_row(std::span<const std::uint32_t> change, std::span<std::byte> row)
   }
 }
 
+void put_words(std::span<const std::uint64_t> words, std::span<std::byte> row) {
+  std::size_t at = 0;
+  for (std::uint64_t word : words) {
+    word = (word >> 1 & 0x5555'5555'5555'5555) | (word & 0x5555'5555'5555'5555) << 1;
+    word = (word >> 2 & 0x3333'3333'3333'3333) | (word & 0x3333'3333'3333'3333) << 2;
+    word = (word >> 4 & 0x0F0F'0F0F'0F0F'0F0F) | (word & 0x0F0F'0F0F'0F0F'0F0F) << 4;
+    const std::size_t bytes = std::min(sizeof word, row.size() - at);
+    std::memcpy(row.data() + at, &word, bytes);
+    at += bytes;
+  }
+}
+
 RunsBuilder::RunsBuilder(std::uint32_t columns) {
   runs_.columns = columns;
   runs_.row_offset.push_back(0);

@@ -22,6 +22,9 @@ constexpr std::size_t row_bytes(std::uint32_t columns) { return (std::size_t{col
 /// cost    a fill of the row and a few operations a run
 void expand_row(std::span<const std::uint32_t> change, std::span<std::byte> row);
 
+/// A row of words whose lowest bit is the leftmost pixel, as in data/bit_rows.h.
+void put_words(std::span<const std::uint64_t> words, std::span<std::byte> row);
+
 /// Collects rows of bits as runs.
 class RunsBuilder {
  public:

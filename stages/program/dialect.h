@@ -74,6 +74,7 @@ struct Dialect {
   /// What it cannot express, apart from the number of nozzles. errors  kUsage
   Status (*check)(const Machine& machine, const HeadGrid& grid) = nullptr;
   MaintenanceRules maintenance = {};
+  bool compressed = false;  // its files are, by default: no controller reads them as they are
 };
 
 std::span<const Dialect> dialects();

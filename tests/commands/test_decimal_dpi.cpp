@@ -41,7 +41,7 @@ std::array<std::uint32_t, 2> rational_of(const std::string& tiff, std::uint16_t 
 }
 
 TEST_F(DecimalDpi, IsReadBackFromEveryFormat) {
-  for (const char* format : {"tiff-g4", "tiff-packbits", "tiff-none", "png", "bmp", "pbm"}) {
+  for (const char* format : {"tiff-g4", "tiff-deflate", "tiff-packbits", "tiff-none", "png", "bmp", "pbm"}) {
     const std::string out = std::string("out-") + format;
     done(std::string(kJet) + "--format " + format + " -o " + out);
     done("verify --quiet " + out);

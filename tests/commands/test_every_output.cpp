@@ -79,6 +79,7 @@ const Row kRows[] = {
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.svg", "made.gcode"},
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.png", "made.gcode"},
     {"verify", "--quote", "verify powder --quiet --quote @", nullptr},
+    {"stream", "-o,--output", "stream powder --quiet -o @", nullptr, "", false, true, true},
     {"report", "-o,--output", "report made --quiet -o @.html", nullptr},
     {"batch", "-o,--output", "batch list.txt --quiet -o @", "list.txt", "/summary.json", true, false, true},
     {"manual", "-o,--output", "manual --markdown -o @", nullptr, "/jet.md", true},

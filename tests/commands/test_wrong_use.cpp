@@ -260,11 +260,18 @@ TEST_F(WrongUse, InfoNamesItsOptionsAndFiles) {
 TEST_F(WrongUse, FullDiskLeavesNothingHalfUnderAFinalName) {
   const std::string disk = directory_ / "disk";
   std::filesystem::create_directory(disk);
-  if (::mount("none", disk.c_str(), "tmpfs", 0, "size=64k") != 0) {
+  if (::mount("none", disk.c_str(), "tmpfs", 0, "size=7m") != 0) {
     GTEST_SKIP() << "FULL DISK NOT TESTED: a tmpfs cannot be mounted here (" << std::strerror(errno) << "); run as root";
   }
-  const Outcome outcome = run_lamina(
-      {"jet", "part.stl", "-o", "disk/out", "--format", "tiff-none", "--bed", "100x100", "--dpi", "300"}, directory_.path());
+  // What cannot fit is refused before it starts; what may fit is tried.
+  const std::vector<std::string> words = words_of("jet part.stl -o disk/out --format tiff-none --bed 100x100 --dpi 300");
+  std::vector<std::string> larger = words;
+  larger.insert(larger.end(), {"--layer", "0.01"});
+  const Outcome refused = run_lamina(larger, directory_.path());
+  EXPECT_EQ(refused.code, 4) << refused.err;
+  EXPECT_NE(refused.err.find("disk: the job needs about "), std::string::npos) << refused.err;
+  EXPECT_FALSE(std::filesystem::exists(disk + "/out"));
+  const Outcome outcome = run_lamina(words, directory_.path());
   EXPECT_EQ(outcome.code, 4) << outcome.err;
   EXPECT_NE(outcome.err.find("No space left"), std::string::npos) << outcome.err;
   EXPECT_EQ(std::ranges::count(outcome.err.substr(outcome.err.find("lamina:")), '\n'), 1) << outcome.err;

@@ -24,7 +24,7 @@ TEST(TiffTags, SayOneBitMinIsWhiteTopLeftAndTheResolutionInDpi) {
   const struct {
     const char* id;
     std::uint16_t compression;
-  } cases[] = {{"tiff-g4", COMPRESSION_CCITTFAX4}, {"tiff-packbits", COMPRESSION_PACKBITS}, {"tiff-none", COMPRESSION_NONE}};
+  } cases[] = {{"tiff-g4", COMPRESSION_CCITTFAX4}, {"tiff-deflate", COMPRESSION_ADOBE_DEFLATE}, {"tiff-packbits", COMPRESSION_PACKBITS}, {"tiff-none", COMPRESSION_NONE}};
   for (const auto& [id, compression] : cases) {
     SCOPED_TRACE(id);
     const std::string path = folder / "tags.tif";
@@ -88,7 +88,7 @@ struct LayerTagsRead {
 TEST(TiffTags, ReportJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
   const testing::Folder folder;
   const std::string path = folder / "tags.tif";
-  for (const char* id : {"tiff-g4", "tiff-packbits", "tiff-none"}) {
+  for (const char* id : {"tiff-g4", "tiff-deflate", "tiff-packbits", "tiff-none"}) {
     SCOPED_TRACE(id);
     const auto encoder = find_image_format(id)->make_encoder();
     const auto read = [&] {

@@ -179,7 +179,7 @@ std::vector<std::string> seeds_of(std::initializer_list<std::string_view> format
   }
   return seeds;
 }
-std::vector<std::string> tiff_seeds() { return seeds_of({"tiff-g4", "tiff-packbits", "tiff-none"}); }
+std::vector<std::string> tiff_seeds() { return seeds_of({"tiff-g4", "tiff-deflate", "tiff-packbits", "tiff-none"}); }
 std::vector<std::string> png_seeds() { return seeds_of({"png"}); }
 std::vector<std::string> pbm_seeds() { return seeds_of({"pbm"}); }
 std::vector<std::string> bmp_seeds() { return seeds_of({"bmp"}); }

@@ -1,9 +1,25 @@
 """What a job leaves, as one hash: names and bytes of layers, programs, toolpaths and tables.
 
-Files about the job that are no product of it are left out: manifests and other JSON, job files, locks.
+Files about the job that are no product of it are left out: manifests and other JSON, job files, locks. Compressed files count
+expanded and without .zst, because a codec's bytes depend on its version.
 """
+import ctypes
 import hashlib
 import os
+
+
+def expanded(content):
+    """The content of a Zstandard frame that states its size."""
+    zstd = ctypes.CDLL("libzstd.so.1")
+    zstd.ZSTD_getFrameContentSize.restype = ctypes.c_ulonglong
+    zstd.ZSTD_decompress.restype = ctypes.c_size_t
+    size = zstd.ZSTD_getFrameContentSize(content, ctypes.c_size_t(len(content)))
+    if size >= 1 << 32:
+        raise ValueError("a frame does not state its size")
+    out = ctypes.create_string_buffer(size)
+    if zstd.ZSTD_decompress(out, ctypes.c_size_t(size), content, ctypes.c_size_t(len(content))) != size:
+        raise ValueError("a frame is damaged")
+    return out.raw
 
 
 def is_product(name):
@@ -25,6 +41,8 @@ def digest(position, version=""):
     for name in names:
         with open(os.path.join(position, name), "rb") as file:
             content = file.read()
+        if name.endswith(".zst"):
+            name, content = name.removesuffix(".zst"), expanded(content)
         if version:
             content = content.replace(b"lamina " + version.encode(), b"lamina VERSION")
         whole.update(f"{name}\0{len(content)}\0".encode())

@@ -47,12 +47,12 @@ READERS = [
     ["heights", "--job", "X"], ["batch", "X", "-o", "o"], ["permeability", "X", "--area", "1", "--length", "1"],
     ["calibrate", "--machine", "anet-a8", "--measured", "X", "-o", "o.toml"], ["calibrate", "--machine", "./X", "-o", "o"],
     ["verify", "X"], ["report", "X", "-o", "o.html"], ["preview", "X", "-o", "o.png"], ["merge", "X", "-o", "o"],
-    ["machines", "--json", "./X"], ["export", "X", "-o", "o.stl"],
+    ["stream", "X"], ["machines", "--json", "./X"], ["export", "X", "-o", "o.stl"],
 ]
 
 # Commands over a finished job, some file of which is replaced.
 OVER_JOBS = [["verify", "out"], ["report", "out", "-o", "o.html"], ["preview", "out", "-o", "o.png"], ["merge", "out", "-o", "o"],
-             ["merge", "out", "-o", "out"]]
+             ["merge", "out", "-o", "out"], ["stream", "out"]]
 
 
 def check(ran, name, shown, tally, must_fail):

@@ -34,6 +34,7 @@ constexpr More kMore[] = {
     {"verify", "[exactness](../../theory/exactness.md), [print programs](../print_program.md)"},
     {"permeability", "[pores and permeability](../../theory/pores.md), [segmented lines](../segmented.md)"},
     {"merge", "[more than one machine](../../howto/run_batches.md#more-than-one-machine)"},
+    {"stream", "[print programs](../print_program.md)"},
     {"machines", "[machines](../machines.md), [how to add one](../../../CONTRIBUTING.md)"},
     {"preview", "[contours](../slice.md), [print programs](../print_program.md)"},
     {"report", "[what is on the page](../../howto/read_reports.md)"},

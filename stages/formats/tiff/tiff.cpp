@@ -23,6 +23,7 @@
 #include "stages/formats/g4/decode.h"
 #include "stages/formats/g4/encode.h"
 #include "stages/formats/images/image_formats.h"
+#include "stages/formats/tiff/dither_deflate.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
 #include "stages/support/text/decimal.h"
@@ -377,8 +378,52 @@ class StripEncoder : public ImageEncoder {
   Bytes strip_;  // of bits
 };
 
+/// Deflate, strip by strip, of dithered images.
+class DeflateEncoder : public ImageEncoder {
+ public:
+  void tag(const LayerTags& tags) override { text_.take(tags); }
+
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_strips(runs.columns, runs.rows(), dpi_x, dpi_y, file,
+                         [&](std::uint32_t r, std::span<std::byte> to) { expand_row(runs.row(r), to); });
+  }
+  Status encode_rows(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    words_.resize(rows.words());
+    return encode_strips(rows.columns(), rows.rows(), dpi_x, dpi_y, file, [&](std::uint32_t r, std::span<std::byte> to) {
+      rows.row(r, words_);
+      put_words(words_, to);
+    });
+  }
+
+ private:
+  template <class Fill>
+  Status encode_strips(std::uint32_t columns, std::uint32_t rows, double dpi_x, double dpi_y, Bytes& file, const Fill& fill) {
+    if (Status status = check_size("TIFF", columns, rows); !status) return status;
+    const TagFrame frame{columns, rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
+    file.resize(file.capacity());
+    return write_file(file, frame, text_, [&](TIFF* tiff) {
+      strip_.resize(frame.stride * frame.rows_per_strip);
+      packed_.resize(DitherDeflate::bound(strip_.size()));
+      for (std::uint32_t row = 0, number = 0; row < rows; ++number) {
+        const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, rows - row);
+        for (; row < end; ++row) fill(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
+        const auto length = static_cast<tmsize_t>(
+            deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
+        if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
+      }
+      return true;
+    });
+  }
+
+  LayerText text_;
+  DitherDeflate deflate_;
+  Bytes strip_, packed_;
+  std::vector<std::uint64_t> words_;  // of a row
+};
+
 }  // namespace
 
+std::unique_ptr<ImageEncoder> make_deflate_encoder() { return std::make_unique<DeflateEncoder>(); }
 std::unique_ptr<ImageEncoder> make_g4_encoder() { return std::make_unique<G4Encoder>(); }
 std::unique_ptr<ImageEncoder> make_packbits_encoder() { return std::make_unique<StripEncoder>(COMPRESSION_PACKBITS); }
 std::unique_ptr<ImageEncoder> make_uncompressed_encoder() { return std::make_unique<StripEncoder>(COMPRESSION_NONE); }

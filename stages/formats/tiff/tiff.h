@@ -9,6 +9,7 @@
 namespace lamina::formats::tiff {
 
 std::unique_ptr<ImageEncoder> make_g4_encoder();
+std::unique_ptr<ImageEncoder> make_deflate_encoder();
 std::unique_ptr<ImageEncoder> make_packbits_encoder();
 std::unique_ptr<ImageEncoder> make_uncompressed_encoder();
 std::unique_ptr<LevelEncoder> make_4_bit_encoder();

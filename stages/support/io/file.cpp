@@ -219,6 +219,24 @@ Status File::flush() {
   return status;
 }
 
+Status File::overwrite(std::uint64_t offset, std::span<const std::byte> bytes) {
+  State& state = *state_;
+  const std::uint64_t flushed = state.size - state.gathered.size();
+  if (offset >= flushed) {
+    std::ranges::copy(bytes, state.gathered.begin() + static_cast<std::ptrdiff_t>(offset - flushed));
+    return {};
+  }
+  if (Status status = flush(); !status) return status;
+  while (!bytes.empty()) {
+    const ssize_t written = ::pwrite(state.file, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return write_failure(state.path, written < 0 ? errno : EIO);
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+    offset += static_cast<std::uint64_t>(written);
+  }
+  return {};
+}
+
 Status File::sync() {
   const int reason = state_->streams ? 0 : sync_file(state_->file);
   return reason == 0 ? Status() : Status(write_failure(state_->path, reason));

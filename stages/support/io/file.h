@@ -57,6 +57,8 @@ class File {
   Status append(const Buffer<char>& text) { return append(std::as_bytes(std::span(text))); }
   /// Gives the system what append() has gathered; a killed run then leaves it in NAME.part.
   Status flush();
+  /// Replaces bytes that append() has taken, of a file without `hash` that is no stream.
+  Status overwrite(std::uint64_t offset, std::span<const std::byte> bytes);
   /// What has been flushed survives a power cut, unless the file is a stream.
   Status sync();
   /// Gives an unfinished file, which grew under another name, the name NAME.part, locked and kept from now on; it takes

@@ -118,8 +118,8 @@ TEST_F(GreyHeads, WriteDropsAsOneGreyImage) {
     ASSERT_TRUE(image.ok()) << image.error().message;
     EXPECT_EQ(levels.level.size(), 30u);
     for (const std::uint8_t level : levels.level) EXPECT_EQ(level, 5);
-    EXPECT_EQ(test::read_text(folder_ / (std::string(format) + "/program/000001.planes")),
-              test::read_text(folder_ / "bits/program/000001.planes"));
+    EXPECT_EQ(test::read_text(folder_ / (std::string(format) + "/program/000001.planes.zst")),
+              test::read_text(folder_ / "bits/program/000001.planes.zst"));
     const auto records = records_of(format);
     EXPECT_EQ(records[1].set_pixels, 600u);
     EXPECT_EQ(records[1].drops, 3000u);

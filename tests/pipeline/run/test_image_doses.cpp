@@ -98,7 +98,7 @@ TEST_F(ImageDoses, OfOnePartAloneAreThoseOfTheJob) {
   done("jet --job own.toml -o own");
   done("jet --job job.toml -o job");
   done("verify own");
-  for (const char* file : {"layers/000001-drop1.tif", "layers/000004-drop2.tif", "program/000002.planes"})
+  for (const char* file : {"layers/000001-drop1.tif", "layers/000004-drop2.tif", "program/000002.planes.zst"})
     EXPECT_TRUE(test::read_text(folder_ / ("own/" + std::string(file))) ==
                 test::read_text(folder_ / ("job/" + std::string(file))))
         << file;

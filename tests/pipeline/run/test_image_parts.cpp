@@ -55,7 +55,7 @@ class ImageParts : public testing::Test {
 TEST_F(ImageParts, GiveTheBytesOfTheMeshesThatTheyWereMadeOfInEveryFormatThatReportsItsResolution) {
   const std::string mesh = part("parameter_quality_nut.stl");
   for (const char* grid : {"--bed 31x29.3 --dpi 150", "--bed 40x37 --dpi 203x127"}) {
-    for (const char* format : {"tiff-g4", "tiff-packbits", "tiff-none", "png", "bmp", "pbm"}) {
+    for (const char* format : {"tiff-g4", "tiff-deflate", "tiff-packbits", "tiff-none", "png", "bmp", "pbm"}) {
       const std::string rest = std::string(" --layer 0.9 --format ") + format + " " + grid;
       done("jet " + mesh + rest + " -o first");
       done("jet first" + rest + " -o again");

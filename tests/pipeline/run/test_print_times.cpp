@@ -212,7 +212,7 @@ TEST_F(PrintTimes, AManifestThatStatesAnotherTimeIsAFault) {
   const auto report = verify(job.output, {});
   ASSERT_TRUE(report.ok());
   ASSERT_EQ(report->faults.size(), 1u);
-  EXPECT_NE(report->faults[0].find("program/000001.raw: takes "), std::string::npos) << report->faults[0];
+  EXPECT_NE(report->faults[0].find("program/000001.raw.zst: takes "), std::string::npos) << report->faults[0];
 }
 
 }  // namespace

@@ -1,0 +1,126 @@
+// TIFF of deflate for dithered images: libtiff and zlib read what is written, of runs as of rows made on demand.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <bit>
+#include <random>
+
+#include "stages/dose/dither.h"
+#include "stages/formats/images/image.h"
+#include "stages/formats/tiff/dither_deflate.h"
+#include "tests/formats/images.h"
+
+namespace lamina {
+namespace {
+
+/// The rows of an image, made on demand.
+class RowsOfRuns : public BitRows {
+ public:
+  explicit RowsOfRuns(const Runs& runs) : runs_(runs) {}
+  std::uint32_t columns() const override { return runs_.columns; }
+  std::uint32_t rows() const override { return runs_.view().rows(); }
+  void row(std::uint32_t number, std::span<std::uint64_t> words) const override {
+    std::ranges::fill(words, 0);
+    const auto change = runs_.view().row(number);
+    for (std::size_t i = 0; i + 1 < change.size(); i += 2) {
+      for (std::uint32_t c = change[i]; c < change[i + 1]; ++c) words[c / 64] |= std::uint64_t{1} << c % 64;
+    }
+  }
+
+ private:
+  const Runs& runs_;
+};
+
+/// A disc, dithered to a fraction of its pixels by blue noise, or by the pattern of a core.
+Runs dithered_disc(std::uint32_t columns, std::uint32_t rows, double fraction, bool core) {
+  std::vector<formats::testing::Row> disc;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const double y = (r + 0.5) / rows * 2 - 1, half = std::sqrt(1 - y * y) * columns / 2;
+    const auto begin = static_cast<std::uint32_t>(columns / 2.0 - half), end = static_cast<std::uint32_t>(columns / 2.0 + half);
+    disc.push_back(begin < end ? formats::testing::Row{begin, end} : formats::testing::Row{});
+  }
+  const Runs image = formats::testing::image_of(columns, disc);
+  Runs result;
+  if (core) {
+    dose::saturate(image, image, fraction, 3, result);
+    return result;
+  }
+  Levels levels;
+  levels_of(image, 1, levels);
+  dose::DitherScratch scratch;
+  const dose::Drops24 drops[] = {0, static_cast<dose::Drops24>(fraction * (1 << dose::kDropBits))};
+  dose::dither_one(levels, drops, 3, scratch, result);
+  return result;
+}
+
+std::string expanded(std::span<const std::byte> stream, std::size_t bytes) {
+  std::string out(bytes + 1, '\0');
+  uLongf length = out.size();
+  EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(out.data()), &length, reinterpret_cast<const Bytef*>(stream.data()), stream.size()),
+            Z_OK);
+  out.resize(length);
+  return out;
+}
+
+TEST(DitherDeflate, AnyBytesComeBackWithinTheBound) {
+  std::mt19937 random(5);
+  formats::tiff::DitherDeflate deflate;
+  for (std::size_t bytes : {1u, 7u, 15u, 16u, 17u, 31u, 40u, 273u, 274u, 275u, 276u, 5000u, 262'144u}) {
+    for (int kind = 0; kind < 6; ++kind) {
+      std::string text(bytes, '\0');
+      for (std::size_t i = 0; i < bytes; ++i) {
+        const auto noise = static_cast<char>(random());
+        text[i] = kind == 0   ? '\0'
+                  : kind == 1 ? noise
+                  : kind == 2 ? (i < 16 || random() % 50 == 0 ? noise : text[i - 16])
+                  : kind == 3 ? static_cast<char>(std::countl_zero(static_cast<std::uint32_t>(random() | 1)))  // skewed
+                  : kind == 4 ? (i % 600 < 300 ? noise : '\0')
+                              : '\xFF';
+      }
+      std::vector<std::byte> out(deflate.bound(bytes) + 16, std::byte{0xA5});
+      const std::size_t made = deflate.compress(std::as_bytes(std::span(text)), out.data());
+      ASSERT_LE(made, deflate.bound(bytes));
+      EXPECT_EQ(out[deflate.bound(bytes)], std::byte{0xA5});
+      EXPECT_TRUE(expanded(std::span(out).first(made), bytes) == text) << bytes << " bytes of kind " << kind;
+    }
+  }
+}
+
+TEST(DitherDeflate, DitheredImagesAreReadAgainAndSmall) {
+  const auto* format = formats::find_image_format("tiff-deflate");
+  ASSERT_NE(format, nullptr);
+  const formats::testing::Folder folder;
+  for (const std::uint32_t columns : {1u, 64u, 129u, 3001u}) {
+    for (const bool core : {false, true}) {
+      const Runs runs = dithered_disc(columns, 1000, 0.62, core);
+      const auto encoder = format->make_encoder();
+      formats::Bytes file, of_rows, g4;
+      ASSERT_TRUE(encoder->encode(runs, 600, 300, file).ok());
+      ASSERT_TRUE(encoder->encode_rows(RowsOfRuns(runs), 600, 300, of_rows).ok());
+      EXPECT_TRUE(file == of_rows) << columns;
+      formats::testing::save(folder / "layer.tif", file);
+      const auto image = formats::image(folder / "layer.tif");
+      ASSERT_TRUE(image.ok()) << image.error().message;
+      EXPECT_EQ(image->dpi_x, 600);
+      EXPECT_EQ(image->dpi_y, 300);
+      EXPECT_TRUE(image->runs.row_offset == runs.row_offset && image->runs.change == runs.change) << columns << core;
+      if (columns < 3000) continue;
+      ASSERT_TRUE(formats::find_image_format("tiff-g4")->make_encoder()->encode(runs, 600, 300, g4).ok());
+      EXPECT_LT(file.size(), g4.size() / (core ? 3 : 6));
+    }
+  }
+}
+
+TEST(DitherDeflate, FormatsWithoutBitsOfTheirOwnEncodeRowsAsRuns) {
+  const Runs runs = dithered_disc(700, 90, 0.3, false);
+  for (const formats::ImageFormat& format : formats::image_formats()) {
+    const auto encoder = format.make_encoder();
+    formats::Bytes of_runs, of_rows;
+    ASSERT_TRUE(encoder->encode(runs, 600, 600, of_runs).ok());
+    ASSERT_TRUE(encoder->encode_rows(RowsOfRuns(runs), 600, 600, of_rows).ok());
+    EXPECT_TRUE(of_runs == of_rows) << format.id;
+  }
+}
+
+}  // namespace
+}  // namespace lamina
