@@ -50,7 +50,17 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
 }
 
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {
-  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMaxProgramBytes);
+  std::string text;
+  return read_program_of_layer(directory, head, layer, text) ? std::move(text) : std::string();
+}
+
+Status read_program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer, std::string& text) {
+  const std::string path = (fs::path(directory) / program_file_name(layer, head.program_extension)).string();
+  const auto file = FileReader::open(path, {.max_bytes = kMaxProgramBytes});
+  if (!file) return file.error();
+  text.resize(file->size());
+  if (file->read_at(0, text)) return {};
+  return Error{Fault::kVerification, fmt::format("{}: cannot be read", path)};
 }
 
 Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,

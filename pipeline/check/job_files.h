@@ -23,6 +23,8 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
 
 /// The text of a layer's print program, unchecked; "" if it cannot be read.
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
+/// The same into memory that is used again. errors  of FileReader
+Status read_program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer, std::string& text);
 
 /// The images of a layer's drops, of all materials, each within the one before; one where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;

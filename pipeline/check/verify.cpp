@@ -1,6 +1,7 @@
 #include "pipeline/check/verify.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -19,6 +20,7 @@
 #include "stages/formats/images/image.h"
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
+#include "stages/support/hash/hash.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
@@ -34,6 +36,7 @@ struct Verification {
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
   std::optional<DoseCheck> doses;
   VerifyReport& report;
+  mutable tbb::enumerable_thread_specific<std::string> texts;  // of programs
 };
 
 /// What is found in a layer.
@@ -76,13 +79,19 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   const std::string path = (fs::path(inspection.directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path, record.program.bytes);
-  if (!digest) return digest.error().message;
-  const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
-  if (image != nullptr && inspection.machine) {
+  bool same = false;
+  if (image == nullptr || !inspection.machine) {
+    const Result<FileDigest> digest = digest_file(path, record.program.bytes);
+    if (!digest) return digest.error().message;
+    same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
+  } else {
+    std::string& text = inspection.texts.local();
+    const Status read = read_program_of_layer(inspection.directory, inspection.head, record.layer.index, text);
+    if (!read) return read.error().message;
+    same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
     const std::vector<RunsView> planes(image->begin(), image->end());
-    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
-                                                   record.layer, planes, record.program.moved, record.program.lost);
+    const auto replay =
+        inspection.machine->replay(text, record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
     const replay::Count reported{.drops = says.drops,
