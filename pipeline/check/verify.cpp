@@ -208,7 +208,7 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
+  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report, {}};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);

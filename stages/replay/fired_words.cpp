@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "stages/geometry/isa.h"
+#include "stages/geometry/targets.h"
 #include "stages/geometry/transpose.h"
 
 namespace lamina::replay {
@@ -20,6 +22,20 @@ std::uint64_t exceeding(const std::uint64_t* word, std::size_t stride, std::uint
   }
   return more;
 }
+
+using Square = std::uint64_t[64];
+
+LAMINA_BODY std::uint64_t count_body(const Square& square) {
+  std::uint64_t count = 0;
+  for (const std::uint64_t word : square) count += static_cast<std::uint64_t>(std::popcount(word));
+  return count;
+}
+std::uint64_t count_plain(const Square& square) { return count_body(square); }
+#ifdef LAMINA_WIDE_KERNELS
+LAMINA_AVX2 std::uint64_t count_popcnt(const Square& square) { return count_body(square); }
+#else
+std::uint64_t count_popcnt(const Square& square) { return count_body(square); }
+#endif
 
 }  // namespace
 
@@ -95,6 +111,7 @@ FiredWords::FiredWords(const VirtualMachine& machine, std::span<const BitRows* c
       positions_(machine.positions_),
       lines_flip_(machine.begins_at(machine.machine_.mounting.scan_axis == ScanAxis::kX ? Side::kFront : Side::kRight)),
       positions_flip_(machine.begins_at(machine.machine_.mounting.scan_axis == ScanAxis::kX ? Side::kRight : Side::kFront)),
+      count_(widest_isa() >= Isa::kAvx2 ? count_popcnt : count_plain),
       used_(nozzle_words_),
       below_(machine.nozzle_.size()),
       lines_(machine.lines_),
@@ -196,7 +213,7 @@ void FiredWords::turn(std::uint32_t residue, std::uint32_t word) {
       const std::uint64_t* const from = vectors_.data() + (residue * kWindow + chunk * 64) * size + b * nozzle_words_ + word;
       for (std::size_t i = 0; i < 64; ++i) square[i] = from[i * size];
       transpose_square(square);
-      for (const std::uint64_t bits : square) count += static_cast<std::uint64_t>(std::popcount(bits));
+      count += count_(square);
     }
     drops_ += count << b;
   }

@@ -103,6 +103,7 @@ class FiredWords {
   std::int64_t positions_;
   bool lines_flip_, positions_flip_;  // lines, positions count from the end of the image
   bool wrong_ = false;
+  std::uint64_t (*count_)(const Square&);  // set bits
   std::uint32_t flip_ = UINT32_MAX;
 
   // A window of all nozzles; steps of one residue belong together.
