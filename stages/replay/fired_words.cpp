@@ -278,19 +278,19 @@ std::uint64_t* FiredWords::open(std::uint32_t nozzle) {
     return nullptr;
   }
   Line& line = lines_[index_of(at)];
-  if (line.state != State::kOpen) {
+  if (line.state != LineState::kOpen) {
     const std::size_t size = bits_ * stride_;
     if (free_.empty()) free_.push_back(stock_.emplace_back(std::make_unique_for_overwrite<std::uint64_t[]>(size)).get());
     line.words = free_.back();
     free_.pop_back();
     std::fill_n(line.words, size, 0);
-    if (line.state == State::kDone) {
+    if (line.state == LineState::kDone) {
       expected_.line(index_of(at), wanted_);
       for (std::uint32_t b = 0; b < bits_; ++b) {
         std::copy_n(wanted_.begin() + b * expected_.words(), expected_.words(), line.words + b * stride_ + kChunks);
       }
     }
-    line.state = State::kOpen;
+    line.state = LineState::kOpen;
   }
   return below_[nozzle] = line.words;
 }
@@ -304,10 +304,10 @@ void FiredWords::settle() {
       across_um_ = std::max(across_um_, std::abs(nozzle.across_um));
       below_[number] = nullptr;
       const std::uint32_t index = index_of(first_line_ + nozzle.line);
-      if (lines_[index].state != State::kOpen || !has_all(index)) continue;
+      if (lines_[index].state != LineState::kOpen || !has_all(index)) continue;
       first_set_ = std::min(first_set_, first_line_ + nozzle.line);
       free_.push_back(lines_[index].words);
-      lines_[index] = {nullptr, State::kDone};
+      lines_[index] = {nullptr, LineState::kDone};
     }
     used_[word] = 0;
   }
@@ -341,7 +341,7 @@ bool FiredWords::has_all(std::uint32_t index) {
 bool FiredWords::difference(std::int64_t line, std::uint32_t drops, std::vector<std::uint64_t>& lacks,
                             std::vector<std::uint64_t>& has) {
   const Line& at = lines_[index_of(line)];
-  if (at.state == State::kDone) return false;
+  if (at.state == LineState::kDone) return false;
   expected_.line(index_of(line), wanted_);
   const std::size_t size = expected_.words();
   lacks.resize(size);
@@ -360,7 +360,7 @@ bool FiredWords::difference(std::int64_t line, std::uint32_t drops, std::vector<
 
 /// Nothing is fired, as the image has it.
 bool FiredWords::is_empty(std::int64_t line) {
-  if (lines_[index_of(line)].state != State::kEmpty) return false;
+  if (lines_[index_of(line)].state != LineState::kEmpty) return false;
   expected_.line(index_of(line), wanted_);
   return std::ranges::all_of(wanted_, [](std::uint64_t word) { return word == 0; });
 }

@@ -62,10 +62,10 @@ class FiredWords {
   double across_um() const { return across_um_; }
 
  private:
-  enum class State : std::uint8_t { kEmpty, kOpen, kDone };  // nothing is fired, some is, all is
+  enum class LineState : std::uint8_t { kEmpty, kOpen, kDone };  // nothing is fired, some is, all is
   struct Line {
     std::uint64_t* words = nullptr;
-    State state = State::kEmpty;
+    LineState state = LineState::kEmpty;
   };
   struct Differences {
     std::uint64_t missing = 0, added = 0;  // drops, of the layer

@@ -257,7 +257,7 @@ void Printing::leave_sweep() {
 }
 
 std::uint32_t Printing::fire_words(std::span<const std::uint64_t> words, std::uint32_t bits) {
-  const std::uint32_t maximum = most_drops(words, bits);
+  const std::uint32_t maximum = max_drops(words, bits);
   if (maximum == 0 || purpose_ == Purpose::kTime) return maximum;
   if (!words_) {
     fire_singly(words, bits);
@@ -271,7 +271,7 @@ std::uint32_t Printing::fire_words(std::span<const std::uint64_t> words, std::ui
   return maximum;
 }
 
-std::uint32_t Printing::most_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const {
+std::uint32_t Printing::max_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const {
   const std::size_t size = words.size() / bits;
   std::uint32_t maximum = 0;
   if (bits == 1) return std::ranges::any_of(words, [](std::uint64_t word) { return word != 0; }) ? 1 : 0;

@@ -175,7 +175,7 @@ class Printing {
   void compare_words(std::uint64_t moved, std::uint64_t lost);
   void compare_plane(const BitRows& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
                      Differences& differ) const;
-  std::uint32_t most_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const;
+  std::uint32_t max_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const;
   void fire_singly(std::span<const std::uint64_t> words, std::uint32_t bits);
   /// The 64 pixels of a word that are fired more than so many times.
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
