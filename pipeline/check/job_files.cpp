@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMaxProgramBytes = 4ull << 30;
+
 
 /// Empty if it cannot be read: the check of its hash has reported what is missing or differs.
 std::string whole_file(const fs::path& path, std::uint64_t max_bytes) {

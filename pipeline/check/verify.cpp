@@ -1,6 +1,7 @@
 #include "pipeline/check/verify.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -20,6 +21,7 @@
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
 #include "stages/support/io/compressed.h"
+#include "stages/support/hash/hash.h"
 #include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
@@ -36,6 +38,7 @@ struct Verification {
   std::optional<DoseCheck> doses;
   ExpectedDrops expected;
   VerifyReport& report;
+  mutable tbb::enumerable_thread_specific<std::string> texts;  // of programs
 };
 
 /// What is found in a layer.
@@ -78,15 +81,24 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   const std::string path = (fs::path(inspection.directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_content(path, record.program.bytes);
-  if (!digest) return digest.error().message;
-  if (is_compressed(name) && digest->bytes != record.program.bytes)
-    return fmt::format("{}: expands to {} bytes, the manifest says {}", name, digest->bytes, record.program.bytes);
-  const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
-  if (image != nullptr && inspection.machine) {
+  bool same = false;
+  const auto expands_to = [&](std::uint64_t bytes) {
+    return fmt::format("{}: expands to {} bytes, the manifest says {}", name, bytes, record.program.bytes);
+  };
+  if (image == nullptr || !inspection.machine) {
+    const Result<FileDigest> digest = digest_content(path, record.program.bytes);
+    if (!digest) return digest.error().message;
+    if (is_compressed(name) && digest->bytes != record.program.bytes) return expands_to(digest->bytes);
+    same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
+  } else {
+    std::string& text = inspection.texts.local();
+    const Status read = read_content(path, is_compressed(name) ? record.program.bytes : kMaxProgramBytes, text);
+    if (!read) return read.error().message;
+    if (is_compressed(name) && text.size() != record.program.bytes) return expands_to(text.size());
+    same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
     const std::vector<RunsView> planes(image->begin(), image->end());
-    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record),
-                                                   record.layer, planes, record.program.moved, record.program.lost);
+    const auto replay =
+        inspection.machine->replay(text, record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
     const replay::Count reported{.drops = says.drops,
@@ -208,7 +220,7 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, {}, report};
+  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, {}, report, {}};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);

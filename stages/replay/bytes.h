@@ -4,14 +4,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <string_view>
 #include <utility>
 
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {
+
+/// An unsigned number at an address, the lowest byte first.
+template <class T>
+T little_endian(const char* bytes) {
+  static_assert(std::endian::native == std::endian::little);
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return value;
+}
 
 /// Reads little-endian numbers from bytes; 0 at a fault.
 class ByteReader {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "stages/geometry/run_rows.h"
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {
@@ -121,14 +122,43 @@ Result<Count> VirtualMachine::replay(std::string_view program, const Layer& laye
 
 Result<Count> VirtualMachine::replay(std::string_view program, const Layer& layer, std::span<const RunsView> planes,
                                      std::uint64_t moved, std::uint64_t lost) const {
+  std::vector<RunRows> rows(planes.begin(), planes.end());
+  std::vector<const BitRows*> views;
+  for (const RunRows& one : rows) views.push_back(&one);
+  return replay(program, layer, views, moved, lost);
+}
+
+Result<Count> VirtualMachine::replay(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
+                                     std::uint64_t moved, std::uint64_t lost) const {
+  auto count = replay_words(program, layer, planes, moved, lost);
+  return count ? std::move(count) : replay_drops(program, layer, planes, moved, lost);
+}
+
+Result<Count> VirtualMachine::replay_words(std::string_view program, const Layer& layer,
+                                           std::span<const BitRows* const> planes, std::uint64_t moved,
+                                           std::uint64_t lost) const {
+  const auto fits = [&](const BitRows* plane) { return plane->columns() == columns_ && plane->rows() == rows_; };
+  if (!std::ranges::all_of(planes, fits)) return Error{Fault::kVerification, "the image is of another size"};
+  Printing printing(*this, layer, planes);
+  return replay(program, printing, planes, moved, lost);
+}
+
+Result<Count> VirtualMachine::replay_drops(std::string_view program, const Layer& layer,
+                                           std::span<const BitRows* const> planes, std::uint64_t moved,
+                                           std::uint64_t lost) const {
   Printing printing(*this, layer, Purpose::kPrint, nullptr, static_cast<std::uint32_t>(planes.size()));
+  return replay(program, printing, planes, moved, lost);
+}
+
+Result<Count> VirtualMachine::replay(std::string_view program, Printing& printing, std::span<const BitRows* const> planes,
+                                     std::uint64_t moved, std::uint64_t lost) const {
   if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
   printing.check_cycle();
   if (printing.ok()) printing.compare(planes, moved, lost);
   if (!printing.ok()) return printing.status().error();
   Count count = printing.finish();
   if (printing.added_sweeps().empty()) return count;
-  Printing without(*this, layer, Purpose::kTime);
+  Printing without(*this, printing.of_layer(), Purpose::kTime);
   without.leave_out(printing.added_sweeps());
   if (Status status = read(machine_.dialect, program, without); !status) return status.error();
   count.added_microseconds = count.microseconds - without.finish().microseconds;

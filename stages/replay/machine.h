@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "stages/data/bit_rows.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
@@ -19,6 +20,8 @@
 #include "stages/replay/count.h"
 
 namespace lamina::replay {
+
+class Printing;
 
 /// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
 std::uint32_t drop_bits(std::uint32_t max_drops);
@@ -51,13 +54,22 @@ class VirtualMachine {
   ///           without firing, a fired pixel that is not set, wrong numbers of moved or lost pixels, a scan speed above the
   ///           nozzles' firing rate; if the dialect moves the machine: a wrong height of the build vat, a wrong dose, a
   ///           roller that does not go to its far end and back, a head that does not wait where the next layer finds it
-  /// cost      O(text + drops); one bit per pixel
+  /// cost      O(text + pixels / 64); where something is wrong O(text + drops) more, to find it. memory: a bit for each pixel
+  ///           below the head, while something is missing there; of columns that are scanned, and of what is wrong, for each
+  ///           pixel of the bed
   Result<Count> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                        std::uint64_t lost) const;
   /// The same for pixels of several drops: plane k, from 0, holds the pixels that have to get more than k drops, and a pixel
-  /// that is fired more often than there are planes is a fault. memory  a bit per pixel for each bit of their number
+  /// that is fired more often than there are planes is a fault. memory  that for each bit of their number
   Result<Count> replay(std::string_view program, const Layer& layer, std::span<const RunsView> planes, std::uint64_t moved,
                        std::uint64_t lost) const;
+  Result<Count> replay(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
+                       std::uint64_t moved, std::uint64_t lost) const;
+  /// What replay() does: 64 pixels at a time, whose errors do not say where; after an error drop by drop, 25 ns each.
+  Result<Count> replay_words(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
+                             std::uint64_t moved, std::uint64_t lost) const;
+  Result<Count> replay_drops(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
+                             std::uint64_t moved, std::uint64_t lost) const;
 
   /// How long a layer's program takes, by its movements alone, and its care: nothing fires on the bed. The machine stands where
   /// the layer below left it, so that layers can be timed in any order and their times add up to that of the job.
@@ -80,6 +92,9 @@ class VirtualMachine {
 
  private:
   friend class Printing;
+  friend class FiredWords;
+  Result<Count> replay(std::string_view program, Printing& printing, std::span<const BitRows* const> planes,
+                       std::uint64_t moved, std::uint64_t lost) const;
   /// Whether sweeps or nozzles count from a side.
   bool begins_at(Side side) const { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; }
 

@@ -20,8 +20,12 @@ Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose pu
       roller_mm_(machine.machine_.powder.roller_mm[0]),
       planes_(planes),
       times_bits_(static_cast<std::uint32_t>(std::bit_width(planes))),
-      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0),
-      fires_row_(purpose == Purpose::kPrint ? machine.rows_ : 0, 0) {}
+      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0) {}
+
+Printing::Printing(const VirtualMachine& machine, const Layer& layer, std::span<const BitRows* const> planes)
+    : Printing(machine, layer, Purpose::kCompare, nullptr, static_cast<std::uint32_t>(planes.size())) {
+  words_.emplace(machine, planes);
+}
 
 AxisPositions Printing::axis_positions() const {
   const auto& motion = profile().motion;
@@ -181,6 +185,12 @@ const Count& Printing::finish() {
 void Printing::fire(std::uint32_t number, std::uint32_t drops) {
   if (purpose_ == Purpose::kTime) return;
   if (number >= machine_.nozzle_.size()) return fault(fmt::format("nozzle {} does not exist", number));
+  if (words_) {
+    one_.assign((nozzles() + 63) / 64, 0);
+    one_[number / 64] = std::uint64_t{1} << (number % 64 ^ flip_);
+    for (std::uint32_t k = 0; k < drops; ++k) fire_words(one_);
+    return;
+  }
   const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[number];
   if (nozzle.blocked) return fault(fmt::format("nozzle {} fires, which is blocked", number));
   if (!fired_here_) sweeps_.push_back({sweep_, first_line_});
@@ -205,7 +215,6 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
   for (std::uint32_t b = 0; b < times_bits_; ++b) {
     fired[b] = (fired[b] & ~(std::uint64_t{1} << bit)) | std::uint64_t{times >> b & 1} << bit;
   }
-  fires_row_[row] = 1;
   count.drops += drops;
   sweep_max_ = std::max(sweep_max_, drops);
   count.max_per_position = std::max(count.max_per_position, drops);
@@ -247,13 +256,50 @@ void Printing::leave_sweep() {
   sweep_max_ = 0;
 }
 
-void Printing::fire_words(std::span<const std::uint64_t> words) {
-  if (purpose_ == Purpose::kTime) return;
-  for (std::size_t w = 0; w < words.size(); ++w) {
-    for (std::uint64_t left = words[w]; left != 0 && ok();) {
-      const int bit = std::countl_zero(left);
-      left &= ~(std::uint64_t{1} << (63 - bit));
-      fire(static_cast<std::uint32_t>(w * 64) + static_cast<std::uint32_t>(bit));
+std::uint32_t Printing::fire_words(std::span<const std::uint64_t> words, std::uint32_t bits) {
+  const std::uint32_t maximum = max_drops(words, bits);
+  if (maximum == 0 || purpose_ == Purpose::kTime) return maximum;
+  if (!words_) {
+    fire_singly(words, bits);
+    return maximum;
+  }
+  if (!fired_here_) sweeps_.push_back({sweep_, first_line_});
+  fired_here_ = true;
+  sweep_max_ = std::max(sweep_max_, maximum);
+  count.max_per_position = std::max(count.max_per_position, maximum);
+  words_->fire(first_line_, step_, words, bits, flip_);
+  return maximum;
+}
+
+std::uint32_t Printing::max_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const {
+  const std::size_t size = words.size() / bits;
+  std::uint32_t maximum = 0;
+  if (bits == 1) return std::ranges::any_of(words, [](std::uint64_t word) { return word != 0; }) ? 1 : 0;
+  for (std::size_t w = 0; w < size; ++w) {
+    std::uint64_t among = ~std::uint64_t{0};  // nozzles with as many as any of the word, in the bits so far
+    std::uint32_t drops = 0;
+    for (std::uint32_t b = bits; b-- > 0;) {
+      const std::uint64_t more = among & words[b * size + w];
+      if (more == 0) continue;
+      among = more;
+      drops |= 1u << b;
+    }
+    maximum = std::max(maximum, drops);
+  }
+  return maximum;
+}
+
+void Printing::fire_singly(std::span<const std::uint64_t> words, std::uint32_t bits) {
+  const std::size_t size = words.size() / bits;
+  for (std::size_t w = 0; w < size; ++w) {
+    std::uint64_t left = 0;
+    for (std::uint32_t b = 0; b < bits; ++b) left |= words[b * size + w];
+    while (left != 0 && ok()) {
+      const auto bit = static_cast<std::uint32_t>(flip_ == 0 ? std::countr_zero(left) : 63 - std::countl_zero(left));
+      left &= ~(std::uint64_t{1} << bit);
+      std::uint32_t drops = 0;
+      for (std::uint32_t b = 0; b < bits; ++b) drops |= static_cast<std::uint32_t>(words[b * size + w] >> bit & 1) << b;
+      fire(static_cast<std::uint32_t>(w * 64) + (bit ^ flip_), drops);
     }
   }
 }
@@ -282,21 +328,28 @@ void Printing::state_sweep(std::uint32_t of) {
 }
 
 // The first line of the layer that has something; the last one if none has.
-std::int64_t Printing::first_of_layer(const RunsView& image) const {
+std::int64_t Printing::first_of_layer(const BitRows& image) const {
   std::int64_t first = machine_.lines_ - 1;
+  std::vector<std::uint64_t> words(image.words());
   for (std::uint32_t row = 0; row < image.rows(); ++row) {
-    const auto line = image.row(row);
-    if (!line.empty()) first = std::min({first, line_of(line.front(), row), line_of(line.back() - 1, row)});
+    image.row(row, words);
+    const auto is_set = [](std::uint64_t word) { return word != 0; };
+    const auto begin = std::ranges::find_if(words, is_set);
+    if (begin == words.end()) continue;
+    const auto end = std::find_if(words.rbegin(), words.rend(), is_set);
+    const auto left = static_cast<std::uint32_t>((begin - words.begin()) * 64 + std::countr_zero(*begin));
+    const auto right = static_cast<std::uint32_t>((words.rend() - end) * 64 - 1 - std::countl_zero(*end));
+    first = std::min({first, line_of(left, row), line_of(right, row)});
   }
   return first;
 }
 
 // Numbers follow from where sweeps begin: a swath after the other, of each its passes, of each the sweeps for its drops.
-void Printing::check_numbers(std::span<const RunsView> planes) {
+void Printing::check_numbers(std::int64_t first_of_layer) {
   if (!swaths_stated_) return;
   const auto& mount = profile().mounting;
   const std::int64_t lines = std::int64_t{nozzles()} * mount.passes, stride = lines - mount.overlap_lines;
-  std::int64_t first = mount.first_swath == FirstSwath::kLayer ? first_of_layer(planes[0]) : 0;
+  std::int64_t first = mount.first_swath == FirstSwath::kLayer ? first_of_layer : 0;
   first -= static_cast<std::int64_t>(layer_.index) * mount.joint_shift_lines % stride;
   const std::int64_t left = machine_.lines_ - first;
   const std::int64_t swaths = left <= lines ? 1 : 1 + (left - lines + stride - 1) / stride;
@@ -342,49 +395,41 @@ std::string Printing::describe_position(std::uint32_t column, std::uint32_t row)
   return fmt::format("layer {}, line {} across, position {} along, which no swath covers", layer_.index, line, position);
 }
 
-// Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
+// Lines of blocked nozzles, and those that no nozzle which works comes over: only these may lose pixels. A sweep in which
 // no nozzle fires is not known; lines that no sweep comes over may be one.
-void Printing::coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const {
+std::vector<bool> Printing::lines_that_may_be_lost() const {
+  std::vector<bool> worked(machine_.lines_), blocked(machine_.lines_);
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
       const std::int64_t over = sweep.first_line + nozzle.line;
       if (over >= 0 && over < machine_.lines_) (nozzle.blocked ? blocked : worked)[std::size_t(over)] = true;
     }
   }
+  for (std::size_t line = 0; line < blocked.size(); ++line) blocked[line] = blocked[line] || !worked[line];
+  return blocked;
 }
 
-void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
+void Printing::compare_plane(const BitRows& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
                              Differences& differ) const {
   const bool x = profile().mounting.scan_axis == ScanAxis::kX;
   const std::int64_t next = profile().mounting.passes;
   const auto may_be_lost = [&](std::int64_t column, std::int64_t row) {
-    const auto over = std::size_t(line_of(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
-    return differ.blocked[over] || !differ.worked[over];
+    return differ.may_be_lost[std::size_t(line_of(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)))];
   };
   const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
     if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row))
       return false;
-    const auto line = image.row(static_cast<std::uint32_t>(row));
-    const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
+    if (differ.neighbour_row != row) image.row(static_cast<std::uint32_t>(row), differ.neighbour);
+    differ.neighbour_row = row;
     const std::uint64_t fired = fired_more(plane, std::size_t(row) * row_words_ + std::size_t(column) / 64);
-    return after % 2 == 1 && (fired >> (column % 64) & 1) == 0;
+    return ((differ.neighbour[std::size_t(column) / 64] & ~fired) >> (column % 64) & 1) != 0;
   };
-  std::vector<std::uint64_t>& wanted = differ.wanted;
+  differ.neighbour_row = -1;
   for (std::uint32_t row = 0; row < image.rows(); ++row) {
-    const auto line = image.row(row);
-    if (line.empty() && fires_row_[row] == 0) continue;
-    std::fill(wanted.begin(), wanted.end(), 0);
-    for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
-      for (std::uint32_t c = line[i]; c < line[i + 1];) {
-        const std::uint32_t to = std::min((c / 64 + 1) * 64, line[i + 1]);
-        const std::uint64_t ones = to - c == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << (to - c)) - 1;
-        wanted[c / 64] |= ones << (c % 64);
-        c = to;
-      }
-    }
+    image.row(row, differ.wanted);
     for (std::uint32_t w = 0; w < row_words_; ++w) {
       const std::uint64_t got = fired_more(plane, std::size_t{row} * row_words_ + w);
-      for (std::uint64_t different = got ^ wanted[w]; different != 0; different &= different - 1) {
+      for (std::uint64_t different = got ^ differ.wanted[w]; different != 0; different &= different - 1) {
         const auto bit = static_cast<std::uint32_t>(std::countr_zero(different));
         const std::uint32_t column = w * 64 + bit;
         const bool extra = (got >> bit & 1) != 0;
@@ -404,28 +449,36 @@ void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::ui
   }
 }
 
-void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, std::uint64_t lost) {
+void Printing::compare(std::span<const BitRows* const> planes, std::uint64_t moved, std::uint64_t lost) {
+  if (words_) return compare_words(moved, lost);
   Differences differ;
   differ.wanted.resize(row_words_);
-  differ.worked.resize(machine_.lines_);
-  differ.blocked.resize(machine_.lines_);
-  coverage(differ.worked, differ.blocked);
+  differ.neighbour.resize(row_words_);
+  differ.may_be_lost = lines_that_may_be_lost();
   for (std::uint32_t plane = 0; plane < planes.size(); ++plane) {
-    const RunsView& image = planes[plane];
-    if (image.columns != machine_.columns_ || image.rows() != machine_.rows_) return fault("the image is of another size");
+    const BitRows& image = *planes[plane];
+    if (image.columns() != machine_.columns_ || image.rows() != machine_.rows_) return fault("the image is of another size");
     compare_plane(image, plane, moved, lost, differ);
   }
-  const auto& [missing, added, first, first_of_all, worked, blocked, wanted] = differ;
-  if (first.empty()) check_numbers(planes);
-  if (!first.empty()) {
-    return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", first, missing, added));
+  if (differ.first.empty()) check_numbers(first_of_layer(*planes[0]));
+  const std::uint64_t missing = differ.missing, added = differ.added;
+  if (!differ.first.empty()) {
+    return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", differ.first, missing, added));
   }
   if (added != moved || missing != moved + lost) {
     // The manifest alone may speak of such pixels.
-    const std::string position = first_of_all.empty() ? fmt::format("layer {}", layer_.index) : first_of_all;
+    const std::string position = differ.first_of_all.empty() ? fmt::format("layer {}", layer_.index) : differ.first_of_all;
     fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", position, missing, added,
                      moved + lost, moved));
   }
+}
+
+void Printing::compare_words(std::uint64_t moved, std::uint64_t lost) {
+  if (!words_->agrees(lines_that_may_be_lost(), moved, lost)) return fault("drops differ from the image");
+  check_numbers(words_->first_line());
+  count.drops = words_->drops();
+  count.farthest_along_um = std::max(count.farthest_along_um, words_->along_um());
+  count.farthest_across_um = std::max(count.farthest_across_um, words_->across_um());
 }
 
 // Maintenance of head and powder on the virtual machine, in any dialect: stages/replay/printing.h.

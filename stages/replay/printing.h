@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "stages/replay/fired_words.h"
 #include "stages/replay/machine.h"
 
 namespace lamina::replay {
@@ -21,8 +22,9 @@ inline constexpr double kHalfMmPerMinute = 0.5 / 60;
 
 /// What a program is carried out for.
 enum class Purpose : std::uint8_t {
-  kPrint,  // its drops
-  kTime    // its movements alone: nothing fires, and no image is held
+  kPrint,    // its drops, one by one
+  kCompare,  // its drops, 64 pixels at a time: whether they are those of the image, and not where they are not
+  kTime      // its movements alone: nothing fires, and no image is held
 };
 
 /// Where the axes stand between two layers, as programs count them: the head waits at its safe place, the roller at home,
@@ -39,6 +41,8 @@ class Printing {
   /// planes  most drops of a pixel
   Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch = nullptr,
            std::uint32_t planes = 1);
+  /// For kCompare. planes  of the machine's size; outlive this object
+  Printing(const VirtualMachine& machine, const Layer& layer, std::span<const BitRows* const> planes);
 
   const Machine& profile() const { return machine_.machine_; }
   /// Sweeps that are there since nozzles cannot fire all of their drops at the scan's speed, by number; after finish().
@@ -46,6 +50,7 @@ class Printing {
   /// Times the others alone; before the program.
   void leave_out(std::set<std::uint32_t> sweeps) { left_out_ = std::move(sweeps); }
   std::uint32_t layer() const { return layer_.index; }
+  const Layer& of_layer() const { return layer_; }
   /// Where the program finds the machine.
   AxisPositions axis_positions() const;
   std::uint32_t nozzles() const { return static_cast<std::uint32_t>(machine_.nozzle_.size()); }
@@ -76,8 +81,11 @@ class Printing {
   void at_step(std::int64_t step);
   /// drops  in a burst, where the dialect can say several
   void fire(std::uint32_t nozzle, std::uint32_t drops = 1);
-  /// Fires all nozzles with set bits; bit 63 of the first word is nozzle 0.
-  void fire_words(std::span<const std::uint64_t> words);
+  /// The lowest bits of words that fire are the first nozzles; else the highest ones are.
+  void lowest_bits_first() { flip_ = 0; }
+  /// Fires all nozzles with set bits: words for each bit of the drops, the lowest bit first.
+  /// returns  the most drops of a nozzle
+  std::uint32_t fire_words(std::span<const std::uint64_t> words, std::uint32_t bits = 1);
   /// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
   std::uint32_t drop_bits() const { return replay::drop_bits(profile().head.max_drops); }
 
@@ -147,7 +155,7 @@ class Printing {
   /// Ends the layer: adds the time of what the profile knows and the program does not spell.
   const Count& finish();
   /// Compares with the image of each drop; see VirtualMachine::replay.
-  void compare(std::span<const RunsView> planes, std::uint64_t moved, std::uint64_t lost);
+  void compare(std::span<const BitRows* const> planes, std::uint64_t moved, std::uint64_t lost);
 
   Count count;
 
@@ -160,11 +168,15 @@ class Printing {
   struct Differences {
     std::uint64_t missing = 0, added = 0;
     std::string first, first_of_all;  // that nothing explains; explained or not
-    std::vector<bool> worked, blocked;
-    std::vector<std::uint64_t> wanted;
+    std::vector<bool> may_be_lost;
+    std::vector<std::uint64_t> wanted, neighbour;
+    std::int64_t neighbour_row = -1;
   };
-  void compare_plane(const RunsView& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
+  void compare_words(std::uint64_t moved, std::uint64_t lost);
+  void compare_plane(const BitRows& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
                      Differences& differ) const;
+  std::uint32_t max_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const;
+  void fire_singly(std::span<const std::uint64_t> words, std::uint32_t bits);
   /// The 64 pixels of a word that are fired more than so many times.
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
   /// what  the complete message
@@ -178,8 +190,8 @@ class Printing {
   void check_spread();
   void check_speed(double mm_s, bool scanning);
   void state_sweep(std::uint32_t of);
-  std::int64_t first_of_layer(const RunsView& image) const;
-  void check_numbers(std::span<const RunsView> planes);
+  std::int64_t first_of_layer(const BitRows& image) const;
+  void check_numbers(std::int64_t first_of_layer);
   // Of heads that fire several drops: sweeps follow each other over a place until its drops are fired.
   std::uint32_t sweeps_per_position() const;
   void leave_sweep();
@@ -193,7 +205,7 @@ class Printing {
   void check_pauses();
   void check_stated();
   void leaves_wiper(std::string_view what);
-  void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
+  std::vector<bool> lines_that_may_be_lost() const;
   /// Across and along the scan, of a pixel.
   std::array<std::int64_t, 2> line_and_position(std::uint32_t column, std::uint32_t row) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const { return line_and_position(column, row)[0]; }
@@ -218,9 +230,10 @@ class Printing {
   bool moves_powder_ = false;                     // moves a vat or the roller
   double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
-  std::uint32_t planes_, times_bits_;
+  std::uint32_t planes_, times_bits_, flip_ = 63;
+  std::optional<FiredWords> words_;  // for kCompare
+  std::vector<std::uint64_t> one_;   // of a nozzle
   std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
-  std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
   struct PositionCount {
     std::uint32_t number = 0, drops = 0;  // drops: of the pixel that gets most
   } position_;

@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 
 #include "stages/data/buffer.h"
 
@@ -28,12 +29,28 @@ class CodeReader {
     good_ = false;
     return 0;
   }
+  /// Of a run: how far its begin and its end move.
+  std::array<std::int64_t, 2> movements() {
+    if (stay_ > 0 && stay_-- > 0) return {};
+    if (at_ == code_.size()) good_ = false;
+    if (!good_) return {};
+    const auto pair = static_cast<std::uint64_t>(code_[at_++]);
+    if (pair < 225) return {unfolded(pair / 15), unfolded(pair % 15)};
+    if (pair < 255) {
+      stay_ = pair - 224;
+      return {};
+    }
+    const std::int64_t begin = unfolded(number());
+    return {begin, unfolded(number())};
+  }
+  bool stays() const { return stay_ > 0; }  // more runs than were read
   bool good() const { return good_; }
   bool ended() const { return good_ && at_ == code_.size(); }
 
  private:
   std::span<const std::byte> code_;
   std::size_t at_ = 0;
+  std::uint64_t stay_ = 0;  // runs
   bool good_ = true;
 };
 
@@ -75,10 +92,12 @@ Result<Runs> unpack_runs(std::span<const std::byte> packed, std::uint32_t column
       const std::uint64_t count = tag < 2 ? last - first : tag - 2;
       if (count > columns + std::uint64_t{1} || count % 2 != 0) return wrong;
       std::int64_t column = -1;
+      std::array<std::int64_t, 2> moved{};
       for (std::size_t i = 0; i < count; ++i) {
         std::int64_t next = 0;
         if (tag < 2) {
-          next = runs.change[first + i] + (tag == 1 ? unfolded(reader.number()) : 0);
+          if (tag == 1 && i % 2 == 0) moved = reader.movements();
+          next = runs.change[first + i] + moved[i % 2];
         } else {
           next = std::max<std::int64_t>(column, 0) + static_cast<std::int64_t>(reader.number());
         }
@@ -86,6 +105,7 @@ Result<Runs> unpack_runs(std::span<const std::byte> packed, std::uint32_t column
         runs.change.push_back(static_cast<std::uint32_t>(next));
         column = next;
       }
+      if (reader.stays()) return wrong;
       first = begin;
       last = runs.change.size();
       runs.row_offset.push_back(static_cast<std::uint32_t>(last));

@@ -1,5 +1,6 @@
 // stages/program/planes/README.md has the format.
 #include <array>
+#include <bit>
 #include <optional>
 #include <vector>
 
@@ -10,52 +11,33 @@ namespace {
 
 constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kGrey = 0x4C06;
 
-/// The bits of a row of u32, the highest bit of the first one in bit 63 of the first word. returns  whether any is set
-bool read_row(const char* row, std::uint32_t words, std::vector<std::uint64_t>& vector) {
-  std::uint64_t any = 0;
-  vector.assign((words + 1) / 2, 0);
-  for (std::uint32_t w = 0; w < words; ++w) {
-    std::uint64_t bits = 0;
-    for (int byte = 0; byte < 4; ++byte) bits |= std::uint64_t{static_cast<std::uint8_t>(row[4 * w + byte])} << (8 * byte);
-    vector[w / 2] |= w % 2 == 0 ? bits << 32 : bits;
-    any |= bits;
-  }
-  return any != 0;
+/// Words of a row of u32, the highest bit of the first one in bit 63 of the first word.
+void read_row(const char* row, std::uint32_t words, std::uint64_t* to) {
+  for (std::uint32_t w = 0; w + 1 < words; w += 2, row += 8) *to++ = std::rotl(little_endian<std::uint64_t>(row), 32);
+  if (words % 2 != 0) *to = std::uint64_t{little_endian<std::uint32_t>(row)} << 32;
 }
 
 /// The rows of a plane, or of the planes of a grey one, and what each step of them fires.
 class PlaneRows {
  public:
   PlaneRows(std::string_view bytes, std::uint32_t steps, std::uint32_t words, std::uint32_t planes)
-      : bytes_(bytes), steps_(steps), words_(words), vector_(planes) {}
+      : bytes_(bytes), steps_(steps), words_(words), planes_(planes), vector_(std::size_t{planes} * ((words + 1) / 2)) {}
 
   void fire(std::uint32_t row, std::int64_t step, Printing& printing, Passes& passes) {
-    bool any = false;
-    for (std::size_t p = 0; p < vector_.size(); ++p) {
-      any |= read_row(bytes_.data() + (p * steps_ + row) * words_ * 4, words_, vector_[p]);
+    std::uint64_t any = 0;
+    for (std::size_t p = 0; p < planes_; ++p) {
+      read_row(bytes_.data() + (p * steps_ + row) * words_ * 4, words_, vector_.data() + p * ((words_ + 1) / 2));
     }
-    if (!any) return;
+    for (const std::uint64_t word : vector_) any |= word;
+    if (any == 0) return;
     printing.at_step(step);
-    if (vector_.size() == 1) {
-      passes.at(step);
-      return printing.fire_words(vector_[0]);
-    }
-    std::uint32_t maximum = 0;
-    for (std::uint32_t nozzle = 0; nozzle < words_ * 32; ++nozzle) {
-      std::uint32_t drops = 0;
-      for (std::size_t p = 0; p < vector_.size(); ++p) {
-        drops |= static_cast<std::uint32_t>(vector_[p][nozzle / 64] >> (63 - nozzle % 64) & 1) << p;
-      }
-      maximum = std::max(maximum, drops);
-      if (drops > 0) printing.fire(nozzle, drops);
-    }
-    passes.at(step, maximum);
+    passes.at(step, printing.fire_words(vector_, planes_));
   }
 
  private:
   std::string_view bytes_;
-  std::uint32_t steps_, words_;
-  std::vector<std::vector<std::uint64_t>> vector_;  // of each plane
+  std::uint32_t steps_, words_, planes_;
+  std::vector<std::uint64_t> vector_;  // of each plane
 };
 
 }  // namespace

@@ -1,4 +1,6 @@
 // stages/program/raw/README.md has the format.
+#include <vector>
+
 #include "stages/replay/bytes.h"
 
 namespace lamina::replay {
@@ -12,6 +14,8 @@ void read_raw(std::string_view text, Printing& printing) {
   printing.state_heights(bottom_mm, reader.mm());
   printing.count.vats = reader.word();
   const std::uint32_t words = (printing.nozzles() + 127) / 128, planes = printing.drop_bits();
+  std::vector<std::uint64_t> vector(std::size_t{words} * planes * 2);
+  printing.lowest_bits_first();
   while (printing.ok()) {
     take_maintenance_records(reader, printing, passes);
     const std::string_view tag = reader.take(4);
@@ -34,22 +38,14 @@ void read_raw(std::string_view text, Printing& printing) {
       for (std::uint32_t left = reader.word(); left > 0; --left, step += backward ? -1 : 1) {
         const std::string_view bytes = reader.take(std::size_t{words} * planes * 16);
         if (!printing.ok()) return;
-        bool any = false;
-        for (const char c : bytes) any = any || c != 0;
-        if (!any) continue;
-        printing.at_step(step);
+        std::uint64_t any = 0;
         // Each word is a number of 128 bits, the highest byte first; bit i is nozzle i of the word.
-        std::uint32_t maximum = 0;
-        for (std::uint32_t nozzle = 0; nozzle < words * 128; ++nozzle) {
-          std::uint32_t drops = 0;
-          for (std::uint32_t plane = 0; plane < planes; ++plane) {
-            const auto byte = static_cast<std::uint8_t>(bytes[(plane * words + nozzle / 128) * 16 + 15 - nozzle % 128 / 8]);
-            drops += static_cast<std::uint32_t>(byte >> (nozzle % 8) & 1) << plane;
-          }
-          maximum = std::max(maximum, drops);
-          if (drops > 0) printing.fire(nozzle, drops);
+        for (std::size_t w = 0; w < vector.size(); ++w) {
+          any |= vector[w] = __builtin_bswap64(little_endian<std::uint64_t>(bytes.data() + 8 * (w ^ 1)));
         }
-        passes.at(step, maximum);
+        if (any == 0) continue;
+        printing.at_step(step);
+        passes.at(step, printing.fire_words(vector, planes));
       }
     }
   }

@@ -263,13 +263,17 @@ Status expand_file(const std::string& path, std::uint64_t max_bytes, const Take&
   }
 }
 
-Result<std::string> read_content(const std::string& path, std::uint64_t max_bytes) {
-  std::string content;
-  const Status status = expand_file(path, max_bytes, [&](std::span<const std::byte> piece) {
+Status read_content(const std::string& path, std::uint64_t max_bytes, std::string& content) {
+  content.clear();
+  return expand_file(path, max_bytes, [&](std::span<const std::byte> piece) {
     content.append(reinterpret_cast<const char*>(piece.data()), piece.size());
     return Status();
   });
-  if (!status) return status.error();
+}
+
+Result<std::string> read_content(const std::string& path, std::uint64_t max_bytes) {
+  std::string content;
+  if (Status status = read_content(path, max_bytes, content); !status) return status.error();
   return content;
 }
 

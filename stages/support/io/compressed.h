@@ -65,6 +65,8 @@ Status expand_file(const std::string& path, std::uint64_t max_bytes,
 
 /// The content of a file. errors  of expand_file
 Result<std::string> read_content(const std::string& path, std::uint64_t max_bytes);
+/// The same into memory that is used again.
+Status read_content(const std::string& path, std::uint64_t max_bytes, std::string& content);
 
 /// As digest_file(), of the content. A file whose frame states another size than `expected` is not expanded; without one at
 /// most 16 MiB are.

@@ -42,9 +42,16 @@ function decodeRuns(code, rows) {
     }
     const begin = change.length;
     if (tag === 1) {
-      for (let i = first; i < last; ++i) {
-        const folded = number();
-        change.push(change[i] + (folded % 2 ? -(folded + 1) / 2 : folded / 2));
+      const moved = folded => folded % 2 ? -(folded + 1) / 2 : folded / 2;
+      for (let i = first; i < last; i += 2) {
+        const pair = code[at++], wide = pair === 255;
+        if (pair > 224 && !wide) {  // so many runs stay
+          for (const stay = i + 2 * (pair - 223); i < stay; ++i) change.push(change[i]);
+          i -= 2;
+          continue;
+        }
+        const begin = wide ? number() : Math.floor(pair / 15), end = wide ? number() : pair % 15;
+        change.push(change[i] + moved(begin), change[i + 1] + moved(end));
       }
     } else {
       for (let left = tag - 2, column = 0; left > 0; --left) change.push(column += number());

@@ -2,8 +2,9 @@
 //
 // Row by row, all numbers in base 128, low digit first, the high bit set on all bytes but the last:
 //   0 n          the next n rows are like the row before (before the first row: empty)
-//   1 d ...      as many changes as in the row before, each that of the row before plus d, folded: 0 -1 1 -2 2 ... are
-//                0 1 2 3 4 ...
+//   1 p ...      as many runs as in the row before, each with its begin moved by b and its end by e, folded: 0 -1 1 -2 2 ...
+//                are 0 1 2 3 4 ...; p is one byte, 15 b + e, where both are below 15; 223 + n of n runs that stay, 2 to 31;
+//                else 255, and b and e follow
 //   2 + m g ...  m changes, each the one before it in the row plus g (the first: g)
 // and all of that in one zlib stream. Most rows of a part are like the row before, or near to it.
 #pragma once
