@@ -9,6 +9,7 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/compare.h"
+#include "stages/geometry/bits.h"
 #include "stages/program/dialect.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/version.h"
@@ -143,7 +144,10 @@ Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord
     work.level_encoder->tag(tags);
   }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(images.whole, images.levels.data(), work, record, work.file); !status) return status;
+    if (Status status = images.bits != nullptr ? encode_bits(*images.bits, work, record)
+                                               : encode_one(images.whole, images.levels.data(), work, record, work.file);
+        !status)
+      return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
@@ -168,6 +172,13 @@ Status ImageFiles::encode_one(const Runs& image, const Levels* levels, FileWork&
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
   const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
                                            : work.level_encoder->encode(*levels, head_.full_level(), x, y, file);
+  if (status) return {};
+  return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
+}
+
+Status ImageFiles::encode_bits(const BitImage& image, FileWork& work, const LayerRecord& record) const {
+  work.file.clear();
+  const Status status = work.encoder->encode(image, head_.grid.x.dpi(), head_.grid.y.dpi(), work.file);
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
@@ -205,7 +216,14 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
                                                   feeds.error().message)};
   }
   report_unfed(record);
-  std::vector<RunsView> planes{images.whole};
+  Runs runs;
+  if (images.bits != nullptr) {
+    RunsBuilder builder(images.bits->columns());
+    RowRuns rows(*images.bits);
+    for (std::uint32_t r = 0; r < rows.rows(); ++r) builder.add_changes(rows.row(r));
+    runs = builder.finish();
+  }
+  std::vector<RunsView> planes{images.bits != nullptr ? runs : images.whole};
   if (head_.max_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
   return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }

@@ -12,6 +12,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
+#include "stages/data/bit_image.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -31,6 +32,7 @@ struct LayerImages {
   std::span<const Runs> planes;    // of all materials, of each drop, if pixels can get several
   std::span<const Runs> several;   // those that have names (ManifestHead::named_images)
   std::span<const Levels> levels;  // for formats that carry shares of the voxels, or drops: one, or one a material
+  const BitImage* bits = nullptr;  // in place of `whole`, of an image whose runs would take more memory
 };
 
 class ImageFiles {
@@ -86,6 +88,7 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void report_unfed(LayerRecord& record) const;
+  Status encode_bits(const BitImage& image, FileWork& work, const LayerRecord& record) const;
   Status encode_one(const Runs& image, const Levels* levels, FileWork& work, const LayerRecord& record,
                     formats::Bytes& file) const;
 

@@ -34,7 +34,11 @@ namespace {
 /// No file at all, for timing what comes before it.
 class NullEncoder : public ImageEncoder {
  public:
-  Status encode(const RunsView&, double, double, Bytes& file) override {
+  Status encode(const RunsView&, double, double, Bytes& file) override { return encode_nothing(file); }
+  Status encode(const BitRows&, double, double, Bytes& file) override { return encode_nothing(file); }
+
+ private:
+  static Status encode_nothing(Bytes& file) {
     file.clear();
     return {};
   }
