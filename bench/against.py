@@ -8,9 +8,9 @@
 
 Every kind of run is taken once to warm up, and its layers are compared with those of the old build, byte for byte, before
 any clock starts. Then kinds take turns, in an order that turns with the round; printed are medians of wall seconds. Outputs
-lie in memory (/dev/shm) where there is one. The limit is measured in the same run on one thread: reading the part's file,
-writing files of the same sizes, and touching each crossing once (bench/limits.cpp); `lamina jet --timing` measures the same by
-itself. What the rays' tree costs, and the bound of what layers need, are of bench/index.cpp.
+lie in memory (/dev/shm) where there is one. The limit is the one of `lamina jet --timing`: reading the part's file, writing files
+of the same sizes, and touching each crossing once, on one thread. What the rays' tree costs, and the bound of what layers need,
+are of bench/index.cpp.
 """
 import argparse
 import hashlib
@@ -28,7 +28,7 @@ sys.path.insert(0, os.path.join(ROOT, "bench"))
 import figures  # noqa: E402
 from measure import build, busy_and_total, instruction_sets, models_default, say, started  # noqa: E402
 
-# part, side of the bed (mm), layer (mm); names as in bench/jet.py and bench/limits.cpp
+# part, side of the bed (mm), layer (mm); names as in bench/jet.py
 CASES = {
     "knot800k": ("knot800k.stl", 100, 0.05),
     "scan680k": ("scan680k.stl", 100, 0.1),
@@ -108,44 +108,19 @@ class Against:
         return runs, {name: size for name, (_, size) in answers.items()}
 
     def limit(self, case):
-        """Seconds of reading the part and of writing files of the layers' sizes, one thread; and what --timing has for the
-        limit, touching included."""
-        self.run(case, "new", [])
-        folder = os.path.join(self.work, "out", "layers")
-        sizes = [os.path.getsize(os.path.join(folder, name)) for name in os.listdir(folder)]
-        data, target = memoryview(os.urandom(max(sizes))), os.path.join(self.work, "limit")
-        block, reads, writes = bytearray(1 << 18), [], []
-        for _ in range(5):
-            start = time.perf_counter()
-            with open(os.path.join(self.parts, CASES[case][0]), "rb", buffering=0) as file:
-                while file.readinto(block):
-                    pass
-            reads.append(time.perf_counter() - start)
-            shutil.rmtree(target, ignore_errors=True)
-            os.makedirs(target)
-            start = time.perf_counter()
-            for number, size in enumerate(sizes):
-                name = f"{target}/{number}"
-                file = os.open(name + ".part", os.O_WRONLY | os.O_CREAT, 0o666)
-                os.write(file, data[:size])
-                os.close(file)
-                os.rename(name + ".part", name)
-            writes.append(time.perf_counter() - start)
-        return {"read": statistics.median(reads), "write": statistics.median(writes), "reported": self.reported_limit(case)}
-
-    def reported_limit(self, case):
+        """Seconds of the limit and of its parts, as --timing has them: medians of five."""
         reported = []
         for _ in range(5):
             out = os.path.join(self.work, "out")
             shutil.rmtree(out, ignore_errors=True)
             done = subprocess.run(self.command(case, "new", ["--timing", "--json", "-o", out]), check=True, stdout=subprocess.PIPE)
-            reported.append(json.loads(done.stdout)["timing"]["limit"]["seconds"])
-        return statistics.median(reported)
+            reported.append(json.loads(done.stdout)["timing"]["limit"])
+        return {key: statistics.median(one[key] for one in reported)
+                for key in ("read_seconds", "write_seconds", "touch_seconds", "seconds")}
 
     def benchmarks(self, cases):
-        """What lamina_bench says of the parts: touching each crossing once (limits), the rays' tree, the bound of layers. By
-        kind and case."""
-        found = {"limits": {}, "tree": {}, "bound": {}}
+        """What lamina_bench says of the parts: the rays' tree, the bound of layers. By kind and case."""
+        found = {"tree": {}, "bound": {}}
         if self.options.bench:
             wanted = f"^({'|'.join(found)})/({'|'.join(cases)})(/|$)"
             output = subprocess.run([self.options.bench, f"--benchmark_filter={wanted}", "--benchmark_format=json"], check=True,
@@ -191,7 +166,7 @@ def rows_of(case, runs, limit):
         requested, old, new = which == engine, runs["old " + which], runs[which]
         yield [f"`{case}`", which, f"{1e3 * wall(old):.0f}", f"{1e3 * wall(new):.0f}",
                lower_bound(wall(old) / wall(new), minimum if requested else None), f"{processor(old) / processor(new):.2f}",
-               not_above(wall(new) / limit, multiple if requested else None) if limit else "-", f"{peak(old):.0f}",
+               not_above(wall(new) / limit["seconds"], multiple if requested else None), f"{peak(old):.0f}",
                not_above(peak(new), mib if which == "default" else None, 0)]
 
 
@@ -214,16 +189,13 @@ def png_lines(cases):
     yield ""
 
 
-def limit_lines(cases, bench):
-    """The limit in its parts, as measured here and as --timing has it."""
-    rows = []
-    for case, (*_, limit) in cases.items():
-        touch = bench["limits"].get(case, {}).get("seconds")
-        rows.append([f"`{case}`", f"{1e3 * limit['read']:.1f}", f"{1e3 * limit['write']:.1f}", f"{1e3 * touch:.1f}" if touch else "-",
-                     f"{1e3 * (limit['read'] + limit['write'] + touch):.1f}" if touch else "-", f"{1e3 * limit['reported']:.1f}"])
-    yield "The limit, ms, and what `--timing` has for it:"
+def limit_lines(cases):
+    """The limit in its parts."""
+    yield "The limit in its parts, ms:"
     yield ""
-    yield from figures.table(["job", "read", "write", "touch each crossing", "limit", "`--timing`"], rows)
+    yield from figures.table(["job", "read", "write", "touch each crossing", "limit"], [
+        [f"`{case}`"] + [f"{1e3 * limit[key]:.1f}" for key in ("read_seconds", "write_seconds", "touch_seconds", "seconds")]
+        for case, (*_, limit) in cases.items()])
 
 
 def index_lines(bench):
@@ -252,16 +224,15 @@ def page(options, found, bench):
            f"instructions: {instruction_sets()[-1]}; part files in the page cache, outputs in memory. Other programs used "
            f"{100 * found['others']:.0f} % of the processors.")
     yield ""
-    yield ("Medians of wall milliseconds of alternating runs. The limit is the time to read the part, write files of the same sizes "
-           "and touch each crossing once on one thread. The layers of all kinds of runs are the same bytes.")
+    yield ("Medians of wall milliseconds of alternating runs. The limit is that of `--timing`: the time to read the part, write files "
+           "of the same sizes and touch each crossing once on one thread. The layers of all kinds of runs are the same bytes.")
     yield ""
     rows = []
     for case, (runs, _, limit) in found["cases"].items():
-        touch = bench["limits"].get(case)
-        rows += rows_of(case, runs, limit["read"] + limit["write"] + touch["seconds"] if touch else None)
+        rows += rows_of(case, runs, limit)
     yield from figures.table(["job", "engine", "old, ms", "new, ms", "times as fast", "processor time", "times the limit", "old MiB",
                               "new MiB"], rows)
-    yield from limit_lines(found["cases"], bench)
+    yield from limit_lines(found["cases"])
     yield "Without wide instructions (`--isa plain`), with AVX2 only, and the two engines compared:"
     yield ""
     yield from figures.table(["job", "plain, times as fast", "the same, contours", "avx2, times as fast",

@@ -70,22 +70,18 @@ DESCRIPTION = {
 }
 
 
-def touched_jobs(root):
-    """What lamina_bench says of touching each crossing once, by job."""
-    return {entry["name"].split("/")[1]: entry for entry in (load(root, "limits") or {}).get("benchmarks", [])}
+def limit_of(root, name, result):
+    """Seconds of the limit of --timing: of the result, or of the same job in those of growth; None without either."""
+    shares = (load(root, "growth") or {}).get("shares", {})
+    return result.get("limit") or shares.get(name, {}).get("limit")
 
 
-def times_the_limit(touched, name, result, wall):
-    """Ratio of wall seconds to reading, writing and touching each crossing once; - where one of them was not measured."""
-    if name not in touched:
-        return "-"
-    limit = result["limits"]
-    touch = touched[name]["real_time"] * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1}[touched[name]["time_unit"]]
-    return f"{wall / (limit['read'] + limit['write'] + touch):.1f}"
+def times_the_limit(root, name, result, wall):
+    limit = limit_of(root, name, result)
+    return f"{wall / limit:.1f}" if limit else "-"
 
 
 def time_rows(root, results):
-    touched = touched_jobs(root)
     for name, result in results:
         rays, contours = result["lamina"]["rays-tiff-g4"], result["lamina"]["contours-tiff-g4"]
         peer = result.get("prusa")
@@ -93,7 +89,7 @@ def time_rows(root, results):
         yield [f"`{name}`: {DESCRIPTION[name]}", f"{result['layers']} of {result['columns']} x {result['rows']}",
                spread(peer) if peer else "-", spread(rays), f"{peer['wall'] / rays['wall']:.1f}" if peer else "-",
                spread(contours), f"{peer['wall'] / contours['wall']:.1f}" if peer else "-", str(result["target"]),
-               times_the_limit(touched, name, result, rays["wall"]), times_the_limit(touched, name, result, contours["wall"]),
+               times_the_limit(root, name, result, rays["wall"]), times_the_limit(root, name, result, contours["wall"]),
                f"{pixels / rays['wall'] / 1e9:.1f}"]
 
 
@@ -123,26 +119,21 @@ def stage_rows(results):
 
 
 def limit_rows(root, results):
-    touched = touched_jobs(root)
     for name, result in results:
-        limit = result["limits"]
-        case = touched.get(name)
-        yield [f"`{name}`", f"{limit['read_bytes'] / 1e6:.1f} MB in {1000 * limit['read']:.0f} ms",
-               f"{limit['write_files']} files, {limit['write_bytes'] / 1e6:.1f} MB in {1000 * limit['write']:.0f} ms",
-               f"{case['crossings'] / 1e6:.1f} million in {case['real_time']:.1f} {case['time_unit']}" if case else "-",
-               seconds(result["lamina"]["rays-tiff-g4"]["wall"]) + " s"]
+        if limit := limit_of(root, name, result):
+            yield [f"`{name}`", f"{1e3 * limit:.1f} ms", seconds(result["lamina"]["rays-tiff-g4"]["wall"]) + " s"]
 
 
 def mslicer_text(root, results):
     """mslicer compared with ours, where it was run: wrong pixels next to the time."""
-    touched, rows = touched_jobs(root), []
+    rows = []
     for name, result in results:
         if "mslicer" not in result:
             continue
         peer, ours = result["mslicer"], result["lamina"]["rays-tiff-g4"]
-        rows.append([f"`{name}`", spread(peer), f"{seconds(peer['processor'])} s", times_the_limit(touched, name, result, peer["wall"]),
+        rows.append([f"`{name}`", spread(peer), f"{seconds(peer['processor'])} s", times_the_limit(root, name, result, peer["wall"]),
                      f"{peer['peak_mib']:.0f} MiB", f"{peer['pixels_different']} of {peer['images_compared']} layers", spread(ours),
-                     f"{seconds(ours['processor'])} s", times_the_limit(touched, name, result, ours["wall"]),
+                     f"{seconds(ours['processor'])} s", times_the_limit(root, name, result, ours["wall"]),
                      f"{peer['wall'] / ours['wall']:.1f}"])
     yield "## mslicer"
     yield ""
@@ -248,10 +239,10 @@ def lines(root, cases):
                      stage_rows(results))
     yield "## What no program can be faster than"
     yield ""
-    yield ("Measured in the same run, on one thread: reading the part's file, writing files of the same sizes (temporary "
-           "name, rename), and touching each crossing of a row with the part's surface once, in memory.")
+    yield ("The limit of `--timing`, on one thread: reading the part's file, writing files of the same sizes (temporary name, rename), "
+           "and touching each crossing of a row with the part's surface once, in memory.")
     yield ""
-    yield from table(["job", "read", "write", "touch each crossing", "the whole job, rays"], limit_rows(root, results))
+    yield from table(["job", "limit", "the whole job, rays"], limit_rows(root, results))
     yield from memory_text(root)
     yield from growth_page.readme(load(root, "growth"))
     yield "## Again"

@@ -147,7 +147,7 @@ class Bench:
         if other_runs:
             result["mslicer"] = dict(median_of(other_runs), version=mslicer.version(self.options.mslicer),
                                      **self.check_other_peer(case, goo, layers))
-        result["limits"] = self.limits(os.path.join(self.parts_folder, part), out_g4)
+        result["limit"] = self.limit(case)
         figures.save(ROOT, case, result)
 
     def check_peer(self, case, archive, layers, side):
@@ -185,59 +185,14 @@ class Bench:
         return {"layers": goo.layers, "images_compared": len(different), "pixels_different": sum(different),
                 "pixels_different_max": max(different)}
 
-    def limits(self, part, out):
-        """What any program has to do for this job: read the part's bytes, write the layers' files."""
-        def timed(action):
-            times = []
-            for _ in range(5):
-                start = time.perf_counter()
-                action()
-                times.append(time.perf_counter() - start)
-            return statistics.median(times)
-
-        def read():
-            with open(part, "rb", buffering=0) as file:
-                block = bytearray(1 << 20)
-                while file.readinto(block):
-                    pass
-
-        folder = os.path.join(out, "layers")
-        sizes = [os.path.getsize(os.path.join(folder, name)) for name in sorted(os.listdir(folder))]
-        data = memoryview(os.urandom(max(sizes)))
-        target = os.path.join(self.work, "limit")
-
-        def write():
-            for number, size in enumerate(sizes):
-                name = os.path.join(target, str(number))
-                with open(name + ".part", "wb", buffering=0) as file:
-                    file.write(data[:size])
-                os.rename(name + ".part", name)
-
-        def write_fresh():
-            shutil.rmtree(target, ignore_errors=True)
-            os.makedirs(target)
-            os.sync()
-            start = time.perf_counter()
-            write()
-            return time.perf_counter() - start
-
-        result = {"read_bytes": os.path.getsize(part), "read": timed(read), "write_bytes": sum(sizes),
-                  "write_files": len(sizes), "write": statistics.median(write_fresh() for _ in range(5))}
-        shutil.rmtree(target)
-        return result
-
-    def crossings(self):
-        """Touching each crossing of a job once, from lamina_bench (bench/limits.cpp)."""
-        program = os.path.join(ROOT, "build/release/lamina_bench")
-        if not os.path.exists(program):
-            return
-        output = subprocess.run([program, "--benchmark_filter=^limits/", "--benchmark_format=json"], check=True,
-                                stdout=subprocess.PIPE, env=dict(os.environ, LAMINA_BENCH_PARTS=self.parts_folder)).stdout
-        found = json.loads(output)
-        figures.save(ROOT, "limits", {
-            "commit": figures.commit(ROOT), "date": time.strftime("%Y-%m-%d"), "machine": figures.machine(self.cache),
-            "benchmarks": [{key: entry[key] for key in ("name", "real_time", "time_unit", "crossings", "layers")
-                            if key in entry} for entry in found["benchmarks"]]})
+    def limit(self, case):
+        """Seconds that no program can be faster than, as --timing has them: the median of five runs."""
+        seconds = []
+        for _ in range(5):
+            command, _ = self.job(case, "rays", "tiff-g4", ["--timing"])
+            done = subprocess.run(command, check=True, stdout=subprocess.PIPE)
+            seconds.append(json.loads(done.stdout)["timing"]["limit"]["seconds"])
+        return statistics.median(seconds)
 
     def memory(self):
         """Peak resident memory: 100 layers against 10,000 of one part, and a large bed with a small budget."""
@@ -299,7 +254,6 @@ def main(arguments):
     if not options.memory:
         for case in cases:
             bench.run_case(case)
-        bench.crossings()
     if options.memory or not options.case:
         bench.memory()
     shutil.rmtree(bench.work)

@@ -59,7 +59,8 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
         read_flag(arguments, "--filament", 0.5, 10, request.gcode.filament_mm),
         read_flag(arguments, "--layer-height", 0.01, 100, request.gcode.layer_height_mm),
         arguments.text("--swath") == "middle" ? Status()
-                                              : read_flag(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
+                                              : read_flag(arguments, "--swath", 0, UINT32_MAX, request.swath_number),
+        arguments.read("--memory", read_bytes, request.memory_bytes)}) {
     if (!status) return status.error();
   }
   if (request.step && !request.swath) return at_option("--step", "needs a swath; add --swath").error();

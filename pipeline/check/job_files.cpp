@@ -18,8 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-
-
 /// Empty if it cannot be read: the check of its hash has reported what is missing or differs.
 std::string whole_file(const fs::path& path, std::uint64_t max_bytes) {
   auto text = read_file(path.string(), {.max_bytes = max_bytes});
@@ -57,10 +55,27 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
   return text ? std::move(*text) : std::string();
 }
 
+bool is_one_bit(const ManifestHead& head) {
+  return head.max_drops <= 1 && head.full_level() == 0 && !head.grey_drops() && head.named_images() == 0;
+}
+
+std::uint64_t bytes_to_read(const ManifestHead& head, const LayerRecord& record, Keep keep) {
+  constexpr std::uint64_t kRows = 4 << 20, kMaxStrip = 64 << 20;
+  const std::uint32_t columns = head.grid.columns(), rows = head.grid.rows();
+  if (keep == Keep::kCounts) return kRows + std::min(record.bytes, kMaxStrip);
+  // A change has a set pixel and another one at its sides, and takes a bit of a file at least, except in deflate.
+  const std::uint64_t all = std::uint64_t{columns} * rows, set = std::min(record.set_pixels, all);
+  const std::uint64_t by_file = head.extension == ".png" ? UINT64_MAX : 8 * record.bytes;
+  const std::uint64_t changes = std::min({2 * set, 2 * (all - set) + 2 * std::uint64_t{rows}, by_file});
+  const std::uint64_t drops = std::max(1u, head.max_drops), runs = 8 * changes * (drops > 1 || head.full_level() > 0 ? 3 : 1);
+  const std::uint64_t pixels = keep == Keep::kSmaller ? std::min(runs, 2 * bytes_of_bits(columns, rows)) : runs;
+  return kRows + std::min(record.bytes, kMaxStrip) + pixels + 2 * record.program.bytes;
+}
+
 Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,
-                                        Levels& levels) {
+                                        Levels& levels, Keep keep) {
   const bool grey = head.grey_drops() || head.full_level() > 0;
-  if (!grey) return formats::image(path);
+  if (!grey) return formats::image(path, 0, keep);
   auto image = formats::levels(path, head.full_level(), levels);
   if (!image || !head.grey_drops()) return image;
   if (const std::uint32_t maximum = highest(levels); maximum > head.max_drops) {

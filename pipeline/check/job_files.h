@@ -31,11 +31,19 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
 /// The images of a layer's drops, of all materials, each within the one before; one where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;
 
+/// Whether a layer is one image of 1 bit.
+bool is_one_bit(const ManifestHead& head);
+/// Memory that reading a layer takes at most: its image and its program, as files and decoded.
+/// keep  of the image of a job that is_one_bit()
+std::uint64_t bytes_to_read(const ManifestHead& head, const LayerRecord& record, Keep keep = Keep::kRuns);
+
 /// Reads an image of a layer; its runs are the pixels with any drop.
+/// keep    of images of 1 bit
 /// drops   of a job whose images are grey drops: the pixels of each
 /// levels  of grey images
 /// errors  kVerification, with the file: of formats::image; more drops than the job has
-Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels);
+Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels,
+                                        Keep keep = Keep::kRuns);
 
 /// What the images of a layer are put together by, and adds the one of this number.
 /// errors  of DropPlanes::add()

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -23,6 +24,7 @@
 #include "stages/support/io/compressed.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/file_reader.h"
+#include "stages/support/memory_gate.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -33,12 +35,15 @@ namespace fs = std::filesystem;
 struct Verification {
   std::string directory;
   const ManifestHead& head;
-  bool quick;
+  VerifyOptions options;
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
   std::optional<DoseCheck> doses;
   ExpectedDrops expected;
   VerifyReport& report;
   mutable tbb::enumerable_thread_specific<std::string> texts;  // of programs
+
+  /// Without a program to compare it with, the numbers of an image are enough.
+  Keep keep() const { return head.machine.empty() && is_one_bit(head) ? Keep::kCounts : Keep::kRuns; }
 };
 
 /// What is found in a layer.
@@ -126,7 +131,8 @@ std::string fault_of_image(const Verification& inspection, const Layer& layer, s
   const std::string& name = file.name;
   LayerPicture drops;
   Levels levels;
-  auto image = read_layer_image((fs::path(inspection.directory) / name).string(), inspection.head, drops, levels);
+  const Keep keep = inspection.keep();
+  auto image = read_layer_image((fs::path(inspection.directory) / name).string(), inspection.head, drops, levels, keep);
   if (!image) return image.error().message;
   const std::uint64_t own = sum_of_levels(levels);
   sum += own;
@@ -134,6 +140,7 @@ std::string fault_of_image(const Verification& inspection, const Layer& layer, s
     return fmt::format("{}: {}", name, what);
   if (file.record.drops > 0 && own != file.record.drops)
     return fmt::format("{}: has {} drops, the manifest says {}", name, own, file.record.drops);
+  if (keep == Keep::kCounts) return {};
   const Status added = add_picture(inspection.head, number, std::move(image->runs), std::move(drops), picture);
   return added ? std::string() : fmt::format("{}: sets pixels that {}", name, added.error().message);
 }
@@ -161,16 +168,16 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
     const LayerImageFile& file = files[i];
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
-    if (inspection.quick) continue;
+    if (inspection.options.quick) continue;
     if (std::string what = fault_of_image(inspection, record.layer, i, file, picture, levels); !what.empty()) return what;
   }
-  if (!inspection.quick) {
+  if (!inspection.options.quick) {
     inspection.expected.apply(record.layer, picture.planes);
     if (std::string what = ExpectedDrops::fault(inspection.head, record, picture.planes); !what.empty()) return what;
     if (std::string what = fault_of_drops(inspection.head, record, picture.planes); !what.empty()) return what;
     if (std::string what = inspection.doses->fault(record, picture.planes, levels); !what.empty()) return what;
   }
-  return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture.planes, count);
+  return fault_of_program(inspection, record, inspection.options.quick ? nullptr : &picture.planes, count);
 }
 
 // Restores the machine that the programs were written for.
@@ -192,7 +199,7 @@ void check_frame(const Verification& inspection, VerifyReport& report) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
     std::string fault = fault_of_file(inspection.directory, name, hash);
     const auto text = read_content((fs::path(inspection.directory) / name).string(), kMaxTomlBytes);
-    if (inspection.machine && !inspection.quick && text) {
+    if (inspection.machine && !inspection.options.quick && text) {
       if (const Status status = check(*inspection.machine, *text); !status)
         fault = fmt::format("{}: {}", name, status.error().message);
     }
@@ -218,9 +225,9 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
   return inspection.machine ? replay::with_fed_by_host(inspection.machine->profile(), record.layer, count) : count;
 }
 
-void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
-                  std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, {}, report, {}};
+void check_layers(const std::string& directory, const Manifest& manifest, const VerifyOptions& options,
+                  std::optional<JobCost>& cost, std::optional<replay::VatLevels>& vats, VerifyReport& report) {
+  Verification inspection{directory, manifest.head, options, std::nullopt, std::nullopt, {}, report, {}};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);
@@ -233,13 +240,17 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   }
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
+  MemoryGate gate(options.memory_bytes);
   std::vector<Finding> found(std::min(kPiece, manifest.layers.size()));
   if (!vats && inspection.machine) vats.emplace(inspection.machine->profile());
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      const LayerRecord& record = manifest.layers[first + i];
+      const auto pass = gate.enter(options.quick ? 0 : bytes_to_read(manifest.head, record, inspection.keep()));
       found[i].count.reset();
-      found[i].fault = fault_of_layer(inspection, manifest.layers[first + i], found[i].count);
+      // Isolated: a thread that waits within has a pass, and must not begin another layer.
+      tbb::this_task_arena::isolate([&] { found[i].fault = fault_of_layer(inspection, record, found[i].count); });
     });
     for (std::size_t i = 0; i < count; ++i) {
       const LayerRecord& record = manifest.layers[first + i];
@@ -376,7 +387,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
   }
   std::ranges::stable_sort(manifests, {}, [](const Manifest& manifest) { return manifest.head.first_layer; });
   std::optional<replay::VatLevels> vats;  // of all shards, one behind the other
-  for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, cost, vats, report);
+  for (const Manifest& manifest : manifests) check_layers(directory, manifest, options, cost, vats, report);
   // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
   if (!whole_job && !manifests.empty()) check_shards(shards, manifests[0].head.layer_count, report);

@@ -14,6 +14,7 @@ namespace lamina::pipeline {
 
 struct VerifyOptions {
   bool quick = false;  // sizes and hashes only; images are not decoded
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // of layers in flight
 };
 
 /// Faults are in layer order, then stray files, then missing shards.

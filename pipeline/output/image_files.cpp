@@ -9,6 +9,7 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/manifest/compare.h"
+#include "stages/geometry/bits.h"
 #include "stages/geometry/drop_rows.h"
 #include "stages/program/dialect.h"
 #include "stages/support/io/file.h"
@@ -174,11 +175,13 @@ Status ImageFiles::encode_one(const LayerImages& images, std::size_t number, Fil
   if (levels_ != nullptr) {
     if (!images.drops.empty()) levels_of(images.drops[several ? 1 + material : 0], work.levels);
     status = work.level_encoder->encode(images.drops.empty() ? images.shares : work.levels, head_.full_level(), x, y, file);
+  } else if (images.bits != nullptr) {
+    status = work.encoder->encode(*images.bits, x, y, file);
   } else if (images.drops.empty() || head_.geometry) {
     status = work.encoder->encode(several ? images.material[material] : images.whole, x, y, file);
   } else {
     const auto drop = static_cast<std::uint32_t>(number % head_.drop_images());
-    status = work.encoder->encode_rows(DropPlane(images.drops[several ? 1 + material : 0], drop), x, y, file);
+    status = work.encoder->encode(DropPlane(images.drops[several ? 1 + material : 0], drop), x, y, file);
   }
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
@@ -226,9 +229,15 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
                                                   feeds.error().message)};
   }
   report_unfed(record);
-  if (images.drops.empty()) return program_->write_layer(record.layer, images.whole, *feeds, work.program, record.program, measures);
-  const PrintProgram::Drops drops{images.drops[0], std::max(1u, head_.max_drops)};
-  return program_->write_layer(record.layer, drops, *feeds, work.program, record.program, measures);
+  if (!images.drops.empty()) {
+    const PrintProgram::Drops drops{images.drops[0], std::max(1u, head_.max_drops)};
+    return program_->write_layer(record.layer, drops, *feeds, work.program, record.program, measures);
+  }
+  if (images.bits == nullptr)
+    return program_->write_layer(record.layer, images.whole, *feeds, work.program, record.program, measures);
+  Runs runs;
+  runs_of(*images.bits, runs);
+  return program_->write_layer(record.layer, runs, *feeds, work.program, record.program, measures);
 }
 
 std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops, std::uint64_t edges) const {
@@ -240,10 +249,8 @@ std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops, std::uint64_
   const bool one = head_.materials.empty() && levels_ == nullptr;
   const std::uint64_t of_file = head_.geometry ? edges : one ? of_plane : drops.changes;
   std::uint64_t total = files * max_bytes(head_.grid.columns(), head_.grid.rows(), of_file);
-  // A plane of drops, or their levels, to be encoded.
-  const std::uint64_t rows = head_.grid.rows(), columns = head_.grid.columns();
-  if (drops.runs > 0 && !head_.extension.empty() && !head_.geometry)
-    total += levels_ == nullptr ? 8 * (drops.changes + columns) + 4 * rows + columns / 8 : 18 * drops.changes + 8 * rows;
+  // Drops as levels, to be encoded.
+  if (drops.runs > 0 && levels_ != nullptr) total += 18 * drops.changes + 8 * std::uint64_t{head_.grid.rows()};
   return total + (program_ ? program_->bytes_bound(drops.runs > 0 ? 2 * drops.runs : drops.changes, planes) : 0);
 }
 

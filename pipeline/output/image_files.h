@@ -12,6 +12,7 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
+#include "stages/data/bit_image.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -31,6 +32,7 @@ struct LayerImages {
   std::span<const Runs> material;        // of each, where there are several
   std::span<const DropImageView> drops;  // of all materials, then of each; none if all get one drop a pixel
   const Levels& shares;                  // of the voxels, for formats that carry them; without drops
+  const BitImage* bits = nullptr;        // in place of `whole`, of an image whose runs would take more memory
 };
 
 class ImageFiles {

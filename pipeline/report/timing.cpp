@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "stages/support/text/readable.h"
 
@@ -31,7 +32,8 @@ Lines timing_lines(const Timing& timing) {
   phase_line("all", timing.whole());
   add(fmt::format("{:<12}{:>10}{:>14}", "node", "busy, s", "processor, s"));
   for (const auto& [name, busy] : timing.nodes) add(fmt::format("{:<12}{:>10.4f}{:>14.4f}", name, busy.wall, busy.processor));
-  const formats::Floor& floor = timing.floor;
+  if (!timing.floor) return lines;
+  const formats::Floor& floor = *timing.floor;
   if (!timing.not_measured.empty()) {
     add("limit       not measured: " + timing.not_measured);
     return lines;
@@ -54,7 +56,9 @@ Json timing_json(const Timing& timing) {
   for (const auto& [name, busy] : timing.nodes) {
     nodes[std::string(name)] = {{"busy_seconds", busy.wall}, {"processor_seconds", busy.processor}};
   }
-  const formats::Floor& floor = timing.floor;
+  Json json = {{"threads", timing.threads}, {"phases", phases}, {"nodes", nodes}};
+  if (!timing.floor) return json;
+  const formats::Floor& floor = *timing.floor;
   Json limit = {{"read_bytes", floor.bytes_read}, {"read_seconds", floor.read},   {"write_bytes", floor.bytes_written},
                 {"write_files", floor.files},     {"write_seconds", floor.write}, {"crossings", floor.crossings},
                 {"touch_seconds", floor.touch},   {"seconds", floor.seconds()}};
@@ -62,7 +66,8 @@ Json timing_json(const Timing& timing) {
     limit = Json::object();
     limit["not_measured"] = timing.not_measured;
   }
-  return {{"threads", timing.threads}, {"phases", phases}, {"nodes", nodes}, {"limit", limit}};
+  json["limit"] = std::move(limit);
+  return json;
 }
 
 }  // namespace lamina::pipeline

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,8 +24,8 @@ struct Timing {
   std::vector<TimedPhase> phases;  // one after the other; together the run. Of "start", what the process did before, the
                                    // processor's time stands for both, in a batch with that of other jobs
   std::vector<NodeTime> nodes;     // of the graph that makes the layers, at the same time
-  formats::Floor floor;
-  std::string not_measured;  // why the limit is not; else empty
+  std::optional<formats::Floor> floor;  // of jobs that are rastered
+  std::string not_measured;             // why the limit is not; else empty
 
   Elapsed whole() const;
 };

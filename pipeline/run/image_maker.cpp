@@ -224,7 +224,7 @@ void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64
 class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
-      : plan_(plan), checks_(checks), imager_(plan), files_(plan), work_(limits.max_in_flight), made_(limits.record_slots) {
+      : plan_(plan), checks_(checks), imager_(plan, true), files_(plan), work_(limits.max_in_flight), made_(limits.record_slots) {
     if (plan.images->machine) parts_.emplace(plan);
     observe_pixels(plan, observers_);
     inspector_ = &observers_.add<Inspector>(plan);
@@ -390,7 +390,7 @@ class ImageMaker : public Maker {
   }
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, images.materials.image, images.drops.drops, images.drops.shares};
+    return {images.runs, images.materials.image, images.drops.drops, images.drops.shares, images.bits ? &*images.bits : nullptr};
   }
 
   const Plan& plan_;

@@ -3,7 +3,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <functional>
 #include <numbers>
+#include <utility>
 
 #include "stages/dose/edges.h"
 #include "stages/formats/image_format.h"
@@ -32,12 +34,21 @@ std::uint64_t ImageWork::bytes() const {
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
+  for (const std::optional<BitImage>* image : {&bits, &section_bits}) total += *image ? (*image)->bytes() : 0;
   return total;
+}
+
+/// Whether images of parts are only placed and written: then large ones stay bits.
+bool LayerImager::takes_bits() const {
+  const ImagePlan& images = *plan_.images;
+  return plan_.job.levels == 0 && !plan_.job.inspect && !images.beads && !images.dose.any() && !images.materials.several() &&
+         !images.dose.zones().several() && formats::find_image_format(plan_.job.format) != nullptr;
 }
 
 Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
   const ImagePlan& images = *plan_.images;
   const bool several = images.materials.several(), zones = images.dose.zones().several();
+  work.bits.reset();
   if (zones) work.zones.start(images.dose.zones().count(), images.grid.columns(), images.grid.rows());
   if (several) work.materials.start(images.materials.used.size(), images.grid.columns(), images.grid.rows());
   if (several || zones) {
@@ -64,13 +75,21 @@ Status LayerImager::position(const Layer& layer, const PlacedImages& part, Image
     threshold_levels(work.drops.zones, 1, work.section);
     filled = sum_of_levels(work.drops.zones);
   } else {
-    const auto read = part.images->read(number);
+    const auto read = part.images->read(number, keeps_bits_ ? Keep::kSmaller : Keep::kRuns);
     if (!read) return read.error();
-    formats::position(*read, part.position, work.section);
-    filled = set_pixels(work.section);
+    work.section_bits.reset();
+    if (read->bits) {
+      RunsBuilder builder(images.grid.columns(), images.grid.rows(), Keep::kSmaller);
+      formats::position(*read->bits, part.position, builder);
+      work.section = builder.finish();
+      work.section_bits = builder.take_bits();
+    } else {
+      formats::position(read->runs, part.position, work.section);
+    }
+    filled = work.section_bits ? work.section_bits->set_pixels() : set_pixels(work.section);
   }
-  const auto outside =
-      images.machine ? program::first_outside(images.machine->machine, images.grid, work.section) : std::nullopt;
+  const RowRuns placed = work.section_bits ? RowRuns(*work.section_bits) : RowRuns(work.section);
+  const auto outside = images.machine ? program::first_outside(images.machine->machine, images.grid, placed) : std::nullopt;
   if (!outside) return {};
   return Error{Fault::kUsage,
                fmt::format("{}: layer {} sets a pixel at x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed of {}; "
@@ -101,11 +120,8 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
       work.materials.deposit(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
     } else if (zones.several()) {
       continue;
-    } else if (work.runs.change.empty()) {
-      std::swap(work.runs, work.section);
     } else {
-      combine(work.runs, work.section, SetOperation::kUnion, work.second);
-      std::swap(work.runs, work.second);
+      merge_section(work);
     }
   }
   if (!shares_voxels() || plan_.scene->images.empty()) return {};
@@ -113,6 +129,26 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
   threshold_levels(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
   own_voxels(work);
   return {};
+}
+
+/// Adds the section to the image of the layer; both may be bits.
+void LayerImager::merge_section(ImageWork& work) const {
+  if (work.section_bits && work.bits) {
+    for (std::uint32_t r = 0; r < work.bits->rows(); ++r)
+      std::ranges::transform(work.bits->row(r), std::as_const(*work.section_bits).row(r), work.bits->row(r).begin(), std::bit_or());
+    work.section_bits.reset();
+  } else if (work.section_bits || work.bits) {
+    const Runs& others = work.section_bits ? work.runs : work.section;
+    if (work.section_bits) work.bits = std::exchange(work.section_bits, std::nullopt);
+    for (std::uint32_t r = 0; r < others.view().rows(); ++r) add_runs(others.view().row(r), work.bits->row(r));
+    work.runs.change.clear();
+    work.runs.row_offset.assign(std::size_t{work.bits->rows()} + 1, 0);
+  } else if (work.runs.change.empty()) {
+    std::swap(work.runs, work.section);
+  } else {
+    combine(work.runs, work.section, SetOperation::kUnion, work.second);
+    std::swap(work.runs, work.second);
+  }
 }
 
 bool LayerImager::samples() const {
@@ -154,6 +190,13 @@ std::uint64_t LayerImager::changes_of_images(Nm plane) const {
     if (const auto number = part.image_at(plane)) changes += part.images->expected_changes(*number);
   }
   return changes;
+}
+
+/// What they become as runs or bits, in changes whose runs take as much memory.
+std::uint64_t LayerImager::kept_changes(Nm plane) const {
+  const PixelGrid& grid = plan_.images->grid;
+  const std::uint64_t changes = changes_of_images(plane);
+  return keeps_bits_ ? std::min(changes, bytes_of_bits(grid.columns(), grid.rows()) / 8) : changes;
 }
 
 Status LayerImager::contours(const Layer& layer, ImageWork& work) const {
@@ -233,10 +276,10 @@ std::array<Nm, 2> LayerImager::planes(const Layer& layer) const {
   return {layer.lowest_plane(), layer.highest_plane()};
 }
 
-dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) const {
+/// of_images  changes of the images of parts
+dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels, std::uint64_t of_images) const {
   const ImagePlan& images = *plan_.images;
   const auto [low, high] = planes(layer);
-  const std::uint64_t of_images = changes_of_images(plane(layer));
   std::uint64_t changes =
       images.solids.crossings_bound(low) + (high == low ? 0 : images.solids.crossings_bound(high)) + of_images;
   dose::DropSizes sizes{images.grid.rows(), images.grid.columns(), images.dose.edges_bound(changes)};
@@ -263,7 +306,8 @@ dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) 
 
 std::uint64_t LayerImager::bytes_of(const Layer& layer, std::uint64_t pixels) const {
   const ImagePlan& images = *plan_.images;
-  const dose::DropSizes sizes = sizes_of(layer, pixels);
+  const std::uint64_t of_images = kept_changes(plane(layer));
+  const dose::DropSizes sizes = sizes_of(layer, pixels, of_images);
   const dose::DropBound drops = images.dose.bound(sizes);
   const std::uint64_t rows = sizes.rows, edges = sizes.edges, zones = images.dose.zones().count();
   const auto image = [rows](std::uint64_t changes) { return 8 * changes + 4 * rows; };
@@ -277,7 +321,6 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer, std::uint64_t pixels) co
   // Images of each dose, before and after they grow, with shells and cores; the whole before it is moved, and scratch.
   if (images.dose.zones().several()) total += (2 * zones + 6) * image(edges);
   // An image as read and as placed; where levels are, 9 bytes a run of those and of both together.
-  const std::uint64_t of_images = changes_of_images(plane(layer));
   if (!plan_.scene->images.empty())
     total += image(of_images) + 4 * rows + (plan_.job.levels > 0 ? 18 * of_images + 12 * rows : 0);
   std::uint64_t scratch = 0;
@@ -306,6 +349,7 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes
   const DoseZones& zones = images.dose.zones();
   const bool shares = plan_.job.levels > 0;
   if (const Mirror axes = plan_.job.mirror; axes != Mirror::kNone) {
+    if (work.bits) raster::mirror(*work.bits, axes != Mirror::kY, axes != Mirror::kX);
     mirror(work.runs, work.second);
     for (Runs& image : work.materials.image) mirror(image, work.second);
     for (Runs& image : work.zones.image) mirror(image, work.second);
@@ -462,7 +506,7 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
 void LayerImager::count(ImageWork& work, LayerRecord& record) const {
   const DosePlan& dose = plan_.images->dose;
   if (!work.drops.dosed()) {
-    record.set_pixels = set_pixels(work.runs);
+    record.set_pixels = work.bits ? work.bits->set_pixels() : set_pixels(work.runs);
     for (const Runs& image : work.materials.image) record.images.emplace_back().set_pixels = set_pixels(image);
     return;
   }

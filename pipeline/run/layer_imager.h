@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "pipeline/output/image_files.h"
 #include "pipeline/plan/layers.h"
@@ -9,6 +10,7 @@
 #include "pipeline/report/image_observers.h"
 #include "stages/checks/thin.h"
 #include "stages/coverage/coverage.h"
+#include "stages/data/bit_image.h"
 #include "stages/data/runs.h"
 #include "stages/raster/images.h"
 #include "stages/raster/raster.h"
@@ -19,10 +21,12 @@ namespace lamina::pipeline {
 struct ImageWork {
   raster::LayerScratch scratch;
   Runs runs;             // the image of all materials
+  std::optional<BitImage> bits;     // in place of it, where runs would take more memory: LayerImager::keeps_bits()
   Runs second;           // of the other engine, mirrored, or before the dose
   Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
+  std::optional<BitImage> section_bits;  // in place of it
   dose::DropWork drops;  // if a saturation or fill fractions of voxels are requested
   coverage::CoverageScratch coverage;
   raster::MaterialImages materials;
@@ -38,8 +42,8 @@ struct ImageWork {
 /// The steps of a layer's images; const, usable from any thread with separate work objects.
 class LayerImager {
  public:
-  /// The plan must outlive this object.
-  explicit LayerImager(const Plan& plan) : plan_(plan) {}
+  /// The plan must outlive this object. bits  whether the caller takes images as bits
+  explicit LayerImager(const Plan& plan, bool bits = false) : plan_(plan), keeps_bits_(bits && takes_bits()) {}
 
   // --- in this order; contours, fill and beads only if beads fill the parts
   /// errors  kVerification: engines disagree
@@ -76,10 +80,10 @@ class LayerImager {
   std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const;
   /// Upper bound of the changes in the layer's images with their drops.
   dose::DropBound drops_bound(const Layer& layer, std::uint64_t pixels) const {
-    return plan_.images->dose.bound(sizes_of(layer, pixels));
+    return plan_.images->dose.bound(sizes_of(layer, pixels, changes_of_images(plane(layer))));
   }
   /// The same before the dose.
-  std::uint64_t edges_bound(const Layer& layer) const { return sizes_of(layer, 0).edges; }
+  std::uint64_t edges_bound(const Layer& layer) const { return sizes_of(layer, 0, changes_of_images(plane(layer))).edges; }
 
  private:
   Nm plane(const Layer& layer) const { return plane_of(plan_.job, layer, plan_.scene->height); }
@@ -98,10 +102,14 @@ class LayerImager {
   static void empty_removed(const Runs& before, bool deposited, ImageWork& work);
   std::array<Nm, 2> planes(const Layer& layer) const;
   void count(ImageWork& work, LayerRecord& record) const;
-  dose::DropSizes sizes_of(const Layer& layer, std::uint64_t pixels) const;
+  dose::DropSizes sizes_of(const Layer& layer, std::uint64_t pixels, std::uint64_t of_images) const;
   std::uint64_t changes_of_images(Nm plane) const;
+  std::uint64_t kept_changes(Nm plane) const;
+  bool takes_bits() const;
+  void merge_section(ImageWork& work) const;
 
   const Plan& plan_;
+  bool keeps_bits_;
 };
 
 }  // namespace lamina::pipeline

@@ -204,18 +204,20 @@ std::shared_ptr<Timing> timing_of(const Plan& plan, const Elapsed& before) {
   return timing;
 }
 
-/// Measures the least that any program would need for the same.
+/// Measures the minimum that any program would need for the same images.
 void report_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary,
                   Timing& timing) {
+  if (plan.product != Product::kImages) return;
   std::vector<std::string> parts;
   for (const PartSummary& part : plan.scene->parts) parts.push_back(part.path);
-  timing.floor.bytes_written = summary.bytes_written;
-  timing.floor.files = summary.bytes_written == 0 ? 0 : plan.product == Product::kImages ? summary.layers_planned : 1;
-  timing.floor.crossings = maker.crossings();
+  formats::Floor& floor = timing.floor.emplace();
+  floor.bytes_written = summary.bytes_written;
+  floor.files = summary.bytes_written == 0 ? 0 : summary.layers_planned;
+  floor.crossings = maker.crossings();
   std::error_code error;
   const bool is_folder = std::filesystem::is_directory(plan.job.output, error);
   const std::string neighbour = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
-  if (Status status = formats::measure_floor(parts, neighbour, cancel, timing.floor); !status)
+  if (Status status = formats::measure_floor(parts, neighbour, cancel, floor); !status)
     timing.not_measured = status.error().message;
 }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +17,7 @@
 #include "pipeline/show/report_warnings.h"
 #include "stages/geometry/coverage.h"
 #include "stages/support/hash/hash.h"
+#include "stages/support/memory_gate.h"
 #include "stages/view/depth.h"
 #include "stages/view/report/page.h"
 #include "stages/view/report/run_code.h"
@@ -32,19 +34,24 @@ constexpr std::uint32_t kChunk = 64;  // layers read in parallel
 /// Calls `work(place, layer, slot)` for every layer on all processors, then `gather(place, slot)` in order. Stops at the
 /// first unreadable layer.
 template <class Slot, class Work, class Gather>
-Status each_layer(const ReportSource& source, bool timed, Work work, Gather gather) {
+Status each_layer(const ReportSource& source, bool timed, std::uint64_t memory, Work work, Gather gather) {
+  MemoryGate gate(memory);
   const auto count = static_cast<std::uint32_t>(source.manifest.layers.size());
   for (std::uint32_t first = 0; first < count; first += kChunk) {
     const std::uint32_t end = std::min(first + kChunk, count);
     std::vector<Slot> slots(end - first);
     std::vector<Status> states(end - first);
     tbb::parallel_for(first, end, [&](std::uint32_t position) {
-      const Result<ReportLayer> layer = source.layer(position, timed);
-      if (layer) {
-        work(position, *layer, slots[position - first]);
-      } else {
-        states[position - first] = layer.error();
-      }
+      const auto pass = gate.enter(source.bytes(position, timed));
+      // Isolated: a thread that waits within has a pass, and must not begin another layer.
+      tbb::this_task_arena::isolate([&] {
+        const Result<ReportLayer> layer = source.layer(position, timed);
+        if (layer) {
+          work(position, *layer, slots[position - first]);
+        } else {
+          states[position - first] = layer.error();
+        }
+      });
     });
     for (std::uint32_t position = first; position < end; ++position) {
       if (!states[position - first]) return states[position - first];
@@ -84,7 +91,8 @@ std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
 }
 
 /// Reads every layer; codes that fit the page go to `held`.
-Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& report_warnings, view::report::HeldLayers& held) {
+Result<ReportLayers> see_layers(const ReportSource& source, std::uint64_t memory, ReportWarnings& report_warnings,
+                                view::report::HeldLayers& held) {
   struct First {
     PixelWindow window;
     Buffer<std::byte> code;
@@ -93,13 +101,12 @@ Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& repo
   };
   ReportLayers detected;
   const Status status = each_layer<First>(
-      source, true,
+      source, true, memory,
       [&](std::uint32_t position, const ReportLayer& layer, First& first) {
-        const RunsView runs = layer.runs.view();
-        report_warnings.inspect(source.manifest.layers[position].layer, runs);
-        first.window = window_of(runs);
-        if (held.wants(position)) first.code = view::report::pack_runs(runs);
-        for (std::size_t i = 0; i < runs.change.size(); i += 2) first.set += runs.change[i + 1] - runs.change[i];
+        report_warnings.inspect(source.manifest.layers[position].layer, layer.rows());
+        first.window = window_of(layer.rows());
+        if (held.wants(position)) first.code = view::report::pack_runs(layer.rows());
+        first.set = layer.bits ? layer.bits->set_pixels() : set_pixels(layer.runs);
         first.seconds = layer.seconds;
       },
       [&](std::uint32_t position, First& first) {
@@ -115,14 +122,14 @@ Result<ReportLayers> see_layers(const ReportSource& source, ReportWarnings& repo
 }
 
 /// Views of the parts from their layers, for missing part files: a second pass over all layers.
-Result<std::vector<ShownView>> build_up(const ReportSource& source, const PixelWindow& window) {
+Result<std::vector<ShownView>> build_up(const ReportSource& source, std::uint64_t memory, const PixelWindow& window) {
   const std::vector<LayerRecord>& layers = source.manifest.layers;
   const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
   view::ThreeViews built(source.grid, window, lowest.bottom, highest.bottom + highest.thickness);
   const Status status = each_layer<std::vector<std::uint8_t>>(
-      source, false,
+      source, false, memory,
       [&](std::uint32_t, const ReportLayer& layer, std::vector<std::uint8_t>& cells) {
-        built.inspect(layer.runs.view(), cells);
+        built.inspect(layer.rows(), cells);
       },
       [&](std::uint32_t position, const std::vector<std::uint8_t>& cells) { built.add(layers[position].layer, cells); });
   if (!status) return status.error();
@@ -160,7 +167,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   taken += options.deposited_svg.size() / 3 * 4;
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
-  auto detected = see_layers(*source, report_warnings, held);
+  auto detected = see_layers(*source, options.memory_bytes, report_warnings, held);
   if (!detected) return detected.error();
   add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *detected);
   detected->deposited = options.deposited;
@@ -174,7 +181,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
     detected->sweeps = sweeps_of_job(folder.string(), manifest);
   }
   if (views.empty()) {
-    auto built = build_up(*source, detected->window);
+    auto built = build_up(*source, options.memory_bytes, detected->window);
     if (!built) return built.error();
     views = std::move(*built);
   }

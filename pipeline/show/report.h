@@ -11,6 +11,7 @@ namespace lamina::pipeline {
 
 struct ReportOptions {
   std::uint64_t size_limit = 19'000'000;  // bytes of the page; layers are omitted evenly to stay below it
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // of layers in flight
   std::vector<std::string> parts;         // folders or files to search first for the parts
   std::string deposited;                  // lines on what toolpaths leave open, a section of the page; "" for none
   std::string deposited_svg;              // a picture of it; "" for none

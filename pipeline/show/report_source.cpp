@@ -40,18 +40,34 @@ Result<Manifest> finished_manifest(const std::string& position, const std::strin
   return manifest;
 }
 
-/// Reads a layer's files into runs if they match the manifest.
-Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
-                                const ExpectedDrops& expected) {
+Status check_files(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   for (const LayerImageFile& file : layer_images(head, record)) {
     const std::string path = directory + "/" + file.name;
     const Result<FileDigest> digest = digest_file(path, file.record.bytes);
     if (!digest) return digest.error();
     if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
   }
+  return {};
+}
+
+/// Reads a layer's files into runs if they match the manifest.
+Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
+                                const ExpectedDrops& expected) {
+  if (Status status = check_files(directory, head, record); !status) return status.error();
   auto picture = picture_of_layer(directory, head, record, expected);
   if (picture || !picture.error().message.starts_with("layers/")) return picture;
   return Error{Fault::kVerification, fmt::format("{}/{}; run lamina verify for details", directory, picture.error().message)};
+}
+
+/// The same of a layer of one image of 1 bit, as runs or bits.
+Result<ReportLayer> read_bits(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  if (Status status = check_files(directory, head, record); !status) return status.error();
+  const std::string name = layer_images(head, record).front().name;
+  auto image = formats::image(directory + "/" + name, 0, Keep::kSmaller);
+  if (!image) return image.error();
+  if (image->columns != head.grid.columns() || image->rows != head.grid.rows())
+    return wrong(directory, fmt::format("{}: is not of the manifest's size; run lamina verify for details", name));
+  return ReportLayer{std::move(image->runs), 0, std::move(image->bits)};
 }
 
 /// Machine time of a layer, from replaying its program as lamina verify does.
@@ -87,12 +103,18 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
   const auto manifest = std::make_shared<const Manifest>(source.manifest);
   source.layer = [directory, manifest, machine, expected](std::uint32_t position, bool timed) -> Result<ReportLayer> {
     const LayerRecord& record = manifest->layers[position];
+    if (is_one_bit(manifest->head) && !manifest->head.geometry && (!machine || !timed))
+      return read_bits(directory, manifest->head, record);
     auto runs = read_layer(directory, manifest->head, record, *expected);
     if (!runs) return runs.error();
     if (!machine || !timed) return ReportLayer{std::move(runs->front())};
     const auto seconds = seconds_of_layer(directory, manifest->head, *machine, record, *runs);
     if (!seconds) return seconds.error();
     return ReportLayer{std::move(runs->front()), *seconds};
+  };
+  source.bytes = [manifest, replays = machine.has_value()](std::uint32_t position, bool timed) {
+    const Keep keep = is_one_bit(manifest->head) && !(replays && timed) ? Keep::kSmaller : Keep::kRuns;
+    return bytes_to_read(manifest->head, manifest->layers[position], keep);
   };
   return source;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,14 +15,18 @@
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 #include "stages/data/status.h"
 #include "stages/view/cast.h"
 
 namespace lamina::pipeline {
 
 struct ReportLayer {
-  Runs runs;           // all materials as one image; toolpaths as the area of their beads
-  double seconds = 0;  // estimated machine time; 0 without a machine
+  Runs runs;                                  // all materials as one image; toolpaths as the area of their beads
+  double seconds = 0;                         // estimated machine time; 0 without a machine
+  std::shared_ptr<const BitImage> bits = {};  // in place of runs that would take more memory
+
+  RowRuns rows() const { return bits ? RowRuns(*bits) : RowRuns(runs); }
 };
 
 struct ReportSource {
@@ -32,6 +37,8 @@ struct ReportSource {
   /// A layer, by its place in the manifest; for any thread. timed: with the machine's seconds
   /// errors  kVerification: a file that is missing or differs from the manifest, a program that prints a different image
   std::function<Result<ReportLayer>(std::uint32_t position, bool timed)> layer;
+  /// Memory that such a layer takes at most.
+  std::function<std::uint64_t(std::uint32_t position, bool timed)> bytes = [](std::uint32_t, bool) { return std::uint64_t{0}; };
 };
 
 /// path  a directory of lamina jet, or a G-code file of lamina extrude with its manifest next to it

@@ -140,7 +140,7 @@ ReportWarnings::ReportWarnings(const Manifest& manifest, const Job& job, const M
   if (images && scene != nullptr) bleed_ = ReportBleed::make(manifest, job, machine, *scene);
 }
 
-void ReportWarnings::inspect(const Layer& layer, const RunsView& image) {
+void ReportWarnings::inspect(const Layer& layer, RowRuns image) {
   if (manifest_.head.product != Product::kImages) return;
   if (bleed_) bleed_->inspect(layer);
   tally_->add_image(layer, image, mirrors_x(job_.mirror), mirrors_y(job_.mirror));

@@ -14,6 +14,7 @@
 #include "pipeline/run/layer_imager.h"
 #include "stages/checks/solid_checks.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
@@ -45,7 +46,7 @@ class ReportWarnings {
   ReportWarnings(const Manifest& manifest, const Job& job, const Machine* machine, const Scene* scene);
 
   /// An image as in its file; from many threads at once.
-  void inspect(const Layer& layer, const RunsView& image);
+  void inspect(const Layer& layer, RowRuns image);
 
   /// set  pixels of each layer. returns  none for a job of some layers only
   std::vector<Warning> report(const std::vector<std::uint64_t>& set) const;

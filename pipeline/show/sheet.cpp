@@ -173,11 +173,13 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   sheet.maximum = head.max_of_pixel();
   sheet.whole_bed = request.whole_bed;
   sheet.width = request.width.value_or(kSheetWidth);
+  sheet.memory_bytes = request.memory_bytes;
   for (const std::size_t index : *chosen) {
     const LayerRecord& record = manifest.layers[index];
     const auto images = layer_images(head, record);
     for (std::size_t first = 0; first < images.size(); first += head.drop_images()) {  // of each material
       view::picture::SheetLayer cell;
+      cell.bytes = bytes_to_read(head, record, is_one_bit(head) ? Keep::kSmaller : Keep::kRuns);
       for (std::size_t drop = 0; drop < head.drop_images(); ++drop)
         cell.paths.push_back((folder / images[first + drop].name).string());
       cell.warns = images[first].record.unfed_pixels > 0;
@@ -188,8 +190,20 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
       sheet.layers.push_back(std::move(cell));
     }
   }
-  const auto read_levels = [&](const std::string& path) { return formats::image_levels(path, head.full_level()); };
-  auto picture = view::picture::contact_sheet(sheet, read_levels);
+  const auto read = [&](const std::string& path) -> Result<view::picture::SheetImage> {
+    if (!is_one_bit(head)) {
+      auto levels = formats::image_levels(path, head.full_level());
+      if (!levels) return levels.error();
+      return view::picture::SheetImage{std::move(*levels), {}};
+    }
+    auto image = formats::image(path, 0, Keep::kSmaller);
+    if (!image) return image.error();
+    if (image->bits) return view::picture::SheetImage{{}, std::move(image->bits)};
+    view::picture::SheetImage made;
+    levels_of(image->runs, 1, made.levels);
+    return made;
+  };
+  auto picture = view::picture::contact_sheet(sheet, read);
   if (!picture) return picture.error();
   const std::size_t made = manifest.layers.size(), all = head.layer_count;
   Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,

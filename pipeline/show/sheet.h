@@ -21,6 +21,7 @@ struct PreviewRequest {
   bool whole_bed = false;              // images: the whole bed instead of the set pixels' window
   bool swath = false;                  // images: the layer during its print program
   std::optional<std::uint32_t> swath_number, step;
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // of images in flight
   formats::GcodeOptions gcode;  // for G-code alone
 };
 

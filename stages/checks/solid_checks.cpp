@@ -230,18 +230,18 @@ void Tally::inspect_layers(const PixelGrid& grid) {
   for (const Group& group : groups_) group_window_.push_back(pixels_of(group.box, grid, 0));
 }
 
-PixelBox Tally::mirrored(PixelBox window, const RunsView& image, bool mirror_x, bool mirror_y) {
+PixelBox Tally::mirrored(PixelBox window, const RowRuns& image, bool mirror_x, bool mirror_y) {
   const auto turn = [](std::uint32_t& first, std::uint32_t& last, std::uint32_t count) {
     const std::uint32_t end = count - first;
     first = count - last;
     last = end;
   };
-  if (mirror_x) turn(window.left, window.right, image.columns);
+  if (mirror_x) turn(window.left, window.right, image.columns());
   if (mirror_y) turn(window.top, window.bottom, image.rows());
   return window;
 }
 
-void Tally::add_image(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y) {
+void Tally::add_image(const Layer& layer, RowRuns image, bool mirror_x, bool mirror_y) {
   for (std::uint32_t s = 0; s < solids_.size(); ++s) {
     if (detected(s) || !crosses(solids_[s].box, layer)) continue;
     const PixelBox window = mirrored(solid_window_[s], image, mirror_x, mirror_y);
@@ -254,12 +254,12 @@ void Tally::add_image(const Layer& layer, const RunsView& image, bool mirror_x, 
   add(layer, image, mirror_x, mirror_y, planned_);
 }
 
-void Tally::add_left(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y) {
+void Tally::add_left(const Layer& layer, RowRuns image, bool mirror_x, bool mirror_y) {
   bleeds_.store(true, std::memory_order_relaxed);
   add(layer, image, mirror_x, mirror_y, left_);
 }
 
-void Tally::add(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const {
+void Tally::add(const Layer& layer, RowRuns& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const {
   const double pixel_mm2 = mm(1) * mm(1) / (grid_->x.pixels_per_nm() * grid_->y.pixels_per_nm());
   const auto measured = static_cast<std::uint32_t>(std::min<std::size_t>(groups_.size(), kMeasured));
   for (std::uint32_t g = 0; g < measured; ++g) {

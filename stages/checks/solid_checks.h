@@ -24,6 +24,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 #include "stages/data/status.h"
 
 namespace lamina::checks {
@@ -57,9 +58,9 @@ class Tally {
   // --- images
   void inspect_layers(const PixelGrid& grid);
   /// The section of all solids. cost  some rows of each group, a few of a solid's until its first pixel is found
-  void add_image(const Layer& layer, const RunsView& image, bool mirror_x = false, bool mirror_y = false);
+  void add_image(const Layer& layer, RowRuns image, bool mirror_x = false, bool mirror_y = false);
   /// The same image after the bleed was removed.
-  void add_left(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y);
+  void add_left(const Layer& layer, RowRuns image, bool mirror_x, bool mirror_y);
 
   // --- contours
   void add_area(std::uint32_t group, const Layer& layer, double area_mm2);
@@ -88,8 +89,8 @@ class Tally {
     sum.fetch_add(static_cast<std::uint64_t>(std::llround(mm3 * 1e6)), std::memory_order_relaxed);
   }
   static double volume(const Sum& sum) { return static_cast<double>(sum.load(std::memory_order_relaxed)) * 1e-6; }
-  static PixelBox mirrored(PixelBox window, const RunsView& image, bool mirror_x, bool mirror_y);
-  void add(const Layer& layer, const RunsView& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const;
+  static PixelBox mirrored(PixelBox window, const RowRuns& image, bool mirror_x, bool mirror_y);
+  void add(const Layer& layer, RowRuns& image, bool mirror_x, bool mirror_y, std::vector<Sum>& sums) const;
 
   std::vector<Solid> solids_;
   std::vector<Group> groups_;

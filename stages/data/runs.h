@@ -35,6 +35,18 @@ struct Runs {
   operator RunsView() const { return view(); }
 };
 
+/// Set pixels, and changes of colour.
+struct PixelCounts {
+  std::uint64_t set = 0, changes = 0;
+};
+
+/// What is kept of an image whose rows come one by one.
+enum class Keep : std::uint8_t {
+  kRuns,
+  kSmaller,  // runs, or bits where runs take more than half the memory of those
+  kCounts,   // numbers alone
+};
+
 /// Number of set pixels.
 inline std::uint64_t set_pixels(const RunsView& runs) {
   std::uint64_t set = 0;

@@ -30,28 +30,16 @@ Status check_size(std::string_view format, std::uint32_t columns, std::uint32_t 
   return {};
 }
 
-Status ImageEncoder::encode_rows(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) {
-  RunsBuilder builder(rows.columns());
-  std::vector<std::uint64_t> words(rows.words());
-  std::vector<std::byte> bits(row_bytes(rows.columns()));
-  for (std::uint32_t r = 0; r < rows.rows(); ++r) {
-    rows.row(r, words);
-    put_words(words, bits);
-    if (!builder.add_row(bits, false)) return cannot_hold("a file", rows.columns(), rows.rows(), "it has too many changes");
-  }
-  return encode(builder.finish(), dpi_x, dpi_y, file);
-}
-
 namespace {
 
 /// No file at all, for timing what comes before it.
 class NullEncoder : public ImageEncoder {
  public:
-  Status encode(const RunsView&, double, double, Bytes& file) override {
-    file.clear();
-    return {};
-  }
-  Status encode_rows(const BitRows&, double, double, Bytes& file) override {
+  Status encode(const RunsView&, double, double, Bytes& file) override { return encode_nothing(file); }
+  Status encode(const BitRows&, double, double, Bytes& file) override { return encode_nothing(file); }
+
+ private:
+  static Status encode_nothing(Bytes& file) {
     file.clear();
     return {};
   }

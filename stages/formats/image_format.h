@@ -17,6 +17,10 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
+namespace lamina {
+class BitRows;
+}
+
 namespace lamina::formats {
 
 using Bytes = Buffer<std::byte>;
@@ -41,9 +45,8 @@ class ImageEncoder {
   /// errors        kOutput if the format cannot hold the image (its limits are named in the message)
   /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
   virtual Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) = 0;
-
-  /// The same of rows that are made on demand. Formats that have no use for bits collect them as runs first.
-  virtual Status encode_rows(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file);
+  /// The same of rows that are read one by one: no whole image of runs is made.
+  virtual Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) = 0;
 
   /// The widest instructions to use, if the processor has them; the bytes are the same with any. Else it chooses itself.
   virtual void use(Isa) {}
@@ -88,6 +91,8 @@ class LevelEncoder {
   /// errors  kOutput if the format cannot hold the image (its limits are named in the message)
   /// memory  a strip or a row of bytes, never the whole image
   virtual Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) = 0;
+  /// The same of an image whose voxels are full or empty, read row by row.
+  virtual Status encode(const BitRows& image, double dpi_x, double dpi_y, Bytes& file) = 0;
 
   /// What the next files say of their layer. Formats without a place for it ignore it.
   virtual void tag(const LayerTags&) {}

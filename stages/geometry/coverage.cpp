@@ -6,7 +6,7 @@
 namespace lamina {
 namespace {
 
-/// Image: RunsView or LevelsView; row  begin and end of each run of a row
+/// Image: RowRuns or LevelsView; row  begin and end of each run of a row
 template <class Image, class Row>
 PixelWindow window_of_rows(const Image& image, Row row) {
   PixelWindow window{UINT32_MAX, 0, UINT32_MAX, 0};
@@ -103,8 +103,8 @@ void fill_parts(const PixelWindow& window, std::uint32_t columns, std::uint64_t 
 
 }  // namespace
 
-PixelWindow window_of(const RunsView& runs) {
-  return window_of_rows(runs, [&](std::uint32_t r) { return runs.row(r); });
+PixelWindow window_of(RowRuns image) {
+  return window_of_rows(image, [&](std::uint32_t r) { return image.row(r); });
 }
 
 PixelWindow window_of(const LevelsView& levels) {
@@ -118,9 +118,9 @@ PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
           std::max(one.bottom, other.bottom)};
 }
 
-void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
+void box_coverage(RowRuns image, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
   fill_parts(window, columns, 1, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
-    part_row.add(runs.row(r), weight, [](std::size_t) { return std::uint64_t{1}; });
+    part_row.add(image.row(r), weight, [](std::size_t) { return std::uint64_t{1}; });
   });
 }
 

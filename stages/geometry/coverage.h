@@ -6,6 +6,7 @@
 
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina {
 
@@ -19,7 +20,7 @@ struct PixelWindow {
 };
 
 /// The smallest window that holds all set pixels; empty if there is none. Cost: the first and last change of each row.
-PixelWindow window_of(const RunsView& runs);
+PixelWindow window_of(RowRuns image);
 PixelWindow window_of(const LevelsView& levels);
 
 /// The smallest window that holds both.
@@ -31,7 +32,7 @@ PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
 /// window   not empty, within the image
 /// columns  1 .. 65535; result  columns x rows values, the top row first
 /// cost     a few operations a run and result row that it touches, and one a result value
-void box_coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
+void box_coverage(RowRuns image, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
 
 /// The same of levels, each pixel set by its share: 255 where all have the level `full` (no pixel has more), and the mean of
 /// shares where they differ. Of one level it is what the runs are.

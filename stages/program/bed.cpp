@@ -62,7 +62,7 @@ std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, c
   return worst;
 }
 
-std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, const RunsView& image) {
+std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, RowRuns image) {
   if (machine.bed.shape != BedShape::kRound) return {};
   const std::int64_t width = nm_of(machine.bed.size_mm[0]);
   for (std::uint32_t r = 0; r < image.rows(); ++r) {

@@ -9,6 +9,7 @@
 #include "stages/data/machine.h"
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::program {
 
@@ -26,7 +27,7 @@ std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, c
 
 /// The first set pixel of an image, row by row, whose centre lies outside of the bed; z is not known. Images of parts that are
 /// no meshes are checked so, layer by layer. cost  O(rows), none for rectangular beds, which images never leave
-std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, const RunsView& image);
+std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, RowRuns image);
 
 /// A letter F, 20 x 30 x 3 mm, as a binary STL in mm: the stem lies along +y, the arms point to +x, the longer one is at
 /// the far end (+y), and a step of 1 mm on top of the foot marks the top. It has no symmetry, so that a print that

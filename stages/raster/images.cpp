@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
+#include "stages/geometry/bits.h"
 #include "stages/geometry/combine.h"
 
 namespace lamina::raster {
@@ -25,6 +27,12 @@ void mirror(const RunsView& runs, bool x, bool y, Runs& out) {
     }
     out.row_offset[r + 1] = static_cast<std::uint32_t>(next - out.change.data());
   }
+}
+
+void mirror(BitImage& image, bool x, bool y) {
+  const std::uint32_t rows = image.rows();
+  for (std::uint32_t r = 0; y && r < rows / 2; ++r) std::ranges::swap_ranges(image.row(r), image.row(rows - 1 - r));
+  for (std::uint32_t r = 0; x && r < rows; ++r) reverse_row(image.row(r), image.columns());
 }
 
 void MaterialImages::start(std::size_t materials, std::uint32_t columns, std::uint32_t rows) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "stages/data/bit_image.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
@@ -13,6 +14,7 @@ namespace lamina::raster {
 /// x: columns are reversed (left becomes right); y: rows are reversed. Both may be requested at once; mirroring twice
 /// gives the image back. O(runs + rows).
 void mirror(const RunsView& runs, bool x, bool y, Runs& out);
+void mirror(BitImage& image, bool x, bool y);
 
 /// Images of one material each, while the solids of a layer are drawn over each other.
 struct MaterialImages {

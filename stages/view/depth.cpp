@@ -27,9 +27,9 @@ ThreeViews::ThreeViews(const PixelGrid& grid, const PixelWindow& window, Nm bott
             view("side", rows_, levels_, columns_, depth, height)};
 }
 
-void ThreeViews::inspect(const RunsView& runs, std::vector<std::uint8_t>& cells) const {
+void ThreeViews::inspect(RowRuns image, std::vector<std::uint8_t>& cells) const {
   cells.resize(std::size_t{columns_} * rows_);
-  box_coverage(runs, window_, columns_, cells);
+  box_coverage(image, window_, columns_, cells);
 }
 
 void ThreeViews::add(const Layer& layer, const std::vector<std::uint8_t>& cells) {

@@ -32,7 +32,7 @@ class ThreeViews {
   std::uint32_t rows() const { return rows_; }
 
   /// The coverage of a layer, columns() x rows() values; for any thread.
-  void inspect(const RunsView& runs, std::vector<std::uint8_t>& cells) const;
+  void inspect(RowRuns image, std::vector<std::uint8_t>& cells) const;
   /// Adds a sampled layer; in any order, from one thread at a time.
   void add(const Layer& layer, const std::vector<std::uint8_t>& cells);
 

@@ -96,7 +96,7 @@ TEST(DitherDeflate, DitheredImagesAreReadAgainAndSmall) {
       const auto encoder = format->make_encoder();
       formats::Bytes file, of_rows, g4;
       ASSERT_TRUE(encoder->encode(runs, 600, 300, file).ok());
-      ASSERT_TRUE(encoder->encode_rows(RowsOfRuns(runs), 600, 300, of_rows).ok());
+      ASSERT_TRUE(encoder->encode(RowsOfRuns(runs), 600, 300, of_rows).ok());
       EXPECT_TRUE(file == of_rows) << columns;
       formats::testing::save(folder / "layer.tif", file);
       const auto image = formats::image(folder / "layer.tif");
@@ -117,7 +117,7 @@ TEST(DitherDeflate, FormatsWithoutBitsOfTheirOwnEncodeRowsAsRuns) {
     const auto encoder = format.make_encoder();
     formats::Bytes of_runs, of_rows;
     ASSERT_TRUE(encoder->encode(runs, 600, 600, of_runs).ok());
-    ASSERT_TRUE(encoder->encode_rows(RowsOfRuns(runs), 600, 600, of_rows).ok());
+    ASSERT_TRUE(encoder->encode(RowsOfRuns(runs), 600, 600, of_rows).ok());
     EXPECT_TRUE(of_runs == of_rows) << format.id;
   }
 }

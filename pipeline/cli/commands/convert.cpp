@@ -9,6 +9,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/manifest/manifest.h"
+#include "stages/data/bit_image.h"
 #include "stages/dose/shares.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/images/image.h"
@@ -17,7 +18,9 @@
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/temporary.h"
+#include "stages/support/memory_gate.h"
 #include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/value.h"
 
@@ -42,6 +45,7 @@ CommandSpec convert_spec() {
                   {"--mirror", "AXES", "mirror images: x swaps left and right, y front and back", "", "Images"},
                   {"--missing-empty", "", "treat missing numbers as empty images", "", "Images"},
                   {"--threads", "N", "number of threads; 0: all processors", "0", "Run"},
+                  {"--memory", "SIZE", "memory limit for images in flight: 256M, 1G", "1G", "Run"},
                   {"--overwrite", "", "replace existing images", "", "Run"},
                   {"--json", "", "print the result as one JSON object on stdout", "", "Run"},
                   {"--quiet", "", "print errors only", "", "Run"}};
@@ -63,7 +67,16 @@ struct Conversion {
   std::string output, mirror;
   std::uint64_t first_number;
   bool overwrite;
+  std::uint64_t memory = std::uint64_t{1} << 30;
 
+  bool turns(char axis) const { return mirror.find(axis) != std::string::npos; }
+  /// Memory of a layer: its pixels, and its file as it is read and written.
+  std::uint64_t bytes_of(std::uint32_t layer) const {
+    const std::uint64_t changes = images.expected_changes(layer);
+    const auto max_bytes = grey != nullptr ? grey->max_bytes : bits->max_bytes;
+    const std::uint64_t pixels = grey != nullptr ? 9 * changes : images.expected_bytes(layer);
+    return pixels + images.file_bytes(layer) + max_bytes(images.columns(), images.rows(), changes);
+  }
   std::string name(std::uint32_t layer) const {
     return fmt::format("{}/{:06}{}", output, first_number + layer, grey != nullptr ? grey->extension : bits->extension);
   }
@@ -75,27 +88,38 @@ struct Converted {
 
 /// One layer, read, turned and coded.
 Status code_bits(const Conversion& all, std::uint32_t layer, formats::Bytes& file, Converted& done) {
-  auto runs = all.images.read(layer);
-  if (!runs) return runs.error();
-  if (!all.mirror.empty()) {
+  auto image = all.images.read(layer, Keep::kSmaller);
+  if (!image) return image.error();
+  if (image->bits) {
+    raster::mirror(*image->bits, all.turns('x'), all.turns('y'));
+  } else if (!all.mirror.empty()) {
     Runs turned;
-    raster::mirror(*runs, all.mirror != "y", all.mirror != "x", turned);
-    *runs = std::move(turned);
+    raster::mirror(image->runs, all.turns('x'), all.turns('y'), turned);
+    image->runs = std::move(turned);
   }
-  done.set = set_pixels(*runs);
-  return all.bits->make_encoder()->encode(*runs, all.dpi[0], all.dpi[1], file);
+  done.set = image->set();
+  const auto encoder = all.bits->make_encoder();
+  if (image->bits) return encoder->encode(*image->bits, all.dpi[0], all.dpi[1], file);
+  return encoder->encode(image->runs.view(), all.dpi[0], all.dpi[1], file);
 }
 
 Status code_grey(const Conversion& all, std::uint32_t layer, formats::Bytes& file, Converted& done) {
-  auto levels = all.images.levels(layer, all.full);
-  if (!levels) return levels.error();
+  Levels levels;
+  auto image = all.images.levels(layer, all.full, levels, Keep::kSmaller);
+  if (!image) return image.error();
+  const auto encoder = all.grey->make_encoder();
+  if (image->bits) {
+    raster::mirror(*image->bits, all.turns('x'), all.turns('y'));
+    done.set = image->bits->set_pixels();
+    return encoder->encode(*image->bits, all.dpi[0], all.dpi[1], file);
+  }
   if (!all.mirror.empty()) {
     Levels turned;
-    dose::mirror(*levels, all.mirror != "y", all.mirror != "x", turned);
-    *levels = std::move(turned);
+    dose::mirror(levels, all.turns('x'), all.turns('y'), turned);
+    levels = std::move(turned);
   }
-  for (std::size_t i = 0; i < levels->level.size(); ++i) done.set += levels->change[2 * i + 1] - levels->change[2 * i];
-  return all.grey->make_encoder()->encode(*levels, all.full, all.dpi[0], all.dpi[1], file);
+  done.set = pixels_at(levels);
+  return encoder->encode(levels.view(), all.full, all.dpi[0], all.dpi[1], file);
 }
 
 Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) {
@@ -129,7 +153,9 @@ Status check_output(const Conversion& all, const std::string& stack) {
 Status convert_all(const Conversion& all, const std::atomic<bool>& cancel, Converted& sum) {
   std::mutex mutex;
   std::optional<std::pair<std::uint32_t, Error>> wrong;
+  MemoryGate gate(all.memory);
   tbb::parallel_for(std::uint32_t{0}, all.images.layers(), [&](std::uint32_t layer) {
+    const auto pass = gate.enter(all.bytes_of(layer));
     if (cancel) return;
     {
       const std::scoped_lock lock(mutex);
@@ -192,7 +218,8 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   std::array<double, 2> given{0, 0};
   std::int64_t threads = 0;
   const Limits resolution{.low = 1, .high = kMaxDpi, .one_for_all = true, .digits = kDpiDigits};
-  for (const Status& status : {arguments.read("--dpi", resolution, given), arguments.read("--threads", {0, 4096}, threads)})
+  for (const Status& status : {arguments.read("--dpi", resolution, given), arguments.read("--threads", {0, 4096}, threads),
+                               arguments.read("--memory", read_bytes, all.memory)})
     if (!status) return status;
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));

@@ -35,6 +35,7 @@ CommandSpec info_spec() {
                   {"--repair", "MODE", "repair of open meshes: auto, winding (approximate) or off", "auto", "", modes},
                   {"--weld", "UM", "max gap to weld in micrometres; 5 is doubled as needed", "5", ""},
                   {"--threshold", "N", "images: pixels with a grey below N are set, 1 to 255", "128", ""},
+                  {"--memory", "SIZE", "memory limit for images in flight: 256M, 1G", "1G", ""},
                   {"--density", "G/CM3", "filament density in g/cm3, if the toolpath file states none", "", ""},
                   {"--json", "", "print one JSON object per part on stdout", "", ""}};
   spec.closing =
@@ -57,10 +58,11 @@ Status report_print(const std::string& path, double density_g_cm3, const Argumen
 }
 
 /// errors  kInput: some images cannot be read
-Status report_images(const std::string& path, int threshold, const Arguments& arguments, Context& context) {
+Status report_images(const std::string& path, int threshold, std::uint64_t memory, const Arguments& arguments,
+                     Context& context) {
   const auto reported = images_on_record(path);
   if (!reported) return reported.error();
-  const Result<formats::StackInfo> info = formats::inspect_stack(reported->path, threshold);
+  const Result<formats::StackInfo> info = formats::inspect_stack(reported->path, threshold, memory);
   if (!info) return info.error();
   Json json = formats::as_json(*info);
   std::string text = formats::as_text(*info);
@@ -89,6 +91,8 @@ Status check_flags(const Arguments& arguments) {
     return at_option("--density", "is of toolpaths; parts have no filament");
   if (arguments.has("--threshold") && !any(formats::names_images))
     return at_option("--threshold", "is of layer images; leave it out");
+  if (arguments.has("--memory") && !any(formats::names_images))
+    return at_option("--memory", "is of layer images; leave it out");
   for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld"})
     if (arguments.has(flag) && !parts) return at_option(flag, "is of parts, not of toolpaths or images");
   return {};
@@ -104,6 +108,8 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--density", {0.1, 25}, density_g_cm3); !status) return status;
   std::int64_t threshold = 128;
   if (Status status = arguments.read("--threshold", {1, 255}, threshold); !status) return status;
+  std::uint64_t memory = std::uint64_t{1} << 30;
+  if (Status status = arguments.read("--memory", read_bytes, memory); !status) return status;
   if (Status status = check_flags(arguments); !status) return status;
   int code = 0;
   const bool json = arguments.has("--json");
@@ -112,7 +118,7 @@ Outcome run_info(const Arguments& arguments, Context& context) {
     if (names_toolpaths(part.path)) {
       status = report_print(part.path, density_g_cm3, arguments, context);
     } else if (formats::names_images(part.path)) {
-      status = report_images(part.path, static_cast<int>(threshold), arguments, context);
+      status = report_images(part.path, static_cast<int>(threshold), memory, arguments, context);
     } else {
       const auto page =
           (json ? describe_part_json : describe_part_text)(part.path, load_options(*job, part), slice::surplus_areas);

@@ -63,7 +63,10 @@ CommandSpec plan_spec(const PlanCommand& row) {
   }
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
-  spec.options.push_back({"--timing", "", "break down the run time and compare it with the hardware limit", "", "Run"});
+  const bool rastered = row.product == Product::kImages;  // else no limit is known
+  spec.options.push_back({"--timing", "",
+                          rastered ? "break down the run time and compare it with the hardware limit" : "break down the run time",
+                          "", "Run"});
   spec.options.push_back({"--json", "", "print the result as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "print errors only", "", "Run"});
   spec.more = row.closing;

@@ -21,6 +21,7 @@ CommandSpec preview_spec() {
       {"--width", "PIXELS", "image width in pixels, 200 to 20000", "2400", ""},
       {"--filament", "MM", "filament diameter of G-code in mm", "the file's, else 1.75", ""},
       {"--layer-height", "MM", "layer height in mm to divide G-code by, as for spirals", "by tags, heights or turns", ""},
+      {"--memory", "SIZE", "memory limit for images in flight: 256M, 1G", "1G", ""},
       {"--whole-bed", "", "show the whole bed, not only the printed area", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "print errors only", "", ""}};

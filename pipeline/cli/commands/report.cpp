@@ -22,6 +22,7 @@ CommandSpec report_spec() {
   spec.options = {{"-o,--output", "HTML", "page to write, .html or .htm", "", ""},
                   {"--max-bytes", "SIZE", "max size of the page; layers are omitted evenly to fit", "19M", ""},
                   {"--parts", "DIR", "folder or file of the parts, for the three views; repeatable", "", ""},
+                  {"--memory", "SIZE", "memory limit for layers in flight: 256M, 1G", "1G", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""},
                   {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
@@ -48,6 +49,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   if (!is_page_name(output)) return usage("-o {}: the page is HTML; give it a name that ends in .html", output);
   ReportOptions options;
   if (Status status = arguments.read("--max-bytes", read_bytes, options.size_limit); !status) return status;
+  if (Status status = arguments.read("--memory", read_bytes, options.memory_bytes); !status) return status;
   options.parts = arguments.all("--parts");
   std::error_code ignored;
   if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored))

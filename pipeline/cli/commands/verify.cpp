@@ -10,6 +10,7 @@
 #include "stages/checks/layer_warnings.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
+#include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
@@ -25,6 +26,7 @@ CommandSpec verify_spec() {
   spec.options = {{"--quote", "CSV", "write material and cost per part as CSV (one directory)", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""},
                   {"--quick", "", "check sizes and hashes only, without decoding images", "", ""},
+                  {"--memory", "SIZE", "memory limit for layers in flight: 256M, 1G", "1G", ""},
                   {"--json", "", "print one JSON object per directory on stdout", "", ""},
                   {"--quiet", "", "print faults only", "", ""}};
   spec.closing =
@@ -60,10 +62,12 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
     return at_option("--quote", "needs the replay of programs; remove --quick");
   if (Status status = check_quote(arguments, arguments.operands.front()); !status) return status;
   if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
+  VerifyOptions options{.quick = arguments.has("--quick")};
+  if (Status status = arguments.read("--memory", read_bytes, options.memory_bytes); !status) return status;
   int code = 0;
   Answer answer(arguments, context);
   for (const std::string& directory : arguments.operands) {
-    const Result<VerifyReport> report = verify(directory, {.quick = arguments.has("--quick")});
+    const Result<VerifyReport> report = verify(directory, options);
     if (!report) {
       code = std::max(code, context.complain(report.error()));
       continue;

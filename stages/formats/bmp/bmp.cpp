@@ -26,14 +26,22 @@ std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>(std::lro
 class BmpEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (runs.columns == 0 || runs.rows() == 0 || runs.columns > kMaxPixelsASide || runs.rows() > kMaxPixelsASide) {
-      return Error{Fault::kOutput, fmt::format("bmp holds no {} x {} pixels", runs.columns, runs.rows())};
+    return encode_rows(runs, dpi_x, dpi_y, file);
+  }
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_rows(rows, dpi_x, dpi_y, file);
+  }
+
+ private:
+  static Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+    if (image.columns == 0 || image.rows == 0 || image.columns > kMaxPixelsASide || image.rows > kMaxPixelsASide) {
+      return Error{Fault::kOutput, fmt::format("bmp holds no {} x {} pixels", image.columns, image.rows)};
     }
-    const std::size_t used = row_bytes(runs.columns), stride = (used + 3) / 4 * 4;
-    const std::uint64_t size = kHeadBytes + std::uint64_t{stride} * runs.rows();
+    const std::size_t used = row_bytes(image.columns), stride = (used + 3) / 4 * 4;
+    const std::uint64_t size = kHeadBytes + std::uint64_t{stride} * image.rows;
     if (size > UINT32_MAX) {
       return Error{Fault::kOutput, fmt::format("bmp holds less than 4 GiB, {} x {} pixels take {} bytes; choose tiff-g4",
-                                               runs.columns, runs.rows(), size)};
+                                               image.columns, image.rows, size)};
     }
     file.resize(size);
     std::fill_n(file.data(), kHeadBytes, std::byte{0});
@@ -41,8 +49,8 @@ class BmpEncoder : public ImageEncoder {
     put(file, 2, static_cast<std::uint32_t>(size));
     put(file, 10, kHeadBytes);
     put(file, 14, kInfoBytes);
-    put(file, 18, runs.columns);
-    put(file, 22, runs.rows());
+    put(file, 18, image.columns);
+    put(file, 22, image.rows);
     put(file, 26, 1, 2);
     put(file, 28, 1, 2);
     put(file, 34, static_cast<std::uint32_t>(size - kHeadBytes));
@@ -52,9 +60,9 @@ class BmpEncoder : public ImageEncoder {
     put(file, 50, 2);
     put(file, 54, 0x00FFFFFF);
     const std::span<std::byte> rows = std::span(file).subspan(kHeadBytes);
-    for (std::uint32_t r = 0; r < runs.rows(); ++r) {
-      const std::span<std::byte> row = rows.subspan(stride * (runs.rows() - 1 - r), stride);
-      expand_row(runs.row(r), row.first(used));
+    for (std::uint32_t r = 0; r < image.rows; ++r) {
+      const std::span<std::byte> row = rows.subspan(stride * (image.rows - 1 - r), stride);
+      image.put(r, row.first(used));
       std::fill(row.begin() + static_cast<std::ptrdiff_t>(used), row.end(), std::byte{0});
     }
     return {};
@@ -81,7 +89,7 @@ std::uint32_t number(std::span<const std::byte> bytes, std::size_t at, std::size
 
 }  // namespace
 
-Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink) {
+Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink, Keep keep) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole BMP: {}; plan the layer again", file.path(), why)};
   };
@@ -113,7 +121,7 @@ Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink) {
     return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, begin + stride * rows));
 
   if (sink != nullptr && grey) sink->levels.start(columns);
-  RunsBuilder builder(columns);
+  RunsBuilder builder(columns, rows, keep);
   const auto at_once = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(256 * 1024 / stride, 1, rows));
   Buffer<std::byte> buffer(stride * at_once), wide(grey && bits < 8 ? columns : 0);
   const bool from_top = height < 0;
@@ -141,7 +149,7 @@ Result<Image> read_bmp(const FileReader& file, int threshold, LevelSink* sink) {
       }
     }
   }
-  return Image{builder.finish(), number(head, 38) * 0.0254, number(head, 42) * 0.0254};
+  return image_of(builder, columns, number(head, 38) * 0.0254, number(head, 42) * 0.0254);
 }
 
 }  // namespace lamina::formats

@@ -177,8 +177,10 @@ bool G4Decoder::decode_row(const std::byte* coded) {
   return at <= bits_;
 }
 
-bool G4Decoder::decode_rows(const std::byte* coded, const G4Strip& strip, Runs& runs) {
-  for (std::uint32_t r = 0; r < strip.rows; ++r) {
+/// From row `r` of the strip on, until the runs have too many changes; `r` becomes the next one.
+bool G4Decoder::decode_rows(const std::byte* coded, const G4Strip& strip, std::uint32_t& r, Runs& runs,
+                            std::size_t max_changes) {
+  for (; r < strip.rows && runs.change.size() < max_changes; ++r) {
     if (of_above_ == 0 && !strip.white_is_set) {  // a bit for each blank row below a blank one
       const std::uint64_t bits = window(coded, bit_);
       const std::uint32_t blank = std::min({static_cast<std::uint32_t>(std::countl_one(bits)), 57u, strip.rows - r});
@@ -207,7 +209,7 @@ bool G4Decoder::decode_rows(const std::byte* coded, const G4Strip& strip, Runs& 
   return true;
 }
 
-bool G4Decoder::append(Buffer<std::byte>& coded, const G4Strip& strip, Runs& runs) {
+void G4Decoder::start(Buffer<std::byte>& coded, const G4Strip& strip) {
   constexpr std::size_t kRead = 16;
   bits_ = std::uint64_t{coded.size()} * 8;
   bit_ = 0;
@@ -226,7 +228,25 @@ bool G4Decoder::append(Buffer<std::byte>& coded, const G4Strip& strip, Runs& run
   above_.resize(std::size_t{columns_} + kBehind);
   row_.resize(std::size_t{columns_} + kBehind);
   std::fill_n(above_.data(), kBehind, columns_);
-  return decode_rows(coded.data(), strip, runs);
+}
+
+bool G4Decoder::append(Buffer<std::byte>& coded, const G4Strip& strip, Runs& runs) {
+  start(coded, strip);
+  std::uint32_t row = 0;
+  return decode_rows(coded.data(), strip, row, runs, SIZE_MAX);
+}
+
+bool G4Decoder::append(Buffer<std::byte>& coded, const G4Strip& strip, RunsBuilder& builder) {
+  constexpr std::size_t kChangesAtOnce = 1 << 18;
+  start(coded, strip);
+  Runs some;
+  some.columns = strip.columns;
+  for (std::uint32_t row = 0; row < strip.rows;) {
+    some.row_offset.assign(1, 0);
+    some.change.clear();
+    if (!decode_rows(coded.data(), strip, row, some, kChangesAtOnce) || !builder.add_all(some)) return false;
+  }
+  return true;
 }
 
 }  // namespace lamina::formats

@@ -6,6 +6,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats {
 
@@ -26,10 +27,13 @@ class G4Decoder {
   ///        what was appended means nothing then. What is taken is what libtiff decodes
   /// cost   some nanoseconds a change; a nanosecond for those that lie below one, a bit for a blank row. Scratch is two rows
   bool append(Buffer<std::byte>& coded, const G4Strip& strip, Runs& runs);
+  /// The same into a builder, some rows at a time.
+  bool append(Buffer<std::byte>& coded, const G4Strip& strip, RunsBuilder& builder);
 
  private:
+  void start(Buffer<std::byte>& coded, const G4Strip& strip);
   bool decode_row(const std::byte* coded);
-  bool decode_rows(const std::byte* coded, const G4Strip& strip, Runs& runs);
+  bool decode_rows(const std::byte* coded, const G4Strip& strip, std::uint32_t& row, Runs& runs, std::size_t max_changes);
 
   Buffer<std::uint32_t> above_, row_;         // changes, then `columns_` some times
   std::uint32_t columns_ = 0, of_above_ = 0;  // changes above

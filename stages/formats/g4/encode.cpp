@@ -350,25 +350,72 @@ SteadyRows steady_rows(const RunsView& runs, std::uint32_t r) {
   return {runs.change.data() + offset[r], changes, end - r, runs.columns};
 }
 
+BitWriter start_file(Buffer<std::byte>& file, std::size_t start) {
+  if (file.size() < start + 64) file.resize(std::max(start + 64, file.capacity()));
+  return BitWriter(file.data() + start);
+}
+
+/// Makes the file large enough for so many bytes more.
+void reserve_bytes(BitWriter& writer, Buffer<std::byte>& file, std::size_t bytes) {
+  const std::size_t used = static_cast<std::size_t>(writer.next() - file.data());
+  if (file.size() - used >= bytes) return;
+  file.resize(used + bytes);
+  writer.move_to(file.data() + used);
+}
+
 }  // namespace
 
 Encoder::Encoder(Isa isa) : body_(steps_body(limited_isa(isa))) {}
 
 std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::size_t start) {
+  BitWriter writer = put_rows(start_file(file, start), runs, 0, file);
+  reserve_bytes(writer, file, 64);
+  writer.put(kEndOfFacsimileBlock);
+  return static_cast<std::size_t>(writer.finish() - file.data());
+}
+
+std::size_t Encoder::encode(const BitRows& rows, Buffer<std::byte>& file, std::size_t start) {
+  constexpr std::size_t kChangesAtOnce = 1 << 16;
+  constexpr std::uint32_t kMaxRows = 4096;
+  BitWriter writer = start_file(file, start);
+  RowRuns image(rows);
+  Runs some;  // with the row above them
+  some.columns = image.columns();
+  const auto add = [&](std::uint32_t r) {
+    const std::span<const std::uint32_t> row = image.row(r);
+    some.change.insert(some.change.end(), row.begin(), row.end());
+    some.row_offset.push_back(static_cast<std::uint32_t>(some.change.size()));
+  };
+  for (std::uint32_t r = 0; r < image.rows();) {
+    const std::uint32_t first = r;
+    some.change.clear();
+    some.row_offset.assign(1, 0);
+    if (first > 0) add(first - 1);
+    for (; r < image.rows() && r < first + kMaxRows && some.change.size() < kChangesAtOnce; ++r) add(r);
+    writer = put_rows(writer, some, first > 0 ? 1 : 0, file);
+    // As much as the rest takes, so that a large file is not held twice while it grows.
+    const auto used = static_cast<std::size_t>(writer.next() - file.data());
+    const auto expected = static_cast<std::size_t>(1.05 * static_cast<double>(used) / r * image.rows());
+    if (file.size() < expected) reserve_bytes(writer, file, std::max(expected, file.size() / 4 * 5) - used);
+  }
+  reserve_bytes(writer, file, 64);
+  writer.put(kEndOfFacsimileBlock);
+  return static_cast<std::size_t>(writer.finish() - file.data());
+}
+
+/// Rows of an image from `first` on, 0 or 1; row 0 is the one above then.
+BitWriter Encoder::put_rows(BitWriter writer, const RunsView& runs, std::uint32_t first, Buffer<std::byte>& file) {
   const std::uint32_t columns = runs.columns, rows = runs.rows();
-  if (file.size() < start + 64) file.resize(std::max(start + 64, file.capacity()));
-  BitWriter writer(file.data() + start);
   const auto ensure_capacity = [&](std::size_t bytes) {
     const std::size_t used = static_cast<std::size_t>(writer.next() - file.data());
-    if (file.size() - used >= bytes) return;
-    file.resize(std::max(used + bytes, file.size() * 2));
-    writer.move_to(file.data() + used);
+    if (file.size() - used < bytes) reserve_bytes(writer, file, std::max(bytes, file.size() * 2 - used));
   };
 
   std::span<const std::uint32_t> above;  // T.6: the row above the first one is white
+  if (first > 0) above = runs.row(0);
   copy_row(above, columns, reference_);
   bool copied = true;  // reference_ holds `above`
-  for (std::uint32_t r = 0; r < rows;) {
+  for (std::uint32_t r = first; r < rows;) {
     std::span<const std::uint32_t> row = runs.row(r);
     std::uint32_t coded = 0;  // changes of the row
     const bool same = row.size() > kFewChanges && is_same(row, above);
@@ -412,9 +459,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     above = row;
     ++r;
   }
-  ensure_capacity(64);
-  writer.put(kEndOfFacsimileBlock);
-  return static_cast<std::size_t>(writer.finish() - file.data());
+  return writer;
 }
 
 }  // namespace lamina::formats::g4

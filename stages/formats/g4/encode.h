@@ -9,10 +9,12 @@
 #include "stages/data/buffer.h"
 #include "stages/data/choices.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats::g4 {
 
 struct StepsBody;
+class BitWriter;
 
 /// Encodes images one after another and keeps its scratch rows between them.
 class Encoder {
@@ -27,8 +29,12 @@ class Encoder {
   /// cost     one read of each change: below a nanosecond where rows follow each other's edges, a few where they do
   ///          not; a row like the one above costs a comparison, a stretch of empty rows the logarithm of its length
   std::size_t encode(const RunsView& runs, Buffer<std::byte>& file, std::size_t start);
+  /// The same of rows, of which some at a time become runs.
+  std::size_t encode(const BitRows& rows, Buffer<std::byte>& file, std::size_t start);
 
  private:
+  BitWriter put_rows(BitWriter writer, const RunsView& runs, std::uint32_t first, Buffer<std::byte>& file);
+
   const StepsBody* body_;
   Buffer<std::uint32_t> coding_, reference_;  // 0, the changes of a row, then `columns` some times
 };

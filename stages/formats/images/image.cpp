@@ -10,6 +10,7 @@
 #include <cstring>
 #include <new>
 
+#include "stages/data/bit_image.h"
 #include "stages/data/units.h"
 #include "stages/formats/images/image_formats.h"
 #include "stages/support/io/file_reader.h"
@@ -19,34 +20,37 @@ namespace lamina::formats {
 namespace {
 
 /// By the first bytes, regardless of the file name.
-Result<Image> read_by_magic(const FileReader& file, int threshold, std::uint64_t page, LevelSink* sink) {
+Result<Image> read_by_magic(const FileReader& file, int threshold, std::uint64_t page, LevelSink* sink, Keep keep) {
   const std::string& path = file.path();
   unsigned char magic[8] = {};
   if (::pread(file.descriptor(), magic, sizeof magic, 0) < 0) {
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return read_tiff(file.descriptor(), file.size(), path, threshold, page, sink);
-  if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file.descriptor(), file.size(), path, threshold, sink);
+  if (begins("II", 2) || begins("MM", 2)) return read_tiff(file.descriptor(), file.size(), path, threshold, page, sink, keep);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return read_png(file.descriptor(), file.size(), path, threshold, sink, keep);
   if (sink != nullptr && !sink->nearest)
     return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
   const bool portable = magic[0] == 'P' && (magic[1] == '1' || magic[1] == '2' || magic[1] == '5');
-  if (begins("P4", 2) || (threshold > 0 && portable)) return read_pbm(file, threshold, sink);
-  if (begins("BM", 2)) return read_bmp(file, threshold, sink);
+  if (begins("P4", 2) || (threshold > 0 && portable)) return read_pbm(file, threshold, sink, keep);
+  if (begins("BM", 2)) return read_bmp(file, threshold, sink, keep);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
 
-Result<Image> read_image(const std::string& path, int threshold, std::uint64_t page = 0, LevelSink* sink = nullptr) {
+Result<Image> read_image(const std::string& path, int threshold, std::uint64_t page = 0, LevelSink* sink = nullptr,
+                         Keep keep = Keep::kRuns) {
   const auto file = FileReader::open(path, {});
   if (!file) return file.error();
   try {
-    return read_by_magic(*file, threshold, page, sink);
+    return read_by_magic(*file, threshold, page, sink, keep);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }
 }
 
 }  // namespace
+
+std::uint64_t Image::set() const { return bits ? bits->set_pixels() : counts.set + set_pixels(runs); }
 
 double requested_dpi(double dpi) {
   constexpr double kMetresAnInch = 0.0254, kSlack = 1e-4;
@@ -55,8 +59,8 @@ double requested_dpi(double dpi) {
   return std::abs(dpi - whole) < (metric ? 0.02 : kSlack / 2) ? whole : dpi;
 }
 
-Result<Image> image(const std::string& path, std::uint8_t full) {
-  if (full == 0) return read_image(path, 0);
+Result<Image> image(const std::string& path, std::uint8_t full, Keep keep) {
+  if (full == 0) return read_image(path, 0, 0, nullptr, keep);
   Levels unused;
   return levels(path, full, unused);
 }
@@ -64,7 +68,9 @@ Result<Image> image(const std::string& path, std::uint8_t full) {
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels) {
   LevelSink sink{full, levels};
   auto image = read_image(path, 0, 0, &sink);
-  if (image) threshold_levels(levels, 1, image->runs);
+  if (!image) return image;
+  threshold_levels(levels, 1, image->runs);
+  image->rows = levels.view().rows();
   return image;
 }
 
@@ -87,20 +93,35 @@ Error of_others(std::string message) {
 
 }  // namespace
 
-Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels) {
+Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels, Keep keep) {
   LevelSink sink{request.full, levels, true, request.invert};
   levels.row_offset.clear();
-  auto image = read_image(path, 128, request.page, &sink);
+  auto image = read_image(path, 128, request.page, &sink, keep);
   if (!image) return of_others(image.error().message);
+  if (image->bits) {
+    if (request.invert) invert(*image->bits);
+    return image;
+  }
   if (levels.row_offset.empty()) {  // of 1 bit
     levels_of(request.invert ? inverse(image->runs) : std::move(image->runs), request.full, levels);
   }
   image->runs = {};
+  image->rows = levels.view().rows();
   return image;
 }
 
-Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page) {
-  auto image = read_image(path, threshold, page);
+Result<GreyCounts> grey_counts(const std::string& path, std::uint64_t page) {
+  GreyCounts counts;
+  Levels unused;
+  LevelSink sink{255, unused, true, false, &counts};
+  const auto image = read_image(path, 128, page, &sink, Keep::kCounts);
+  if (!image) return of_others(image.error().message);
+  if (unused.row_offset.empty()) counts.darkness = 255 * image->counts.set;  // of 1 bit
+  return counts;
+}
+
+Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page, Keep keep) {
+  auto image = read_image(path, threshold, page, nullptr, keep);
   return image ? std::move(image) : of_others(image.error().message);
 }
 
@@ -136,7 +157,7 @@ std::string other_layer(const std::string& description, const Layer& layer) {
 }  // namespace
 
 std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set, const Layer& layer) {
-  const std::uint32_t columns = image.runs.columns, rows = image.runs.view().rows();
+  const std::uint32_t columns = image.columns, rows = image.rows;
   if (columns != grid.columns() || rows != grid.rows()) {
     return fmt::format("{} x {} pixels, the manifest says {} x {}", columns, rows, grid.columns(), grid.rows());
   }
@@ -147,7 +168,7 @@ std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t 
   if (dpi_differs(image.dpi_x, grid.x.dpi()) || dpi_differs(image.dpi_y, grid.y.dpi())) {
     return fmt::format("{} x {} dpi, the manifest says {} x {}", image.dpi_x, image.dpi_y, grid.x.dpi(), grid.y.dpi());
   }
-  const std::uint64_t is_set = set_pixels(image.runs);
+  const std::uint64_t is_set = image.set();
   return is_set == set ? other_layer(image.description, layer)
                        : fmt::format("{} set pixels, the manifest says {}", is_set, set);
 }
@@ -166,6 +187,15 @@ Runs inverse(const Runs& image) {
     out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
   }
   return out;
+}
+
+void invert(BitImage& image) {
+  const std::uint32_t last = image.columns() % 64;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::span<std::uint64_t> row = image.row(r);
+    for (std::uint64_t& word : row) word = ~word;
+    if (last != 0) row.back() &= (std::uint64_t{1} << last) - 1;
+  }
 }
 
 // Rows of grey values become bits or levels.
@@ -283,9 +313,16 @@ bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, u
           std::max(end, static_cast<std::uint32_t>(2 * first_other(row, (begin + 1) / 2, columns / 2, std::byte(17 * value))));
     while (end < columns && value_at(end) == value) ++end;
     if ((!nearest && dark * full % darkest != 0) || levels.level.size() >= UINT32_MAX / 2) return false;
-    levels.append(begin, end, static_cast<std::uint8_t>((2 * dark * full + darkest) / (2 * darkest)));
+    const auto level = static_cast<std::uint8_t>((2 * dark * full + darkest) / (2 * darkest));
+    if (counts != nullptr) {
+      counts->darkness += std::uint64_t{level} * (end - begin);
+      counts->between += level > 0 && level < full ? end - begin : 0;
+    } else {
+      levels.append(begin, end, level);
+    }
     begin = end;
   }
+  if (counts != nullptr) return true;
   levels.end_row();
   return true;
 }

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
@@ -21,6 +22,7 @@ struct LevelSink {
   Levels& levels;
   bool nearest = false;  // values between two levels become the nearest, halves the higher one; else they are wrong
   bool invert = false;   // bright pixels are full
+  GreyCounts* counts = nullptr;  // takes what rows have; the levels stay empty then
 
   /// bits     a value, 4, 8 or 16 (low byte first)
   /// maximum  of the values; 0: that of the bits. returns  false if a value is not a level, or there are too many runs
@@ -30,17 +32,27 @@ struct LevelSink {
 /// Each reads `file`, open for reading and at its start, which stays the caller's; `bytes` is its size, `path` for messages.
 /// threshold  0: 1-bit images alone; else grey ones of 2, 4, 8 and 16 bits too, of which pixels below it are set
 /// page       the place of the directory; 0: the only one that is no thumbnail
+/// keep       of the pixels that are set
 /// sink       takes the levels of a grey image, whose runs are empty then; one of 1 bit, black and white, leaves the sink as
 ///            it is with `nearest`; without, it is refused, except as PNG, which other programs pack into fewer bits
 /// errors     of image()
 Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, std::uint64_t page = 0,
-                        LevelSink* sink = nullptr);
+                        LevelSink* sink = nullptr, Keep keep = Keep::kRuns);
 Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path);
-Result<Image> read_bmp(const FileReader& file, int threshold = 0, LevelSink* sink = nullptr);
-Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr);
-Result<Image> read_pbm(const FileReader& file, int threshold = 0, LevelSink* sink = nullptr);
+Result<Image> read_bmp(const FileReader& file, int threshold = 0, LevelSink* sink = nullptr, Keep keep = Keep::kRuns);
+Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, LevelSink* sink = nullptr,
+                       Keep keep = Keep::kRuns);
+Result<Image> read_pbm(const FileReader& file, int threshold = 0, LevelSink* sink = nullptr, Keep keep = Keep::kRuns);
 /// Bits a value of a PGM: 16 where its maximum is above 255, else 8.
 unsigned pgm_bits(const FileReader& file);
+
+/// The image that a builder collected.
+inline Image image_of(RunsBuilder& builder, std::uint32_t columns, double dpi_x, double dpi_y) {
+  Image image{builder.finish(), dpi_x, dpi_y, {}, columns, builder.rows()};
+  if (auto bits = builder.take_bits()) image.bits = std::make_shared<BitImage>(std::move(*bits));
+  image.counts = builder.counts();
+  return image;
+}
 
 /// Reads rows of an uncompressed image as bytes; false if the file is shorter.
 inline bool read_bytes_at(const FileReader& file, std::uint64_t offset, std::span<std::byte> to) {

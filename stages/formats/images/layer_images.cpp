@@ -114,16 +114,16 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
     stack.files_.push_back(std::move(file.path));
   }
   stack.fingerprint_ = hash_text(all).low;
-  auto first = dark_pixels(stack.files_.front(), request.threshold, stack.pages_.front().position);
+  auto first = dark_pixels(stack.files_.front(), request.threshold, stack.pages_.front().position, Keep::kCounts);
   if (!first) return first.error();
-  stack.columns_ = first->runs.columns;
-  stack.rows_ = first->runs.view().rows();
+  stack.columns_ = first->columns;
+  stack.rows_ = first->rows;
   // A resolution that no printer has is none.
   const auto sound = [](double dpi) { return dpi >= 1 && dpi <= 25'400; };
   if (!sound(first->dpi_x) || !sound(first->dpi_y)) first->dpi_x = first->dpi_y = 0;
   stack.dpi_x_ = first->dpi_x;
   stack.dpi_y_ = first->dpi_y;
-  if (Status status = stack.inspect_others(first->runs.change.size()); !status) return status.error();
+  if (Status status = stack.inspect_others(first->counts.changes); !status) return status.error();
   return stack;
 }
 
@@ -136,9 +136,9 @@ Status LayerImages::inspect_others(std::uint64_t changes_of_first) {
   for (std::uint32_t inspection = 1; inspection < request_.inspections; ++inspection) {
     const auto layer = static_cast<std::uint32_t>(std::uint64_t{inspection} * (layers() - 1) / (request_.inspections - 1));
     if (layer == 0 || pages_[layer].file == UINT32_MAX) continue;
-    const auto image = read(layer);
+    const auto image = read(layer, Keep::kCounts);
     if (!image) return image.error();
-    add(layer, image->change.size());
+    add(layer, image->counts.changes);
   }
   return {};
 }
@@ -147,6 +147,11 @@ std::uint64_t LayerImages::expected_changes(std::uint32_t layer) const {
   const std::uint64_t maximum = std::uint64_t{rows_} * (std::uint64_t{columns_} + 2);
   const double expected = 2 * changes_a_byte_ * static_cast<double>(pages_[layer].bytes + 512);
   return pages_[layer].file == UINT32_MAX ? 0 : std::min(maximum, static_cast<std::uint64_t>(expected));
+}
+
+std::uint64_t LayerImages::expected_bytes(std::uint32_t layer) const {
+  // Runs that grow are held twice; above half of the bits they become those (geometry/bits.h).
+  return std::min(16 * expected_changes(layer), 2 * bytes_of_bits(columns_, rows_)) + 8 * std::uint64_t{rows_};
 }
 
 LayerImages::Stamp LayerImages::stamp_of(const std::string& path) {
@@ -160,33 +165,52 @@ std::string_view LayerImages::file(std::uint32_t layer) const {
 }
 
 Result<Runs> LayerImages::read(std::uint32_t layer) const {
+  auto image = read(layer, Keep::kRuns);
+  if (!image) return image.error();
+  return std::move(image->runs);
+}
+
+Result<Image> LayerImages::read(std::uint32_t layer, Keep keep) const {
   const Page& page = pages_[layer];
   if (page.file == UINT32_MAX) {
-    Runs empty;
-    empty.columns = columns_;
-    empty.row_offset.assign(std::size_t{rows_} + 1, 0);
+    Image empty;
+    empty.columns = empty.runs.columns = columns_;
+    empty.rows = rows_;
+    empty.runs.row_offset.assign(std::size_t{rows_} + 1, 0);
     return empty;
   }
-  auto image = dark_pixels(files_[page.file], request_.threshold, page.position);
+  auto image = dark_pixels(files_[page.file], request_.threshold, page.position, keep);
   if (Status status = check_stamp(page.file); !status) return status.error();
   if (!image) return image.error();
-  if (Status status = check(layer, *image, image->runs.columns, image->runs.view().rows()); !status) return status.error();
-  return request_.invert ? inverse(image->runs) : std::move(image->runs);
+  if (Status status = check(layer, *image, image->columns, image->rows); !status) return status.error();
+  if (!request_.invert || keep == Keep::kCounts) return image;
+  if (image->bits) {
+    invert(*image->bits);
+  } else {
+    image->runs = inverse(image->runs);
+  }
+  return image;
 }
 
 Result<Levels> LayerImages::levels(std::uint32_t layer, std::uint8_t full) const {
+  Levels read;
+  const auto image = levels(layer, full, read, Keep::kRuns);
+  if (!image) return image.error();
+  return read;
+}
+
+Result<Image> LayerImages::levels(std::uint32_t layer, std::uint8_t full, Levels& levels, Keep keep) const {
   const Page& page = pages_[layer];
-  Levels levels;
   if (page.file == UINT32_MAX) {
     levels.start(columns_);
     levels.row_offset.assign(std::size_t{rows_} + 1, 0);
-    return levels;
+    return Image();
   }
-  const auto image = nearest_levels(files_[page.file], {full, request_.invert, page.position}, levels);
+  auto image = nearest_levels(files_[page.file], {full, request_.invert, page.position}, levels, keep);
   if (Status status = check_stamp(page.file); !status) return status.error();
   if (!image) return image.error();
-  if (Status status = check(layer, *image, levels.columns, levels.view().rows()); !status) return status.error();
-  return levels;
+  if (Status status = check(layer, *image, image->columns, image->rows); !status) return status.error();
+  return image;
 }
 
 Status LayerImages::check_stamp(std::uint32_t file) const {

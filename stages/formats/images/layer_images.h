@@ -9,10 +9,10 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/formats/images/image.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats {
-
-struct Image;
 
 /// Whether a name is that of layer images: a folder, or a file that ends in .tif, .tiff, .png, .bmp, .pbm or .pgm.
 bool names_images(const std::string& path);
@@ -60,11 +60,19 @@ class LayerImages {
   /// inspected one.
   std::uint64_t expected_changes(std::uint32_t layer) const;
 
+  /// The memory that such runs take at most, or the bits of an image with more.
+  std::uint64_t expected_bytes(std::uint32_t layer) const;
+  std::uint64_t file_bytes(std::uint32_t layer) const { return pages_[layer].bytes; }  // its share of the file
+
   /// Decodes one layer. errors  kInput with the file: cannot be read, is of another size or resolution than the first,
   /// or was changed since open()
   Result<Runs> read(std::uint32_t layer) const;
+  /// The same as runs or bits. keep  kRuns or kSmaller
+  Result<Image> read(std::uint32_t layer, Keep keep) const;
   /// The same in levels up to `full`, 1 to 255, regardless of the threshold: nearest_levels().
   Result<Levels> levels(std::uint32_t layer, std::uint8_t full) const;
+  /// The same; of an image of 1 bit whose levels would take more memory, the bits of the image returned instead.
+  Result<Image> levels(std::uint32_t layer, std::uint8_t full, Levels& levels, Keep keep) const;
 
  private:
   struct Page {

@@ -45,24 +45,42 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, const DotPitch
   return placement;
 }
 
+namespace {
+
+/// Adds a row's runs as they are on the bed to those of `out` from `begin` on, which are of the same row.
+void append_row(std::span<const std::uint32_t> row, const Placement& placement, std::size_t begin, Buffer<std::uint32_t>& out) {
+  for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+    const std::uint32_t from = placement.column[row[i]], to = placement.column[row[i + 1]];
+    if (from == to) continue;
+    if (out.size() > begin && out.back() == from) {
+      out.back() = to;
+    } else {
+      out.push_back(from);
+      out.push_back(to);
+    }
+  }
+}
+
+}  // namespace
+
+void position(const BitRows& image, const Placement& placement, RunsBuilder& out) {
+  RowRuns rows(image);
+  Buffer<std::uint32_t> row;
+  for (std::uint32_t r = 0; r < placement.rows; ++r) {
+    row.clear();
+    if (r >= placement.first_row && r - placement.first_row < placement.row.size())
+      append_row(rows.row(placement.row[r - placement.first_row]), placement, 0, row);
+    out.add_changes(row);
+  }
+}
+
 void position(const RunsView& image, const Placement& placement, Runs& out) {
   out.columns = placement.columns;
   out.change.clear();
   out.row_offset.assign(std::size_t{placement.rows} + 1, 0);
   const auto held = static_cast<std::uint32_t>(placement.row.size());
   for (std::uint32_t r = 0; r < held; ++r) {
-    const auto row = image.row(placement.row[r]);
-    const std::size_t begin = out.change.size();
-    for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
-      const std::uint32_t from = placement.column[row[i]], to = placement.column[row[i + 1]];
-      if (from == to) continue;
-      if (out.change.size() > begin && out.change.back() == from) {
-        out.change.back() = to;
-      } else {
-        out.change.push_back(from);
-        out.change.push_back(to);
-      }
-    }
+    append_row(image.row(placement.row[r]), placement, out.change.size(), out.change);
     out.row_offset[placement.first_row + r + 1] = static_cast<std::uint32_t>(out.change.size());
   }
   std::fill(out.row_offset.begin() + placement.first_row + held + 1, out.row_offset.end(),

@@ -7,6 +7,7 @@
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats {
 
@@ -27,5 +28,7 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, const DotPitch
 /// The image on the bed; `out` is another one. cost  O(changes + rows of the bed)
 void position(const RunsView& image, const Placement& placement, Runs& out);
 void position(const LevelsView& image, const Placement& placement, Levels& out);
+/// The same of bits, all rows of the bed into a builder of its size.
+void position(const BitRows& image, const Placement& placement, RunsBuilder& out);
 
 }  // namespace lamina::formats

@@ -9,12 +9,12 @@
 #include <cstring>
 #include <filesystem>
 
-#include "stages/data/levels.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/images/image_formats.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/late/tiff.h"
+#include "stages/support/memory_gate.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
@@ -25,6 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxWrong = 20;  // lines
+/// Memory of an image that is read for its counts: of some rows, and of a strip as coded.
+constexpr std::uint64_t kRowsBytes = 4 << 20, kMaxStripBytes = 64 << 20;
 
 struct ImageFile {
   const std::string* path;
@@ -46,22 +48,20 @@ ImageInspection inspect_image(const ImageFile& position, int threshold) {
   const auto refuse = [&](const Error& error) { return inspection.wrong = one_line(error.message), inspection; };
   auto kind = kind_of(*position.path, position.page);
   if (!kind) return refuse(kind.error());
-  const auto image = dark_pixels(*position.path, threshold, position.page);
+  const auto image = dark_pixels(*position.path, threshold, position.page, Keep::kCounts);
   if (!image) return refuse(image.error());
   inspection.kind = std::move(*kind);
-  inspection.columns = image->runs.columns;
-  inspection.rows = image->runs.view().rows();
+  inspection.columns = image->columns;
+  inspection.rows = image->rows;
   inspection.dpi_x = image->dpi_x;
   inspection.dpi_y = image->dpi_y;
-  inspection.set = set_pixels(image->runs);
+  inspection.set = image->counts.set;
   inspection.light = 255 * inspection.set;
   if (inspection.kind.bits == 1) return inspection;
-  Levels levels;
-  if (const auto grey = nearest_levels(*position.path, {255, false, position.page}, levels); !grey) return refuse(grey.error());
-  inspection.light = sum_of_levels(levels);
-  for (std::size_t i = 0; i < levels.level.size(); ++i) {
-    if (levels.level[i] < 255) inspection.grey += levels.change[2 * i + 1] - levels.change[2 * i];
-  }
+  const auto grey = grey_counts(*position.path, position.page);
+  if (!grey) return refuse(grey.error());
+  inspection.light = grey->darkness;
+  inspection.grey = grey->between;
   return inspection;
 }
 
@@ -116,7 +116,7 @@ std::uint64_t StackInfo::missing_numbers() const {
   return sum;
 }
 
-Result<StackInfo> inspect_stack(const std::string& path, int threshold) {
+Result<StackInfo> inspect_stack(const std::string& path, int threshold, std::uint64_t memory) {
   StackInfo info;
   info.path = path;
   std::error_code ignored;
@@ -148,8 +148,13 @@ Result<StackInfo> inspect_stack(const std::string& path, int threshold) {
   }
   info.images = positions.size();
   std::vector<ImageInspection> inspections(positions.size());
-  tbb::parallel_for(std::size_t{0}, positions.size(),
-                    [&](std::size_t i) { inspections[i] = inspect_image(positions[i], threshold); });
+  MemoryGate gate(memory);
+  tbb::parallel_for(std::size_t{0}, positions.size(), [&](std::size_t i) {
+    std::error_code unknown;
+    const std::uintmax_t bytes = fs::file_size(*positions[i].path, unknown);
+    const auto pass = gate.enter(kRowsBytes + (unknown ? 0 : std::min<std::uint64_t>(bytes, kMaxStripBytes)));
+    inspections[i] = inspect_image(positions[i], threshold);
+  });
   const auto first =
       std::ranges::find_if(inspections, [](const ImageInspection& inspection) { return inspection.wrong.empty(); });
   if (first == inspections.end()) return Error{Fault::kInput, inspections.front().wrong};

@@ -42,10 +42,11 @@ struct StackInfo {
   std::uint64_t missing_numbers() const;
 };
 
-/// Reads all images of a folder or a file, side by side, one a thread in memory.
+/// Reads all images of a folder or a file, side by side, rows of each in memory.
 /// threshold  1 .. 255: grey below it is dark
+/// memory     bytes that those being read may take
 /// errors     kInput: no images, two of one number, no number in a name; the first image cannot be read
-Result<StackInfo> inspect_stack(const std::string& path, int threshold);
+Result<StackInfo> inspect_stack(const std::string& path, int threshold, std::uint64_t memory = std::uint64_t{1} << 30);
 
 std::string as_text(const StackInfo& info);
 Json as_json(const StackInfo& info);

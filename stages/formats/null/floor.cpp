@@ -121,7 +121,7 @@ Result<double> write_files(const Names& names, const std::atomic<bool>& cancel, 
 }
 
 /// Reads one number a crossing and writes it, 64 MiB at a time. Both places have been written to before: fresh memory costs a
-/// system several times as much, and a program may use what it has again. bench/limits.cpp does the same with real crossings.
+/// system several times as much, and a program may use what it has again.
 Result<double> touch_all(std::uint64_t crossings, const std::atomic<bool>& cancel) {
   const std::size_t block = std::min<std::uint64_t>(crossings, 1u << 24);
   std::vector<std::uint32_t> all(block, 1), copy(block, 2);

@@ -21,12 +21,20 @@ namespace {
 class PbmEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    const std::string head = fmt::format("P4\n# lamina dpi {:.10g} {:.10g}\n{} {}\n", dpi_x, dpi_y, runs.columns, runs.rows());
-    const std::size_t stride = row_bytes(runs.columns);
-    file.resize(head.size() + stride * runs.rows());
+    return encode_rows(runs, dpi_x, dpi_y, file);
+  }
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_rows(rows, dpi_x, dpi_y, file);
+  }
+
+ private:
+  static Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+    const std::string head = fmt::format("P4\n# lamina dpi {:.10g} {:.10g}\n{} {}\n", dpi_x, dpi_y, image.columns, image.rows);
+    const std::size_t stride = row_bytes(image.columns);
+    file.resize(head.size() + stride * image.rows);
     std::memcpy(file.data(), head.data(), head.size());
     const std::span<std::byte> rows = std::span(file).subspan(head.size());
-    for (std::uint32_t r = 0; r < runs.rows(); ++r) expand_row(runs.row(r), rows.subspan(stride * r, stride));
+    for (std::uint32_t r = 0; r < image.rows; ++r) image.put(r, rows.subspan(stride * r, stride));
     return {};
   }
 };
@@ -198,7 +206,7 @@ unsigned pgm_bits(const FileReader& file) {
   return head && head->brightest > 255 ? 16 : 8;
 }
 
-Result<Image> read_pbm(const FileReader& file, int threshold, LevelSink* sink) {
+Result<Image> read_pbm(const FileReader& file, int threshold, LevelSink* sink, Keep keep) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole PBM or PGM: {}; plan the layer again", file.path(), why)};
   };
@@ -218,7 +226,7 @@ Result<Image> read_pbm(const FileReader& file, int threshold, LevelSink* sink) {
 
   const bool to_sink = sink != nullptr && head->grey;
   if (to_sink) sink->levels.start(columns);
-  RunsBuilder builder(columns);
+  RunsBuilder builder(columns, rows, keep);
   Colours scale;
   if (head->grey && head->brightest < 255) scale = Colours::of_grey(static_cast<unsigned>(head->brightest));
   std::optional<PlainNumbers> numbers;
@@ -245,7 +253,7 @@ Result<Image> read_pbm(const FileReader& file, int threshold, LevelSink* sink) {
     }
   }
   if (numbers && numbers->next(true) != -1) return failure("more than its pixels");
-  return Image{builder.finish(), head->dpi_x, head->dpi_y};
+  return image_of(builder, columns, head->dpi_x, head->dpi_y);
 }
 
 }  // namespace lamina::formats

@@ -322,20 +322,20 @@ void put_zero_run(BitWriter& out, Chunks& chunks, FilteredRows& rows, std::uint3
 
 }  // namespace
 
-std::size_t put_image_data(const RunsView& runs, Bytes& file, std::size_t start) {
-  const std::uint32_t rows = runs.rows();
-  const Table& table = table_for(row_bytes(runs.columns) * rows, runs.change.size());
+std::size_t put_image_data(RowRuns& image, std::uint64_t changes, Bytes& file, std::size_t start) {
+  const std::uint32_t rows = image.rows();
+  const Table& table = table_for(row_bytes(image.columns()) * rows, changes);
   Chunks chunks(file, start);
   BitWriter out(chunks.content());
   out.put(kZlibHeader, 16);
   put_block_head(out, table.head);
 
-  FilteredRows filtered(table.codes, runs.columns, rows);
+  FilteredRows filtered(table.codes, image.columns(), rows);
   std::span<const std::uint32_t> above;  // the row above the first one is white (9.2)
   for (std::uint32_t r = 0; r < rows; ++r) {
-    const std::span<const std::uint32_t> row = runs.row(r);
+    const std::span<const std::uint32_t> row = image.row(r);
     if (row.empty()) {
-      r = g4::end_of_empty_rows(runs.row_offset, r) - 1;
+      if (const RunsView* runs = image.runs()) r = g4::end_of_empty_rows(runs->row_offset, r) - 1;
     } else {
       put_zero_run(out, chunks, filtered, r, FilteredRows::kMaxWaiting);
       chunks.ensure_capacity(out, filtered.max_bytes(row.size() + above.size()));

@@ -10,9 +10,9 @@
 #include <cstring>
 #include <string_view>
 
-#include "stages/data/runs.h"
 #include "stages/formats/image_format.h"
 #include "stages/formats/png/deflate.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats::png {
 
@@ -90,10 +90,11 @@ class Chunks {
 
 /// Rows of bits, filtered and deflated, as IDAT chunks into file[start ...). Bytes before `start` are kept; the file grows
 /// as needed and may be left larger than its content.
+/// changes  of all rows
 /// needs    1 <= columns and rows <= kMaxPixelsASide and well-formed runs (data/runs.h)
 /// returns  one past the last byte of the chunks
 /// cost     one read of each change and some 5 ns for each that is not as in the row above; some 10 ns for a row that is not
 ///          white; a stretch of white rows costs the logarithm of its length and a bit in a hundred bytes
-std::size_t put_image_data(const RunsView& runs, Bytes& file, std::size_t start);
+std::size_t put_image_data(RowRuns& image, std::uint64_t changes, Bytes& file, std::size_t start);
 
 }  // namespace lamina::formats::png

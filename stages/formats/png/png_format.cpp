@@ -58,10 +58,18 @@ void put_last_chunk(Bytes& file, std::size_t end) {
 class PngEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (Status status = check_size("PNG", runs.columns, runs.rows()); !status) return status;
+    return encode_rows(runs, runs.change.size(), dpi_x, dpi_y, file);
+  }
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_rows(rows, counts_of(rows).changes, dpi_x, dpi_y, file);
+  }
+
+ private:
+  static Status encode_rows(RowRuns rows, std::uint64_t changes, double dpi_x, double dpi_y, Bytes& file) {
+    if (Status status = check_size("PNG", rows.columns(), rows.rows()); !status) return status;
     constexpr std::string_view kKind = "\x01\x03\0\0\0"sv;  // 1 bit, palette, deflate, filters, not interlaced
-    const std::size_t data = put_first_chunks(file, runs.columns, runs.rows(), kKind, "\xFF\xFF\xFF\0\0\0"sv, dpi_x, dpi_y);
-    put_last_chunk(file, put_image_data(runs, file, data));
+    const std::size_t data = put_first_chunks(file, rows.columns(), rows.rows(), kKind, "\xFF\xFF\xFF\0\0\0"sv, dpi_x, dpi_y);
+    put_last_chunk(file, put_image_data(rows, changes, file, data));
     return {};
   }
 };
@@ -118,30 +126,48 @@ class GreyEncoder : public LevelEncoder {
     if (full == 0 || 255 % full != 0) {
       return cannot_hold("PNG", image.columns, image.rows(), fmt::format("{} levels are no whole steps of 8 bits", full + 1));
     }
-    constexpr std::string_view kKind = "\x08\0\0\0\0"sv;  // 8 bits, grey, deflate, filters, not interlaced
-    Chunks chunks(file, put_first_chunks(file, image.columns, image.rows(), kKind, {}, dpi_x, dpi_y));
-    BitWriter out(chunks.content());
-    out.put(kZlibHeader, 16);
-    out.put(0b011, 3);  // the last block, of the fixed code
-    check_ = Check();
-    for (std::uint32_t r = 0; r < image.rows(); ++r) {
-      put(0, 1, out, chunks);  // no filter
-      std::uint32_t at = 0;
-      for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
-        put(255, image.change[2 * i] - at, out, chunks);
-        at = image.change[2 * i + 1];
-        put(255u - image.level[i] * (255u / full), at - image.change[2 * i], out, chunks);
-      }
-      put(255, image.columns - at, out, chunks);
-    }
-    chunks.ensure_capacity(out, kWords);
-    out.put(kFixed[kEndOfBlock]);
-    put_last_chunk(file, chunks.close(put_number(out.finish(), check_.value())));
+    encode_rows(image.columns, image.rows(), dpi_x, dpi_y, file, [&](std::uint32_t r, const auto& put_run) {
+      for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i)
+        put_run(image.change[2 * i], image.change[2 * i + 1], image.level[i] * (255u / full));
+    });
+    return {};
+  }
+  Status encode(const BitRows& image, double dpi_x, double dpi_y, Bytes& file) override {
+    if (Status status = check_size("PNG", image.columns(), image.rows()); !status) return status;
+    RowRuns rows(image);
+    encode_rows(image.columns(), image.rows(), dpi_x, dpi_y, file, [&](std::uint32_t r, const auto& put_run) {
+      const std::span<const std::uint32_t> row = rows.row(r);
+      for (std::size_t i = 0; i + 1 < row.size(); i += 2) put_run(row[i], row[i + 1], 255u);
+    });
     return {};
   }
 
  private:
   static constexpr std::size_t kWords = 16;  // bytes, of the words between two tests of the capacity at most
+
+  /// each_run(row, put_run)  calls put_run(begin, end, darkness) for the runs of a row
+  template <class EachRun>
+  void encode_rows(std::uint32_t columns, std::uint32_t rows, double dpi_x, double dpi_y, Bytes& file, const EachRun& each_run) {
+    constexpr std::string_view kKind = "\x08\0\0\0\0"sv;  // 8 bits, grey, deflate, filters, not interlaced
+    Chunks chunks(file, put_first_chunks(file, columns, rows, kKind, {}, dpi_x, dpi_y));
+    BitWriter out(chunks.content());
+    out.put(kZlibHeader, 16);
+    out.put(0b011, 3);  // the last block, of the fixed code
+    check_ = Check();
+    for (std::uint32_t r = 0; r < rows; ++r) {
+      put(0, 1, out, chunks);  // no filter
+      std::uint32_t at = 0;
+      each_run(r, [&](std::uint32_t begin, std::uint32_t end, unsigned darkness) {
+        put(255, begin - at, out, chunks);
+        put(255u - darkness, end - begin, out, chunks);
+        at = end;
+      });
+      put(255, columns - at, out, chunks);
+    }
+    chunks.ensure_capacity(out, kWords);
+    out.put(kFixed[kEndOfBlock]);
+    put_last_chunk(file, chunks.close(put_number(out.finish(), check_.value())));
+  }
 
   void put(std::uint32_t byte, std::uint64_t count, BitWriter& out, Chunks& chunks) {
     if (count == 0) return;
@@ -226,6 +252,7 @@ struct ReadState {
   Buffer<std::byte> row;
   std::optional<RunsBuilder> builder;
   LevelSink* sink = nullptr;
+  Keep keep = Keep::kRuns;
   int threshold = 0;
   std::uint32_t columns = 0;
   unsigned bits = 0;  // of a coded value
@@ -313,10 +340,10 @@ const char* add_row(ReadState& source) {
   }
 }
 
-bool prepare(ReadState& source, std::size_t stride) {
+bool prepare(ReadState& source, std::size_t stride, std::uint32_t rows) {
   try {
     source.row.resize(stride);
-    source.builder.emplace(source.columns);
+    source.builder.emplace(source.columns, rows, source.keep);
     if (source.sink != nullptr && !source.as_bits) source.sink->levels.start(source.columns);
     return true;
   } catch (...) {
@@ -359,7 +386,7 @@ bool read_rows(png_structp png, png_infop info, ReadState& source) {
     source.dpi_x = per_unit_x * 0.0254;
     source.dpi_y = per_unit_y * 0.0254;
   }
-  if (!prepare(source, source.as_bits ? coded_stride : std::max<std::size_t>(coded_stride, columns)))
+  if (!prepare(source, source.as_bits ? coded_stride : std::max<std::size_t>(coded_stride, columns), rows))
     png_error(png, "out of memory");
   for (std::uint32_t r = 0; r < rows; ++r) {
     png_read_row(png, reinterpret_cast<png_bytep>(source.row.data()), nullptr);
@@ -371,12 +398,13 @@ bool read_rows(png_structp png, png_infop info, ReadState& source) {
 
 }  // namespace
 
-Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
+Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink, Keep keep) {
   const auto source = std::make_unique<ReadState>();
   source->file = file;
   source->bytes = bytes;
   source->sink = sink;
   source->threshold = threshold;
+  source->keep = keep;
   png_structp reader = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), keep_error, ignore_warning);
   png_infop info = reader != nullptr ? png_create_info_struct(reader) : nullptr;
   bool whole = false;
@@ -390,7 +418,7 @@ Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, i
                                                    threshold > 0 || sink != nullptr ? "" : "1-bit ",
                                                    source->message[0] != 0 ? source->message : "out of memory")};
   }
-  return Image{source->builder->finish(), source->dpi_x, source->dpi_y};
+  return image_of(*source->builder, source->columns, source->dpi_x, source->dpi_y);
 }
 
 }  // namespace lamina::formats

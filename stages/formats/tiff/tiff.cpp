@@ -328,13 +328,22 @@ class G4Encoder : public ImageEncoder {
   void use(Isa isa) override { encoder_ = g4::Encoder(isa); }
 
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (Status status = check_size("TIFF", runs.columns, runs.rows()); !status) return status;
-    TagFrame frame{runs.columns, runs.rows(), dpi_x, dpi_y, 1, COMPRESSION_CCITTFAX4};
+    return encode_image(runs, runs.columns, runs.rows(), {dpi_x, dpi_y}, file);
+  }
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_image(rows, rows.columns(), rows.rows(), {dpi_x, dpi_y}, file);
+  }
+
+ private:
+  template <class Image>
+  Status encode_image(const Image& pixels, std::uint32_t columns, std::uint32_t rows, std::array<double, 2> dpi, Bytes& file) {
+    if (Status status = check_size("TIFF", columns, rows); !status) return status;
+    TagFrame frame{columns, rows, dpi[0], dpi[1], 1, COMPRESSION_CCITTFAX4};
     frame.rows_per_strip = frame.rows;
     file.resize(file.capacity());
-    const std::size_t end = encoder_.encode(runs, file, kStripAt);
+    const std::size_t end = encoder_.encode(pixels, file, kStripAt);
     if (end > kMaxClassicBytes - kDirectoryBytes) return refused(frame, "the file would exceed 4 GiB");
-    const Ending::TiffLayout image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kStripAt > UINT16_MAX};
+    const Ending::TiffLayout image{columns, rows, dpi[0], dpi[1], end - kStripAt > UINT16_MAX};
     if (!text_.any() && ending_.put(image, end, file)) return {};
     if (file.size() < end + kDirectoryBytes) file.resize(end + kDirectoryBytes);
     Status status = write_file(file, frame, text_, [&](TIFF* tiff) {
@@ -345,7 +354,6 @@ class G4Encoder : public ImageEncoder {
     return status;
   }
 
- private:
   LayerText text_;
   g4::Encoder encoder_;
   Ending ending_;  // of the layer before
@@ -357,8 +365,16 @@ class StripEncoder : public ImageEncoder {
   explicit StripEncoder(std::uint16_t compression) : compression_(compression) {}
 
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    if (Status status = check_size("TIFF", runs.columns, runs.rows()); !status) return status;
-    const TagFrame frame{runs.columns, runs.rows(), dpi_x, dpi_y, 1, compression_};
+    return encode_rows(runs, dpi_x, dpi_y, file);
+  }
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_rows(rows, dpi_x, dpi_y, file);
+  }
+
+ private:
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+    if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
+    const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, compression_};
     if (compression_ == COMPRESSION_NONE) {  // its size is known: nothing has to grow, and no second copy exists meanwhile
       if (frame.stride * frame.rows > kMaxClassicBytes - kStripBytes) {
         return refused(frame, "the file would exceed 4 GiB; use --format tiff-g4");
@@ -368,11 +384,9 @@ class StripEncoder : public ImageEncoder {
       file.reserve(kStripAt + frame.stride * frame.rows + kDirectoryBytes + strips * 2 * sizeof(std::uint32_t));
     }
     file.resize(file.capacity());
-    return write_rows(file, frame, text_, strip_,
-                      [&](std::uint32_t r, std::span<std::byte> to) { expand_row(runs.row(r), to); });
+    return write_rows(file, frame, text_, strip_, [&](std::uint32_t r, std::span<std::byte> to) { image.put(r, to); });
   }
 
- private:
   LayerText text_;
   std::uint16_t compression_;
   Bytes strip_;  // of bits
@@ -387,11 +401,11 @@ class DeflateEncoder : public ImageEncoder {
     return encode_strips(runs.columns, runs.rows(), dpi_x, dpi_y, file,
                          [&](std::uint32_t r, std::span<std::byte> to) { expand_row(runs.row(r), to); });
   }
-  Status encode_rows(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
     words_.resize(rows.words());
     return encode_strips(rows.columns(), rows.rows(), dpi_x, dpi_y, file, [&](std::uint32_t r, std::span<std::byte> to) {
       rows.row(r, words_);
-      put_words(words_, to);
+      bits_of_words(words_, to);
     });
   }
 
@@ -436,6 +450,19 @@ class GreyEncoder : public LevelEncoder {
  public:
   explicit GreyEncoder(unsigned bits) : bits_(bits), darkest_((1u << bits) - 1) {}
   void tag(const LayerTags& tags) override { text_.take(tags); }
+
+  Status encode(const BitRows& image, double dpi_x, double dpi_y, Bytes& file) override {
+    if (Status status = check_size("TIFF", image.columns(), image.rows()); !status) return status;
+    const TagFrame frame{image.columns(), image.rows(), dpi_x, dpi_y, static_cast<std::uint16_t>(bits_), COMPRESSION_PACKBITS};
+    file.resize(file.capacity());
+    Buffer<std::uint64_t> words(image.words());
+    return write_rows(file, frame, text_, strip_, [&](std::uint32_t row, std::span<std::byte> to) {
+      image.row(row, words);
+      const auto set = [&](std::size_t column) { return column < frame.columns ? words[column / 64] >> column % 64 & 1 : 0; };
+      for (std::size_t i = 0; i < to.size(); ++i)
+        to[i] = static_cast<std::byte>(bits_ == 8 ? 255 * set(i) : 240 * set(2 * i) + 15 * set(2 * i + 1));
+    });
+  }
 
   Status encode(const LevelsView& image, std::uint8_t full, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size("TIFF", image.columns, image.rows()); !status) return status;
@@ -516,14 +543,12 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
 }
 
 /// The image of a file in Group 4, without bits. false: libtiff has to say what is wrong with it, or to read it.
-bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bool white_is_set, Runs& runs) {
+bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bool white_is_set, RunsBuilder& builder) {
   std::uint32_t rows_per_strip = rows;
   std::uint16_t fill_order = FILLORDER_MSB2LSB;
   TIFFGetFieldDefaulted(tiff, TIFFTAG_ROWSPERSTRIP, &rows_per_strip);
   TIFFGetFieldDefaulted(tiff, TIFFTAG_FILLORDER, &fill_order);
   rows_per_strip = std::min(rows_per_strip, rows);
-  runs.columns = columns;
-  runs.row_offset.assign(1, 0);
   G4Decoder decoder;
   Buffer<std::byte> coded;
   for (std::uint32_t row = 0, strip = 0; row < rows; row += rows_per_strip, ++strip) {
@@ -533,7 +558,7 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
     const auto position = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
     if (::pread(file, coded.data(), coded.size(), position) != static_cast<ssize_t>(coded.size())) return false;
     const G4Strip of_rows{columns, std::min(rows_per_strip, rows - row), fill_order == FILLORDER_LSB2MSB, white_is_set};
-    if (!decoder.append(coded, of_rows, runs)) return false;
+    if (!decoder.append(coded, of_rows, builder)) return false;
   }
   return true;
 }
@@ -700,7 +725,7 @@ std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, in
 }  // namespace
 
 Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
-                        LevelSink* sink) {
+                        LevelSink* sink, Keep keep) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path,
@@ -721,11 +746,16 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
   Image image;
   read_resolution(handle.get(), file, image);
   image.description = description_of(handle.get());
-  if (head.compression == COMPRESSION_CCITTFAX4 && !head.grey() &&
-      read_g4(handle.get(), file, head.columns, head.rows, !head.bright_is_low(), image.runs)) {
-    return image;
+  RunsBuilder builder(head.columns, head.rows, keep);
+  const auto finish = [&] {
+    Image whole = image_of(builder, head.columns, image.dpi_x, image.dpi_y);
+    whole.description = std::move(image.description);
+    return whole;
+  };
+  if (head.compression == COMPRESSION_CCITTFAX4 && !head.grey()) {
+    if (read_g4(handle.get(), file, head.columns, head.rows, !head.bright_is_low(), builder)) return finish();
+    builder = RunsBuilder(head.columns, head.rows, keep);
   }
-  RunsBuilder builder(head.columns);
   Buffer<std::byte> row(head.bits == 2 ? head.columns : head.stride());
   for (std::uint32_t r = 0; r < head.rows; ++r) {
     if (TIFFReadScanline(handle.get(), row.data(), r, 0) < 0 || !message.empty()) {
@@ -734,8 +764,7 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
     if (const std::string_view why = add_tiff_row(row, head, threshold, sink, builder); !why.empty())
       return failure(fmt::format("row {}: {}", r, why));
   }
-  if (!to_sink) image.runs = builder.finish();
-  return image;
+  return finish();
 }
 
 Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "stages/geometry/combine.h"
+#include "stages/support/memory_gate.h"
 #include "stages/view/picture/canvas.h"
 
 namespace lamina::view::picture {
@@ -55,44 +56,46 @@ constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208,
     kWarning{217, 72, 15};
 
 /// The levels of a layer, its images added up.
-Result<Levels> levels_of_layer(const SheetRequest& request, const SheetLayer& layer, const ReadImage& read) {
-  Levels all;
+Result<SheetImage> image_of_layer(const SheetRequest& request, const SheetLayer& layer, const ReadImage& read) {
+  SheetImage all;
   for (const std::string& path : layer.paths) {
-    Result<Levels> image = read(path);
+    Result<SheetImage> image = read(path);
     if (!image) return image;
-    if (image->columns != request.grid.columns() || image->view().rows() != request.grid.rows()) {
+    if (image->columns() != request.grid.columns() || image->rows() != request.grid.rows()) {
       return Error{Fault::kVerification,
-                   fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again", path, image->columns,
-                               image->view().rows(), request.grid.columns(), request.grid.rows())};
+                   fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again", path, image->columns(),
+                               image->rows(), request.grid.columns(), request.grid.rows())};
     }
     if (&path == &layer.paths.front()) {
       all = std::move(*image);
       continue;
     }
     Levels before;
-    std::swap(before, all);
-    add_levels(before, *image, all);
+    std::swap(before, all.levels);
+    add_levels(before, image->levels, all.levels);
   }
-  if (const int found = highest(all); found > request.maximum) {
+  if (const int found = highest(all.levels); found > request.maximum) {
     return Error{Fault::kVerification, fmt::format("{}: has pixels of {} drops, the job at most {}; plan the layer again",
                                                    layer.paths.front(), found, request.maximum)};
   }
   return all;
 }
 
-/// Calls use(index, levels) for each layer, from several threads. The error is that of the first layer with one.
+/// Calls use(index, image) for each layer, from several threads. The error is that of the first layer with one.
 template <class Use>
 Status for_each_image(const SheetRequest& request, const ReadImage& read, const Use& use) {
+  MemoryGate gate(request.memory_bytes);
   std::mutex mutex;
   std::size_t first_wrong = request.layers.size();
   Error error;
   tbb::parallel_for(std::size_t{0}, request.layers.size(), [&](std::size_t index) {
-    const Result<Levels> levels = levels_of_layer(request, request.layers[index], read);
-    if (levels) return use(index, levels->view());
+    const auto pass = gate.enter(request.layers[index].bytes);
+    const Result<SheetImage> image = image_of_layer(request, request.layers[index], read);
+    if (image) return use(index, *image);
     const std::lock_guard lock(mutex);
     if (index < first_wrong) {
       first_wrong = index;
-      error = levels.error();
+      error = image.error();
     }
   });
   if (first_wrong < request.layers.size()) return error;
@@ -117,8 +120,8 @@ Result<PixelWindow> shown_window(const SheetRequest& request, const ReadImage& r
   if (request.whole_bed) return bed;
   std::mutex mutex;
   PixelWindow all;
-  const Status status = for_each_image(request, read, [&](std::size_t, const LevelsView& levels) {
-    const PixelWindow window = window_of(levels);
+  const Status status = for_each_image(request, read, [&](std::size_t, const SheetImage& image) {
+    const PixelWindow window = image.bits ? window_of(*image.bits) : window_of(image.levels.view());
     const std::lock_guard lock(mutex);
     all = joined(all, window);
   });
@@ -184,9 +187,14 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
               fitted(title, layout.title_size, layout.width - 2 * layout.margin), kInk);
   for (int cell = 0; cell < cells; ++cell) draw_frame(canvas, request, layout, cell);
 
-  const Status status = for_each_image(request, read, [&](std::size_t index, const LevelsView& levels) {
+  const Status status = for_each_image(request, read, [&](std::size_t index, const SheetImage& image) {
     Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
-    box_coverage(levels, request.maximum, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
+    const auto width = static_cast<std::uint32_t>(layout.picture_width);
+    if (image.bits) {
+      box_coverage(*image.bits, *window, width, shares);
+    } else {
+      box_coverage(image.levels.view(), request.maximum, *window, width, shares);
+    }
     const int cell = static_cast<int>(index);
     const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;
     canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, request.layers[index].warns ? kWarning : kInk);

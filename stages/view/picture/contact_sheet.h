@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "stages/data/bit_image.h"
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
@@ -36,6 +38,7 @@ struct SheetLayer {
   std::vector<std::string> paths;  // of the images, whose levels are added up: one a drop of a pixel, or one of all
   std::string name, remark;        // below the cell, on the left and on the right
   bool warns = false;              // drawn in orange, its name too
+  std::uint64_t bytes = 0;         // memory that its images take at most
 };
 
 struct SheetRequest {
@@ -44,7 +47,17 @@ struct SheetRequest {
   PixelGrid grid;                  // of the bed; all images are of its size
   std::uint8_t maximum = 1;        // level of a pixel that is drawn as set; those below are paler by their share of it
   bool whole_bed = false;          // else the part of it that holds what is set in any of the layers, and a margin
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // of layers that are read
   std::uint32_t width = 2400;      // pixels of the sheet; a single layer is never made larger than its pixels
+};
+
+/// An image as levels, or of a layer of one image whose levels are 0 and 1, as bits.
+struct SheetImage {
+  Levels levels;
+  std::shared_ptr<const BitImage> bits = {};
+
+  std::uint32_t columns() const { return bits ? bits->columns() : levels.columns; }
+  std::uint32_t rows() const { return bits ? bits->rows() : levels.view().rows(); }
 };
 
 /// A PNG of the layers. All cells show the same part of the bed at the same scale; each of its pixels is as dark as
@@ -53,7 +66,7 @@ struct SheetRequest {
 /// read    the image of a file, 1 where one of 1 bit is set; called from any thread
 /// errors  those of `read`; kVerification if an image is not of the bed's size, or a pixel has a level above the most
 /// cost    two readings of each image, on all processors; memory is the picture and the runs of the images being read
-using ReadImage = std::function<Result<Levels>(const std::string& path)>;
+using ReadImage = std::function<Result<SheetImage>(const std::string& path)>;
 Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read);
 
 }  // namespace lamina::view::picture

@@ -52,25 +52,63 @@ std::byte* put_movements(std::span<const std::uint32_t> row, std::span<const std
   return to;
 }
 
+/// Deflates bytes as they come, so that they are never in memory all at once.
+class Deflater {
+ public:
+  Deflater() { deflateInit(&stream_, kLevel); }
+  Deflater(const Deflater&) = delete;
+  Deflater& operator=(const Deflater&) = delete;
+  ~Deflater() { deflateEnd(&stream_); }
+
+  void add(std::span<const std::byte> bytes) { put(bytes, Z_NO_FLUSH); }
+  Buffer<std::byte> finish() {
+    put({}, Z_FINISH);
+    packed_.resize(used_);
+    return std::move(packed_);
+  }
+
+ private:
+  void put(std::span<const std::byte> bytes, int flush) {
+    constexpr std::size_t kStep = 1 << 16;
+    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
+    stream_.avail_in = static_cast<uInt>(bytes.size());
+    int state = Z_OK;
+    do {
+      if (packed_.size() - used_ < kStep) packed_.resize(used_ + used_ / 4 + kStep);
+      stream_.next_out = reinterpret_cast<Bytef*>(packed_.data() + used_);
+      stream_.avail_out = static_cast<uInt>(std::min<std::size_t>(packed_.size() - used_, UINT32_MAX));
+      const uInt before = stream_.avail_out;
+      state = deflate(&stream_, flush);
+      used_ += before - stream_.avail_out;
+    } while (stream_.avail_in > 0 || (flush == Z_FINISH && state == Z_OK));
+  }
+
+  z_stream stream_{};
+  Buffer<std::byte> packed_;
+  std::size_t used_ = 0;
+};
+
 }  // namespace
 
 Buffer<std::byte> deflate_bytes(std::span<const std::byte> bytes) {
-  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
-  Buffer<std::byte> packed(size);
-  compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
-            static_cast<uLong>(bytes.size()), kLevel);
-  packed.resize(size);
-  return packed;
+  constexpr std::size_t kPiece = 1 << 30;
+  Deflater deflater;
+  for (; bytes.size() > kPiece; bytes = bytes.subspan(kPiece)) deflater.add(bytes.first(kPiece));
+  deflater.add(bytes);
+  return deflater.finish();
 }
 
-Buffer<std::byte> pack_runs(const RunsView& runs) {
+Buffer<std::byte> pack_runs(RowRuns image) {
+  constexpr std::size_t kPiece = 1 << 18;
+  Deflater deflater;
   Buffer<std::byte> code;
   std::size_t size = 0;
   std::span<const std::uint32_t> before;
   std::uint32_t same = 0;
-  for (std::uint32_t r = 0; r <= runs.rows(); ++r) {
-    const std::span<const std::uint32_t> row = r < runs.rows() ? runs.row(r) : std::span<const std::uint32_t>();
-    if (r < runs.rows() && std::ranges::equal(row, before)) {
+  for (std::uint32_t r = 0; r <= image.rows(); ++r) {
+    const std::span<const std::uint32_t> row = r < image.rows() ? image.row(r) : std::span<const std::uint32_t>();
+    if (r < image.rows() && std::ranges::equal(row, before)) {
+      before = row;
       ++same;
       continue;
     }
@@ -79,17 +117,21 @@ Buffer<std::byte> pack_runs(const RunsView& runs) {
     std::byte* to = code.data() + size;
     if (same > 0) to = put_number(same, put_number(0, to));
     same = 0;
-    if (r < runs.rows() && row.size() == before.size()) {
+    if (r < image.rows() && row.size() == before.size()) {
       to = put_movements(row, before, put_number(1, to));
-    } else if (r < runs.rows()) {
+    } else if (r < image.rows()) {
       to = put_number(2 + row.size(), to);
       std::uint32_t column = 0;
       for (const std::uint32_t change : row) to = put_number(change - std::exchange(column, change), to);
     }
     size = static_cast<std::size_t>(to - code.data());
     before = row;
+    if (size < kPiece) continue;
+    deflater.add(std::span(code).first(size));
+    size = 0;
   }
-  return deflate_bytes(std::span(code).first(size));
+  deflater.add(std::span(code).first(size));
+  return deflater.finish();
 }
 
 }  // namespace lamina::view::report

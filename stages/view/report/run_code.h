@@ -16,12 +16,12 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
-#include "stages/data/runs.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::view::report {
 
 /// The code of an image, deflated. cost  one pass over the changes, and deflate
-Buffer<std::byte> pack_runs(const RunsView& runs);
+Buffer<std::byte> pack_runs(RowRuns image);
 
 /// Any bytes as one zlib stream.
 Buffer<std::byte> deflate_bytes(std::span<const std::byte> bytes);

@@ -92,6 +92,23 @@ TEST(Timing, ARunReportsEachStepAndWhatTheLimitReadsAndWrites) {
   EXPECT_FALSE(summary_of({"untimed"}).contains("timing"));
 }
 
+// A limit counts the crossings of pixels; nothing is rastered here.
+TEST(Timing, ContoursAndPathsHaveNoLimit) {
+  const test::Directory folder;
+  const std::string part = test::corpus_file("dental_crown.stl");
+  for (const std::vector<std::string>& job : {std::vector<std::string>{"slice", part, "--layer", "1", "-o", "sliced"},
+                                              {"extrude", part, "--layer", "0.3", "-o", "part.gcode"}}) {
+    std::vector<std::string> timed = job;
+    timed.insert(timed.end(), {"--timing", "--json"});
+    const test::Outcome outcome = test::run_lamina(timed, folder.path());
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const nlohmann::json timing = nlohmann::json::parse(outcome.out)["timing"];
+    EXPECT_TRUE(timing.contains("nodes"));
+    EXPECT_FALSE(timing.contains("limit")) << job.front();
+    EXPECT_EQ(outcome.err.find("limit"), std::string::npos) << outcome.err;
+  }
+}
+
 // Amdahl: a share s alone and the rest on n threads take s + (1 - s) / n of the time of one.
 TEST(Timing, TheShareOfOneThreadFollowsFromWallAndProcessor) {
   for (const double share : {0.0, 0.25, 1.0}) {
@@ -173,9 +190,9 @@ TEST(Timing, InterruptedCallsGoOn) {
 TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
   Timing timing;
   timing.phases = {{"layers", {2, 3}}};
-  timing.floor.bytes_written = 10;
+  timing.floor.emplace().bytes_written = 10;
   const test::Directory folder;
-  timing.not_measured = formats::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
+  timing.not_measured = formats::measure_floor({folder / "missing.stl"}, folder / "out", never, *timing.floor).error().message;
   EXPECT_NE(timing.not_measured.find("missing.stl: "), std::string::npos);
   const Json limit = timing_json(timing)["limit"];
   EXPECT_EQ(limit.size(), 1u) << json_text(limit);
