@@ -87,7 +87,7 @@ double DoseCheck::max_pixels(const Layer& layer) const {
   return std::min(pixels, bed);
 }
 
-std::string DoseCheck::fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const {
+std::string DoseCheck::fault(const LayerRecord& record, std::uint64_t set, std::uint64_t levels) const {
   const auto said = [&](const std::string& what) { return fmt::format("layer {}: {}", record.layer.index, what); };
   if (record.half_far > record.half_differs) {
     return said(fmt::format("the manifest says {} of {} pixels whose voxels differ", record.half_far, record.half_differs));
@@ -99,7 +99,7 @@ std::string DoseCheck::fault(const LayerRecord& record, const LayerPicture& pict
         fmt::format("its levels come to {} full voxels, the manifest says dosed_pixels {}", voxels, record.dosed_pixels));
   }
   if (head_.max_drops == 0) return {};
-  const std::string what = fault_of_dosed(record, set_pixels(picture.front()));
+  const std::string what = fault_of_dosed(record, set);
   if (!what.empty()) return said(what);
   const std::string requested = fault_of_target(record);
   return requested.empty() ? requested : said(requested);

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 
-#include "pipeline/check/job_files.h"
 #include "pipeline/job/job.h"
 #include "pipeline/manifest/manifest.h"
 #include "stages/data/machine.h"
@@ -23,8 +22,8 @@ class DoseCheck {
   /// Adds the layers that lie or are thick as none of the job can.
   void check_heights(const Manifest& manifest, Faults& faults) const;
 
-  /// Empty, or what is wrong. levels  sum of the levels of the layer's image, of a job that has them
-  std::string fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const;
+  /// Empty, or what is wrong. set  pixels with any drop; levels  sum of the levels of the layer's image, of a job that has them
+  std::string fault(const LayerRecord& record, std::uint64_t set, std::uint64_t levels) const;
 
  private:
   struct RequestedRange {

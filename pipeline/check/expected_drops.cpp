@@ -8,7 +8,6 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/dose.h"
-#include "stages/data/runs.h"
 
 namespace lamina::pipeline {
 
@@ -28,6 +27,7 @@ Result<ExpectedDrops> ExpectedDrops::of(const ManifestHead& head, const Machine&
   if (!drops_follow_image(job))
     return Error{Fault::kVerification, "manifest.json: the drops of its job do not follow from images of the geometry"};
   expected.dose_ = std::move(dose);
+  expected.max_drops_ = std::max(1u, head.max_drops);
   return expected;
 }
 
@@ -37,33 +37,55 @@ Result<ExpectedDrops> ExpectedDrops::of(const std::string& directory, const Mani
   return machine ? of(head, machine->profile()) : machine.error();
 }
 
-void ExpectedDrops::apply(const Layer& layer, std::vector<Runs>& planes) const {
-  if (!dose_) return;
-  Runs image = std::move(planes.front()), second, third;
-  dose_->thin(layer.index, image, second, third);
-  dose::DropWork work;
+void ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, LayerDrops& drops) const {
+  drops.planes_.clear();
+  drops.made_.clear();
+  drops.runs_.clear();
+  drops.pixels = drops.drops = drops.maximum = 0;
+  if (!dose_) {
+    drops.runs_.reserve(images.size());
+    for (const Runs& image : images) {
+      const std::uint64_t set = set_pixels(image);
+      if (drops.planes_.empty()) drops.pixels = set;
+      drops.drops += set;
+      drops.maximum += set > 0 ? 1 : 0;
+      drops.planes_.push_back(&drops.runs_.emplace_back(image));
+    }
+    return;
+  }
+  dose::DropWork& work = drops.work_;
+  work.drops.clear();
+  if (dose_->thins()) dose_->thin(layer.index, images.front(), drops.second_, work);
   if (dose_->saturates()) {
-    const auto sums = dose_->saturate(layer, false, 1, image, {}, second, work);
+    const auto sums = dose_->saturate(layer, false, 1, images.front(), {}, drops.second_, work);
     if (!sums) return;  // only formulas fail
   }
-  planes.clear();
-  if (dose_->max_drops() > 1) {
-    planes.assign(std::make_move_iterator(work.planes.begin()), std::make_move_iterator(work.planes.end()));
-  } else {
-    planes.push_back(std::move(image));
-  }
+  const DropTotals totals(work.drops.front(), work.counter);
+  drops.pixels = totals.pixels();
+  drops.drops = totals.drops();
+  drops.maximum = totals.maximum();
+  for (std::uint32_t drop = 0; drop < max_drops_; ++drop) drops.made_.emplace_back(work.drops.front(), drop);
+  for (const DropPlane& plane : drops.made_) drops.planes_.push_back(&plane);
 }
 
-std::string ExpectedDrops::fault(const ManifestHead& head, const LayerRecord& record, const std::vector<Runs>& planes) {
+void ExpectedDrops::apply(const Layer& layer, std::vector<Runs>& images) const {
+  if (!dose_) return;
+  LayerDrops drops;
+  make(layer, images, drops);
+  std::vector<Runs> planes(drops.planes().size());
+  for (std::size_t i = 0; i < planes.size(); ++i) runs_of(*drops.planes()[i], planes[i]);
+  images = std::move(planes);
+}
+
+std::string ExpectedDrops::fault(const ManifestHead& head, const LayerRecord& record, const LayerDrops& drops) {
   if (!head.geometry) return {};
   if (head.max_drops > 0 && record.dosed_pixels != record.geometry_pixels) {
     return fmt::format("layer {}: its image sets {} pixels, the manifest says dosed_pixels {}", record.layer.index,
                        record.geometry_pixels, record.dosed_pixels);
   }
-  const std::uint64_t set = set_pixels(planes.front());
-  if (set == record.set_pixels) return {};
+  if (drops.pixels == record.set_pixels) return {};
   return fmt::format("layer {}: {} pixels of its image get drops by the job, the manifest says set_pixels {}",
-                     record.layer.index, set, record.set_pixels);
+                     record.layer.index, drops.pixels, record.set_pixels);
 }
 
 }  // namespace lamina::pipeline

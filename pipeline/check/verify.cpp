@@ -41,6 +41,7 @@ struct Verification {
   ExpectedDrops expected;
   VerifyReport& report;
   mutable tbb::enumerable_thread_specific<std::string> texts;  // of programs
+  mutable tbb::enumerable_thread_specific<LayerDrops> drops;
 
   /// Without a program to compare it with, the numbers of an image are enough.
   Keep keep() const { return head.machine.empty() && is_one_bit(head) ? Keep::kCounts : Keep::kRuns; }
@@ -79,7 +80,8 @@ std::string fault_of_feeding(const Verification& inspection, const LayerRecord& 
 
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
 // locates the difference.
-std::string fault_of_program(const Verification& inspection, const LayerRecord& record, const LayerPicture* image,
+// drops  null if only its hash counts
+std::string fault_of_program(const Verification& inspection, const LayerRecord& record, const LayerDrops* drops,
                              std::optional<replay::Count>& count) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
@@ -90,7 +92,7 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   const auto expands_to = [&](std::uint64_t bytes) {
     return fmt::format("{}: expands to {} bytes, the manifest says {}", name, bytes, record.program.bytes);
   };
-  if (image == nullptr || !inspection.machine) {
+  if (drops == nullptr || !inspection.machine) {
     const Result<FileDigest> digest = digest_content(path, record.program.bytes);
     if (!digest) return digest.error().message;
     if (is_compressed(name) && digest->bytes != record.program.bytes) return expands_to(digest->bytes);
@@ -101,9 +103,8 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
     if (!read) return read.error().message;
     if (is_compressed(name) && text.size() != record.program.bytes) return expands_to(text.size());
     same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
-    const std::vector<RunsView> planes(image->begin(), image->end());
     const auto replay =
-        inspection.machine->replay(text, record.layer, planes, record.program.moved, record.program.lost);
+        inspection.machine->replay(text, record.layer, drops->planes(), record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
     const replay::Count reported{.drops = says.drops,
@@ -122,7 +123,7 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   }
   return same ? std::string()
               : fmt::format("{}: layer {}: its content is not what was written{}", name, record.layer.index,
-                            image != nullptr ? ", though it prints the same" : "");
+                            drops != nullptr ? ", though it prints the same" : "");
 }
 
 // Empty, or the fault of the image of this number; its set pixels are added to `picture`, its levels to `sum`.
@@ -146,17 +147,15 @@ std::string fault_of_image(const Verification& inspection, const Layer& layer, s
 }
 
 /// Empty, or what the manifest says of a layer's drops that its images do not.
-std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, const LayerPicture& picture) {
+std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, const LayerDrops& drops) {
   if (head.max_drops == 0) return {};
-  std::uint64_t drops = 0;
-  for (const Runs& plane : picture) drops += set_pixels(plane);
-  if (drops != record.drops)
-    return fmt::format("layer {}: its images have {} drops, the manifest says {}", record.layer.index, drops, record.drops);
-  const std::uint64_t set = set_pixels(picture.front());
-  const auto maximum = std::ranges::count_if(picture, [](const Runs& plane) { return !plane.change.empty(); });
-  if (set == record.set_pixels && maximum == record.max_drops) return {};
+  if (drops.drops != record.drops) {
+    return fmt::format("layer {}: its images have {} drops, the manifest says {}", record.layer.index, drops.drops,
+                       record.drops);
+  }
+  if (drops.pixels == record.set_pixels && drops.maximum == record.max_drops) return {};
   return fmt::format("layer {}: its images set {} pixels with up to {} drops, the manifest says {} with {}", record.layer.index,
-                     set, maximum, record.set_pixels, record.max_drops);
+                     drops.pixels, drops.maximum, record.set_pixels, record.max_drops);
 }
 
 std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
@@ -171,13 +170,13 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
     if (inspection.options.quick) continue;
     if (std::string what = fault_of_image(inspection, record.layer, i, file, picture, levels); !what.empty()) return what;
   }
-  if (!inspection.options.quick) {
-    inspection.expected.apply(record.layer, picture.planes);
-    if (std::string what = ExpectedDrops::fault(inspection.head, record, picture.planes); !what.empty()) return what;
-    if (std::string what = fault_of_drops(inspection.head, record, picture.planes); !what.empty()) return what;
-    if (std::string what = inspection.doses->fault(record, picture.planes, levels); !what.empty()) return what;
-  }
-  return fault_of_program(inspection, record, inspection.options.quick ? nullptr : &picture.planes, count);
+  if (inspection.options.quick) return fault_of_program(inspection, record, nullptr, count);
+  LayerDrops& drops = inspection.drops.local();
+  inspection.expected.make(record.layer, picture.planes, drops);
+  if (std::string what = ExpectedDrops::fault(inspection.head, record, drops); !what.empty()) return what;
+  if (std::string what = fault_of_drops(inspection.head, record, drops); !what.empty()) return what;
+  if (std::string what = inspection.doses->fault(record, drops.pixels, levels); !what.empty()) return what;
+  return fault_of_program(inspection, record, &drops, count);
 }
 
 // Restores the machine that the programs were written for.
@@ -227,7 +226,7 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 
 void check_layers(const std::string& directory, const Manifest& manifest, const VerifyOptions& options,
                   std::optional<JobCost>& cost, std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, options, std::nullopt, std::nullopt, {}, report, {}};
+  Verification inspection{directory, manifest.head, options, std::nullopt, std::nullopt, {}, report, {}, {}};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);
