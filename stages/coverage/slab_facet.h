@@ -68,10 +68,10 @@ struct Corner {
   Number x, y, z;
 };
 
-/// A convex piece of a facet. A triangle that four planes have cut has up to seven corners.
+/// A convex piece of a facet. A triangle that six planes have cut has up to nine corners.
 template <class Number>
 struct Piece {
-  std::array<Corner<Number>, 8> corner;
+  std::array<Corner<Number>, 9> corner;
   std::uint32_t size = 0;
 };
 

@@ -1,96 +1,14 @@
 #include "stages/coverage/band/maker.h"
 
-#include <gmpxx.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "stages/coverage/band/exact.h"
 #include "stages/coverage/coverage.h"
 
 namespace lamina::coverage {
 namespace {
-
-// --- the level of a voxel in rationals.
-
-using Rational = mpq_class;
-
-Rational rational(std::int64_t whole) { return Rational(static_cast<long>(whole)); }
-
-/// A box of the second contract (coverage.h), nm.
-struct Voxel {
-  std::int64_t x0, x1, y0, y1, z0, z1;
-};
-
-using RationalCorner = Corner<Rational>;
-
-/// A triangle as what lies behind it, towards +x, sees it: its area along x by x. The area before x rises with the square of
-/// the distance from the first corner, and falls short of all by the square of that from the last.
-struct Tent {
-  Rational x0, x1, x2;  // corners, in order
-  Rational area;        // projected along x; positive where +x goes into the solid
-
-  Tent(const RationalCorner& a, const RationalCorner& b, const RationalCorner& c) : x0(a.x), x1(b.x), x2(c.x) {
-    if (x1 < x0) std::swap(x0, x1);
-    if (x2 < x1) std::swap(x1, x2);
-    if (x1 < x0) std::swap(x0, x1);
-    area = area_along_x(a, b, c);
-  }
-
-  Rational mean() const { return (x0 + x1 + x2) / 3; }
-  /// Volume between the triangle and x, behind it.
-  Rational behind(const Rational& x) const {
-    if (x <= x0) return Rational(0);
-    if (x >= x2) return area * (x - mean());
-    if (x < x1) return area * ((x - x0) / 3 * ((x - x0) * (x - x0) / ((x1 - x0) * (x2 - x0))));
-    return area * (x - mean()) + area * ((x2 - x) / 3 * ((x2 - x) * (x2 - x) / ((x2 - x1) * (x2 - x0))));
-  }
-};
-
-/// Volume of the voxel that lies behind the facet, nm^3; negative behind one where +x leaves the solid.
-Rational volume_behind(const Triangle& facet, const Voxel& voxel) {
-  Piece<Rational> one, other;
-  for (const Point3* p : {&facet.a, &facet.b, &facet.c}) {
-    one.corner[one.size++] = {rational(p->x - voxel.x0), rational(p->y - voxel.y0), rational(p->z - voxel.z0)};
-  }
-  const Rational zero, depth = rational(voxel.y1 - voxel.y0), height = rational(voxel.z1 - voxel.z0);
-  cut<&RationalCorner::z, true>(one, zero, other);
-  cut<&RationalCorner::z, false>(other, height, one);
-  cut<&RationalCorner::y, true>(one, zero, other);
-  cut<&RationalCorner::y, false>(other, depth, one);
-  const Rational width = rational(voxel.x1 - voxel.x0);
-  Rational sum;
-  for (std::uint32_t k = 1; k + 1 < one.size; ++k) {
-    const Tent tent(one.corner[0], one.corner[k], one.corner[k + 1]);
-    if (tent.x0 >= width) continue;
-    if (tent.x2 <= zero) {
-      sum += tent.area * width;
-    } else {
-      sum += tent.behind(width) - tent.behind(zero);
-    }
-  }
-  return sum;
-}
-
-/// floor(share n + 1/2) within 0 .. n of a voxel of a column of the span.
-/// taken  facets of the span; those that begin at or before the column count
-/// cost   some ten microseconds a facet
-std::uint32_t exact_level(const BandSlab& slab, const Voxel& voxel, const ColumnSpan& span, std::span<const RowFacet> taken,
-                          std::uint32_t column) {
-  const Rational whole = rational(voxel.x1 - voxel.x0) * rational(voxel.y1 - voxel.y0) * rational(voxel.z1 - voxel.z0);
-  Rational volume = rational(span.winding) * whole;
-  for (const RowFacet& of_row : taken) {
-    const SlabFacet& facet = slab.facets[of_row.index];
-    if (facet.edgewise || of_row.first > column) continue;
-    volume += volume_behind(facet.facet, voxel);
-  }
-  const std::uint32_t top_level = slab.rule.top_level;
-  const Rational level = volume * static_cast<long>(top_level) / whole + Rational(1, 2);
-  mpz_class below;
-  mpz_fdiv_q(below.get_mpz_t(), level.get_num_mpz_t(), level.get_den_mpz_t());
-  if (below < 0) return 0;
-  return below > top_level ? top_level : static_cast<std::uint32_t>(below.get_ui());
-}
 
 // --- samples.
 
@@ -281,6 +199,8 @@ void RowResolver::take(const ColumnSpan& span) {
   spoilt_ =
       spoilt_share(*slab_, depth, scale, 3 * (columns + 2 * facets), std::abs(static_cast<double>(span.winding)) + facets);
   even_begin_ = even_end_ = 0;
+  next_ = 0;
+  near_.clear();
   samples_.forget();
 }
 
@@ -307,17 +227,30 @@ std::uint8_t RowResolver::exact(const OpenLanes& open_lanes, std::uint32_t lane)
   const double minimum = std::floor(position - off), maximum = std::floor(position + off);
   if (minimum == maximum || maximum <= 0 || minimum >= top) return static_cast<std::uint8_t>(std::clamp(minimum, 0.0, top));
   ++report_->exact_voxels;
+  return resolve(open_lanes.span, column, {(position - 0.5) / top, off / top, slab_->rule.top_level});
+}
+
+/// The level by the facets that reach the column, and how far it continues.
+std::uint8_t RowResolver::resolve(const ColumnSpan& span, std::uint32_t column, const NearShare& near_share) {
+  for (; next_ < taken_.size() && taken_[next_].first <= column; ++next_) near_.push_back(taken_[next_]);
+  std::erase_if(near_, [&](const RowFacet& of_row) { return of_row.last < column; });
+  near_facets_.clear();
+  for (const RowFacet& of_row : near_) near_facets_.push_back(&slab_->facets[of_row.index]);
   const Voxel voxel{
       edge(slab_->columns, column), edge(slab_->columns, std::int64_t{column} + 1), strip_.y0, strip_.y1, strip_.z0, strip_.z1};
-  const auto level = static_cast<std::uint8_t>(exact_level(*slab_, voxel, open_lanes.span, taken_, column));
-  even_begin_ = column;
-  even_end_ = open_lanes.span.end;
-  even_level_ = level;
-  for (const RowFacet& of_row : taken_) {
-    if (slab_->facets[of_row.index].edgewise || of_row.last < column) continue;
-    even_end_ = std::min(even_end_, of_row.first);  // before `column` if it is no even one
+  const ExactLevel exact = exact_level(voxel, near_facets_, near_share);
+  even_begin_ = even_end_ = column;
+  even_level_ = exact.level;
+  const auto ends = [&](const RowFacet& of_row) {
+    return !splits_no_more(slab_->facets[of_row.index], exact.plane, voxel);
+  };
+  if (!exact.continues || std::ranges::any_of(near_, [&](const RowFacet& of_row) { return of_row.last > column && ends(of_row); }))
+    return exact.level;
+  even_end_ = span.end;
+  for (std::size_t i = next_; i < taken_.size() && even_end_ == span.end; ++i) {
+    if (ends(taken_[i])) even_end_ = taken_[i].first;
   }
-  return level;
+  return exact.level;
 }
 
 std::uint64_t RowResolver::decide(const OpenLanes& open_lanes, std::uint64_t levels) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "stages/coverage/band/exact.h"
 #include "stages/coverage/band/kernels.h"
 #include "stages/coverage/slab_facet.h"
 #include "stages/data/buffer.h"
@@ -92,13 +93,14 @@ class RowResolver {
   std::uint32_t even_until() const { return even_end_; }
   /// Columns [begin, end), which hold no facet, lie at that winding number, neither 0 nor 1.
   void free(std::int64_t winding, std::uint32_t begin, std::uint32_t end);
-  std::uint64_t bytes() const { return bytes_held(facet_) + samples_.bytes(); }
+  std::uint64_t bytes() const { return bytes_held(facet_) + bytes_held(near_) + bytes_held(near_facets_) + samples_.bytes(); }
 
  private:
   void list_facets();
   void take(const ColumnSpan& span);
   bool resolve_lane(const OpenLanes& open_lanes, std::uint32_t lane, std::uint8_t& level);
   std::uint8_t exact(const OpenLanes& open_lanes, std::uint32_t lane);
+  std::uint8_t resolve(const ColumnSpan& span, std::uint32_t column, const NearShare& near_share);
 
   const BandSlab* slab_ = nullptr;
   CoverageReport* report_ = nullptr;
@@ -109,6 +111,9 @@ class RowResolver {
   Buffer<RowFacet> facet_;           // of the row, by the first column that they reach
   std::span<const RowFacet> taken_;  // of the interval at work
   std::uint32_t taken_first_ = 0;    // where it begins
+  std::size_t next_ = 0;             // of those: behind all that begin at or before the last column that was resolved
+  Buffer<RowFacet> near_;            // those that reach it
+  Buffer<const SlabFacet*> near_facets_;
   double spoilt_ = 0;
   std::uint32_t even_begin_ = 0, even_end_ = 0;  // columns of one share
   std::uint8_t even_level_ = 0;
