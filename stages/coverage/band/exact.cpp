@@ -193,7 +193,7 @@ std::uint32_t level_by_volume(const Voxel& v, std::span<const SlabFacet* const> 
 
 }  // namespace
 
-ExactLevel exact_level(const Voxel& voxel, std::span<const SlabFacet* const> near_facets, const NearShare& near_share) {
+std::uint32_t exact_level(const Voxel& voxel, std::span<const SlabFacet* const> near_facets, const NearShare& near_share) {
   const SlabFacet* plane = nullptr;
   bool one_plane = true;
   for (const SlabFacet* facet : near_facets) {
@@ -208,17 +208,9 @@ ExactLevel exact_level(const Voxel& voxel, std::span<const SlabFacet* const> nea
     const std::optional<Fraction> part =
         plane == nullptr ? Fraction{0, 1} : part_of(normal, plane->facet.a, voxel);
     const auto level = part ? level_by_plane(*part, near_share) : std::nullopt;
-    if (level) return {static_cast<std::uint8_t>(*level), normal.x == 0, plane};
+    if (level) return *level;
   }
-  return {static_cast<std::uint8_t>(level_by_volume(voxel, near_facets, near_share)), false, nullptr};
-}
-
-bool splits_no_more(const SlabFacet& facet, const SlabFacet* plane, const Voxel& of_row) {
-  const FacetNormal normal(facet.facet);
-  if (plane != nullptr && in_one_plane(facet.facet, normal, plane->facet)) return !facet.suspect;
-  const Triangle& t = facet.facet;
-  if (!is_within(t.a.y, t.b.y, t.c.y, of_row.y0, of_row.y1) || !is_within(t.a.z, t.b.z, t.c.z, of_row.z0, of_row.z1)) return true;
-  return false;
+  return level_by_volume(voxel, near_facets, near_share);
 }
 
 }  // namespace lamina::coverage

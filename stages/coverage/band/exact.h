@@ -22,21 +22,10 @@ struct NearShare {
   std::uint32_t top_level;
 };
 
-struct ExactLevel {
-  std::uint8_t level;
-  /// No facet, or facets in one plane parallel to x, split the voxel: the level is that of the columns behind it too, as far
-  /// as no other facet begins.
-  bool continues;
-  const SlabFacet* plane;  // in which those are; null if there are none
-};
-
 /// floor(share n + 1/2) within 0 .. n.
 /// near_facets  at least those that meet the voxel
 /// cost         some ten nanoseconds a facet where one plane holds all that split the voxel, at an axis or through its centre;
 ///              else some ten microseconds a facet
-ExactLevel exact_level(const Voxel& voxel, std::span<const SlabFacet* const> near_facets, const NearShare& near_share);
-
-/// Whether the facet splits no voxel of the row, or is in the plane of the other one, which is parallel to x.
-bool splits_no_more(const SlabFacet& facet, const SlabFacet* plane, const Voxel& of_row);
+std::uint32_t exact_level(const Voxel& voxel, std::span<const SlabFacet* const> near_facets, const NearShare& near_share);
 
 }  // namespace lamina::coverage
