@@ -13,6 +13,10 @@ shall stand on the bed; parts.json says where that is, in nanometres:
     gyroid.stl        a gyroid sheet of 24 mm: 246,820 triangles, for the runs that measure memory
     crowns96.stl      96 of them in one mesh, 12 x 8 on 400 x 400 mm
     knot800k.stl      a torus knot by formula: 800,000 triangles, 472 layers of 0.05 mm (--made)
+    pins.stl          80 x 80 square pins of 0.5 mm on a plate of 80 mm: 156,172 triangles, 16 layers of 0.1 mm (--made)
+    pins_tie.stl      the same; the plate's face is 7 um lower, in the middle of a layer (--made)
+    steps.stl         96 round towers of 12 horizontal steps, 12 x 8 on 400 x 400 mm: 13 layers of 0.1 mm (--made)
+    steps_tie.stl     the same; each step is 7 um lower, in the middle of a layer (--made)
     scan680k.stl      a bumpy ball of 42 mm whose 683,280 triangles lie in disorder: 425 layers of 0.1 mm (--made)
     benchies72.stl    72 Benchies in one mesh, 6 x 12 on 400 x 400 mm: 811 MB, 480 layers of 0.1 mm (--large)
 """
@@ -139,6 +143,56 @@ def torus_knot(around, along):
     return axes
 
 
+def pins(face, across=80, side=0.5, height=1.6):
+    """Square pins, 1 mm apart, on a plate whose face is at that height; mm. All share one grid of corners, which the underside
+    has too, so that every edge has two facets."""
+    lines = [0.0] + [i + k * side + (1 - side) / 2 for i in range(across) for k in range(2)] + [float(across)]
+    cells, facets = range(len(lines) - 1), []
+
+    def is_pin(i, k):
+        return i % 2 == 1 and k % 2 == 1
+
+    def quad(a, b, c, d):
+        facets.extend((a, b, c, a, c, d))
+
+    for i in cells:
+        for k in cells:
+            x0, x1, y0, y1 = lines[i], lines[i + 1], lines[k], lines[k + 1]
+            z = height if is_pin(i, k) else face
+            quad((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
+            quad((x0, y0, 0), (x0, y1, 0), (x1, y1, 0), (x1, y0, 0))
+            walls = [((x0, y0), (x1, y0), k == 0), ((x1, y0), (x1, y1), i == cells[-1]),
+                     ((x1, y1), (x0, y1), k == cells[-1]), ((x0, y1), (x0, y0), i == 0)]
+            for (ax, ay), (bx, by), outside in walls:
+                if outside or is_pin(i, k):
+                    low = face if is_pin(i, k) else 0
+                    quad((ax, ay, low), (bx, by, low), (bx, by, z), (ax, ay, z))
+    return [array.array("d", [corner[axis] for corner in facets]) for axis in range(3)]
+
+
+def steps(below, count=12, sides=48, radius=14.0):
+    """A round tower whose horizontal steps are that far below whole tenths of a millimetre; mm."""
+    def ring(size, z):
+        turns = (2 * math.pi * (k + 0.25) / sides for k in range(sides))
+        return [(radius + size * math.cos(t), radius + size * math.sin(t), z) for t in turns]
+
+    rings = [ring(radius, 0.0)]
+    for i in range(count):
+        size, z = radius - i, (i + 1) / 10 - below
+        rings += [ring(size, z), ring(size - 1, z)]
+    rings[-1] = ring(radius - count, rings[-1][0][2])
+    facets = []
+    for here, there in zip(rings, rings[1:]):
+        for j in range(sides):
+            k = (j + 1) % sides
+            facets += [here[j], here[k], there[k], here[j], there[k], there[j]]
+    for ends in (rings[0][::-1], rings[-1]):
+        middle = (radius, radius, ends[0][2])
+        for j in range(sides):
+            facets += [middle, ends[j], ends[(j + 1) % sides]]
+    return placed([array.array("d", [corner[axis] for corner in facets]) for axis in range(3)], (1, 1, 1))
+
+
 def bumpy_ball(across):
     """As a scanner leaves a surface: fine waves, and facets in no order. 2 x across x (across + 1) facets."""
     def point(i, j):
@@ -221,6 +275,9 @@ def main():
     make("crowns96.stl", lambda: many(crown(), 12, 8))
     if options.made:
         make("knot800k.stl", lambda: one(placed(torus_knot(200, 2000), (1, 1, 1))))
+        for name, lift in (("", 0.007), ("_tie", 0.0)):
+            make(f"pins{name}.stl", lambda: one(pins(1.05 + lift)))
+            make(f"steps{name}.stl", lambda: many(steps(0.05 - lift), 12, 8))
         make("scan680k.stl", lambda: one(placed(bumpy_ball(584), (1, 1, 1))))
     if options.large:
         make("benchies72.stl", lambda: many(benchy(1.0), 6, 12))

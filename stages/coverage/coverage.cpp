@@ -384,7 +384,7 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
                       bottom,
                       top,
                       scratch.facets};
-  scratch.maker.start(slab, state.isa);
+  scratch.maker.start(slab, state.isa, scratch.counts_held);
   for (std::uint32_t band = state.bands(); band-- > 0;) {
     for (std::uint32_t k = scratch.begins[band]; k < scratch.begins[band + 1]; ++k) {
       if (k + 4 < scratch.order.size()) fetch(scratch.facets[scratch.order[k + 4]]);

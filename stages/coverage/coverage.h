@@ -39,6 +39,7 @@ struct CoverageScratch {
   Buffer<SlabFacet> facets;             // that reach into the layer
   Buffer<std::uint32_t> begins, order;  // facets by the band of the last row they reach: where a band's begin; indices
   BandMaker maker;
+  bool counts_held = false;  // whether layers report held_voxels, which makes them slower
 
   std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + maker.bytes(); }
 };
@@ -49,7 +50,7 @@ struct CoverageScratch {
 struct CoverageReport {
   double volume_mm3 = 0;             // sum of share x voxel, before shares become levels
   std::uint32_t facets = 0;          // that reach into the layer
-  std::uint64_t held_voxels = 0;     // that hold facets
+  std::uint64_t held_voxels = 0;     // that hold facets, if they are counted
   std::uint64_t sampled_voxels = 0;  // whose share is that of samples
   std::uint64_t inspected = 0;       // voxels whose samples were counted, for a facet in them meets another one
   std::uint64_t exact_voxels = 0;    // that rationals decided; an interval of one share counts once

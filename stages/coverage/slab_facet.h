@@ -15,7 +15,7 @@ namespace lamina::coverage {
 /// nm of the edge before pixel i; that of pixel `count` ends the last one.
 constexpr std::int64_t edge(const PixelAxis& axis, std::int64_t i) { return i * axis.span / axis.dots; }
 
-/// All edges of an axis; doubles hold them exactly. 8 bytes a pixel.
+/// All edges of an axis; doubles hold them exactly. 16 bytes a pixel.
 class Edges {
  public:
   explicit Edges(const PixelAxis& axis) : per_nm_(axis.pixels_per_nm()), count_(axis.count) {
@@ -26,6 +26,9 @@ class Edges {
       widest_ = std::max(widest_, width(i));
       narrowest_ = std::min(narrowest_, width(i));
     }
+    per_width_.resize(edge_.size());
+    for (std::uint32_t i = 0; i + 1 < edge_.size(); ++i) per_width_[i] = 1 / width(i);
+    per_width_.back() = 1;
   }
 
   /// A pixel at or before that of `nm` is at nm x per_nm(), one at or behind it at (nm + kBehind) x per_nm(): edges are up to
@@ -35,6 +38,8 @@ class Edges {
 
   /// kMore edges follow those of the axis, for who reads several at once.
   const double* data() const { return edge_.data(); }
+  /// 1 / width(i), and kMore more.
+  const double* per_width() const { return per_width_.data(); }
   static constexpr std::uint32_t kMore = 16;
 
   double operator[](std::uint32_t i) const { return edge_[i]; }
@@ -42,7 +47,7 @@ class Edges {
   double widest() const { return widest_; }
   double narrowest() const { return narrowest_; }
   std::uint32_t count() const { return count_; }
-  std::uint64_t bytes() const { return bytes_held(edge_); }
+  std::uint64_t bytes() const { return bytes_held(edge_) + bytes_held(per_width_); }
 
   /// The pixel in which `nm` lies, the one behind if it lies on an edge; the nearest one of the bed.
   std::uint32_t at(double nm) const {
@@ -57,7 +62,7 @@ class Edges {
   double per_nm_;
   std::uint32_t count_;
   double widest_ = 0, narrowest_ = 0;
-  Buffer<double> edge_;
+  Buffer<double> edge_, per_width_;
 };
 
 // --- what lies behind a piece of a facet, in doubles for all voxels and in rationals for the few that
@@ -68,10 +73,10 @@ struct Corner {
   Number x, y, z;
 };
 
-/// A convex piece of a facet. A triangle that four planes have cut has up to seven corners.
+/// A convex piece of a facet. A triangle that six planes have cut has up to nine corners.
 template <class Number>
 struct Piece {
-  std::array<Corner<Number>, 8> corner;
+  std::array<Corner<Number>, 9> corner;
   std::uint32_t size = 0;
 };
 

@@ -24,6 +24,7 @@ BandLayer band_layer(const Triangles& triangles, std::uint32_t levels, Isa isa =
   auto coverage = coverage::Coverage::build({&mesh, 1}, {&instance, 1}, kWide, FillRule::kNonzero, levels, isa);
   EXPECT_TRUE(coverage.ok());
   coverage::CoverageScratch scratch;
+  scratch.counts_held = true;
   BandLayer made;
   // A layer before it: what it leaves behind must not show.
   coverage->layer({0, -40'000, 100'000}, scratch, made.image);

@@ -22,6 +22,7 @@ struct BoundSums {
 
 void expect_layer_within(const coverage::Coverage& coverage, const Layer& layer, std::uint32_t levels, BoundSums& sums) {
   coverage::CoverageScratch scratch;  // of this layer alone
+  scratch.counts_held = true;
   Levels image;
   const coverage::CoverageReport report = coverage.layer(layer, scratch, image);
   const coverage::LayerBound bound = coverage.bound(layer);

@@ -269,6 +269,7 @@ TEST(CoverageShapes, CopiesThatOverlapAreSampledOnlyWhereTheirBoxesMeet) {
     auto copies = coverage::Coverage::build({&mesh, 1}, instances, grid, rule, 16);
     auto together = coverage::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, rule, 16);
     coverage::CoverageScratch scratch;
+    scratch.counts_held = true;
     Levels of_copies, of_all;
     std::uint64_t held = 0, inspected = 0, sampled = 0;
     for (const Layer& layer : layers_of(90'000, 8, 20'000)) {

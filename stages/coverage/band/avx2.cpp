@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "stages/coverage/band/maker.h"
 #include "stages/geometry/targets.h"
@@ -30,7 +31,8 @@ LAMINA_AVX2 void deposit(const Trapezoid& piece, const BandRows& rows, const Edg
                          ColumnReach& reach, BandSums& sums) {
   add_body(piece, rows, columns, cells, reach, sums);
 }
-LAMINA_AVX2 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
+LAMINA_AVX2 void sweep(const BandTask& band, SweptBand& swept) { sweep_body(band, swept); }
+LAMINA_AVX2 void split(const SweptBand& swept, Changes* rows) { split_body(swept, rows); }
 
 }  // namespace lamina::coverage::avx2
 

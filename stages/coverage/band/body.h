@@ -22,25 +22,6 @@ LAMINA_LANES Tent tent_of(Eight a, Eight b, Eight c, Eight area) {
   return t;
 }
 
-/// Two tents of each row, number by number.
-struct alignas(64) TentRows {
-  double of[14][kLanes];
-
-  LAMINA_LANES void put(std::uint32_t first, const Tent& t) {
-    store(of[first], t.x0), store(of[first + 1], t.x1), store(of[first + 2], t.x2), store(of[first + 3], t.area);
-    store(of[first + 4], t.mean), store(of[first + 5], t.rise), store(of[first + 6], t.fall);
-  }
-};
-
-/// The same numbers of one row, in all lanes.
-struct TentPair {
-  Tent a, b;
-};
-LAMINA_LANES TentPair pair_of(const TentRows& rows, std::uint32_t lane) {
-  const auto at = [&](std::uint32_t i) LAMINA_TARGET { return all(rows.of[i][lane]); };
-  return {{at(0), at(1), at(2), at(3), at(4), at(5), at(6)}, {at(7), at(8), at(9), at(10), at(11), at(12), at(13)}};
-}
-
 /// Volume between a tent and x, behind it.
 LAMINA_LANES Eight behind(const Tent& t, Eight x) {
   const Mask rises = below(x, t.x1);
@@ -48,32 +29,24 @@ LAMINA_LANES Eight behind(const Tent& t, Eight x) {
   const Eight part = times(times(pick(rises, t.rise, t.fall), from), times(from, from));
   return plus(drop(rises, times(t.area, less(x, t.mean))), part);
 }
-LAMINA_LANES Eight behind(const TentPair& t, Eight x) { return plus(behind(t.a, x), behind(t.b, x)); }
-
-LAMINA_LANES void add_columns(const TentPair& tents, double from_x, const double* edges, double* partial,
-                              std::uint32_t columns) {
-  const Eight from = all(from_x);
-  Eight now = behind(tents, less(load(edges), from));
-  for (;;) {
-    if (columns < kLanes) {
-      store_first(partial, columns, plus(load(partial), less(shifted(now, now), now)));
-      return;
-    }
-    edges += kLanes;
-    const Eight next = behind(tents, less(load(edges), from));
-    store(partial, plus(load(partial), less(shifted(now, next), now)));
-    columns -= kLanes;
-    if (columns == 0) return;
-    partial += kLanes;
-    now = next;
-  }
-}
-
 LAMINA_LANES void add_lanes(double* to, std::uint32_t begin, std::uint32_t end, Eight value) {
   store(to, plus(load(to), less(keep_first(end, value), keep_first(begin, value))));
 }
 
 LAMINA_LANES Eight along(double at, double per_y, Eight from) { return plus(all(at), times(from, all(per_y))); }
+
+/// Marks columns that the piece may reach in some row; how many they are.
+LAMINA_LANES std::uint32_t mark_columns(const Trapezoid& piece, const ColumnReach& reach, std::uint32_t begin, std::uint32_t end,
+                                        BandCells& cells) {
+  std::uint32_t first = UINT32_MAX, last = 0;
+  for (std::uint32_t lane = begin; lane < end; ++lane) {
+    first = std::min(first, reach.first[lane]), last = std::max(last, reach.last[lane]);
+  }
+  cells.held().mark(first, last);
+  if (!piece.edgewise) cells.summed().mark(first, last);
+  if (piece.suspect) cells.suspect().mark(first, last);
+  return last - first + 1;
+}
 
 LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
                            ColumnReach& reach, BandSums& sums) {
@@ -102,105 +75,157 @@ LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const E
   const std::uint32_t begin = piece.first_row > rows.first ? piece.first_row - rows.first : 0;
   const std::uint32_t end = std::min(piece.last_row - rows.first + 1, rows.count);
   add_lanes(sums.size.data(), begin, end, all(piece.size));
-  add_lanes(sums.columns.data(), begin, end, plus(less(end_column, first_column), all(2)));
+  add_lanes(sums.columns.data(), begin, end, all(1 + mark_columns(piece, reach, begin, end, cells)));
   add_lanes(sums.count.data(), begin, end, all(1));
-  TentRows tents;
-  alignas(64) double area[kLanes];
-  std::uint32_t with_area = 0;
-  if (!piece.edgewise) {
-    with_area = bits(has_height);
-    const Eight half = times(less(high, low), all(0.5));
-    const auto height = [&](Eight on, Eight back) LAMINA_TARGET {
-      return less(along(piece.back.z, piece.back.dz, back), along(piece.on.z, piece.on.dz, on));
-    };
-    const Eight upper = times(height(on_high, back_high), half), lower = times(height(on_low, back_low), half);
-    tents.put(0, tent_of(x_back_high, x_on_high, x_back_low, upper));
-    tents.put(7, tent_of(x_back_low, x_on_low, x_on_high, lower));
-    store(area, plus(upper, lower));
-  }
-  for (std::uint32_t lane = begin; lane < end; ++lane) {
-    const std::uint32_t first = reach.first[lane], last = reach.last[lane];
-    cells.held(lane).mark(first, last);
-    if (piece.suspect) cells.suspect(lane).mark(first, last);
-    if ((with_area >> lane & 1) == 0) continue;
-    add_columns(pair_of(tents, lane), piece.from_x, columns.data() + first, cells.partial(lane) + first, last - first + 1);
-    cells.passed(lane)[last + 1] += area[lane];
-  }
-}
-
-/// Whether no trapezoid with area along x begins or ends in 64 columns.
-LAMINA_LANES bool is_even(const double* partial, const double* passed) {
-  for (std::uint32_t k = 0; k < 64; k += kLanes) {
-    if (!is_zero(load(partial + k), load(passed + k))) return false;
-  }
-  return true;
-}
-
-/// Levels of a span, from `winding` before it; returns that behind it.
-LAMINA_LANES std::int64_t sweep_span(const RowTask& row, const ColumnSpan& span, std::uint32_t& level, Changes& changes) {
-  const Eight top = all(row.top), spoilt = all(row.spoilt * row.top), rounding = all(0x1p-49);
-  double cover = static_cast<double>(span.winding) * row.area;
-  for (std::uint32_t c = span.first; c < span.end; c += kLanes) {
-    const std::uint32_t columns = std::min(span.end - c, kLanes), ends = std::min(columns + 1, kLanes);
-    const Eight width = less(load(row.edges + c + 1), load(row.edges + c));
-    const Eight old_partial = load(row.partial + c), old_passed = load(row.passed + c);
-    const Eight partial = keep_first(columns, old_partial), passed = keep_first(ends, old_passed);
-    store_first(row.partial + c, columns, all(0));
-    store_first(row.passed + c, ends, all(0));
-    const Eight behind = plus(sums_of(passed), all(cover));
-    cover = last_of(behind);
-    const Eight volume = plus(times(behind, width), partial);
-    const Eight per_voxel = pick(below(width, all(row.widest)), all(row.per_narrowest), all(row.per_widest));
-    const Eight position = plus(times(volume, per_voxel), all(0.5));
-    const Eight off = plus(spoilt, times(rounding, plus(absolute(position), top)));
-    const Eight lowest = maximum(minimum(whole_below(less(position, off)), top), all(0));
-    const Eight highest = maximum(minimum(whole_below(plus(position, off)), top), all(0));
-    const std::uint32_t valid = (1u << columns) - 1;
-    std::uint64_t levels = bytes_of(lowest);
-    const std::uint32_t undecided = bits(below(lowest, highest)) & valid;
-    const std::uint32_t suspects = row.has_suspects ? row.suspect.eight(c) & valid : 0;
-    if ((undecided | suspects) != 0) [[unlikely]] {
-      OpenLanes open_lanes{span, c, undecided, suspects, {}};
-      store(open_lanes.volume.data(), volume);
-      levels = row.resolver->decide(open_lanes, levels);
-    }
-    note_changes(levels, columns, c, level, changes);
-    // A flat top, or a floor, within the layer.
-    if (span.end - c >= 128 && !row.has_suspects && is_zero(old_partial, old_passed)) [[unlikely]] {
-      const std::uint32_t until = undecided != 0 ? row.resolver->even_until() : span.end;
-      while (c + kLanes + 64 < until && is_even(row.partial + c + kLanes, row.passed + c + kLanes)) c += 64;
-    }
-  }
-  if ((span.end - span.first) % kLanes == 0) {
-    cover += row.passed[span.end];
-    row.passed[span.end] = 0;
-  }
-  return static_cast<std::int64_t>(std::floor(cover / row.area + 0.5));
-}
-
-LAMINA_LANES void sweep_body(const RowTask& row_of, Changes& result) {
-  const RowTask row = row_of;  // a copy: no member is read again after a write
-  Changes changes = result;
-  ColumnSpan span;
-  std::uint32_t level = 0, at = 0;
-  const auto pass_free = [&](std::uint32_t end) LAMINA_TARGET {
-    const std::uint32_t free =
-        is_solid(row.fill, static_cast<std::int32_t>(span.winding)) ? static_cast<std::uint32_t>(row.top) : 0;
-    if (at < end && free != level) {
-      changes.column[changes.count] = at;
-      changes.level[changes.count++] = static_cast<std::uint8_t>(free);
-      level = free;
-    }
-    if (at < end && (span.winding < 0 || span.winding > 1)) row.resolver->free(span.winding, at, end);
+  if (piece.edgewise || bits(has_height) == 0) return;
+  const Eight half = keep(has_height, times(less(high, low), all(0.5)));
+  const auto height = [&](Eight on, Eight back) LAMINA_TARGET {
+    return less(along(piece.back.z, piece.back.dz, back), along(piece.on.z, piece.on.dz, on));
   };
-  for (std::uint32_t c = row.held.next(0); c != ColumnMarks::kNone; c = row.held.next(at)) {
-    pass_free(c);
-    span.first = c;
-    span.end = row.held.end_of(c);
-    changes.held += span.end - span.first;
-    span.winding = sweep_span(row, span, level, changes);
-    at = span.end;
+  const Eight upper = times(height(on_high, back_high), half), lower = times(height(on_low, back_low), half);
+  const Tent a = tent_of(x_back_high, x_on_high, x_back_low, upper), b = tent_of(x_back_low, x_on_low, x_on_high, lower);
+  std::uint32_t first = UINT32_MAX, last = 0;
+  for (std::uint32_t with_height = bits(has_height); with_height != 0; with_height &= with_height - 1) {
+    const auto lane = static_cast<std::uint32_t>(std::countr_zero(with_height));
+    first = std::min(first, reach.first[lane]), last = std::max(last, reach.last[lane]);
   }
-  pass_free(row.columns);
-  result = changes;
+  double* cell = cells.column(first);
+  const double* edges = columns.data() + first;
+  const auto behind_both = [&](double x) LAMINA_TARGET {
+    const Eight from_piece = all(x - piece.from_x);
+    return plus(behind(a, from_piece), behind(b, from_piece));
+  };
+  Eight before = behind_both(*edges);
+  for (std::uint32_t column = first; column <= last; ++column, cell += 2 * kLanes) {
+    const Eight now = behind_both(*++edges);
+    store(cell, plus(load(cell), less(now, before)));
+    before = now;
+  }
+  store(cell + kLanes, plus(load(cell + kLanes), plus(upper, lower)));
+}
+
+/// Levels of one column in each row; what is not decided is noted.
+struct SweepState {
+  Eight cover, area, per_area, off, top, lowest_inside, highest_inside;
+  std::uint32_t rows;  // a bit each
+};
+
+LAMINA_LANES std::uint64_t levels_at(const SweepState& state, Eight share, std::uint32_t& undecided, std::uint32_t& outside) {
+  const Eight position = plus(times(share, state.top), all(0.5));
+  const Eight lowest = whole_below(maximum(minimum(less(position, state.off), state.top), all(0)));
+  const Eight highest = whole_below(maximum(minimum(plus(position, state.off), state.top), all(0)));
+  undecided = bits(below(lowest, highest)) & state.rows;
+  outside = (bits(below(share, state.lowest_inside)) | bits(below(state.highest_inside, share))) & state.rows;
+  return bytes_of(lowest);
+}
+
+/// Columns of one share, with numbers if they are a single one.
+LAMINA_LANES void sweep_columns(const BandTask& band, SweepState& state, const LevelSegment& columns, bool suspect,
+                                SweptBand& swept) {
+  double* cell = band.cells->column(columns.first);
+  state.cover = plus(state.cover, load(cell + kLanes));
+  const Eight share = times(plus(state.cover, times(load(cell), all(band.per_width[columns.first]))), state.per_area);
+  store(cell, all(0)), store(cell + kLanes, all(0));
+  std::uint32_t undecided = 0, outside = 0;
+  swept.level[columns.first] = levels_at(state, share, undecided, outside);
+  if ((undecided | outside) == 0 && !suspect) [[likely]]
+    return;
+  OpenColumns open{columns.first,
+                   columns.end,
+                   static_cast<std::uint32_t>(swept.span.size() - 1),
+                   static_cast<std::uint8_t>(undecided),
+                   static_cast<std::uint8_t>(outside),
+                   suspect,
+                   {}};
+  store(open.share.data(), share);
+  swept.open.push_back(open);
+}
+
+LAMINA_LANES void add_segment(std::uint32_t first, std::uint32_t end, SweptBand& swept) {
+  if (!swept.segment.empty() && swept.segment.back().end == first) {
+    swept.segment.back().end = end;
+  } else {
+    swept.segment.push_back({first, end});
+  }
+}
+
+LAMINA_LANES void sweep_body(const BandTask& band, SweptBand& swept) {
+  const ColumnMarks held = band.cells->held(), summed = band.cells->summed(), suspect = band.cells->suspect();
+  const bool has_suspects = suspect.next(0) != ColumnMarks::kNone;
+  SweepState state{all(0),         load(band.area.data()), load(band.per_area.data()), load(band.off.data()),
+                   all(band.top),  all(-0.25),             all(1.25),                  (1u << band.rows) - 1};
+  ColumnSpan span;
+  for (std::uint32_t c = held.next(0); c != ColumnMarks::kNone; c = held.next(span.end)) {
+    span.first = c;
+    span.end = held.end_of(c);
+    swept.span.push_back(span);
+    std::uint32_t at = c;
+    while (at < span.end) {
+      const std::uint32_t next = has_suspects ? at : std::min(summed.next(at), span.end);
+      if (next > at) sweep_columns(band, state, {at, next}, false, swept), add_segment(at, at + 1, swept);
+      if (next >= span.end) break;
+      at = has_suspects ? span.end : std::min(summed.end_of(next), span.end);
+      for (std::uint32_t column = next; column < at; ++column)
+        sweep_columns(band, state, {column, column + 1}, has_suspects && suspect.has(column), swept);
+      add_segment(next, at, swept);
+    }
+    double* cell = band.cells->column(span.end);
+    const Eight cover = plus(state.cover, load(cell + kLanes));
+    store(cell + kLanes, all(0));
+    const Eight winding = whole_below(plus(times(cover, state.per_area), all(0.5)));
+    state.cover = times(winding, state.area);
+    alignas(64) double whole[kLanes];
+    store(whole, winding);
+    std::uint64_t levels = 0;
+    for (std::uint32_t lane = 0; lane < band.rows; ++lane) {
+      span.winding[lane] = static_cast<std::int32_t>(whole[lane]);
+      swept.winds |= span.winding[lane] < 0 || span.winding[lane] > 1;
+      const bool solid = is_solid(band.fill, span.winding[lane]);
+      levels |= (solid ? static_cast<std::uint64_t>(band.top) : 0) << 8 * lane;
+    }
+    swept.level[span.end] = levels;
+    add_segment(span.end, span.end + 1, swept);
+  }
+  span.first = span.end = UINT32_MAX;
+  swept.span.push_back(span);  // behind all
+}
+
+/// Columns become rows: byte i of word k is byte k of word i.
+LAMINA_LANES void turn(const std::uint64_t* from, std::uint64_t* to) {
+  using Bytes16 = std::uint8_t __attribute__((vector_size(16)));
+  Bytes16 in[4], a[4], b[4];
+  std::memcpy(in, from, 64);
+  for (int i = 0; i < 4; ++i)
+    a[i] = __builtin_shufflevector(in[i], in[i], 0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15);
+  for (int i = 0; i < 2; ++i) {
+    const Bytes16 &x = a[2 * i], &y = a[2 * i + 1];
+    b[2 * i] = __builtin_shufflevector(x, y, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);
+    b[2 * i + 1] = __builtin_shufflevector(x, y, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31);
+  }
+  for (int i = 0; i < 2; ++i) {
+    const Bytes16 &x = b[i], &y = b[i + 2];
+    a[2 * i] = __builtin_shufflevector(x, y, 0, 1, 2, 3, 16, 17, 18, 19, 4, 5, 6, 7, 20, 21, 22, 23);
+    a[2 * i + 1] = __builtin_shufflevector(x, y, 8, 9, 10, 11, 24, 25, 26, 27, 12, 13, 14, 15, 28, 29, 30, 31);
+  }
+  std::memcpy(to, a, 64);
+}
+
+LAMINA_LANES void split_body(const SweptBand& swept, Changes* rows) {
+  std::uint32_t level[kLanes] = {};
+  std::uint64_t last = 0;  // levels of the column before
+  for (const LevelSegment& segment : swept.segment) {
+    for (std::uint32_t c = segment.first; c < segment.end; c += kLanes) {
+      const std::uint32_t columns = std::min(segment.end - c, kLanes);
+      const std::uint64_t* levels = swept.level.data() + c;
+      std::uint64_t changed = 0;
+      for (std::uint32_t i = 0; i < columns; ++i) changed |= levels[i] ^ last;
+      if (changed == 0) continue;
+      last = levels[columns - 1];
+      std::uint64_t row[kLanes];
+      turn(levels, row);
+      for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+        if ((changed >> 8 * lane & 255) != 0) note_changes(row[lane], columns, c, level[lane], rows[lane]);
+      }
+    }
+  }
 }

@@ -1,7 +1,7 @@
-// stages/coverage/band/kernels.h: adds trapezoids to cells of eight rows, and converts cells of a row into changes of level.
+// stages/coverage/band/kernels.h: adds trapezoids to cells of eight rows, and converts cells into changes of level of each row.
 //
-// Eight rows of a trapezoid are cut out at once, then eight columns of a row at a time get what it adds. All instruction sets
-// do the same with the same numbers in the same order.
+// Eight rows of a trapezoid are cut out at once, and each column gets what it adds to the eight. All instruction sets do the
+// same with the same numbers in the same order.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace lamina::coverage {
 // --- what trapezoids add to the columns of a band of rows, and which columns they reach.
 
 inline constexpr std::uint32_t kBandRows = 8;
-/// Kernels work on so many columns, or rows, at once, and may read that far beyond the last column.
+/// Kernels work on so many rows at once.
 inline constexpr std::uint32_t kLanes = 8;
 
 /// Columns as bits, with a bit for each word that holds any.
@@ -64,12 +64,7 @@ struct ColumnMarks {
     while (gap == 0) gap = ~word[++w];
     return w * 64 + static_cast<std::uint32_t>(std::countr_zero(gap));
   }
-  /// Eight columns from `column` on.
-  std::uint32_t eight(std::uint32_t column) const {
-    const std::uint32_t w = column / 64, by = column % 64;
-    const std::uint64_t low = word[w] >> by, high = by == 0 ? 0 : word[w + 1] << (64 - by);
-    return static_cast<std::uint32_t>((low | high) & 255);
-  }
+  bool has(std::uint32_t column) const { return (word[column / 64] >> column % 64 & 1) != 0; }
   void clear() const {
     for (std::uint32_t g = 0; g * 64 < words; ++g) {
       for (; group[g] != 0; group[g] &= group[g] - 1) word[g * 64 + static_cast<std::uint32_t>(std::countr_zero(group[g]))] = 0;
@@ -77,41 +72,48 @@ struct ColumnMarks {
   }
 };
 
-/// Eight rows, all empty but while they are made. 16 bytes a column and row, of which those are touched that facets reach.
+/// Columns of eight rows, all empty but while they are made. 128 bytes a column, of which those are touched that facets reach;
+/// numbers of the rows are next to each other, a lane each.
 class BandCells {
  public:
   void start(std::uint32_t columns) {
     if (columns_ == columns) return;
     size(columns);
-    value_.assign(std::size_t{2} * kBandRows * stride_, 0.0);
-    word_.assign(std::size_t{2} * kBandRows * words_, 0);
-    group_.assign(std::size_t{2} * kBandRows * groups_, 0);
+    value_.assign(values_ + kLanes, 0.0);
+    word_.assign(std::size_t{kMarks} * words_, 0);
+    group_.assign(std::size_t{kMarks} * groups_, 0);
+    const std::size_t beyond = reinterpret_cast<std::uintptr_t>(value_.data()) / sizeof(double) % kLanes;
+    first_ = value_.data() + (kLanes - beyond) % kLanes;
   }
-  /// nm^3 that facets add within a column.
-  double* partial(std::uint32_t lane) { return value_.data() + std::size_t{lane} * stride_; }
-  /// nm^2 of facets that end before a column: they add this times the width to it and all behind.
-  double* passed(std::uint32_t lane) { return partial(kBandRows + lane); }
-  ColumnMarks held(std::uint32_t lane) {
-    return {word_.data() + std::size_t{lane} * words_, group_.data() + std::size_t{lane} * groups_, words_};
-  }
-  ColumnMarks suspect(std::uint32_t lane) { return held(kBandRows + lane); }
+  /// First nm^3 that facets add within the column, then nm^2 of facets that end before it: they add this times the width to it
+  /// and all behind.
+  double* column(std::uint32_t column) { return first_ + std::size_t{column} * 2 * kLanes; }
+  /// Columns that hold facets, in any row; those that have numbers; those with facets that meet others.
+  ColumnMarks held() { return marks(0); }
+  ColumnMarks summed() { return marks(1); }
+  ColumnMarks suspect() { return marks(2); }
   static std::uint64_t bytes_of(std::uint32_t columns) {
     BandCells cells;
     cells.size(columns);
-    return std::uint64_t{2} * kBandRows *
-           (cells.stride_ * sizeof(double) + (cells.words_ + cells.groups_) * sizeof(std::uint64_t));
+    return (cells.values_ + kLanes) * sizeof(double) + kMarks * (cells.words_ + cells.groups_) * sizeof(std::uint64_t);
   }
   std::uint64_t bytes() const { return bytes_held(value_) + bytes_held(word_) + bytes_held(group_); }
 
  private:
+  static constexpr std::uint32_t kMarks = 3;
+  ColumnMarks marks(std::uint32_t kind) {
+    return {word_.data() + std::size_t{kind} * words_, group_.data() + std::size_t{kind} * groups_, words_};
+  }
   void size(std::uint32_t columns) {
     columns_ = columns;
-    stride_ = (columns + 2 * kLanes) / kLanes * kLanes;
+    values_ = (std::size_t{columns} + 2) * 2 * kLanes;
     words_ = columns / 64 + 2;
     groups_ = words_ / 64 + 1;
   }
 
-  std::uint32_t columns_ = 0, stride_ = 0, words_ = 0, groups_ = 0;
+  std::uint32_t columns_ = 0, words_ = 0, groups_ = 0;
+  std::size_t values_ = 0;
+  double* first_ = nullptr;
   Buffer<double> value_;
   Buffer<std::uint64_t> word_, group_;
 };
@@ -134,52 +136,68 @@ struct BandSums {
   alignas(64) std::array<double, kBandRows> size, columns, count;
 };
 
-/// Columns that hold facets, one next to the other.
+/// Columns that hold facets in some row, one next to the other.
 struct ColumnSpan {
   std::uint32_t first = 0, end = 0;
-  std::int64_t winding = 0;  // before it
+  std::array<std::int32_t, kLanes> winding{};  // before it
 };
 
-/// Some of eight columns that doubles do not decide, or whose samples have to be read: a bit each.
-struct OpenLanes {
-  const ColumnSpan& span;
-  std::uint32_t column;               // the first of the eight
-  std::uint32_t undecided, suspects;  // an undecided one may be suspect
-  std::array<double, kLanes> volume;  // nm^3
+/// Columns of one share in each row, some of which doubles do not decide, or whose samples have to be read: a bit each.
+struct OpenColumns {
+  std::uint32_t first, end;
+  std::uint32_t span;               // its index
+  std::uint8_t undecided, outside;  // a share that is neither 0 nor 1 nor between them is outside
+  bool suspect;                     // a row may hold facets that meet others
+  std::array<double, kLanes> share;
 };
 
-class RowResolver;  // decides them (maker.h)
+/// Columns from `first` on whose levels are known; columns behind them are of the last one's, up to the next.
+struct LevelSegment {
+  std::uint32_t first, end;
+};
 
-/// A row whose cells are complete. They are empty again once it is swept, but for marks.
-struct RowTask {
-  const double* edges;  // of columns, kLanes more than there are
-  std::uint32_t columns;
+/// What a sweep finds; keeps its buffers.
+struct SweptBand {
+  Buffer<std::uint64_t> level;  // of each column of a segment: a byte a row
+  Buffer<LevelSegment> segment;
+  Buffer<ColumnSpan> span;
+  Buffer<OpenColumns> open;
+  bool winds = false;  // a winding number is neither 0 nor 1
+  void start(std::uint32_t columns) {
+    level.resize(std::size_t{columns} + 1 + kLanes);
+    segment.clear(), span.clear(), open.clear();
+    winds = false;
+  }
+  std::uint64_t bytes() const { return bytes_held(level) + bytes_held(segment) + bytes_held(span) + bytes_held(open); }
+};
+
+/// Rows whose cells are complete. They are empty again once they are swept.
+struct BandTask {
+  const double* per_width;  // of columns
+  std::uint32_t columns, rows;
   FillRule fill;
-  double area;                       // nm^2 of the row's section
-  double widest;                     // nm, of a column; others are 1 nm narrower
-  double per_widest, per_narrowest;  // levels for each nm^3 of a voxel
-  double top;                        // the highest level
-  double spoilt;                     // bound of errors of shares
-  double *partial, *passed;
-  ColumnMarks held, suspect;
-  bool has_suspects;
-  RowResolver* resolver;
+  alignas(64) std::array<double, kLanes> area, per_area;  // nm^2 of each row's section; 1 / that, 0 of rows beyond the bed
+  alignas(64) std::array<double, kLanes> off;             // bound of errors of levels
+  double top;                                             // the highest level
+  BandCells* cells;
 };
 
-/// Where the level changes, and what it is from there on; before the first it is 0. Capacity for one more than columns.
+/// Where the level of each row changes, and what it is from there on; before the first it is 0. Capacity for one more than
+/// columns, and kLanes.
 struct Changes {
   std::uint32_t* column;
   std::uint8_t* level;
   std::uint32_t count = 0;
-  std::uint64_t held = 0;  // columns
 };
 
 struct BandKernels {
   using Deposit = void(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, ColumnReach& reach,
                        BandSums& sums);
-  using Sweep = void(const RowTask& row, Changes& changes);
+  using Sweep = void(const BandTask& band, SweptBand& swept);
+  using Split = void(const SweptBand& swept, Changes* rows);
   Deposit* deposit;
   Sweep* sweep;
+  Split* split;  // levels of columns become changes of each row
 };
 
 /// isa  one that this processor has (geometry/isa.h), not kAuto

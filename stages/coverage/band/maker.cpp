@@ -1,96 +1,14 @@
 #include "stages/coverage/band/maker.h"
 
-#include <gmpxx.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "stages/coverage/band/exact.h"
 #include "stages/coverage/coverage.h"
 
 namespace lamina::coverage {
 namespace {
-
-// --- the level of a voxel in rationals.
-
-using Rational = mpq_class;
-
-Rational rational(std::int64_t whole) { return Rational(static_cast<long>(whole)); }
-
-/// A box of the second contract (coverage.h), nm.
-struct Voxel {
-  std::int64_t x0, x1, y0, y1, z0, z1;
-};
-
-using RationalCorner = Corner<Rational>;
-
-/// A triangle as what lies behind it, towards +x, sees it: its area along x by x. The area before x rises with the square of
-/// the distance from the first corner, and falls short of all by the square of that from the last.
-struct Tent {
-  Rational x0, x1, x2;  // corners, in order
-  Rational area;        // projected along x; positive where +x goes into the solid
-
-  Tent(const RationalCorner& a, const RationalCorner& b, const RationalCorner& c) : x0(a.x), x1(b.x), x2(c.x) {
-    if (x1 < x0) std::swap(x0, x1);
-    if (x2 < x1) std::swap(x1, x2);
-    if (x1 < x0) std::swap(x0, x1);
-    area = area_along_x(a, b, c);
-  }
-
-  Rational mean() const { return (x0 + x1 + x2) / 3; }
-  /// Volume between the triangle and x, behind it.
-  Rational behind(const Rational& x) const {
-    if (x <= x0) return Rational(0);
-    if (x >= x2) return area * (x - mean());
-    if (x < x1) return area * ((x - x0) / 3 * ((x - x0) * (x - x0) / ((x1 - x0) * (x2 - x0))));
-    return area * (x - mean()) + area * ((x2 - x) / 3 * ((x2 - x) * (x2 - x) / ((x2 - x1) * (x2 - x0))));
-  }
-};
-
-/// Volume of the voxel that lies behind the facet, nm^3; negative behind one where +x leaves the solid.
-Rational volume_behind(const Triangle& facet, const Voxel& voxel) {
-  Piece<Rational> one, other;
-  for (const Point3* p : {&facet.a, &facet.b, &facet.c}) {
-    one.corner[one.size++] = {rational(p->x - voxel.x0), rational(p->y - voxel.y0), rational(p->z - voxel.z0)};
-  }
-  const Rational zero, depth = rational(voxel.y1 - voxel.y0), height = rational(voxel.z1 - voxel.z0);
-  cut<&RationalCorner::z, true>(one, zero, other);
-  cut<&RationalCorner::z, false>(other, height, one);
-  cut<&RationalCorner::y, true>(one, zero, other);
-  cut<&RationalCorner::y, false>(other, depth, one);
-  const Rational width = rational(voxel.x1 - voxel.x0);
-  Rational sum;
-  for (std::uint32_t k = 1; k + 1 < one.size; ++k) {
-    const Tent tent(one.corner[0], one.corner[k], one.corner[k + 1]);
-    if (tent.x0 >= width) continue;
-    if (tent.x2 <= zero) {
-      sum += tent.area * width;
-    } else {
-      sum += tent.behind(width) - tent.behind(zero);
-    }
-  }
-  return sum;
-}
-
-/// floor(share n + 1/2) within 0 .. n of a voxel of a column of the span.
-/// taken  facets of the span; those that begin at or before the column count
-/// cost   some ten microseconds a facet
-std::uint32_t exact_level(const BandSlab& slab, const Voxel& voxel, const ColumnSpan& span, std::span<const RowFacet> taken,
-                          std::uint32_t column) {
-  const Rational whole = rational(voxel.x1 - voxel.x0) * rational(voxel.y1 - voxel.y0) * rational(voxel.z1 - voxel.z0);
-  Rational volume = rational(span.winding) * whole;
-  for (const RowFacet& of_row : taken) {
-    const SlabFacet& facet = slab.facets[of_row.index];
-    if (facet.edgewise || of_row.first > column) continue;
-    volume += volume_behind(facet.facet, voxel);
-  }
-  const std::uint32_t top_level = slab.rule.top_level;
-  const Rational level = volume * static_cast<long>(top_level) / whole + Rational(1, 2);
-  mpz_class below;
-  mpz_fdiv_q(below.get_mpz_t(), level.get_num_mpz_t(), level.get_den_mpz_t());
-  if (below < 0) return 0;
-  return below > top_level ? top_level : static_cast<std::uint32_t>(below.get_ui());
-}
 
 // --- samples.
 
@@ -131,8 +49,6 @@ constexpr double kEpsilon = 0x1p-53;
 
 /// Roundings of a facet's corners and volumes together, and more (docs/theory/coverage.md counts 190).
 constexpr double kRoundings = 512;
-
-constexpr std::uint32_t kNoSpan = UINT32_MAX;
 
 double widest_side(const BandSlab& slab, double depth) { return std::max({slab.edges.widest(), depth, slab.sides.z}); }
 
@@ -188,7 +104,7 @@ void Samples::cross(const BandSlab& slab, const Strip& strip, const Triangle& fa
   }
 }
 
-void Samples::count(const BandSlab& slab, const Strip& strip, const ColumnSpan& span, std::span<const RowFacet> taken) {
+void Samples::count(const BandSlab& slab, const Strip& strip, const LineSpan& span, std::span<const RowFacet> taken) {
   first_ = span.first;
   end_ = span.end;
   crossing_.clear();
@@ -232,14 +148,11 @@ void RowResolver::start(const BandSlab& slab, BandPieces pieces, std::uint32_t r
   row_ = row;
   first_row_ = first;
   strip_ = {edge(slab.rows, row), edge(slab.rows, std::int64_t{row} + 1), slab.bottom, slab.top};
-  is_listed_ = false;
-  taken_first_ = kNoSpan;
+  facet_.clear();
 }
 
 /// A facet that several trapezoids of the row are of is listed once.
 void RowResolver::list_facets() {
-  is_listed_ = true;
-  facet_.clear();
   const std::uint32_t lane = row_ - first_row_;
   for (std::size_t i = 0; i < pieces_.piece.size(); ++i) {
     const Trapezoid& piece = pieces_.piece[i];
@@ -262,96 +175,126 @@ void RowResolver::list_facets() {
 }
 
 /// Facets of the span, and the bound of its errors.
-void RowResolver::take(const ColumnSpan& span) {
-  if (taken_first_ == span.first) return;
-  if (!is_listed_) list_facets();
-  taken_first_ = span.first;
+void RowResolver::take(const ColumnSpan& span, std::uint32_t lane) {
+  span_ = {span.first, span.end, span.winding[lane]};
   const auto begins = [](const RowFacet& of_row) { return of_row.first; };
   const auto begin = std::ranges::lower_bound(facet_, span.first, {}, begins);
   const auto end = std::ranges::lower_bound(begin, facet_.end(), span.end, {}, begins);
   taken_ = {begin, end};
   const double depth = static_cast<double>(strip_.y1 - strip_.y0), widest = widest_side(*slab_, depth);
-  double scale = 0, columns = 0;
-  for (const RowFacet& of_row : taken_) {
-    scale += std::max(static_cast<double>(slab_->facets[of_row.index].size), widest);
-    columns += of_row.last - of_row.first + 1;
-  }
+  double scale = 0;
+  for (const RowFacet& of_row : taken_) scale += std::max(static_cast<double>(slab_->facets[of_row.index].size), widest);
   const auto facets = static_cast<double>(taken_.size());
-  // Each facet is added as up to three trapezoids in a row.
-  spoilt_ =
-      spoilt_share(*slab_, depth, scale, 3 * (columns + 2 * facets), std::abs(static_cast<double>(span.winding)) + facets);
-  even_begin_ = even_end_ = 0;
+  // Each facet is added as up to three trapezoids in a row, to no more columns than the span has.
+  spoilt_ = spoilt_share(*slab_, depth, scale, 3 * facets * (span.end - span.first + 2.0),
+                         std::abs(static_cast<double>(span_.winding)) + facets);
+  next_ = 0;
+  near_.clear();
+  even_ = false;
   samples_.forget();
 }
 
+/// Finds the facets that reach the column.
+void RowResolver::approach(std::uint32_t column) {
+  std::size_t changes = next_;
+  for (; next_ < taken_.size() && taken_[next_].first <= column; ++next_) near_.push_back(taken_[next_]);
+  changes = next_ - changes + std::erase_if(near_, [&](const RowFacet& of_row) { return of_row.last < column; });
+  if (changes != 0) even_ = false;
+}
+
 /// False if all samples have winding number 0 or 1.
-bool RowResolver::resolve_lane(const OpenLanes& open_lanes, std::uint32_t lane, std::uint8_t& level) {
-  const std::uint32_t column = open_lanes.column + lane;
-  if (!samples_.knows(column)) samples_.count(*slab_, strip_, open_lanes.span, taken_);
+bool RowResolver::count_samples(const OpenColumns& open, double share, std::uint8_t& level) {
+  if (!samples_.knows(open.first)) samples_.count(*slab_, strip_, span_, taken_);
   ++report_->inspected;
-  const Samples::SampleCount& count = samples_.at(column);
+  const Samples::SampleCount& count = samples_.at(open.first);
   if (count.others == 0) return false;
-  ++report_->sampled_voxels;
-  const double voxel = slab_->edges.width(column) * strip_.area();
-  report_->volume_mm3 += static_cast<double>(count.solid) / kAllSamples * voxel - open_lanes.volume[lane];
+  report_->sampled_voxels += open.end - open.first;
+  const double width = slab_->edges[open.end] - slab_->edges[open.first];
+  report_->volume_mm3 += (static_cast<double>(count.solid) / kAllSamples - share) * width * strip_.area();
   level = static_cast<std::uint8_t>(level_of_samples(count.solid, slab_->rule.top_level));
   return true;
 }
 
-std::uint8_t RowResolver::exact(const OpenLanes& open_lanes, std::uint32_t lane) {
-  const std::uint32_t column = open_lanes.column + lane;
-  if (column >= even_begin_ && column < even_end_) return even_level_;
+std::uint8_t RowResolver::exact(std::uint32_t column, double share) {
+  if (even_) return even_level_;
   const auto top = static_cast<double>(slab_->rule.top_level);
-  const double position = open_lanes.volume[lane] / (slab_->edges.width(column) * strip_.area()) * top + 0.5;
+  const double position = share * top + 0.5;
   const double off = spoilt_ * top + 16 * kEpsilon * (std::abs(position) + top);
   const double minimum = std::floor(position - off), maximum = std::floor(position + off);
   if (minimum == maximum || maximum <= 0 || minimum >= top) return static_cast<std::uint8_t>(std::clamp(minimum, 0.0, top));
   ++report_->exact_voxels;
+  near_facets_.clear();
+  for (const RowFacet& of_row : near_) near_facets_.push_back(&slab_->facets[of_row.index]);
   const Voxel voxel{
       edge(slab_->columns, column), edge(slab_->columns, std::int64_t{column} + 1), strip_.y0, strip_.y1, strip_.z0, strip_.z1};
-  const auto level = static_cast<std::uint8_t>(exact_level(*slab_, voxel, open_lanes.span, taken_, column));
-  even_begin_ = column;
-  even_end_ = open_lanes.span.end;
-  even_level_ = level;
-  for (const RowFacet& of_row : taken_) {
-    if (slab_->facets[of_row.index].edgewise || of_row.last < column) continue;
-    even_end_ = std::min(even_end_, of_row.first);  // before `column` if it is no even one
-  }
-  return level;
+  even_level_ = static_cast<std::uint8_t>(exact_level(voxel, near_facets_, {share, off / top, slab_->rule.top_level}));
+  even_ = std::ranges::all_of(near_facets_, [](const SlabFacet* facet) { return facet->edgewise; });
+  return even_level_;
 }
 
-std::uint64_t RowResolver::decide(const OpenLanes& open_lanes, std::uint64_t levels) {
-  take(open_lanes.span);
-  for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
-    const bool is_suspect = (open_lanes.suspects >> lane & 1) != 0, is_undecided = (open_lanes.undecided >> lane & 1) != 0;
+void RowResolver::decide(SweptBand& swept) {
+  const std::uint32_t lane = row_ - first_row_;
+  std::uint32_t span = UINT32_MAX;
+  for (const OpenColumns& open : swept.open) {
+    const bool is_undecided = (open.undecided >> lane & 1) != 0;
+    bool is_suspect = (open.outside >> lane & 1) != 0;
+    if (!is_undecided && !is_suspect && !open.suspect) continue;
+    if (span == UINT32_MAX) list_facets();
+    if (span != open.span) take(swept.span[open.span], lane);
+    span = open.span;
+    approach(open.first);
+    is_suspect |= open.suspect && std::ranges::any_of(near_, [&](const RowFacet& of_row) {
+                    return slab_->facets[of_row.index].suspect;
+                  });
     std::uint8_t level = 0;
-    const bool is_sampled = is_suspect && resolve_lane(open_lanes, lane, level);
+    const bool is_sampled = is_suspect && count_samples(open, open.share[lane], level);
     if (!is_sampled && !is_undecided) continue;
-    if (!is_sampled) level = exact(open_lanes, lane);
+    if (!is_sampled) level = exact(open.first, open.share[lane]);
+    std::uint64_t& levels = swept.level[open.first];
     levels = (levels & ~(std::uint64_t{255} << 8 * lane)) | std::uint64_t{level} << 8 * lane;
   }
-  return levels;
 }
 
-void RowResolver::free(std::int64_t winding, std::uint32_t begin, std::uint32_t end) {
-  const bool solid = is_solid(slab_->rule.fill, static_cast<std::int32_t>(winding));
-  const auto reported = static_cast<double>((solid ? 1 : 0) - winding);
-  report_->volume_mm3 += reported * (slab_->edges[end] - slab_->edges[begin]) * strip_.area();
+std::uint64_t RowResolver::count_held() {
+  list_facets();
+  std::uint64_t held = 0;
+  std::uint32_t end = 0;
+  for (const RowFacet& of_row : facet_) {
+    if (of_row.last >= end) held += of_row.last + 1 - std::max(end, of_row.first);
+    end = std::max(end, of_row.last + 1);
+  }
+  facet_.clear();
+  return held;
+}
+
+void RowResolver::add_free(const SweptBand& swept) {
+  const std::uint32_t lane = row_ - first_row_;
+  for (std::size_t i = 1; i < swept.span.size(); ++i) {
+    const std::int32_t winding = swept.span[i].winding[lane];
+    if (winding == 0 || winding == 1) continue;
+    const auto reported = static_cast<double>((is_solid(slab_->rule.fill, winding) ? 1 : 0) - winding);
+    const std::uint32_t end = std::min(swept.span[i].first, slab_->edges.count());
+    report_->volume_mm3 += reported * (slab_->edges[end] - slab_->edges[swept.span[i - 1].end]) * strip_.area();
+  }
 }
 
 std::uint64_t BandMaker::bytes_of(std::uint64_t facets, std::uint32_t columns) {
   // Rows list facets where doubles do not decide, and lists double as they grow.
   const std::uint64_t pieces = kMaxPieces * facets, slack = pieces + pieces / 8 + 2 * kExtraCapacity;
+  const std::uint64_t of_columns = std::uint64_t{columns} + 1 + kLanes;
+  const std::uint64_t swept = sizeof(std::uint64_t) + sizeof(LevelSegment) + sizeof(ColumnSpan) / 2 + sizeof(OpenColumns);
   return slack * (sizeof(Trapezoid) + sizeof(ColumnReach)) + 2 * pieces * sizeof(RowFacet) + BandCells::bytes_of(columns) +
-         (std::uint64_t{columns} + 1 + kLanes) * (sizeof(std::uint32_t) + sizeof(std::uint8_t));
+         of_columns * (kBandRows * (sizeof(std::uint32_t) + sizeof(std::uint8_t)) + swept);
 }
 
-void BandMaker::start(const BandSlab& slab, Isa isa) {
+void BandMaker::start(const BandSlab& slab, Isa isa, bool counts_held) {
+  counts_held_ = counts_held;
   kernels_ = &band_kernels_for(isa);
   cells_.start(slab.edges.count());
   active_.clear();
-  column_.resize(std::size_t{slab.edges.count()} + 1 + kLanes);
-  level_.resize(std::size_t{slab.edges.count()} + 1 + kLanes);
+  const std::size_t columns = std::size_t{slab.edges.count()} + 1 + kLanes;
+  column_.resize(kBandRows * columns);
+  level_.resize(kBandRows * columns);
 }
 
 void BandMaker::enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows) {
@@ -397,25 +340,35 @@ void BandMaker::append(const Changes& changes, std::uint32_t columns, Levels& ou
   out.end_row();
 }
 
-RowTask BandMaker::task(const BandSlab& slab, std::uint32_t lane, const BandSums& sums) {
-  const double depth = rows_.y[lane + 1] - rows_.y[lane], area = depth * slab.sides.z, count = sums.count[lane];
-  const double scale = sums.size[lane] + count * widest_side(slab, depth), added = sums.columns[lane] + 2 * count;
-  const ColumnMarks suspect = cells_.suspect(lane);
-  return {.edges = slab.edges.data(),
-          .columns = slab.edges.count(),
-          .fill = slab.rule.fill,
-          .area = area,
-          .widest = slab.edges.widest(),
-          .per_widest = slab.rule.top_level / (slab.edges.widest() * area),
-          .per_narrowest = slab.rule.top_level / (slab.edges.narrowest() * area),
-          .top = static_cast<double>(slab.rule.top_level),
-          .spoilt = spoilt_share(slab, depth, scale, added, count),
-          .partial = cells_.partial(lane),
-          .passed = cells_.passed(lane),
-          .held = cells_.held(lane),
-          .suspect = suspect,
-          .has_suspects = suspect.next(0) != ColumnMarks::kNone,
-          .resolver = &resolver_};
+BandTask BandMaker::task(const BandSlab& slab, const BandSums& sums) {
+  BandTask band{.per_width = slab.edges.per_width(),
+                .columns = slab.edges.count(),
+                .rows = rows_.count,
+                .fill = slab.rule.fill,
+                .area = {},
+                .per_area = {},
+                .off = {},
+                .top = static_cast<double>(slab.rule.top_level),
+                .cells = &cells_};
+  for (std::uint32_t lane = 0; lane < rows_.count; ++lane) {
+    const double depth = rows_.y[lane + 1] - rows_.y[lane], count = sums.count[lane];
+    const double scale = sums.size[lane] + count * widest_side(slab, depth), added = sums.columns[lane] + 2 * count;
+    band.area[lane] = depth * slab.sides.z;
+    band.per_area[lane] = 1 / band.area[lane];
+    band.off[lane] = band.top * (spoilt_share(slab, depth, scale, added, count) + 16 * kEpsilon * (count + 3));
+  }
+  return band;
+}
+
+/// What doubles do not decide, row by row.
+void BandMaker::resolve(const BandSlab& slab, CoverageReport& report) {
+  if (swept_.open.empty() && !swept_.winds && !counts_held_) return;
+  for (std::uint32_t lane = rows_.count; lane-- > 0;) {
+    resolver_.start(slab, {active_, reach_}, rows_.first + lane, rows_.first, report);
+    if (counts_held_) report.held_voxels += resolver_.count_held();
+    resolver_.decide(swept_);
+    if (swept_.winds) resolver_.add_free(swept_);
+  }
 }
 
 void BandMaker::make(const BandSlab& slab, std::uint32_t first, std::uint32_t rows, Levels& out, CoverageReport& report) {
@@ -426,18 +379,18 @@ void BandMaker::make(const BandSlab& slab, std::uint32_t first, std::uint32_t ro
   }
   BandSums sums;
   deposit(slab, sums);
-  for (std::uint32_t lane = rows; lane-- > 0;) {
-    Changes changes{column_.data(), level_.data()};
-    if (sums.count[lane] > 0) {
-      resolver_.start(slab, {active_, reach_}, first + lane, first, report);
-      const RowTask row = task(slab, lane, sums);
-      kernels_->sweep(row, changes);
-      report.held_voxels += changes.held;
-      row.held.clear();
-      if (row.has_suspects) row.suspect.clear();
-    }
-    append(changes, slab.edges.count(), out);
+  const std::uint32_t columns = slab.edges.count();
+  swept_.start(columns);
+  kernels_->sweep(task(slab, sums), swept_);
+  resolve(slab, report);
+  for (const ColumnMarks& marks : {cells_.held(), cells_.summed(), cells_.suspect()}) marks.clear();
+  std::array<Changes, kBandRows> changes;
+  for (std::uint32_t lane = 0; lane < kBandRows; ++lane) {
+    const std::size_t at = std::size_t{lane} * (columns + 1 + kLanes);
+    changes[lane] = {column_.data() + at, level_.data() + at};
   }
+  kernels_->split(swept_, changes.data());
+  for (std::uint32_t lane = rows; lane-- > 0;) append(changes[lane], columns, out);
   std::erase_if(active_, [&](const Trapezoid& piece) { return piece.first_row >= first; });
 }
 

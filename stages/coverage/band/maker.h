@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "stages/coverage/band/exact.h"
 #include "stages/coverage/band/kernels.h"
 #include "stages/coverage/slab_facet.h"
 #include "stages/data/buffer.h"
@@ -42,6 +43,12 @@ struct Strip {
 
 // --- levels of voxels that doubles do not decide, and of those that facets share which meet others.
 
+/// A span in one row.
+struct LineSpan {
+  std::uint32_t first = 0, end = 0;
+  std::int64_t winding = 0;  // before it
+};
+
 /// Winding numbers at 8 x 8 x 8 points a voxel, along 64 lines of a row. Counts an interval of columns at once; keeps its
 /// buffers.
 class Samples {
@@ -53,7 +60,7 @@ class Samples {
 
   /// taken  facets that reach the columns; none reaches columns outside
   /// cost   64 lines a facet, one step a column and line
-  void count(const BandSlab& slab, const Strip& strip, const ColumnSpan& span, std::span<const RowFacet> taken);
+  void count(const BandSlab& slab, const Strip& strip, const LineSpan& span, std::span<const RowFacet> taken);
 
   const SampleCount& at(std::uint32_t column) const { return count_[column - first_]; }
   bool knows(std::uint32_t column) const { return column >= first_ && column < end_; }
@@ -86,31 +93,34 @@ class RowResolver {
   };
   /// pieces  of the band whose first row is `first`; all outlive the row
   void start(const BandSlab& slab, BandPieces pieces, std::uint32_t row, std::uint32_t first, CoverageReport& report);
-  /// levels  eight, a byte each, the first lowest; returned with the requested ones
-  std::uint64_t decide(const OpenLanes& open_lanes, std::uint64_t levels);
-  /// Where the level of the last column that decide() decided, which holds no facet with area along x, ends.
-  std::uint32_t even_until() const { return even_end_; }
-  /// Columns [begin, end), which hold no facet, lie at that winding number, neither 0 nor 1.
-  void free(std::int64_t winding, std::uint32_t begin, std::uint32_t end);
-  std::uint64_t bytes() const { return bytes_held(facet_) + samples_.bytes(); }
+  /// Puts levels of the row's open columns in their place.
+  void decide(SweptBand& swept);
+  /// Columns that hold facets.
+  std::uint64_t count_held();
+  /// Adds what columns between spans, whose winding numbers are neither 0 nor 1, change of the volume.
+  void add_free(const SweptBand& swept);
+  std::uint64_t bytes() const { return bytes_held(facet_) + bytes_held(near_) + bytes_held(near_facets_) + samples_.bytes(); }
 
  private:
   void list_facets();
-  void take(const ColumnSpan& span);
-  bool resolve_lane(const OpenLanes& open_lanes, std::uint32_t lane, std::uint8_t& level);
-  std::uint8_t exact(const OpenLanes& open_lanes, std::uint32_t lane);
+  void take(const ColumnSpan& span, std::uint32_t lane);
+  void approach(std::uint32_t column);
+  bool count_samples(const OpenColumns& open, double share, std::uint8_t& level);
+  std::uint8_t exact(std::uint32_t column, double share);
 
   const BandSlab* slab_ = nullptr;
   CoverageReport* report_ = nullptr;
   BandPieces pieces_;
   std::uint32_t row_ = 0, first_row_ = 0;
   Strip strip_{};
-  bool is_listed_ = false;
   Buffer<RowFacet> facet_;           // of the row, by the first column that they reach
-  std::span<const RowFacet> taken_;  // of the interval at work
-  std::uint32_t taken_first_ = 0;    // where it begins
+  std::span<const RowFacet> taken_;  // of the span at work
+  LineSpan span_;
+  std::size_t next_ = 0;   // of those: behind all that begin at or before the column at work
+  Buffer<RowFacet> near_;  // those that reach it
+  Buffer<const SlabFacet*> near_facets_;
   double spoilt_ = 0;
-  std::uint32_t even_begin_ = 0, even_end_ = 0;  // columns of one share
+  bool even_ = false;  // facets near have no area along x, and are those of the column that was decided last
   std::uint8_t even_level_ = 0;
   Samples samples_;
 };
@@ -124,8 +134,8 @@ class RowResolver {
 /// facets, and rationals read no further back.
 class BandMaker {
  public:
-  /// slab  outlives the layer. isa  one that this processor has, not kAuto
-  void start(const BandSlab& slab, Isa isa);
+  /// slab  outlives the layer. isa  one that this processor has, not kAuto. counts_held  CoverageScratch::counts_held
+  void start(const BandSlab& slab, Isa isa, bool counts_held);
   /// The facet's last row lies in the band that is made next. rows  edges of all
   void enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows);
   bool is_empty() const { return active_.empty(); }
@@ -134,23 +144,26 @@ class BandMaker {
   void make(const BandSlab& slab, std::uint32_t first, std::uint32_t rows, Levels& out, CoverageReport& report);
 
   std::uint64_t bytes() const {
-    return cells_.bytes() + resolver_.bytes() + bytes_held(active_) + bytes_held(reach_) + bytes_held(column_) +
-           bytes_held(level_);
+    return cells_.bytes() + swept_.bytes() + resolver_.bytes() + bytes_held(active_) + bytes_held(reach_) +
+           bytes_held(column_) + bytes_held(level_);
   }
   /// Bound of bytes(), for a layer of so many facets on a grid of so many columns.
   static std::uint64_t bytes_of(std::uint64_t facets, std::uint32_t columns);
 
  private:
   void deposit(const BandSlab& slab, BandSums& sums);
-  RowTask task(const BandSlab& slab, std::uint32_t lane, const BandSums& sums);
+  BandTask task(const BandSlab& slab, const BandSums& sums);
+  void resolve(const BandSlab& slab, CoverageReport& report);
   void append(const Changes& changes, std::uint32_t columns, Levels& out) const;
 
   const BandKernels* kernels_ = nullptr;
   BandRows rows_;
+  bool counts_held_ = false;
   BandCells cells_;
+  SweptBand swept_;
   Buffer<Trapezoid> active_;   // that reach the band, or one below it
   Buffer<ColumnReach> reach_;  // of each active one
-  Buffer<std::uint32_t> column_;
+  Buffer<std::uint32_t> column_;  // changes of each row
   Buffer<std::uint8_t> level_;
   RowResolver resolver_;
 };

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "stages/coverage/band/maker.h"
 
@@ -37,7 +38,8 @@ void deposit(const Trapezoid& piece, const BandRows& rows, const Edges& columns,
              BandSums& sums) {
   add_body(piece, rows, columns, cells, reach, sums);
 }
-void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
+void sweep(const BandTask& band, SweptBand& swept) { sweep_body(band, swept); }
+void split(const SweptBand& swept, Changes* rows) { split_body(swept, rows); }
 
 }  // namespace lamina::coverage::plain
 

@@ -24,6 +24,7 @@
 #include "stages/formats/g4/encode.h"
 #include "stages/formats/images/image_formats.h"
 #include "stages/formats/tiff/dither_deflate.h"
+#include "stages/formats/tiff/packbits.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
 #include "stages/support/text/decimal.h"
@@ -471,31 +472,60 @@ class GreyEncoder : public LevelEncoder {
       return refused(frame, fmt::format("{} levels are no whole steps of {} bits", full + 1, bits_));
     }
     file.resize(file.capacity());
-    return write_rows(file, frame, text_, strip_, [&](std::uint32_t row, std::span<std::byte> to) {
-      std::memset(to.data(), 0, to.size());
-      put_row(image, row, darkest_ / full, to.data());
+    return write_file(file, frame, text_, [&](TIFF* tiff) {
+      for (std::uint32_t row = 0, number = 0; row < frame.rows; ++number) {
+        packed_.start();
+        const std::uint32_t end = row + std::min(frame.rows_per_strip, frame.rows - row);
+        for (; row < end; ++row) {
+          packed_.start_row(frame.stride);
+          bits_ == 8 ? put_bytes(image, row, darkest_ / full) : put_nibbles(image, row, darkest_ / full);
+        }
+        const auto length = static_cast<tmsize_t>(packed_.size());
+        if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
+      }
+      return true;
     });
   }
 
  private:
-  /// The runs of a row over zeros. Of 4 bits the left pixel is in the high ones.
-  void put_row(const LevelsView& image, std::uint32_t row, unsigned step, std::byte* to) const {
+  void put_bytes(const LevelsView& image, std::uint32_t row, unsigned step) {
+    std::uint32_t at = 0;
     for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
-      const unsigned value = image.level[i] * step;
-      std::uint32_t begin = image.change[2 * i], end = image.change[2 * i + 1];
-      if (bits_ == 8) {
-        std::memset(to + begin, static_cast<int>(value), end - begin);
-        continue;
-      }
-      if (begin % 2 != 0) to[begin++ / 2] |= static_cast<std::byte>(value);
-      if (end > begin && end % 2 != 0) to[--end / 2] |= static_cast<std::byte>(value << 4);
-      if (end > begin) std::memset(to + begin / 2, static_cast<int>(value * 17), (end - begin) / 2);
+      const std::uint32_t begin = image.change[2 * i], end = image.change[2 * i + 1];
+      packed_.add(0, begin - at);
+      packed_.add(static_cast<std::uint8_t>(image.level[i] * step), end - begin);
+      at = end;
     }
+    packed_.add(0, image.columns - at);
+  }
+
+  /// The left pixel of two is in the high bits.
+  void put_nibbles(const LevelsView& image, std::uint32_t row, unsigned step) {
+    unsigned value = 0;       // of the run of bytes that is not added yet
+    std::uint32_t count = 0;  // and its length
+    unsigned half = 0;        // a left pixel
+    const auto add = [&](unsigned next, std::uint32_t bytes) {
+      if (next != value) packed_.add(static_cast<std::uint8_t>(value), count), value = next, count = 0;
+      count += bytes;
+    };
+    std::uint32_t at = 0;
+    const auto fill = [&](unsigned level, std::uint32_t end) {
+      if (at % 2 != 0 && at < end) add(half << 4 | level, 1), ++at;
+      if ((end - at) / 2 > 0) add(level * 17, (end - at) / 2);
+      if ((end - at) % 2 != 0) half = level;
+      at = end;
+    };
+    for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
+      fill(0, image.change[2 * i]);
+      fill(image.level[i] * step, image.change[2 * i + 1]);
+    }
+    fill(0, image.columns + image.columns % 2);
+    packed_.add(static_cast<std::uint8_t>(value), count);
   }
 
   LayerText text_;
   unsigned bits_, darkest_;
-  Bytes strip_;
+  PackBits packed_;
 };
 
 }  // namespace
