@@ -10,7 +10,6 @@
 #include <atomic>
 #include <memory>
 
-#include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
@@ -172,15 +171,13 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   return visited;
 }
 
-/// The number of each facet's shell, by the smallest facets; those that use a vertex twice belong to none: UINT32_MAX.
-/// shells: how many
-Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std::uint32_t> parents, std::uint32_t& shells) {
-  Buffer<std::uint32_t> shell_of(parents.size());
-  prefer_large_pages(shell_of);
-  shells = 0;
+/// The number of each facet's shell, by the smallest facets, in place of its parent, which comes before it; those that use a vertex
+/// twice belong to none: UINT32_MAX. returns  how many
+std::uint32_t number_shells(const Numbered& mesh, std::span<std::uint32_t> parents) {
+  std::uint32_t shells = 0;
   for (std::uint32_t i = 0; i < parents.size(); ++i)
-    shell_of[i] = parents[i] != i ? shell_of[parents[i]] : mesh.collapsed(i) ? UINT32_MAX : shells++;
-  return shell_of;
+    parents[i] = parents[i] != i ? parents[parents[i]] : mesh.collapsed(i) ? UINT32_MAX : shells++;
+  return shells;
 }
 
 /// ShellFindings by their numbers.
@@ -261,8 +258,8 @@ void diagnose_edges(const Numbered& mesh, std::size_t positions, Diagnosis& resu
     result.misoriented_edges = edges.misoriented.finding();
     result.duplicate_facets = edges.duplicate.finding();
   }
-  std::uint32_t count = 0;
-  const Buffer<std::uint32_t> shell_of = numbered_shells(mesh, joined.sets.parents(), count);
+  const std::uint32_t count = number_shells(mesh, joined.sets.parents());
+  const std::span<const std::uint32_t> shell_of = joined.sets.parents();
   ShellFindings shells{std::vector<Shell>(count)};
   const auto measure = [&](const BlockedRange& range, ShellFindings& visited) {
     visited.inspect(mesh, shell_of, joined.unbalanced, result.bounds.lo, range);
@@ -289,7 +286,8 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t positions) {
 Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks) {
   Diagnosis result;
   result.triangles = blocks->triangle_count();
-  const Numbered numbered(*blocks);
+  constexpr std::uint32_t kLarge = 16;  // blocks: of few there is little to give back
+  const Numbered numbered(*blocks, blocks.use_count() == 1 && blocks->block_count() > kLarge);
   blocks.reset();
   diagnose_edges(numbered, 0, result);
   return result;
