@@ -104,7 +104,7 @@ void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row,
   const BeadShape shape = shape_of(deposited.a, deposited.b, deposited.width, deposited.ends, grid_.x);
   if (kernels_->columns(shape, first, last, rows_)) {
     for (std::uint32_t r = first; r < last; ++r) {
-      if (rows_.doubt[r] != 0) decide(deposited, shape, first_row + r, r);
+      if (rows_.near[r] < shape.doubt) decide(deposited, shape, first_row + r, r);
     }
   }
   kernels_->set(rows_, first, last, words_.data(), touched_.data());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "stages/geometry/targets.h"
 
@@ -12,78 +13,101 @@
 namespace lamina::raster {
 namespace {
 
-constexpr std::uint32_t kLanes = 8;  // of doubles
+/// As many doubles as a register has: comparisons of wider vectors become those of single numbers.
+struct Two {
+  typedef double Doubles __attribute__((vector_size(16)));
+  typedef std::int32_t Integers __attribute__((vector_size(8)));
+};
+struct Four {
+  typedef double Doubles __attribute__((vector_size(32)));
+  typedef std::int32_t Integers __attribute__((vector_size(16)));
+};
+struct Eight {
+  typedef double Doubles __attribute__((vector_size(64)));
+  typedef std::int32_t Integers __attribute__((vector_size(32)));
+};
 
-// By value, so that nothing branches.
-LAMINA_BODY double lesser(double a, double b) { return a < b ? a : b; }
-LAMINA_BODY double greater(double a, double b) { return a < b ? b : a; }
+// By reference, so that no vector is passed in registers that another instruction set does not have.
+
+/// Of what is not below 0, else 0.
+template <class Doubles>
+LAMINA_BODY void root(Doubles& x) {
+  double lane[sizeof(Doubles) / sizeof(double)];
+  x = x < 0 ? Doubles{} : x;
+  std::memcpy(lane, &x, sizeof x);
+  for (double& one : lane) one = std::sqrt(one);
+  std::memcpy(&x, lane, sizeof x);
+}
 
 /// The first columns at or beyond left and beyond right, within the image.
-LAMINA_BODY void whole_columns(const BeadShape& bead, const double* left, const double* right, std::int32_t* __restrict begin,
-                               std::int32_t* __restrict end, std::int32_t* __restrict doubt) {
-  for (std::uint32_t k = 0; k < kLanes; ++k) {
-    const double from = left[k] * bead.columns_per_nm + bead.first_column;
-    const double to = right[k] * bead.columns_per_nm + bead.first_column;
-    const auto b = static_cast<std::int32_t>(from), e = static_cast<std::int32_t>(to);
-    doubt[k] = (from - b < bead.doubt ? 1 : 0) | (to - e < bead.doubt ? 1 : 0);
-    begin[k] = b < 0 ? 0 : b;
-    end[k] = e < bead.columns ? e : bead.columns;
-  }
+/// nearest  becomes the least of rows.near
+template <class Doubles, class Integers>
+LAMINA_BODY void whole_columns(const BeadShape& bead, const Doubles& left, const Doubles& right, std::uint32_t first,
+                               BeadRows& rows, Doubles& nearest) {
+  const Doubles from = left * bead.columns_per_nm + bead.first_column, to = right * bead.columns_per_nm + bead.first_column;
+  Integers begin = __builtin_convertvector(from, Integers), end = __builtin_convertvector(to, Integers);
+  const Doubles near_begin = from - __builtin_convertvector(begin, Doubles);
+  const Doubles near_end = to - __builtin_convertvector(end, Doubles);
+  const Doubles near = near_begin < near_end ? near_begin : near_end;
+  begin = begin < 0 ? Integers{} : begin;
+  end = end < bead.columns ? end : Integers{} + bead.columns;
+  std::memcpy(rows.begin + first, &begin, sizeof begin);
+  std::memcpy(rows.end + first, &end, sizeof end);
+  std::memcpy(rows.near + first, &near, sizeof near);
+  nearest = near < nearest ? near : nearest;
 }
 
-LAMINA_BODY void square_block(const BeadShape& bead, const double* ys, double* __restrict left, double* __restrict right) {
+template <class Doubles>
+LAMINA_BODY void square_block(const BeadShape& bead, const Doubles& y, Doubles& left, Doubles& right) {
   constexpr double kFar = 1e10;  // nm: beyond any bed
-  for (std::uint32_t k = 0; k < kLanes; ++k) {
-    const double y = ys[k] - bead.y0, line = y * bead.slope, across = y * bead.turned;
-    left[k] = lesser(greater(line - bead.aside, across + bead.end[0]), kFar);
-    right[k] = greater(lesser(line + bead.aside, across + bead.end[1]), -kFar);
-  }
+  const Doubles from = y * bead.slope - bead.aside, from_end = y * bead.turned + bead.end[0];
+  const Doubles to = y * bead.slope + bead.aside, to_end = y * bead.turned + bead.end[1];
+  left = from > from_end ? from : from_end;
+  right = to < to_end ? to : to_end;
+  left = left < kFar ? left : Doubles{} + kFar;
+  right = right > -kFar ? right : Doubles{} - kFar;
 }
 
-/// Rows between the discs.
-LAMINA_BODY void line_block(const BeadShape& bead, const double* ys, double* __restrict left, double* __restrict right) {
-  for (std::uint32_t k = 0; k < kLanes; ++k) {
-    const double line = (ys[k] - bead.y0) * bead.slope;
-    left[k] = line - bead.aside;
-    right[k] = line + bead.aside;
-  }
+template <class Doubles>
+LAMINA_BODY void round_block(const BeadShape& bead, const Doubles& y, Doubles& left, Doubles& right) {
+  const Doubles up = y - bead.dy, from = y * bead.slope - bead.aside, to = y * bead.slope + bead.aside;
+  Doubles low = bead.radius2 - y * y, high = bead.radius2 - up * up;
+  root(low);
+  root(high);
+  left = y < bead.left[1] ? from : bead.dx - high;
+  left = y < bead.left[0] ? -low : left;
+  right = y < bead.right[1] ? to : bead.dx + high;
+  right = y < bead.right[0] ? low : right;
 }
 
-LAMINA_BODY void round_block(const BeadShape& bead, const double* ys, double* __restrict left, double* __restrict right) {
-  for (std::uint32_t k = 0; k < kLanes; ++k) {
-    const double y = ys[k] - bead.y0, up = y - bead.dy, line = y * bead.slope;
-    const double low = std::sqrt(greater(bead.radius2 - y * y, 0)), high = std::sqrt(greater(bead.radius2 - up * up, 0));
-    const double on_left = y < bead.left[1] ? line - bead.aside : bead.dx - high;
-    const double on_right = y < bead.right[1] ? line + bead.aside : bead.dx + high;
-    left[k] = y < bead.left[0] ? -low : on_left;
-    right[k] = y < bead.right[0] ? low : on_right;
-  }
-}
-
-LAMINA_BODY void empty(BeadRows& rows, std::uint32_t first, std::uint32_t last) {
-  for (std::uint32_t r = first; r < last; ++r) rows.begin[r] = INT32_MAX, rows.end[r] = 0, rows.doubt[r] = 0;
-}
-
+template <class Vectors>
 LAMINA_BODY bool columns_body(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows) {
-  alignas(64) double left[kLanes], right[kLanes];
+  using Doubles = typename Vectors::Doubles;
+  constexpr std::uint32_t kLanes = sizeof(Doubles) / sizeof(double);
+  Doubles nearest = Doubles{} + 1;
   // Image rows go down: y of the last row of a block is its lowest.
   const double low = bead.y0 + std::max(bead.left[0], bead.right[0]), high = bead.y0 + std::min(bead.left[1], bead.right[1]);
-  std::int32_t doubt = 0;
   for (std::uint32_t r = first / kLanes * kLanes; r < last; r += kLanes) {
-    const double* const y = rows.y + r;
-    if (bead.square) square_block(bead, y, left, right);
-    else if (y[0] <= high && y[kLanes - 1] >= low) line_block(bead, y, left, right);
-    else round_block(bead, y, left, right);
-    whole_columns(bead, left, right, rows.begin + r, rows.end + r, rows.doubt + r);
-    for (std::uint32_t k = 0; k < kLanes; ++k) doubt |= rows.doubt[r + k];
+    Doubles y, left, right;
+    std::memcpy(&y, rows.y + r, sizeof y);
+    y -= bead.y0;
+    if (bead.square) {
+      square_block(bead, y, left, right);
+    } else if (rows.y[r] <= high && rows.y[r + kLanes - 1] >= low) {  // between the discs
+      left = y * bead.slope - bead.aside;
+      right = y * bead.slope + bead.aside;
+    } else {
+      round_block(bead, y, left, right);
+    }
+    whole_columns<Doubles, typename Vectors::Integers>(bead, left, right, r, rows, nearest);
   }
-  empty(rows, first / kBeadBlockRows * kBeadBlockRows, first);
-  empty(rows, last, (last + kBeadBlockRows - 1) / kBeadBlockRows * kBeadBlockRows);
-  return doubt != 0;
+  double least = 1;
+  for (std::uint32_t k = 0; k < kLanes; ++k) least = std::min(least, nearest[k]);
+  return least < bead.doubt;
 }
 
 bool columns_plain(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows) {
-  return columns_body(bead, first, last, rows);
+  return columns_body<Two>(bead, first, last, rows);
 }
 
 void set_plain(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words, std::uint8_t* touched) {
@@ -115,24 +139,30 @@ std::uint64_t changes_plain(std::uint32_t* words, std::uint32_t* carry, std::uin
 #if defined(LAMINA_WIDE_KERNELS)
 
 LAMINA_AVX2 bool columns_avx2(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows) {
-  return columns_body(bead, first, last, rows);
+  return columns_body<Four>(bead, first, last, rows);
 }
 
 LAMINA_AVX2 void set_avx2(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
                           std::uint8_t* touched) {
-  const __m256i all = _mm256_set1_epi32(-1), none = _mm256_setzero_si256();
-  for (std::uint32_t r = first / 8 * 8; r < last; r += 8) {
+  constexpr int kRows = 8;
+  const __m256i all = _mm256_set1_epi32(-1), none = _mm256_setzero_si256(), step = _mm256_set1_epi32(kBeadWordBits);
+  const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+  const __m256i begins = _mm256_set1_epi32(static_cast<int>(first)), ends = _mm256_set1_epi32(static_cast<int>(last));
+  for (std::uint32_t r = first / kRows * kRows; r < last; r += kRows) {
+    const __m256i row = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(r)));
+    const __m256i within = _mm256_andnot_si256(_mm256_cmpgt_epi32(begins, row), _mm256_cmpgt_epi32(ends, row));
+    __m256i end = _mm256_and_si256(within, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.end + r)));
     __m256i begin = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.begin + r));
-    __m256i end = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.end + r));
-    alignas(32) std::int32_t lowest[8], highest[8];
+    begin = _mm256_blendv_epi8(_mm256_set1_epi32(INT32_MAX), begin, within);
+    alignas(32) std::int32_t lowest[kRows], highest[kRows];
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(lowest), begin);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(highest), end);
     std::int32_t low = lowest[0], high = highest[0];
-    for (int k = 1; k < 8; ++k) low = std::min(low, lowest[k]), high = std::max(high, highest[k]);
+    for (int k = 1; k < kRows; ++k) low = std::min(low, lowest[k]), high = std::max(high, highest[k]);
     if (low >= high) continue;
     const std::uint32_t from = static_cast<std::uint32_t>(low) / kBeadWordBits;
     const std::uint32_t to = (static_cast<std::uint32_t>(high) - 1) / kBeadWordBits;
-    const __m256i before = _mm256_set1_epi32(static_cast<int>(from * kBeadWordBits)), step = _mm256_set1_epi32(kBeadWordBits);
+    const __m256i before = _mm256_set1_epi32(static_cast<int>(from * kBeadWordBits));
     begin = _mm256_sub_epi32(begin, before);
     end = _mm256_sub_epi32(end, before);
     for (std::uint32_t w = from; w <= to; ++w) {
@@ -167,14 +197,18 @@ LAMINA_AVX2 std::uint64_t changes_avx2(std::uint32_t* words, std::uint32_t* carr
 LAMINA_AVX512_BEGIN
 
 LAMINA_AVX512 bool columns_avx512(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows) {
-  return columns_body(bead, first, last, rows);
+  return columns_body<Eight>(bead, first, last, rows);
 }
 
 LAMINA_AVX512 void set_avx512(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
                               std::uint8_t* touched) {
+  constexpr std::uint32_t kRows = 16;
   const __m512i all = _mm512_set1_epi32(-1), none = _mm512_setzero_si512(), step = _mm512_set1_epi32(kBeadWordBits);
-  for (std::uint32_t r = first / 16 * 16; r < last; r += 16) {
-    __m512i begin = _mm512_loadu_si512(rows.begin + r), end = _mm512_loadu_si512(rows.end + r);
+  for (std::uint32_t r = first / kRows * kRows; r < last; r += kRows) {
+    std::uint32_t lanes = r < first ? 0xFFFFu << (first - r) : 0xFFFFu;
+    if (r + kRows > last) lanes &= 0xFFFFu >> (r + kRows - last);
+    __m512i begin = _mm512_mask_loadu_epi32(_mm512_set1_epi32(INT32_MAX), static_cast<__mmask16>(lanes), rows.begin + r);
+    __m512i end = _mm512_maskz_loadu_epi32(static_cast<__mmask16>(lanes), rows.end + r);
     const std::int32_t low = _mm512_reduce_min_epi32(begin), high = _mm512_reduce_max_epi32(end);
     if (low >= high) continue;
     const std::uint32_t from = static_cast<std::uint32_t>(low) / kBeadWordBits;

@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kBeadBandRows = 64, kBeadWordBits = 32;
 struct alignas(64) BeadRows {
   double y[kBeadBandRows];  // nm of the row's centre on the bed, descending; any number beyond the last row of the image
   std::int32_t begin[kBeadBandRows], end[kBeadBandRows];
-  std::int32_t doubt[kBeadBandRows];  // not 0: begin or end is that, or one less
+  double near[kBeadBandRows];  // from begin or end back to where it is: below BeadShape::doubt it may be one less
 };
 
 /// A bead as two chains of edges, left and right, nm from its lower end; its columns are first guesses.
@@ -35,10 +35,10 @@ struct BeadShape {
 };
 
 struct BeadKernels {
-  /// Columns of rows [first, last) of the band, not clipped to the image; all other rows of their blocks become empty.
-  /// returns  whether any is in doubt
+  /// Columns of rows [first, last) of the band, and of some more.
+  /// returns  whether any may be in doubt
   bool (*columns)(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows);
-  /// Sets the bits of [begin, end) in those rows, in whole blocks of rows. touched  of each column of words, becomes 1
+  /// Sets the bits of [begin, end) in those rows. touched  of each column of words: becomes 1
   void (*set)(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words, std::uint8_t* touched);
   /// Which bits of a column of words differ from the ones before, and those of the rows to come; clears the words.
   /// words, carry, changed  kBeadBandRows each; returns  a bit for each row that changes
@@ -46,8 +46,5 @@ struct BeadKernels {
 };
 
 const BeadKernels& bead_kernels_for(Isa isa);
-
-/// Rows that kernels take at once.
-inline constexpr std::uint32_t kBeadBlockRows = 16;
 
 }  // namespace lamina::raster
