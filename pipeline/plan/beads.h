@@ -23,7 +23,7 @@ namespace lamina::pipeline {
 
 /// Scratch for a layer of beads in flight.
 struct BeadWork {
-  explicit BeadWork(const PixelGrid& grid) : beads(grid) {}
+  BeadWork(const PixelGrid& grid, Isa isa) : beads(grid, isa) {}
   std::uint64_t bytes() const;
 
   Sections::Work sections;

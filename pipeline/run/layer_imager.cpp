@@ -200,7 +200,7 @@ std::uint64_t LayerImager::kept_changes(Nm plane) const {
 }
 
 Status LayerImager::contours(const Layer& layer, ImageWork& work) const {
-  if (!work.beads) work.beads = std::make_unique<BeadWork>(plan_.images->grid);
+  if (!work.beads) work.beads = std::make_unique<BeadWork>(plan_.images->grid, plan_.job.isa);
   return plan_.sections->contours(layer.index, work.beads->sections);
 }
 

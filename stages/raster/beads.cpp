@@ -1,10 +1,12 @@
 #include "stages/raster/beads.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
 #include "stages/geometry/combine.h"
+#include "stages/geometry/isa.h"
 
 namespace lamina::raster {
 namespace {
@@ -32,134 +34,158 @@ struct Bead {
   }
 };
 
-/// About where the bead meets a row: its convex shape is the hull of two discs, or a rectangle.
-struct Interval {
-  double low = INFINITY, high = -INFINITY;
-  void add(double a, double b) {
-    low = std::min(low, a);
-    high = std::max(high, b);
-  }
-};
+Bead bead_of(Point2 a, Point2 b, Nm width, BeadEnds ends) {
+  Bead bead{a.x, a.y, std::int64_t{b.x} - a.x, std::int64_t{b.y} - a.y, static_cast<Wide>(width) * width,
+            0,   ends == BeadEnds::kSquare};
+  bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
+  return bead;
+}
 
-Interval estimate(const Bead& bead, double radius, double y) {
-  Interval x;
-  const double dx = static_cast<double>(bead.dx), dy = static_cast<double>(bead.dy), length = std::hypot(dx, dy);
-  if (!bead.square) {
-    for (const double end : {0.0, 1.0}) {
-      const double rise = y - end * dy, square = radius * radius - rise * rise;
-      if (square >= 0) x.add(end * dx - std::sqrt(square), end * dx + std::sqrt(square));
+/// Of doubles: a root is off by less than 2 nm, as its argument is by less than 4 nm2, and centres of pixels are rounded down by
+/// less than 1; what slopes multiply is off by its last bits.
+BeadShape shape_of(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis& axis) {
+  if (b.y < a.y || (b.y == a.y && b.x < a.x)) std::swap(a, b);
+  constexpr double kOfRoot = 3, kOfSlope = 1.0 / (1ull << 49);
+  BeadShape shape{};
+  const double radius = static_cast<double>(width) / 2;
+  shape.y0 = a.y;
+  shape.dx = static_cast<double>(std::int64_t{b.x} - a.x);
+  shape.dy = static_cast<double>(std::int64_t{b.y} - a.y);
+  shape.radius2 = radius * radius;
+  shape.square = ends == BeadEnds::kSquare;
+  double doubt = kOfRoot + std::abs(shape.dx) * kOfSlope;
+  if (shape.dy > 0) {
+    const double length = std::sqrt(shape.dx * shape.dx + shape.dy * shape.dy), tangent = radius * shape.dx / length;
+    shape.slope = shape.dx / shape.dy;
+    shape.aside = radius * length / shape.dy;
+    shape.left[0] = tangent, shape.left[1] = tangent + shape.dy;
+    shape.right[0] = -tangent, shape.right[1] = shape.dy - tangent;
+    doubt += (shape.aside + std::abs(shape.slope) * (radius + shape.dy)) * kOfSlope;
+  } else {
+    // The lower end is the left one: its disc is all of the left boundary, the other one of the right.
+    shape.aside = INFINITY;
+    shape.left[0] = shape.left[1] = INFINITY;
+    shape.right[0] = shape.right[1] = -INFINITY;
+  }
+  if (shape.square) {
+    shape.end[0] = -INFINITY, shape.end[1] = INFINITY;
+    if (shape.dx != 0) {
+      shape.turned = -shape.dy / shape.dx;
+      const double other = shape.dx + shape.dy * shape.dy / shape.dx;
+      shape.end[0] = std::min(other, 0.0), shape.end[1] = std::max(other, 0.0);
+      doubt += (std::abs(other) + std::abs(shape.turned) * radius) * kOfSlope;
     }
   }
-  if (length > 0) {
-    // The four corners of the rectangle; its edges cut the row.
-    const double nx = -dy / length * radius, ny = dx / length * radius;
-    const double cx[] = {nx, dx + nx, dx - nx, -nx}, cy[] = {ny, dy + ny, dy - ny, -ny};
-    for (int i = 0; i < 4; ++i) {
-      const int j = (i + 1) % 4;
-      if ((cy[i] <= y) == (cy[j] <= y)) {
-        if (cy[i] == y && cy[j] == y) x.add(std::min(cx[i], cx[j]), std::max(cx[i], cx[j]));
-        continue;
-      }
-      const double at = cx[i] + (y - cy[i]) / (cy[j] - cy[i]) * (cx[j] - cx[i]);
-      x.add(at, at);
-    }
-  }
-  return x;
+  shape.columns_per_nm = axis.pixels_per_nm();
+  shape.doubt = 2 * (doubt * shape.columns_per_nm + 1e-7);
+  shape.first_column = a.x * shape.columns_per_nm + 0.5 + shape.doubt / 2;
+  shape.columns = static_cast<std::int32_t>(axis.count);
+  return shape;
 }
 
 }  // namespace
 
+BeadRaster::BeadRaster(const PixelGrid& grid, Isa isa) : grid_(grid), kernels_(&bead_kernels_for(limited_isa(isa))) {}
+
 void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
-  const std::int64_t half = (std::int64_t{width} + 1) / 2;
+  const bool upright = ends == BeadEnds::kSquare && a.x == b.x;
+  const std::int64_t half = upright ? 0 : width / 2;  // what is within reach, in whole nm
   const auto rows = static_cast<std::int64_t>(grid_.rows());
   const std::int64_t first = std::max<std::int64_t>(0, grid_.y.first_at_or_beyond(std::min(a.y, b.y) - half));
   const std::int64_t last = std::min(rows, grid_.y.first_at_or_beyond(std::max(a.y, b.y) + half + 1));
-  if (first >= last) return;
+  if (first >= last || (ends == BeadEnds::kSquare && a == b)) return;
   beads_.push_back({a, b, static_cast<std::uint32_t>(rows - last), static_cast<std::uint32_t>(rows - first), width, ends});
 }
 
-/// The spans of a bead in the image rows [first_row, last_row), which it may reach.
-void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t last_row) {
-  const Point2 a = deposited.a, b = deposited.b;
-  Bead bead{a.x,
-            a.y,
-            std::int64_t{b.x} - a.x,
-            std::int64_t{b.y} - a.y,
-            static_cast<Wide>(deposited.width) * deposited.width,
-            0,
-            deposited.ends == BeadEnds::kSquare};
-  bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
-  const auto rows = static_cast<std::int64_t>(grid_.rows()), columns = static_cast<std::int64_t>(grid_.columns());
-  // A guess is wrong by the rounding of doubles, and by the nanometre that a centre is rounded down: one pixel is ample.
-  const double radius = static_cast<double>(deposited.width) / 2;
-  for (std::uint32_t row = first_row; row < last_row; ++row) {
-    const std::int64_t y = grid_.y.centre(rows - 1 - row);
-    Interval x = estimate(bead, radius, static_cast<double>(y - bead.ay));
-    if (!(x.low <= x.high)) {
-      // A row that only touches the bead's edge, as far as doubles can decide: test where it is widest.
-      const double share =
-          bead.dy == 0 ? 0.5 : std::clamp(static_cast<double>(y - bead.ay) / static_cast<double>(bead.dy), 0.0, 1.0);
-      x.add(share * static_cast<double>(bead.dx), share * static_cast<double>(bead.dx));
+/// Sets the bits of a bead in the band that begins with first_row, into which it reaches.
+void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t band_rows) {
+  const std::uint32_t first = std::max(first_row, deposited.first_row) - first_row;
+  const std::uint32_t last = std::min(first_row + band_rows, deposited.last_row) - first_row;
+  const BeadShape shape = shape_of(deposited.a, deposited.b, deposited.width, deposited.ends, grid_.x);
+  if (kernels_->columns(shape, first, last, rows_)) {
+    for (std::uint32_t r = first; r < last; ++r) {
+      if (rows_.near[r] < shape.doubt) decide(deposited, shape, first_row + r, r);
     }
-    const std::int64_t low = bead.ax + static_cast<std::int64_t>(std::floor(x.low)),
-                       high = bead.ax + static_cast<std::int64_t>(std::ceil(x.high));
-    std::int64_t begin = grid_.x.first_at_or_beyond(low) - 1, end = grid_.x.first_at_or_beyond(high + 1) + 1;
-    while (begin < end && !bead.holds(grid_.x.centre(begin), y)) ++begin;
-    while (end > begin && !bead.holds(grid_.x.centre(end - 1), y)) --end;
-    begin = std::max<std::int64_t>(begin, 0);
-    end = std::min(end, columns);
-    if (begin < end) spans_.push_back({row, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)});
   }
+  kernels_->set(rows_, first, last, words_.data(), touched_.data());
 }
 
-/// Merges the spans of the image rows [first_row, last_row) in band_.
-void BeadRaster::merge(std::uint32_t first_row, std::uint32_t last_row) {
-  const std::uint32_t rows = last_row - first_row;
-  start_.assign(std::size_t{rows} + 1, 0);
-  for (const Span& span : spans_) ++start_[span.row - first_row + 1];
-  for (std::uint32_t r = 0; r < rows; ++r) start_[r + 1] += start_[r];
-  ordered_.resize(spans_.size());
-  for (const Span& span : spans_) ordered_[start_[span.row - first_row]++] = span;  // start_[r] becomes the end of row r
+/// The columns of a row in doubt, exactly.
+void BeadRaster::decide(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t row, std::uint32_t in_band) {
+  const Bead bead = bead_of(deposited.a, deposited.b, deposited.width, deposited.ends);
+  const std::int64_t y = grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row);
+  const auto margin = static_cast<std::int32_t>(std::min(shape.doubt, 1e9)) + 1;
+  std::int32_t& begin = rows_.begin[in_band];
+  std::int32_t& end = rows_.end[in_band];
+  begin = std::max(0, begin - margin);
+  end = std::min(end, shape.columns - margin) + margin;
+  while (begin < end && !bead.holds(grid_.x.centre(begin), y)) ++begin;
+  while (end > begin && !bead.holds(grid_.x.centre(end - 1), y)) --end;
+}
+
+/// Room for any changes of one more column of words in each row.
+void BeadRaster::widen_rows() {
+  const std::size_t before = row_capacity_;
+  row_capacity_ = std::min<std::size_t>(2 * before + 256, std::size_t{grid_.columns()} + 2 * kBeadWordBits);
+  row_change_.resize(kBeadBandRows * row_capacity_);
+  for (std::size_t r = kBeadBandRows; r-- > 1 && before > 0;)
+    std::copy_backward(row_change_.begin() + r * before, row_change_.begin() + (r + 1) * before,
+                       row_change_.begin() + r * row_capacity_ + before);
+}
+
+/// The changes of the band's bits, in band_; clears the bits.
+void BeadRaster::collect(std::uint32_t band_rows) {
+  alignas(64) std::uint32_t carry[kBeadBandRows] = {}, changed[kBeadBandRows];
+  std::uint32_t count[kBeadBandRows] = {};
+  std::size_t most = 0;
+  for (std::uint32_t w = 0, ends = 0; w < touched_.size(); ++w) {
+    if (touched_[w] == 0 && ends == 0) continue;
+    ends = std::exchange(touched_[w], std::uint8_t{0});
+    if (most + kBeadWordBits > row_capacity_) widen_rows();
+    std::uint64_t rows = kernels_->changes(words_.data() + std::size_t{w} * kBeadBandRows, carry, changed);
+    for (; rows != 0; rows &= rows - 1) {
+      const auto r = static_cast<std::uint32_t>(std::countr_zero(rows));
+      std::uint32_t* next = row_change_.data() + r * row_capacity_ + count[r];
+      for (std::uint32_t bits = changed[r]; bits != 0; bits &= bits - 1)
+        *next++ = w * kBeadWordBits + static_cast<std::uint32_t>(std::countr_zero(bits));
+      count[r] = static_cast<std::uint32_t>(next - (row_change_.data() + r * row_capacity_));
+      most = std::max<std::size_t>(most, count[r]);
+    }
+  }
   band_.row_offset.assign(1, 0);
   band_.change.clear();
-  std::uint32_t begin = 0;
-  for (std::uint32_t r = 0; r < rows; ++r) {
-    const std::uint32_t end = start_[r];
-    std::sort(ordered_.begin() + begin, ordered_.begin() + end,
-              [](const Span& s, const Span& t) { return s.begin != t.begin ? s.begin < t.begin : s.end < t.end; });
-    for (std::uint32_t i = begin; i < end;) {
-      std::uint32_t reach = ordered_[i].end;
-      band_.change.push_back(ordered_[i].begin);
-      for (++i; i < end && ordered_[i].begin <= reach; ++i) reach = std::max(reach, ordered_[i].end);
-      band_.change.push_back(reach);
-    }
+  for (std::uint32_t r = 0; r < band_rows; ++r) {
+    const std::uint32_t* const first = row_change_.data() + r * row_capacity_;
+    band_.change.insert(band_.change.end(), first, first + count[r]);
     band_.row_offset.push_back(static_cast<std::uint32_t>(band_.change.size()));
-    begin = end;
   }
 }
 
 void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const RunsView&)>& take) {
-  const std::uint32_t rows = grid_.rows(), bands = (rows + kBandRows - 1) / kBandRows;
+  const std::uint32_t rows = grid_.rows(), bands = (rows + kBeadBandRows - 1) / kBeadBandRows;
   // Beads by the band of their first row.
   band_begin_.assign(std::size_t{bands} + 1, 0);
-  for (const DepositedParts& bead : beads_) ++band_begin_[bead.first_row / kBandRows + 1];
+  for (const DepositedParts& bead : beads_) ++band_begin_[bead.first_row / kBeadBandRows + 1];
   for (std::uint32_t b = 0; b < bands; ++b) band_begin_[b + 1] += band_begin_[b];
   by_band_.resize(beads_.size());
-  for (std::uint32_t i = 0; i < beads_.size(); ++i) by_band_[band_begin_[beads_[i].first_row / kBandRows]++] = i;
+  for (std::uint32_t i = 0; i < beads_.size(); ++i) by_band_[band_begin_[beads_[i].first_row / kBeadBandRows]++] = i;
   band_.columns = grid_.columns();
   reaching_.clear();
+  // A column of words more, in which runs that end with the image do.
+  touched_.assign(grid_.columns() / kBeadWordBits + 2, 0);
+  words_.assign(touched_.size() * kBeadBandRows, 0);
   for (std::uint32_t b = 0, next = 0; b < bands; ++b) {
-    const std::uint32_t first = b * kBandRows, last = std::min(rows, first + kBandRows);
+    const std::uint32_t first = b * kBeadBandRows, last = std::min(rows, first + kBeadBandRows);
     for (; next < band_begin_[b]; ++next) reaching_.push_back(by_band_[next]);
-    spans_.clear();
+    for (std::uint32_t r = 0; r < kBeadBandRows; ++r)
+      rows_.y[r] = static_cast<double>(grid_.y.centre(std::int64_t{rows} - 1 - first - r));
     std::size_t stay = 0;
     for (const std::uint32_t i : reaching_) {
-      const DepositedParts& bead = beads_[i];
-      cover(bead, std::max(first, bead.first_row), std::min(last, bead.last_row));
-      if (bead.last_row > last) reaching_[stay++] = i;
+      cover(beads_[i], first, last - first);
+      if (beads_[i].last_row > last) reaching_[stay++] = i;
     }
     reaching_.resize(stay);
-    merge(first, last);
+    collect(last - first);
     take(first, band_);
   }
 }

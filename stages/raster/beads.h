@@ -1,8 +1,8 @@
 // stages/raster/beads.h: beads of true width become runs of pixels.
 //
 // A pixel is set if and only if its centre lies in a bead: no farther than half of the width from the bead's straight
-// line (round ends), or from the part of it between the two ends (square ends). Whole numbers decide; floating point
-// only finds the neighbourhood in which they are used.
+// line (round ends), or from the part of it between the two ends (square ends). Columns of a row begin and end where a double
+// says so, unless a whole number is so near that rounding might pass it: then integers decide.
 #pragma once
 
 #include <cstdint>
@@ -16,14 +16,16 @@
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/runs.h"
 #include "stages/data/toolpaths.h"
+#include "stages/raster/kernels/bead_rows.h"
 
 namespace lamina::raster {
 
-/// Collects the beads of a layer, in any order; reused from layer to layer. Keeps 36 bytes a bead, and the rows of one band
-/// at a time: a bead may cover thousands of rows.
+/// Collects the beads of a layer, in any order; reused from layer to layer. Keeps 36 bytes a bead, and the bits and runs of one
+/// band of rows at a time: a bead may cover thousands of rows.
 class BeadRaster {
  public:
-  explicit BeadRaster(const PixelGrid& grid) : grid_(grid) {}
+  /// isa  widest instructions of the loops; no image depends on it
+  explicit BeadRaster(const PixelGrid& grid, Isa isa = Isa::kAuto);
 
   void clear() { beads_.clear(); }
   /// a, b   nm on the bed; equal for a dot (round ends only, square ends leave nothing)
@@ -33,37 +35,40 @@ class BeadRaster {
   void add(std::span<const DepositedBead> beads, Point2 origin);
   /// Gives the union of all beads, as bands of image rows from row 0 (at the back) on; each serves until the next.
   /// take  called with the image row that is the band's first
-  /// cost  O(S log(S of a row) + rows) for S rows that beads cover, each counted on its own
+  /// cost  O(S + W + rows) for S rows that beads cover, each counted on its own, and W words of 32 pixels that these share
   void for_each_band(const std::function<void(std::uint32_t first_row, const RunsView& band)>& take);
   /// All bands as one image. cost  of for_each_band
   void runs(Runs& out);
 
   std::uint64_t bytes() const {
-    return bytes_held(beads_) + bytes_held(by_band_) + bytes_held(reaching_) + bytes_held(band_begin_) + bytes_held(spans_) +
-           bytes_held(ordered_) + bytes_held(start_) + bytes_held(band_.row_offset) + bytes_held(band_.change);
+    return bytes_held(beads_) + bytes_held(by_band_) + bytes_held(reaching_) + bytes_held(band_begin_) + bytes_held(words_) +
+           bytes_held(touched_) + bytes_held(row_change_) + bytes_held(band_.row_offset) + bytes_held(band_.change);
   }
+  /// Bytes of the bits of a band.
+  static std::uint64_t band_bytes(const PixelGrid& grid) { return (std::uint64_t{grid.columns()} / kBeadWordBits + 3) * 257; }
 
  private:
-  static constexpr std::uint32_t kBandRows = 64;  // so that the spans of a band stay within a second-level cache
-
   struct DepositedParts {
     Point2 a, b;
     std::uint32_t first_row, last_row;  // image rows that it may reach
     Nm width;
     BeadEnds ends;
   };
-  struct Span {
-    std::uint32_t row, begin, end;
-  };
-  void cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t last_row);
-  void merge(std::uint32_t first_row, std::uint32_t last_row);
+  void cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t band_rows);
+  void decide(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t row, std::uint32_t in_band);
+  void collect(std::uint32_t band_rows);
+  void widen_rows();
 
   PixelGrid grid_;
+  const BeadKernels* kernels_;
   Buffer<DepositedParts> beads_;
   Buffer<std::uint32_t> by_band_, band_begin_;  // beads by the band of their first row; where each band's end
   Buffer<std::uint32_t> reaching_;              // into the band at work
-  Buffer<Span> spans_, ordered_;                // of the band, as they come and by row
-  Buffer<std::uint32_t> start_;                 // of its rows in ordered_
+  BeadRows rows_;                               // of the band, and of the bead at work
+  Buffer<std::uint32_t> words_;                 // of the band; all 0 between bands
+  Buffer<std::uint8_t> touched_;                // by column of words
+  Buffer<std::uint32_t> row_change_;            // of the band: row_capacity_ for each row
+  std::size_t row_capacity_ = 0;
   Runs band_;
 };
 
