@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "stages/data/levels.h"
 #include "stages/formats/image_format.h"
 
 namespace lamina::formats::tiff {
@@ -67,5 +68,41 @@ class PackBits {
   std::size_t size_ = 0, literal_ = 0;  // where the last literal begins
   State state_ = State::kBase;
 };
+
+/// A row of levels as bytes: `step` times the level.
+inline void put_bytes(const LevelsView& image, std::uint32_t row, unsigned step, PackBits& to) {
+  std::uint32_t at = 0;
+  for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
+    const std::uint32_t begin = image.change[2 * i], end = image.change[2 * i + 1];
+    to.add(0, begin - at);
+    to.add(static_cast<std::uint8_t>(image.level[i] * step), end - begin);
+    at = end;
+  }
+  to.add(0, image.columns - at);
+}
+
+/// The same as half bytes; the left pixel of two is in the high bits.
+inline void put_nibbles(const LevelsView& image, std::uint32_t row, unsigned step, PackBits& to) {
+  unsigned value = 0;       // of the run of bytes that is not added yet
+  std::uint32_t count = 0;  // and its length
+  unsigned half = 0;        // a left pixel
+  const auto add = [&](unsigned next, std::uint32_t bytes) {
+    if (next != value) to.add(static_cast<std::uint8_t>(value), count), value = next, count = 0;
+    count += bytes;
+  };
+  std::uint32_t at = 0;
+  const auto fill = [&](unsigned level, std::uint32_t end) {
+    if (at % 2 != 0 && at < end) add(half << 4 | level, 1), ++at;
+    if ((end - at) / 2 > 0) add(level * 17, (end - at) / 2);
+    if ((end - at) % 2 != 0) half = level;
+    at = end;
+  };
+  for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
+    fill(0, image.change[2 * i]);
+    fill(image.level[i] * step, image.change[2 * i + 1]);
+  }
+  fill(0, image.columns + image.columns % 2);
+  to.add(static_cast<std::uint8_t>(value), count);
+}
 
 }  // namespace lamina::formats::tiff

@@ -399,29 +399,23 @@ class DeflateEncoder : public ImageEncoder {
   void tag(const LayerTags& tags) override { text_.take(tags); }
 
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_strips(runs.columns, runs.rows(), dpi_x, dpi_y, file,
-                         [&](std::uint32_t r, std::span<std::byte> to) { expand_row(runs.row(r), to); });
+    return encode_rows(runs, dpi_x, dpi_y, file);
   }
   Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
-    words_.resize(rows.words());
-    return encode_strips(rows.columns(), rows.rows(), dpi_x, dpi_y, file, [&](std::uint32_t r, std::span<std::byte> to) {
-      rows.row(r, words_);
-      bits_of_words(words_, to);
-    });
+    return encode_rows(rows, dpi_x, dpi_y, file);
   }
 
  private:
-  template <class Fill>
-  Status encode_strips(std::uint32_t columns, std::uint32_t rows, double dpi_x, double dpi_y, Bytes& file, const Fill& fill) {
-    if (Status status = check_size("TIFF", columns, rows); !status) return status;
-    const TagFrame frame{columns, rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+    if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
+    const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
     file.resize(file.capacity());
     return write_file(file, frame, text_, [&](TIFF* tiff) {
       strip_.resize(frame.stride * frame.rows_per_strip);
       packed_.resize(DitherDeflate::bound(strip_.size()));
-      for (std::uint32_t row = 0, number = 0; row < rows; ++number) {
-        const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, rows - row);
-        for (; row < end; ++row) fill(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
+      for (std::uint32_t row = 0, number = 0; row < image.rows; ++number) {
+        const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, image.rows - row);
+        for (; row < end; ++row) image.put(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
         const auto length = static_cast<tmsize_t>(
             deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
         if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
@@ -433,7 +427,6 @@ class DeflateEncoder : public ImageEncoder {
   LayerText text_;
   DitherDeflate deflate_;
   Bytes strip_, packed_;
-  std::vector<std::uint64_t> words_;  // of a row
 };
 
 }  // namespace
@@ -478,7 +471,7 @@ class GreyEncoder : public LevelEncoder {
         const std::uint32_t end = row + std::min(frame.rows_per_strip, frame.rows - row);
         for (; row < end; ++row) {
           packed_.start_row(frame.stride);
-          bits_ == 8 ? put_bytes(image, row, darkest_ / full) : put_nibbles(image, row, darkest_ / full);
+          bits_ == 8 ? put_bytes(image, row, darkest_ / full, packed_) : put_nibbles(image, row, darkest_ / full, packed_);
         }
         const auto length = static_cast<tmsize_t>(packed_.size());
         if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
@@ -488,43 +481,9 @@ class GreyEncoder : public LevelEncoder {
   }
 
  private:
-  void put_bytes(const LevelsView& image, std::uint32_t row, unsigned step) {
-    std::uint32_t at = 0;
-    for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
-      const std::uint32_t begin = image.change[2 * i], end = image.change[2 * i + 1];
-      packed_.add(0, begin - at);
-      packed_.add(static_cast<std::uint8_t>(image.level[i] * step), end - begin);
-      at = end;
-    }
-    packed_.add(0, image.columns - at);
-  }
-
-  /// The left pixel of two is in the high bits.
-  void put_nibbles(const LevelsView& image, std::uint32_t row, unsigned step) {
-    unsigned value = 0;       // of the run of bytes that is not added yet
-    std::uint32_t count = 0;  // and its length
-    unsigned half = 0;        // a left pixel
-    const auto add = [&](unsigned next, std::uint32_t bytes) {
-      if (next != value) packed_.add(static_cast<std::uint8_t>(value), count), value = next, count = 0;
-      count += bytes;
-    };
-    std::uint32_t at = 0;
-    const auto fill = [&](unsigned level, std::uint32_t end) {
-      if (at % 2 != 0 && at < end) add(half << 4 | level, 1), ++at;
-      if ((end - at) / 2 > 0) add(level * 17, (end - at) / 2);
-      if ((end - at) % 2 != 0) half = level;
-      at = end;
-    };
-    for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
-      fill(0, image.change[2 * i]);
-      fill(image.level[i] * step, image.change[2 * i + 1]);
-    }
-    fill(0, image.columns + image.columns % 2);
-    packed_.add(static_cast<std::uint8_t>(value), count);
-  }
-
   LayerText text_;
   unsigned bits_, darkest_;
+  Bytes strip_;
   PackBits packed_;
 };
 
