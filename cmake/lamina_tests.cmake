@@ -178,5 +178,7 @@ add_test(NAME Documentation.EveryQuestionHasItsAnswerNearTheIndex
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/questions ${PROJECT_SOURCE_DIR})
 add_test(NAME Documentation.EveryFigureOfTheReadmeIsInAPageOfItsCommit
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/figures ${PROJECT_SOURCE_DIR})
+add_test(NAME Bench.APeerOfAnyProgramIsRunAndItsPixelsAreCompared
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/bench/test_mslicer $<TARGET_FILE:lamina>)
 add_test(NAME House.EveryRuleFindsThePlantedFault COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/house/test_check_house)
 add_test(NAME Landing.FilesOfThreeCommitsAreFound COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/landing/three_commits ${PROJECT_SOURCE_DIR})

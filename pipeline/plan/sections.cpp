@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -109,6 +110,7 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   made.body_ = slice::group_bodies(reach);
   const std::vector<std::uint32_t>& body = made.body_;
   const std::vector<std::uint32_t> part_area = made.make_areas(job, boxes, body);
+  made.find_copies(body);
   made.bounds_ = slice::grown(made.bounds_, made.grow_);
   slice::SliceOptions options;
   options.fill_rule = job.fill_rule;
@@ -174,6 +176,40 @@ std::vector<std::uint32_t> Sections::make_areas(const Job& job, const std::vecto
   }
   body_area_.push_back(static_cast<std::uint32_t>(areas_.size()));
   return part_area;
+}
+
+/// Copies of a part, each a body of its own, that stand at one height. Middles of their boxes have to be rounded alike.
+void Sections::find_copies(const std::vector<std::uint32_t>& body) {
+  std::vector<std::uint32_t> members(areas_.size(), 0);
+  std::vector<std::uint32_t> mesh(areas_.size(), 0);
+  for (std::size_t i = 0; i < body.size(); ++i) {
+    const std::uint32_t a = body_area_[body[i]];
+    ++members[a];
+    mesh[a] = scene_->instances[i].mesh;
+  }
+  std::map<std::array<std::int64_t, 3>, std::uint32_t> first;  // by part, mesh and height
+  for (std::uint32_t a = 0; a < areas_.size(); ++a) {
+    Area& area = areas_[a];
+    area.alike = a;
+    if (area.shared != UINT32_MAX || members[a] != 1 || area.box.lo.x < 0 || area.box.lo.y < 0) continue;
+    area.alike = first.try_emplace({area.part, mesh[a], area.box.lo.z}, a).first->second;
+  }
+}
+
+bool Sections::is_moved(const Area& copy, const Area& original, const Work& work) const {
+  const Contours& all = work.contours.contours;
+  const std::span<const std::uint32_t> body = work.contours.body;
+  const std::uint32_t a = body[copy.body], b = body[original.body], count = body[copy.body + 1] - a;
+  if (body[original.body + 1] - b != count) return false;
+  const std::uint32_t from = all.offset[a], of_original = all.offset[b];
+  for (std::uint32_t c = 1; c <= count; ++c) {
+    if (all.offset[a + c] - from != all.offset[b + c] - of_original) return false;
+  }
+  const Nm dx = copy.box.lo.x - original.box.lo.x, dy = copy.box.lo.y - original.box.lo.y;
+  const std::span<const Point2> points = all.point;
+  return std::ranges::equal(points.subspan(from, all.offset[a + count] - from),
+                            points.subspan(of_original, all.offset[b + count] - of_original),
+                            [&](Point2 p, Point2 q) { return std::int64_t{p.x} - q.x == dx && std::int64_t{p.y} - q.y == dy; });
 }
 
 const infill::FillParameters& Sections::filling(const Area& area, const Layer& layer) const {
@@ -257,8 +293,13 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
     }
   }
   work.outlines.resize(areas_.size());
-  for (std::size_t a = 0; a < areas_.size(); ++a) {
+  work.original.resize(areas_.size());
+  for (std::uint32_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
+    const bool copy = area.alike != a && is_moved(area, areas_[area.alike], work);
+    work.original[a] = copy ? area.alike : a;
+    work.outlines[a] = {};
+    if (copy) continue;
     auto outlines = infill::outlines_of(contours_of(area, work), {own, area.box, of_walls_}, filling(area, own));
     if (!outlines) return failed(area, outlines.error());
     work.outlines[a] = std::move(*outlines);
@@ -271,10 +312,17 @@ Status Sections::fill(std::uint32_t index, Work& work) const {
   const Layer layer = schedule_.layers[index].own();
   work.path_body.push_back(0);
   work.path_area.push_back(0);
-  for (std::size_t a = 0; a < areas_.size(); ++a) {
+  for (std::uint32_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
-    const Status status = infill::append_fill(std::move(work.outlines[a]), {layer, area.box}, filling(area, layer), work.paths);
-    if (!status) return failed(area, status.error());
+    if (const std::uint32_t original = work.original[a]; original != a) {
+      const Box &from = areas_[original].box, &to = area.box;
+      work.paths.append_moved(work.path_area[original], work.path_area[original + 1],
+                              {to.lo.x - from.lo.x, to.lo.y - from.lo.y});
+    } else if (const Status status =
+                   infill::append_fill(std::move(work.outlines[a]), {layer, area.box}, filling(area, layer), work.paths);
+               !status) {
+      return failed(area, status.error());
+    }
     work.outlines[a] = {};
     work.path_area.push_back(work.paths.size());
     if (a + 1 == body_area_[area.body + 1]) work.path_body.push_back(work.paths.size());
@@ -311,12 +359,19 @@ Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work
   constexpr std::uint64_t kOfPoint = 17, kOfPath = 4;
   const Layer own = schedule_.layers[index].own();
   std::uint64_t bytes = 0, scratch = 0;
+  std::vector<std::uint64_t> of_area(areas_.size());
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
+    if (work.original[a] != a) {
+      bytes += of_area[a] = of_area[work.original[a]];
+      continue;
+    }
     const auto bound =
         infill::bound_fill(contours_of(area, work), work.outlines[a].region, {own, area.box}, filling(area, own));
     if (!bound) return failed(area, bound.error());
-    bytes += bound->points * (kOfPoint + text.point) + bound->intervals * text.interval + bound->paths * (kOfPath + text.path);
+    of_area[a] =
+        bound->points * (kOfPoint + text.point) + bound->intervals * text.interval + bound->paths * (kOfPath + text.path);
+    bytes += of_area[a];
     scratch = std::max(scratch, bound->scratch_bytes);
   }
   // Buffers grow by half or double, so their capacity is at most twice their content.
@@ -333,7 +388,7 @@ std::uint64_t Sections::Work::bytes() const {
   total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + scratch.simplify.bytes() +
            bytes_held(scratch.facets) + scratch.blocks.bytes();
   return total + bytes_held(paths.point) + bytes_held(paths.kind) + bytes_held(paths.width) + bytes_held(paths.line) +
-         bytes_held(paths.offset);
+         bytes_held(paths.offset) + bytes_held(original);
 }
 
 }  // namespace lamina::pipeline

@@ -54,7 +54,8 @@ class Sections {
     slice::LayerContours highest;            // section at the layer's top, if steps must stay on one side
     slice::LayerContours parts;              // of areas in bodies with several parts, merged part by part
     std::vector<Contours> surface;           // of these areas: the region without earlier parts
-    std::vector<infill::Outlines> outlines;  // of each area: where the centres of beads lie
+    std::vector<infill::Outlines> outlines;  // of each area: where the centres of beads lie; none of copies of another
+    Buffer<std::uint32_t> original;          // of each area: the first one with the same contours, moved
     Toolpaths paths;
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
@@ -64,7 +65,8 @@ class Sections {
 
     std::uint64_t bytes() const;  // capacity of its buffers
   };
-  /// Contours, and the filling if the job has one. Pure: independent of thread and order.
+  /// Contours, and the filling if the job has one. Pure: independent of thread and order. Patterns are anchored to the parts:
+  /// what copies at one height have alike is filled once, and moved.
   Status layer(std::uint32_t index, Work& work) const;
   /// The two halves of layer(): contours and regions, then their filling. The bound of the filling's memory needs the first.
   Status contours(std::uint32_t index, Work& work) const;
@@ -76,6 +78,7 @@ class Sections {
     std::uint32_t body, part;
     Box box;                            // of its instances, before any offset
     std::uint32_t shared = UINT32_MAX;  // number among the areas of bodies with several parts
+    std::uint32_t alike = 0;            // the first area of such a part: itself, or one that it may be a moved copy of
   };
   const std::vector<Area>& areas() const { return areas_; }
   /// Within the contours of an area, mm2. work  of contours()
@@ -119,6 +122,8 @@ class Sections {
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
   Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
                                        slice::LayerContours& out) const;
+  void find_copies(const std::vector<std::uint32_t>& body);
+  bool is_moved(const Area& copy, const Area& original, const Work& work) const;
   ContoursView contours_of(const Area& area, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;

@@ -74,6 +74,17 @@ struct Toolpaths {
     width.push_back(bead_width);
     line.push_back(line_number);
   }
+  /// Appends paths [first, last) of these once more, moved.
+  void append_moved(std::uint32_t first, std::uint32_t last, Point2 by) {
+    const std::size_t begin = offset[first], count = offset[last] - begin, before = point.size();
+    const auto repeat = [&](auto& list) {
+      list.resize(before + count);
+      std::copy_n(list.begin() + static_cast<std::ptrdiff_t>(begin), count, list.begin() + static_cast<std::ptrdiff_t>(before));
+    };
+    repeat(point), repeat(kind), repeat(width), repeat(line);
+    for (std::size_t i = before; i < before + count; ++i) point[i] = {point[i].x + by.x, point[i].y + by.y};
+    for (std::uint32_t p = first; p < last; ++p) offset.push_back(static_cast<std::uint32_t>(offset[p + 1] - begin + before));
+  }
   /// Ends the path whose points were added.
   void close() { offset.push_back(static_cast<std::uint32_t>(point.size())); }
 };

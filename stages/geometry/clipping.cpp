@@ -26,10 +26,11 @@ Point2 middle_of(const ContoursView& contours) {
     lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
     hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
   }
-  return {static_cast<Nm>((std::int64_t{lo.x} + hi.x) / 2), static_cast<Nm>((std::int64_t{lo.y} + hi.y) / 2)};
+  const auto middle = [](Nm a, Nm b) { return static_cast<Nm>(floor_div<std::int64_t>(std::int64_t{a} + b, 2)); };
+  return {middle(lo.x, hi.x), middle(lo.y, hi.y)};
 }
 
-/// Clipper is fastest on numbers below 2^30: contours are moved to the origin and back.
+/// Clipper is fastest on numbers below 2^30: contours are moved to the origin and back. So results move with the contours.
 clip::Paths to_clipper(const ContoursView& contours, Point2 by) {
   clip::Paths paths(contours.size());
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
@@ -122,9 +123,13 @@ Result<Contours> curve_union(const ContoursView& curves) {
 
 constexpr double kSharpest = 0.5;  // 1 + cosine of a turn whose miter is twice the distance from the corner
 
+/// Only the way is rounded: curves of contours that are moved are the same, moved.
 void put(Point2 at, double x, double y, Contours& to) {
-  const auto rounded = [](double v) { return static_cast<Nm>(std::clamp<double>(std::nearbyint(v), -kNmReach, kNmReach)); };
-  to.point.push_back({rounded(at.x + x), rounded(at.y + y)});
+  constexpr double kFar = 2.0 * kNmReach;
+  const auto moved = [&](Nm from, double by) {
+    return within_reach(from + static_cast<std::int64_t>(std::nearbyint(std::clamp(by, -kFar, kFar))));
+  };
+  to.point.push_back({moved(at.x, x), moved(at.y, y)});
 }
 
 /// Moves contours by one distance, piece by piece. Buffers are reused.

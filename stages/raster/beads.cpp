@@ -35,14 +35,19 @@ struct Bead {
 };
 
 Bead bead_of(Point2 a, Point2 b, Nm width, BeadEnds ends) {
-  Bead bead{a.x, a.y, std::int64_t{b.x} - a.x, std::int64_t{b.y} - a.y, static_cast<Wide>(width) * width,
-            0,   ends == BeadEnds::kSquare};
+  Bead bead{a.x,
+            a.y,
+            std::int64_t{b.x} - a.x,
+            std::int64_t{b.y} - a.y,
+            static_cast<Wide>(width) * width,
+            0,
+            ends == BeadEnds::kSquare};
   bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
   return bead;
 }
 
-/// Of doubles: a root is off by less than 2 nm, as its argument is by less than 4 nm2, and centres of pixels are rounded down by
-/// less than 1; what slopes multiply is off by its last bits.
+/// Of doubles: a root is off by less than 2 nm, as its argument is by less than 4 nm2, and centres of pixels are rounded down
+/// by less than 1; what slopes multiply is off by its last bits.
 BeadShape shape_of(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis& axis) {
   if (b.y < a.y || (b.y == a.y && b.x < a.x)) std::swap(a, b);
   constexpr double kOfRoot = 3, kOfSlope = 1.0 / (1ull << 49);
@@ -53,14 +58,14 @@ BeadShape shape_of(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis&
   shape.dy = static_cast<double>(std::int64_t{b.y} - a.y);
   shape.radius2 = radius * radius;
   shape.square = ends == BeadEnds::kSquare;
-  double doubt = kOfRoot + std::abs(shape.dx) * kOfSlope;
+  double tolerance = kOfRoot + std::abs(shape.dx) * kOfSlope;
   if (shape.dy > 0) {
     const double length = std::sqrt(shape.dx * shape.dx + shape.dy * shape.dy), tangent = radius * shape.dx / length;
     shape.slope = shape.dx / shape.dy;
     shape.aside = radius * length / shape.dy;
     shape.left[0] = tangent, shape.left[1] = tangent + shape.dy;
     shape.right[0] = -tangent, shape.right[1] = shape.dy - tangent;
-    doubt += (shape.aside + std::abs(shape.slope) * (radius + shape.dy)) * kOfSlope;
+    tolerance += (shape.aside + std::abs(shape.slope) * (radius + shape.dy)) * kOfSlope;
   } else {
     // The lower end is the left one: its disc is all of the left boundary, the other one of the right.
     shape.aside = INFINITY;
@@ -73,19 +78,20 @@ BeadShape shape_of(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis&
       shape.turned = -shape.dy / shape.dx;
       const double other = shape.dx + shape.dy * shape.dy / shape.dx;
       shape.end[0] = std::min(other, 0.0), shape.end[1] = std::max(other, 0.0);
-      doubt += (std::abs(other) + std::abs(shape.turned) * radius) * kOfSlope;
+      tolerance += (std::abs(other) + std::abs(shape.turned) * radius) * kOfSlope;
     }
   }
   shape.columns_per_nm = axis.pixels_per_nm();
-  shape.doubt = 2 * (doubt * shape.columns_per_nm + 1e-7);
-  shape.first_column = a.x * shape.columns_per_nm + 0.5 + shape.doubt / 2;
+  shape.tolerance = 2 * (tolerance * shape.columns_per_nm + 1e-7);
+  shape.first_column = a.x * shape.columns_per_nm + 0.5 + shape.tolerance / 2;
   shape.columns = static_cast<std::int32_t>(axis.count);
   return shape;
 }
 
 }  // namespace
 
-BeadRaster::BeadRaster(const PixelGrid& grid, Isa isa) : grid_(grid), kernels_(&bead_kernels_for(limited_isa(isa))) {}
+BeadRaster::BeadRaster(const PixelGrid& grid, Isa isa)
+    : grid_(grid), rows_per_nm_(grid.y.pixels_per_nm()), kernels_(&bead_kernels_for(limited_isa(isa))) {}
 
 void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
   const bool upright = ends == BeadEnds::kSquare && a.x == b.x;
@@ -102,19 +108,65 @@ void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row,
   const std::uint32_t first = std::max(first_row, deposited.first_row) - first_row;
   const std::uint32_t last = std::min(first_row + band_rows, deposited.last_row) - first_row;
   const BeadShape shape = shape_of(deposited.a, deposited.b, deposited.width, deposited.ends, grid_.x);
+  std::array<std::uint32_t, 2> line{first, last};
+  std::uint64_t undecided = 0;
+  if (!cover_line(shape, line, undecided)) return cover_rows(deposited, shape, first_row, first, last);
+  if (first < line[0]) cover_rows(deposited, shape, first_row, first, line[0]);
+  if (line[1] < last) cover_rows(deposited, shape, first_row, line[1], last);
+  for (; undecided != 0; undecided &= undecided - 1) {
+    const auto r = static_cast<std::uint32_t>(std::countr_zero(undecided));
+    cover_rows(deposited, shape, first_row, r, r + 1);
+  }
+}
+
+/// Sets the bits of those rows that are between the discs, if they are many and no flat line.
+/// rows      of the bead in the band; become those that are done
+/// undecided  becomes a bit for each of these whose bits are not set
+bool BeadRaster::cover_line(const BeadShape& shape, std::array<std::uint32_t, 2>& rows, std::uint64_t& undecided) {
+  constexpr std::uint32_t kMinRows = 12;
+  constexpr double kMaxColumns = 1 << (32 - kBeadLineBits), kOne = 1 << kBeadLineBits;
+  if (kernels_->line == nullptr || shape.square || !(shape.dy * rows_per_nm_ > kMinRows)) return false;
+  const auto row_at = [&](double y) { return (rows_.y[0] - y) * rows_per_nm_; };  // of the band
+  const double high = shape.y0 + std::min(shape.left[1], shape.right[1]),
+               low = shape.y0 + std::max(shape.left[0], shape.right[0]);
+  // Rows are cut off from doubles: std::ceil and std::floor are calls, and a row more or less is the other loop's.
+  const double above = std::clamp<double>(row_at(high) + 1, rows[0], rows[1]),
+               below = std::clamp<double>(row_at(low) + 1, 0, rows[1]);
+  rows = {static_cast<std::uint32_t>(above), static_cast<std::uint32_t>(below)};
+  if (rows[1] < rows[0] + kMinRows) return false;
+  // Centres of rows are rounded down by less than 1 nm, and the step by half of its last bit.
+  const double off = (1 + std::abs(shape.slope)) * shape.columns_per_nm + (kBeadBandRows / 2 + 1) / kOne;
+  const double step = -shape.slope / rows_per_nm_ * shape.columns_per_nm;
+  const double at = shape.first_column - shape.tolerance / 2 + off;
+  const double line = (rows_.y[rows[0]] - shape.y0) * shape.slope;
+  const double from = (line - shape.aside) * shape.columns_per_nm + at, to = (line + shape.aside) * shape.columns_per_nm + at;
+  const double way = step * (rows[1] - 1 - rows[0]), left = from + std::min(way, 0.0), right = to + std::max(way, 0.0);
+  if (!(left >= 1 && right < shape.columns && right - left < kMaxColumns - 2 * kBeadWordBits && off < 0.25)) return false;
+  const std::uint32_t word = static_cast<std::uint32_t>(left) / kBeadWordBits;
+  const auto fixed = [&](double column) { return static_cast<std::uint32_t>((column - word * kBeadWordBits) * kOne + 0.5); };
+  const BeadLine bits{word, fixed(from), fixed(to),
+                      static_cast<std::uint32_t>(static_cast<std::int32_t>(step * kOne + std::copysign(0.5, step))),
+                      (static_cast<std::uint32_t>(2 * off * kOne) + 1) << (32 - kBeadLineBits)};
+  undecided = kernels_->line(bits, rows[0], rows[1], words_.data(), touched_.data());
+  return true;
+}
+
+/// Sets the bits of rows [first, last) of the band.
+void BeadRaster::cover_rows(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row,
+                            std::uint32_t first, std::uint32_t last) {
   if (kernels_->columns(shape, first, last, rows_)) {
     for (std::uint32_t r = first; r < last; ++r) {
-      if (rows_.near[r] < shape.doubt) decide(deposited, shape, first_row + r, r);
+      if (rows_.near[r] < shape.tolerance) decide(deposited, shape, first_row + r, r);
     }
   }
   kernels_->set(rows_, first, last, words_.data(), touched_.data());
 }
 
-/// The columns of a row in doubt, exactly.
+/// The columns of an undecided row, exactly.
 void BeadRaster::decide(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t row, std::uint32_t in_band) {
   const Bead bead = bead_of(deposited.a, deposited.b, deposited.width, deposited.ends);
   const std::int64_t y = grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row);
-  const auto margin = static_cast<std::int32_t>(std::min(shape.doubt, 1e9)) + 1;
+  const auto margin = static_cast<std::int32_t>(std::min(shape.tolerance, 1e9)) + 1;
   std::int32_t& begin = rows_.begin[in_band];
   std::int32_t& end = rows_.end[in_band];
   begin = std::max(0, begin - margin);
@@ -137,11 +189,11 @@ void BeadRaster::widen_rows() {
 void BeadRaster::collect(std::uint32_t band_rows) {
   alignas(64) std::uint32_t carry[kBeadBandRows] = {}, changed[kBeadBandRows];
   std::uint32_t count[kBeadBandRows] = {};
-  std::size_t most = 0;
+  std::size_t longest = 0;
   for (std::uint32_t w = 0, ends = 0; w < touched_.size(); ++w) {
     if (touched_[w] == 0 && ends == 0) continue;
     ends = std::exchange(touched_[w], std::uint8_t{0});
-    if (most + kBeadWordBits > row_capacity_) widen_rows();
+    if (longest + kBeadWordBits > row_capacity_) widen_rows();
     std::uint64_t rows = kernels_->changes(words_.data() + std::size_t{w} * kBeadBandRows, carry, changed);
     for (; rows != 0; rows &= rows - 1) {
       const auto r = static_cast<std::uint32_t>(std::countr_zero(rows));
@@ -149,7 +201,7 @@ void BeadRaster::collect(std::uint32_t band_rows) {
       for (std::uint32_t bits = changed[r]; bits != 0; bits &= bits - 1)
         *next++ = w * kBeadWordBits + static_cast<std::uint32_t>(std::countr_zero(bits));
       count[r] = static_cast<std::uint32_t>(next - (row_change_.data() + r * row_capacity_));
-      most = std::max<std::size_t>(most, count[r]);
+      longest = std::max<std::size_t>(longest, count[r]);
     }
   }
   band_.row_offset.assign(1, 0);

@@ -5,6 +5,7 @@
 // says so, unless a whole number is so near that rounding might pass it: then integers decide.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -44,8 +45,11 @@ class BeadRaster {
     return bytes_held(beads_) + bytes_held(by_band_) + bytes_held(reaching_) + bytes_held(band_begin_) + bytes_held(words_) +
            bytes_held(touched_) + bytes_held(row_change_) + bytes_held(band_.row_offset) + bytes_held(band_.change);
   }
-  /// Bytes of the bits of a band.
-  static std::uint64_t band_bytes(const PixelGrid& grid) { return (std::uint64_t{grid.columns()} / kBeadWordBits + 3) * 257; }
+  /// Bytes of a band: its bits, and runs of rows with so many changes.
+  static std::uint64_t band_bytes(const PixelGrid& grid, std::uint64_t changes_of_row) {
+    return (std::uint64_t{grid.columns()} / kBeadWordBits + 2) * (4 * kBeadBandRows + 1) +
+           8 * kBeadBandRows * (changes_of_row + 256);
+  }
 
  private:
   struct DepositedParts {
@@ -55,11 +59,15 @@ class BeadRaster {
     BeadEnds ends;
   };
   void cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t band_rows);
+  bool cover_line(const BeadShape& shape, std::array<std::uint32_t, 2>& rows, std::uint64_t& undecided);
+  void cover_rows(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row, std::uint32_t first,
+                  std::uint32_t last);
   void decide(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t row, std::uint32_t in_band);
   void collect(std::uint32_t band_rows);
   void widen_rows();
 
   PixelGrid grid_;
+  double rows_per_nm_;
   const BeadKernels* kernels_;
   Buffer<DepositedParts> beads_;
   Buffer<std::uint32_t> by_band_, band_begin_;  // beads by the band of their first row; where each band's end

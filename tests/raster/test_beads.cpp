@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <random>
+#include <string>
 
 #include "stages/geometry/combine.h"
 #include "stages/raster/beads.h"
@@ -33,6 +36,8 @@ std::vector<bool> bits_of(const RunsView& runs) {
   return bits;
 }
 
+constexpr std::array kSets{Isa::kPlain, Isa::kAvx2, Isa::kAvx512};  // what a processor lacks becomes what it has
+
 TEST(BeadRaster, SetsThePixelsWhoseCentresLieInABeadAndNoOthers) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 150; ++round) {
@@ -46,7 +51,7 @@ TEST(BeadRaster, SetsThePixelsWhoseCentresLieInABeadAndNoOthers) {
     };
     const int beads = round % 5 + 1;
     std::vector<std::tuple<Point2, Point2, Nm, BeadEnds>> list;
-    BeadRaster raster(grid);
+    BeadRaster raster(grid, kSets[static_cast<std::size_t>(round) % kSets.size()]);
     for (int i = 0; i < beads; ++i) {
       const Point2 a{position(5'000'000), position(4'000'000)};
       Point2 b{position(5'000'000), position(4'000'000)};
@@ -71,6 +76,58 @@ TEST(BeadRaster, SetsThePixelsWhoseCentresLieInABeadAndNoOthers) {
         }
         ASSERT_EQ(bits[std::size_t{r} * grid.columns() + c], expected) << round << " row " << r << " column " << c;
       }
+    }
+  }
+}
+
+/// Lines over many bands at any slope, among them flat, upright and slightly tilted ones, and short walls; where runs begin and
+/// end is decided by the widest integers.
+TEST(BeadRaster, LongLinesBeginAndEndWhereIntegersDecideOnEveryInstructionSet) {
+  std::mt19937_64 random(11);
+  const auto any = [&](std::int64_t low, std::int64_t high) {
+    return std::uniform_int_distribution<std::int64_t>(low, high)(random);
+  };
+  for (int round = 0; round < 40; ++round) {
+    const std::int64_t dpi = round % 2 == 0 ? 1200 : 254;
+    const PixelGrid grid{PixelAxis(dpi, 40'000'000), PixelAxis(round % 3 == 0 ? 600 : dpi, 40'000'000)};
+    std::vector<std::tuple<Point2, Point2, Nm, BeadEnds>> list;
+    for (int i = 0; i < 12; ++i) {
+      const Point2 a{static_cast<Nm>(any(-1'000'000, 41'000'000)), static_cast<Nm>(any(-1'000'000, 41'000'000))};
+      const std::int64_t far = i % 3 == 0 ? 500'000 : 40'000'000;
+      Point2 b{static_cast<Nm>(a.x + any(-far, far)), static_cast<Nm>(a.y + any(-far, far))};
+      if (i % 4 == 1) b.x = static_cast<Nm>(a.x + any(-2, 2));
+      if (i % 4 == 2) b.y = static_cast<Nm>(a.y + any(-2, 2));
+      list.emplace_back(a, b, static_cast<Nm>(any(20'000, 1'500'000)), round % 5 == 0 ? BeadEnds::kSquare : BeadEnds::kRound);
+    }
+    Runs plain;
+    for (const Isa isa : kSets) {
+      BeadRaster raster(grid, isa);
+      for (const auto& [a, b, width, ends] : list) raster.add(a, b, width, ends);
+      Runs runs;
+      raster.runs(runs);
+      if (isa == Isa::kPlain) plain = runs;
+      ASSERT_EQ(runs.row_offset, plain.row_offset) << round;
+      ASSERT_EQ(runs.change, plain.change) << round;
+    }
+    const auto covered = [&](std::int64_t column, std::int64_t y) {
+      return std::ranges::any_of(list, [&](const auto& bead) {
+        const auto& [a, b, width, ends] = bead;
+        return covers(a, b, width, ends, grid.x.centre(column), y);
+      });
+    };
+    for (std::uint32_t r = 0; r < grid.rows(); ++r) {
+      const std::int64_t y = grid.y.centre(grid.rows() - 1 - r);
+      bool set = false;
+      for (const std::uint32_t column : plain.view().row(r)) {
+        set = !set;
+        const std::string where = std::to_string(round) + " row " + std::to_string(r) + " column " + std::to_string(column);
+        ASSERT_TRUE(column == grid.columns() || covered(column, y) == set) << where;
+        ASSERT_TRUE(column == 0 || covered(column - 1, y) == !set) << where;
+      }
+      const auto column = static_cast<std::uint32_t>(any(0, grid.columns() - 1));  // between changes
+      const auto row = plain.view().row(r);
+      const auto changes = std::ranges::upper_bound(row, column) - row.begin();
+      ASSERT_EQ(covered(column, y), changes % 2 != 0) << round << " row " << r << " column " << column;
     }
   }
 }

@@ -1,6 +1,7 @@
 #include "stages/raster/kernels/bead_rows.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -40,7 +41,7 @@ LAMINA_BODY void root(Doubles& x) {
 }
 
 /// The first columns at or beyond left and beyond right, within the image.
-/// nearest  becomes the least of rows.near
+/// nearest  becomes the lowest of rows.near
 template <class Doubles, class Integers>
 LAMINA_BODY void whole_columns(const BeadShape& bead, const Doubles& left, const Doubles& right, std::uint32_t first,
                                BeadRows& rows, Doubles& nearest) {
@@ -101,9 +102,9 @@ LAMINA_BODY bool columns_body(const BeadShape& bead, std::uint32_t first, std::u
     }
     whole_columns<Doubles, typename Vectors::Integers>(bead, left, right, r, rows, nearest);
   }
-  double least = 1;
-  for (std::uint32_t k = 0; k < kLanes; ++k) least = std::min(least, nearest[k]);
-  return least < bead.doubt;
+  double lowest = 1;
+  for (std::uint32_t k = 0; k < kLanes; ++k) lowest = std::min(lowest, nearest[k]);
+  return lowest < bead.tolerance;
 }
 
 bool columns_plain(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows) {
@@ -177,6 +178,50 @@ LAMINA_AVX2 void set_avx2(const BeadRows& rows, std::uint32_t first, std::uint32
   }
 }
 
+/// Words from which on and up to which the bits of some rows of a line are.
+LAMINA_BODY std::array<std::uint32_t, 2> words_of(const BeadLine& line, std::uint32_t first, std::uint32_t last) {
+  const std::uint32_t up = first * line.step, down = last * line.step;
+  const std::uint32_t low = std::min(line.from + up, line.from + down) >> kBeadLineBits;
+  const std::uint32_t high = std::max(line.to + up, line.to + down) >> kBeadLineBits;
+  return {low / kBeadWordBits, high / kBeadWordBits};
+}
+
+LAMINA_AVX2 std::uint64_t line_avx2(const BeadLine& line, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
+                                    std::uint8_t* touched) {
+  constexpr std::uint32_t kRows = 8;
+  const __m256i all = _mm256_set1_epi32(-1), none = _mm256_setzero_si256();
+  const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
+                tolerance = _mm256_set1_epi32(static_cast<int>(line.tolerance));
+  const __m256i count = _mm256_set1_epi32(static_cast<int>(last - first));
+  std::uint64_t undecided = 0;
+  for (std::uint32_t r = first / kRows * kRows; r < last; r += kRows) {
+    const __m256i row = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(r - first)));  // of the line
+    const __m256i by = _mm256_mullo_epi32(row, _mm256_set1_epi32(static_cast<int>(line.step)));
+    const __m256i from = _mm256_add_epi32(by, _mm256_set1_epi32(static_cast<int>(line.from)));
+    const __m256i to = _mm256_add_epi32(by, _mm256_set1_epi32(static_cast<int>(line.to)));
+    const __m256i near =
+        _mm256_min_epu32(_mm256_slli_epi32(from, 32 - kBeadLineBits), _mm256_slli_epi32(to, 32 - kBeadLineBits));
+    const __m256i sure = _mm256_cmpeq_epi32(_mm256_max_epu32(near, tolerance), near);
+    const __m256i within = _mm256_andnot_si256(_mm256_cmpgt_epi32(none, row), _mm256_cmpgt_epi32(count, row));
+    const __m256i unsure = _mm256_andnot_si256(sure, within), kept = _mm256_and_si256(sure, within);
+    undecided |= std::uint64_t{static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(unsure)))} << r;
+    const auto [low, high] = words_of(line, std::max(r, first) - first, std::min(r + kRows, last) - 1 - first);
+    const __m256i before = _mm256_set1_epi32(static_cast<int>(low * kBeadWordBits)), step = _mm256_set1_epi32(kBeadWordBits);
+    __m256i begin = _mm256_sub_epi32(_mm256_srli_epi32(from, kBeadLineBits), before);
+    __m256i end = _mm256_sub_epi32(_mm256_srli_epi32(to, kBeadLineBits), before);
+    for (std::uint32_t w = line.first_word + low; w <= line.first_word + high; ++w) {
+      const __m256i from_begin = _mm256_sllv_epi32(kept, _mm256_max_epi32(begin, none));
+      const __m256i from_end = _mm256_sllv_epi32(all, _mm256_max_epi32(end, none));
+      auto* const at = reinterpret_cast<__m256i*>(words + std::size_t{w} * kBeadBandRows + r);
+      _mm256_storeu_si256(at, _mm256_or_si256(_mm256_loadu_si256(at), _mm256_andnot_si256(from_end, from_begin)));
+      touched[w] = 1;
+      begin = _mm256_sub_epi32(begin, step);
+      end = _mm256_sub_epi32(end, step);
+    }
+  }
+  return undecided;
+}
+
 LAMINA_AVX2 std::uint64_t changes_avx2(std::uint32_t* words, std::uint32_t* carry, std::uint32_t* changed) {
   std::uint64_t rows = 0;
   for (std::uint32_t r = 0; r < kBeadBandRows; r += 8) {
@@ -228,6 +273,46 @@ LAMINA_AVX512 void set_avx512(const BeadRows& rows, std::uint32_t first, std::ui
   }
 }
 
+LAMINA_AVX512 std::uint64_t line_avx512(const BeadLine& line, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
+                                        std::uint8_t* touched) {
+  constexpr std::uint32_t kRows = 16;
+  const __m512i none = _mm512_setzero_si512(), step = _mm512_set1_epi32(kBeadWordBits), all = _mm512_set1_epi32(-1);
+  const __m512i tolerance = _mm512_set1_epi32(static_cast<int>(line.tolerance));
+  std::uint32_t r = first / kRows * kRows;
+  const __m512i row = _mm512_add_epi32(_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
+                                       _mm512_set1_epi32(static_cast<int>(r - first)));  // of the line
+  const __m512i by = _mm512_mullo_epi32(row, _mm512_set1_epi32(static_cast<int>(line.step)));
+  const __m512i further = _mm512_set1_epi32(static_cast<int>(kRows * line.step));
+  __m512i from = _mm512_add_epi32(by, _mm512_set1_epi32(static_cast<int>(line.from)));
+  __m512i to = _mm512_add_epi32(by, _mm512_set1_epi32(static_cast<int>(line.to)));
+  std::uint64_t undecided = 0;
+  for (; r < last; r += kRows) {
+    std::uint32_t lanes = r < first ? 0xFFFFu << (first - r) & 0xFFFFu : 0xFFFFu;
+    if (r + kRows > last) lanes &= 0xFFFFu >> (r + kRows - last);
+    const __m512i near =
+        _mm512_min_epu32(_mm512_slli_epi32(from, 32 - kBeadLineBits), _mm512_slli_epi32(to, 32 - kBeadLineBits));
+    const std::uint32_t unsure = _mm512_cmplt_epu32_mask(near, tolerance) & lanes;
+    undecided |= std::uint64_t{unsure} << r;
+    const auto kept = static_cast<__mmask16>(lanes & ~unsure);
+    const auto [low, high] = words_of(line, std::max(r, first) - first, std::min(r + kRows, last) - 1 - first);
+    const __m512i before = _mm512_set1_epi32(static_cast<int>(low * kBeadWordBits));
+    __m512i begin = _mm512_sub_epi32(_mm512_srli_epi32(from, kBeadLineBits), before);
+    __m512i end = _mm512_sub_epi32(_mm512_srli_epi32(to, kBeadLineBits), before);
+    from = _mm512_add_epi32(from, further);
+    to = _mm512_add_epi32(to, further);
+    for (std::uint32_t w = line.first_word + low; w <= line.first_word + high; ++w) {
+      const __m512i from_begin = _mm512_maskz_sllv_epi32(kept, all, _mm512_max_epi32(begin, none));
+      const __m512i from_end = _mm512_sllv_epi32(all, _mm512_max_epi32(end, none));
+      std::uint32_t* const at = words + std::size_t{w} * kBeadBandRows + r;
+      _mm512_storeu_si512(at, _mm512_or_si512(_mm512_loadu_si512(at), _mm512_andnot_si512(from_end, from_begin)));
+      touched[w] = 1;
+      begin = _mm512_sub_epi32(begin, step);
+      end = _mm512_sub_epi32(end, step);
+    }
+  }
+  return undecided;
+}
+
 LAMINA_AVX512 std::uint64_t changes_avx512(std::uint32_t* words, std::uint32_t* carry, std::uint32_t* changed) {
   std::uint64_t rows = 0;
   for (std::uint32_t r = 0; r < kBeadBandRows; r += 16) {
@@ -247,10 +332,10 @@ LAMINA_AVX512_END
 }  // namespace
 
 const BeadKernels& bead_kernels_for([[maybe_unused]] Isa isa) {
-  static constexpr BeadKernels kPlain{columns_plain, set_plain, changes_plain};
+  static constexpr BeadKernels kPlain{columns_plain, set_plain, nullptr, changes_plain};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr BeadKernels kAvx2{columns_avx2, set_avx2, changes_avx2};
-  static constexpr BeadKernels kAvx512{columns_avx512, set_avx512, changes_avx512};
+  static constexpr BeadKernels kAvx2{columns_avx2, set_avx2, line_avx2, changes_avx2};
+  static constexpr BeadKernels kAvx512{columns_avx512, set_avx512, line_avx512, changes_avx512};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif

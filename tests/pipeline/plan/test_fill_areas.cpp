@@ -223,5 +223,64 @@ TEST_F(FillAreas, WhatFollowsTheCountOfPointsIsWithinIt) {
   EXPECT_LE(work.bytes(), before + *bound);
 }
 
+/// Toolpaths of all areas of a layer.
+void expect_same_paths(const Sections::Work& a, const Sections::Work& b, std::uint32_t layer) {
+  ASSERT_EQ(a.paths.offset, b.paths.offset) << "layer " << layer;
+  ASSERT_EQ(a.paths.kind, b.paths.kind) << "layer " << layer;
+  ASSERT_EQ(a.paths.width, b.paths.width) << "layer " << layer;
+  ASSERT_EQ(a.paths.line, b.paths.line) << "layer " << layer;
+  ASSERT_EQ(a.paths.point, b.paths.point) << "layer " << layer;
+  ASSERT_EQ(a.path_area, b.path_area) << "layer " << layer;
+}
+
+/// Copies of one part, and as many parts of the same file in their positions, which are filled one by one.
+TEST(FillAreas, CopiesAreFilledOnceAsIfEachWereFilled) {
+  for (const infill::Pattern pattern :
+       {infill::Pattern::kNone, infill::Pattern::kRaster, infill::Pattern::kContour, infill::Pattern::kContourRaster,
+        infill::Pattern::kHoneycomb, infill::Pattern::kQuatrefoil}) {
+    Job job;
+    job.dry_run = true;
+    job.layer_mm = 0.7;
+    job.gap_mm = 3.000137;
+    job.parts.resize(1);
+    job.parts[0].path = LAMINA_TEST_DIR "/corpus/dental_crown.stl";
+    job.parts[0].copies = 7;
+    job.fill.all.walls = 2;
+    job.fill.all.pattern = pattern;
+    job.fill.all.width_mm = 0.35;
+    job.fill.all.gap_mm = {0.2};
+    job.fill.all.angle_deg = 17;
+    const Result<Plan> copies = plan_of(job, Product::kContours);
+    ASSERT_TRUE(copies.ok()) << copies.error().message;
+    const PartRequest request = job.parts[0];
+    job.parts.clear();
+    for (const Sections::Area& area : copies->sections->areas()) {
+      PartRequest& part = job.parts.emplace_back(request);
+      part.copies = 1;
+      part.at_mm = {{mm(area.box.lo.x), mm(area.box.lo.y)}};
+    }
+    const Result<Plan> single = plan_of(job, Product::kContours);
+    ASSERT_TRUE(single.ok()) << single.error().message;
+    ASSERT_EQ(single->sections->areas().size(), 7u);
+    Sections::Work once, each;
+    for (std::uint32_t layer = 0; layer < copies->sections->layers().size(); ++layer) {
+      ASSERT_TRUE(copies->sections->contours(layer, once));
+      ASSERT_TRUE(single->sections->contours(layer, each));
+      for (std::uint32_t a = 1; a < 7; ++a) {
+        EXPECT_EQ(once.original[a], 0u);
+        EXPECT_TRUE(once.outlines[a].walls.empty() && once.outlines[a].region.size() == 0);
+        EXPECT_EQ(each.original[a], a);
+      }
+      const auto bound = copies->sections->fill_bytes_bound(layer, once, {});
+      ASSERT_TRUE(bound.ok());
+      EXPECT_LE(*bound, *single->sections->fill_bytes_bound(layer, each, {}));
+      ASSERT_TRUE(copies->sections->fill(layer, once));
+      ASSERT_TRUE(single->sections->fill(layer, each));
+      expect_same_paths(once, each, layer);
+      EXPECT_GE(*bound, bytes_held(once.paths.point) / 2);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lamina::test
