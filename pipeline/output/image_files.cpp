@@ -42,7 +42,8 @@ ManifestHead image_head(const Plan& plan) {
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
-  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = program_extension(*dialect, job.compress_programs);
+  if (const auto* dialect = program::find_dialect(machine.dialect))
+    head.program_extension = program_extension(*dialect, job.compress_programs);
   const std::string profile = pipeline::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
@@ -144,7 +145,10 @@ Status ImageFiles::encode(const LayerImages& images, FileWork& work, LayerRecord
     work.level_encoder->tag(tags);
   }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(head_.geometry ? images.geometry : images.whole, images.levels.data(), work, record, work.file); !status) return status;
+    if (Status status =
+            encode_one(head_.geometry ? images.geometry : images.whole, images.levels.data(), work, record, work.file);
+        !status)
+      return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};

@@ -472,7 +472,8 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
 }
 
 std::span<const Runs> LayerImager::several(const ImageWork& work) const {
-  const bool drops = plan_.images->dose.max_drops() > 1 && !plan_.images->geometry && formats::find_level_format(plan_.job.format) == nullptr;
+  const bool drops =
+      plan_.images->dose.max_drops() > 1 && !plan_.images->geometry && formats::find_level_format(plan_.job.format) == nullptr;
   if (!drops) return work.materials.image;
   return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
 }

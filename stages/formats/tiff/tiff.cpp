@@ -407,8 +407,8 @@ class DeflateEncoder : public ImageEncoder {
       for (std::uint32_t row = 0, number = 0; row < rows; ++number) {
         const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, rows - row);
         for (; row < end; ++row) fill(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
-        const auto length = static_cast<tmsize_t>(
-            deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
+        const auto length =
+            static_cast<tmsize_t>(deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
         if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
       }
       return true;
