@@ -166,7 +166,7 @@ struct Job {
   std::uint32_t levels = 0;  // of shares of voxels, 2, 4 or 16; 0: pixels are set or not
   std::string format = "tiff-g4";
   ImageContent image_content = ImageContent::kAuto;  // kAuto: geometry where drops follow from it, the job and the machine
-  std::string title;  // of the job, in tags of its images
+  std::string title;                                 // of the job, in tags of its images
   SliceRequest slice;
   FillRequest fill;
   SegmentRequest segment;

@@ -57,7 +57,7 @@ void for_each_entry(const fs::path& directory, Visit visit) {
 bool is_program_file(std::string_view stem, std::string_view name, const program::Dialect& dialect) {
   if (!name.starts_with(stem)) return false;
   name.remove_prefix(stem.size());
-  if (dialect.compressed && is_compressed(name)) name.remove_suffix(kCompressedEnd.size());
+  if (dialect.compressed() && is_compressed(name)) name.remove_suffix(kCompressedEnd.size());
   return name == dialect.extension;
 }
 

@@ -140,8 +140,8 @@ std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRe
   std::vector<LayerImageFile> files;
   const std::size_t named = head.named_images();
   if (named == 0) {
-    files.push_back(
-        {layer_file_name(record.layer.index, head.extension), {record.bytes, head.geometry ? record.geometry_pixels : record.set_pixels, 0, 0, record.hash}});
+    files.push_back({layer_file_name(record.layer.index, head.extension),
+                     {record.bytes, head.geometry ? record.geometry_pixels : record.set_pixels, 0, 0, record.hash}});
   }
   for (std::size_t m = 0; m < named; ++m) {
     files.push_back({layer_file_name(record.layer.index, head.extension, head.image_name(m)),

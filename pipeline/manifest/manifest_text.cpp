@@ -84,7 +84,7 @@ std::string fault_of_images(const ManifestHead& head) {
   const auto* dialect = program::find_dialect(head.dialect);
   if (dialect == nullptr) return no_such("dialect", head.dialect);
   std::string_view end = head.program_extension;
-  if (dialect->compressed && is_compressed(end)) end.remove_suffix(kCompressedEnd.size());
+  if (dialect->compressed() && is_compressed(end)) end.remove_suffix(kCompressedEnd.size());
   return end == dialect->extension ? "" : no_such("program_extension", head.program_extension);
 }
 

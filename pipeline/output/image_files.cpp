@@ -44,7 +44,8 @@ ManifestHead image_head(const Plan& plan) {
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
-  if (const auto* dialect = program::find_dialect(machine.dialect)) head.program_extension = program_extension(*dialect, job.compress_programs);
+  if (const auto* dialect = program::find_dialect(machine.dialect))
+    head.program_extension = program_extension(*dialect, job.compress_programs);
   const std::string profile = pipeline::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);

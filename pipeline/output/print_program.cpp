@@ -9,7 +9,7 @@
 namespace lamina::pipeline {
 
 std::string program_extension(const program::Dialect& dialect, bool compress) {
-  return fmt::format("{}{}", dialect.extension, compress && dialect.compressed ? kCompressedEnd : "");
+  return fmt::format("{}{}", dialect.extension, compress && dialect.compressed() ? kCompressedEnd : "");
 }
 
 std::string program_file_name(std::uint32_t index, std::string_view extension) {
@@ -107,7 +107,8 @@ Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>&
   if (Status status = flush(); !status) return status;
   const auto taken = work.timer->end();
   if (!taken) return taken.error();
-  record = {0, {}, 0, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
+  record = {0,          {}, 0, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds,
+            taken->spat};
   record.added_sweeps = count->added;
   record.added_microseconds = work.timer->added_microseconds();
   if (!writes) return {};

@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::optional<std::uint64_t> stated_free;
-
 /// Bytes of a line of the manifest, and of a file's last block, about.
 constexpr std::uint64_t kBytesOfLayer = 1024;
 
@@ -78,21 +76,18 @@ std::optional<FreeSpace> free_space(const std::string& output) {
   std::error_code error;
   fs::path folder = fs::absolute(output.empty() ? "." : output, error).lexically_normal();
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-  if (stated_free) return FreeSpace{folder.string(), *stated_free};
   const fs::space_info space = fs::space(folder, error);
   if (error) return std::nullopt;
   return FreeSpace{folder.string(), space.available};
 }
 
-void set_free_space(std::optional<std::uint64_t> bytes) { stated_free = bytes; }
-
 Status check_space(const SpaceNeed& need, const FreeSpace& space, std::uint64_t freed, bool only_warn,
                    std::vector<Warning>& warnings) {
   if (space.bytes + freed >= need.bytes) return {};
-  const std::string text =
-      fmt::format("{}: the job needs about {}, by {} of its layers, and {} are free; free some space, or name another folder "
-                  "with -o",
-                  one_line(space.folder), readable_bytes(need.bytes), need.sampled, readable_bytes(space.bytes + freed));
+  const std::string text = fmt::format(
+      "{}: the job needs about {}, by {} of its layers, and {} are free; free some space, or name another folder "
+      "with -o",
+      one_line(space.folder), readable_bytes(need.bytes), need.sampled, readable_bytes(space.bytes + freed));
   if (!only_warn && space.bytes + freed < need.bytes / 2) return Error{Fault::kOutput, text};
   warnings.push_back({"low-space", text});
   return {};

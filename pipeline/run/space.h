@@ -33,8 +33,6 @@ struct FreeSpace {
 };
 /// Nothing if the system does not say.
 std::optional<FreeSpace> free_space(const std::string& output);
-/// Replaces the system's answer; nothing: the system's. For tests.
-void set_free_space(std::optional<std::uint64_t> bytes);
 
 /// Refuses a job of which not even half of the estimate fits, and warns of one that may not fit.
 /// freed   bytes of files of the same job that are replaced or kept

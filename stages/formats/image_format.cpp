@@ -76,7 +76,9 @@ constexpr Count max_bmp(Count columns, Count rows, Count) { return kFileOverhead
 constexpr Count max_null(Count, Count, Count) { return 0; }
 
 /// A strip in addition to the file, as bits and as deflate (DitherDeflate::bound).
-constexpr Count max_deflate(Count columns, Count rows, Count changes) { return max_strips(columns, rows, changes) * 5 / 4 + 512 * 1024; }
+constexpr Count max_deflate(Count columns, Count rows, Count changes) {
+  return max_strips(columns, rows, changes) * 5 / 4 + 512 * 1024;
+}
 
 constexpr std::array<ImageFormat, 8> kFormats = {{
     {"tiff-g4", ".tif", "TIFF, CCITT Group 4: small and fast, read by every RIP", tiff::make_g4_encoder, max_g4},

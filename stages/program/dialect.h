@@ -74,7 +74,8 @@ struct Dialect {
   /// What it cannot express, apart from the number of nozzles. errors  kUsage
   Status (*check)(const Machine& machine, const HeadGrid& grid) = nullptr;
   MaintenanceRules maintenance = {};
-  bool compressed = false;  // its files are, by default: no controller reads them as they are
+  /// Files with the data of the head alone are for a host, which expands them.
+  bool compressed() const { return !has_motion; }
 };
 
 std::span<const Dialect> dialects();

@@ -56,8 +56,9 @@ Runs dithered_disc(std::uint32_t columns, std::uint32_t rows, double fraction, b
 std::string expanded(std::span<const std::byte> stream, std::size_t bytes) {
   std::string out(bytes + 1, '\0');
   uLongf length = out.size();
-  EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(out.data()), &length, reinterpret_cast<const Bytef*>(stream.data()), stream.size()),
-            Z_OK);
+  EXPECT_EQ(
+      uncompress(reinterpret_cast<Bytef*>(out.data()), &length, reinterpret_cast<const Bytef*>(stream.data()), stream.size()),
+      Z_OK);
   out.resize(length);
   return out;
 }

@@ -24,7 +24,10 @@ TEST(TiffTags, SayOneBitMinIsWhiteTopLeftAndTheResolutionInDpi) {
   const struct {
     const char* id;
     std::uint16_t compression;
-  } cases[] = {{"tiff-g4", COMPRESSION_CCITTFAX4}, {"tiff-deflate", COMPRESSION_ADOBE_DEFLATE}, {"tiff-packbits", COMPRESSION_PACKBITS}, {"tiff-none", COMPRESSION_NONE}};
+  } cases[] = {{"tiff-g4", COMPRESSION_CCITTFAX4},
+               {"tiff-deflate", COMPRESSION_ADOBE_DEFLATE},
+               {"tiff-packbits", COMPRESSION_PACKBITS},
+               {"tiff-none", COMPRESSION_NONE}};
   for (const auto& [id, compression] : cases) {
     SCOPED_TRACE(id);
     const std::string path = folder / "tags.tif";

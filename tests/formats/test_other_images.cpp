@@ -490,7 +490,8 @@ TEST(ImageOrder, AMinusIsASignWhereOtherHeightsHaveNone) {
 TEST(ImageFormats, UnknownOnesNameTheNearest) {
   for (const char* id : {"tif", "TIFF", "tiff-g3"})
     EXPECT_EQ(unknown_format(id),
-              "unknown value '" + std::string(id) + "'; use one of tiff-g4, tiff-deflate, tiff-packbits, tiff-none, tiff-4, tiff-8; did you mean 'tiff-g4'?");
+              "unknown value '" + std::string(id) +
+                  "'; use one of tiff-g4, tiff-deflate, tiff-packbits, tiff-none, tiff-4, tiff-8; did you mean 'tiff-g4'?");
   EXPECT_NE(unknown_format("jpeg").find("tiff-g4, tiff-deflate, tiff-packbits, tiff-none, png, pbm, bmp"), std::string::npos);
 }
 

@@ -1,8 +1,8 @@
 // stages/formats/tiff/dither_deflate.h: deflate of dithered 1-bit images, whose rows repeat every 16 bytes.
 //
-// The blue-noise tile is 128 pixels wide (stages/dose/blue_noise.h), and its rows repeat after 128 rows, out of reach of deflate's
-// window. So the only distance is 16, at which empty areas repeat too, and bytes that differ are literals in a code of each strip.
-// Sources: RFC 1951 (deflate), RFC 1950 (zlib), TIFF 6.0 and its Technical Note 2 (compression 8).
+// The blue-noise tile is 128 pixels wide (stages/dose/blue_noise.h), and its rows repeat after 128 rows, out of reach of
+// deflate's window. So the only distance is 16, at which empty areas repeat too, and bytes that differ are literals in a code
+// of each strip. Sources: RFC 1951 (deflate), RFC 1950 (zlib), TIFF 6.0 and its Technical Note 2 (compression 8).
 #pragma once
 
 #include <array>
