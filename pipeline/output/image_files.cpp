@@ -177,7 +177,7 @@ Status ImageFiles::encode_one(const LayerImages& images, std::size_t number, Fil
   } else {
     if (!images.drops.empty()) {
       const auto drop = static_cast<std::uint32_t>(number % head_.drop_images());
-      runs_of(DropPlane(images.drops[several ? 1 + material : 0], drop), work.plane);
+      runs_of(images.drops[several ? 1 + material : 0], drop, work.plane);
     }
     const Runs& image = !images.drops.empty() ? work.plane : several ? images.material[material] : images.whole;
     status = work.encoder->encode(image, x, y, file);
