@@ -101,8 +101,8 @@ Result<PlannedImages> LayerSource::images(std::uint32_t index) const {
     images.whole = work->runs;  // exact-size copies; the scratch keeps its capacity
     if (several) images.material = work->materials.image;
   } else if (status) {
-    runs_of(DropPlane(drops[0], 0), images.whole);
-    for (std::size_t m = 1; several && m < drops.size(); ++m) runs_of(DropPlane(drops[m], 0), images.material.emplace_back());
+    runs_of(drops[0], 0, images.whole);
+    for (std::size_t m = 1; several && m < drops.size(); ++m) runs_of(drops[m], 0, images.material.emplace_back());
   }
   state_->give_back(std::move(work));
   if (!status) return status.error();

@@ -27,7 +27,7 @@ Reach reach_of(const PixelGrid& grid, std::int64_t x_nm, std::int64_t y_nm);
 
 /// A pixel stays if and only if every pixel within reach of it is set; beyond the image nothing is set. So with a circle
 /// it stays if its centre is farther than the radius from the centre of the nearest pixel that is not set.
-/// cost  O(rows of the reach x changes), nothing is expanded
+/// cost  O(changes x log(rows of the reach)), and some operations for 8 rows of the reach at a time; nothing is expanded
 void erode(const RunsView& image, const Reach& reach, Runs& result);
 
 /// A pixel is set if and only if a pixel within reach of it is: the complement of what erode() leaves of the complement,

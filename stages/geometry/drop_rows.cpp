@@ -19,6 +19,12 @@ struct CoreTask {
   std::uint32_t first, step, threshold;
 };
 
+struct CoreRow {
+  std::uint64_t* words;
+  std::size_t stride;
+  std::uint64_t allowed;
+};
+
 /// Bit i: whether value + i * step is below the threshold.
 LAMINA_BODY std::uint64_t core_word(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
   std::uint64_t bits = 0;
@@ -73,8 +79,9 @@ LAMINA_BODY void for_core_words(const CoreTask& task, Word word_of, Take take) {
 }
 
 template <class Word>
-LAMINA_BODY void set_body(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed, Word word_of) {
-  for_core_words(task, word_of, [&](std::uint64_t word, std::uint64_t bits) { row[word] |= bits & allowed; });
+LAMINA_BODY void set_body(const CoreTask& task, const CoreRow& row, Word word_of) {
+  for_core_words(task, word_of,
+                 [&](std::uint64_t word, std::uint64_t bits) { row.words[word * row.stride] |= bits & row.allowed; });
 }
 template <class Word>
 LAMINA_BODY std::uint64_t count_body(const CoreTask& task, Word word_of) {
@@ -85,7 +92,7 @@ LAMINA_BODY std::uint64_t count_body(const CoreTask& task, Word word_of) {
 }
 
 struct CoreKernels {
-  void (*set)(const CoreTask&, std::uint64_t*, std::uint64_t);
+  void (*set)(const CoreTask&, const CoreRow&);
   std::uint64_t (*count)(const CoreTask&);
   std::uint64_t (*word)(std::uint32_t, std::uint32_t, std::uint32_t);
 };
@@ -93,16 +100,12 @@ struct CoreKernels {
 std::uint64_t word_plain(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
   return core_word(value, step, threshold);
 }
-void set_plain(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed) { set_body(task, row, allowed, word_plain); }
+void set_plain(const CoreTask& task, const CoreRow& row) { set_body(task, row, word_plain); }
 std::uint64_t count_plain(const CoreTask& task) { return count_body(task, word_plain); }
 #if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 void set_avx2(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed) {
-  set_body(task, row, allowed, core_word_avx2);
-}
+LAMINA_AVX2 void set_avx2(const CoreTask& task, const CoreRow& row) { set_body(task, row, core_word_avx2); }
 LAMINA_AVX2 std::uint64_t count_avx2(const CoreTask& task) { return count_body(task, core_word_avx2); }
-LAMINA_AVX512 void set_avx512(const CoreTask& task, std::uint64_t* row, std::uint64_t allowed) {
-  set_body(task, row, allowed, core_word_avx512);
-}
+LAMINA_AVX512 void set_avx512(const CoreTask& task, const CoreRow& row) { set_body(task, row, core_word_avx512); }
 LAMINA_AVX512 std::uint64_t count_avx512(const CoreTask& task) { return count_body(task, core_word_avx512); }
 #endif
 
@@ -120,8 +123,8 @@ const CoreKernels& core_kernels() {
 }  // namespace
 
 void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, std::uint32_t step,
-              std::uint32_t threshold, std::uint64_t allowed) {
-  if (begin < end) core_kernels().set({begin, end, first, step, threshold}, row, allowed);
+              std::uint32_t threshold, std::uint64_t allowed, std::size_t stride) {
+  if (begin < end) core_kernels().set({begin, end, first, step, threshold}, {row, stride, allowed});
 }
 
 std::uint64_t extra_bits(const DropPatterns& patterns, const DropZone& zone, std::uint32_t row, std::uint32_t word) {
@@ -150,25 +153,69 @@ void DropPlane::row(std::uint32_t number, std::span<std::uint64_t> words) const 
   }
 }
 
-void runs_of(const BitRows& image, Runs& result) {
-  const std::uint32_t rows = image.rows();
-  result.columns = image.columns();
-  result.row_offset.assign(1, 0);
-  std::vector<std::uint64_t> words(image.words());
-  std::size_t used = 0;
-  for (std::uint32_t r = 0; r < rows; ++r) {
-    image.row(r, words);
-    const std::size_t maximum = used + image.columns() + 2;
-    if (result.change.size() < maximum) result.change.resize(std::max(2 * result.change.size(), maximum));
-    std::uint32_t* change = result.change.data() + used;
-    std::uint64_t before = 0;
-    for (std::size_t w = 0; w < words.size(); ++w) {
-      for (std::uint64_t turns = words[w] ^ (words[w] << 1 | before); turns != 0; turns &= turns - 1)
-        *change++ = static_cast<std::uint32_t>(64 * w) + static_cast<std::uint32_t>(std::countr_zero(turns));
-      before = words[w] >> 63;
+namespace {
+
+/// A row of runs while it is made; the last run is open.
+struct RowWriter {
+  std::uint32_t* change;
+  std::uint64_t set = 0;  // 1: the last pixel so far
+  std::uint32_t end = 0;  // one past it
+
+  void start(std::uint32_t begin) {
+    if (begin == end) return;
+    *change = end;
+    change += set;
+    set = 0;
+  }
+  void put(std::uint32_t begin, std::uint32_t stop) {
+    start(begin);
+    *change = begin;
+    change += 1 - set;
+    set = 1;
+    end = stop;
+  }
+  /// bits_of(word)  the pixels of a word that are set
+  template <class Bits>
+  void put_bits(std::uint32_t begin, std::uint32_t stop, const Bits& bits_of) {
+    start(begin);
+    const std::uint32_t last = (stop - 1) / 64;
+    for (std::uint32_t word = begin / 64; word <= last; ++word) {
+      const std::uint64_t bits = bits_of(word);
+      const std::uint32_t first = word == begin / 64 ? begin % 64 : 0;
+      std::uint64_t turns = bits ^ bits << 1;
+      turns ^= (((bits << 1) >> first & 1) ^ set) << first;  // the pixel before the first one
+      turns &= ~std::uint64_t{0} << first;
+      if (word == last) turns &= ~std::uint64_t{0} >> (63 - (stop - 1) % 64);
+      for (; turns != 0; turns &= turns - 1) *change++ = 64 * word + static_cast<std::uint32_t>(std::countr_zero(turns));
+      set = bits >> (word == last ? (stop - 1) % 64 : 63) & 1;
     }
-    if (before != 0) *change++ = image.columns();
-    used = static_cast<std::size_t>(change - result.change.data());
+    end = stop;
+  }
+};
+
+}  // namespace
+
+void runs_of(const DropImageView& image, std::uint32_t drop, Runs& result) {
+  const LevelsView& zones = image.zones;
+  result.columns = zones.columns;
+  result.row_offset.assign(1, 0);
+  std::size_t used = 0;
+  for (std::uint32_t row = 0; row < zones.rows(); ++row) {
+    const std::uint32_t first = zones.row_offset[row], last = zones.row_offset[row + 1];
+    if (const std::size_t maximum = used + zones.columns + 2; first < last && result.change.size() < maximum)
+      result.change.resize(std::max({2 * result.change.size(), result.change.capacity(), maximum}));
+    RowWriter writer{result.change.data() + used};
+    for (std::uint32_t i = first; i < last; ++i) {
+      const DropZone& zone = image.patterns->zone[zones.level[i]];
+      const std::uint32_t begin = zones.change[2 * std::size_t{i}], end = zones.change[2 * std::size_t{i} + 1];
+      if (zone.base > drop) {
+        writer.put(begin, end);
+      } else if (zone.base == drop && zone.extra != DropZone::Extra::kNone) {
+        writer.put_bits(begin, end, [&](std::uint32_t word) { return extra_bits(*image.patterns, zone, row, word); });
+      }
+    }
+    if (writer.set != 0) *writer.change++ = writer.end;
+    used = first < last ? static_cast<std::size_t>(writer.change - result.change.data()) : used;
     result.row_offset.push_back(static_cast<std::uint32_t>(used));
   }
   result.change.resize(used);

@@ -1,6 +1,7 @@
 // stages/geometry/drop_rows.h: rows of drop images (data/drop_image.h) as words, and counts of their drops.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -13,24 +14,26 @@
 namespace lamina {
 
 /// Sets the bits [begin, end) of a row that a pattern of 128 has: bit b of the row is bit b % 64 of `odd` or `even`, by b / 64.
-inline void set_pattern(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint64_t even, std::uint64_t odd) {
+/// stride  from a word of the row to the next one
+inline void set_pattern(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint64_t even, std::uint64_t odd,
+                        std::size_t stride = 1) {
   if (begin >= end) return;
   const std::uint64_t first = begin / 64, last = (end - 1) / 64;
   const std::uint64_t head = ~std::uint64_t{0} << (begin % 64), tail = ~std::uint64_t{0} >> (63 - (end - 1) % 64);
   const auto of = [&](std::uint64_t word) { return (word & 1) != 0 ? odd : even; };
   if (first == last) {
-    row[first] |= head & tail & of(first);
+    row[first * stride] |= head & tail & of(first);
     return;
   }
-  row[first] |= head & of(first);
-  for (std::uint64_t word = first + 1; word < last; ++word) row[word] = of(word);
-  row[last] |= tail & of(last);
+  row[first * stride] |= head & of(first);
+  for (std::uint64_t word = first + 1; word < last; ++word) row[word * stride] = of(word);
+  row[last * stride] |= tail & of(last);
 }
 
 /// Sets the bits b of [begin, end) with first + b * step < threshold, modulo 2^32, where `allowed` has bit b % 64.
 /// cost  64 comparisons a word
 void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, std::uint32_t step,
-              std::uint32_t threshold, std::uint64_t allowed);
+              std::uint32_t threshold, std::uint64_t allowed, std::size_t stride = 1);
 
 /// The bits of the 64 pixels from column 64 x word on that get a drop more than the base of their zone.
 std::uint64_t extra_bits(const DropPatterns& patterns, const DropZone& zone, std::uint32_t row, std::uint32_t word);
@@ -48,8 +51,8 @@ class DropPlane final : public BitRows {
   std::uint32_t drop_;
 };
 
-/// All rows as runs. cost  one read of each word, and a few operations a change
-void runs_of(const BitRows& image, Runs& result);
+/// The same as runs. cost  O(runs), and a few operations a change
+void runs_of(const DropImageView& image, std::uint32_t drop, Runs& result);
 
 /// Drops of each pixel as levels. cost  O(pixels that are not whole)
 void levels_of(const DropImageView& image, Levels& result);

@@ -52,8 +52,10 @@ class DropSweep {
     return true;
   }
 
-  LAMINA_BODY void make() {
+  template <class Transpose>
+  LAMINA_BODY void make(Transpose transpose) {
     const std::uint64_t ticks = grid_.steps_per_pixel;
+    mark_residues();
     const std::size_t rows = std::size_t{grid_.words()} * 64 * grid_.drop_bits;
     block_ = std::clamp<std::size_t>(kBlockWords / rows, 2, 64);
     scratch_.rows.resize(rows * block_);
@@ -67,7 +69,7 @@ class DropSweep {
       }
       for (std::uint64_t b = 0; b < block_ && (q + 64 * b) * ticks <= last; ++b) {
         for (std::uint32_t word = 0; word < vectors_.words; ++word) {
-          for (std::uint32_t residue = 0; residue < ticks; ++residue) transpose(word, residue, q, b);
+          for (std::uint32_t residue = 0; residue < ticks; ++residue) put(word, residue, q, b, transpose);
         }
         add_firing((q + 64 * b) * ticks, (q + 64 * b + 64) * ticks);
       }
@@ -141,7 +143,7 @@ class DropSweep {
     const std::uint64_t end_of_block = q + 64 * block_;
     const std::uint64_t allowed = turned(line.allowed, shift);
     const std::size_t bit = nozzle ^ grid_.bit_order, plane = std::size_t{grid_.words()} * 64 * block_;
-    std::uint64_t* const row = scratch_.rows.data() + bit * block_;
+    std::uint64_t* const row = scratch_.rows.data() + bit / 64 * 64 * block_ + bit % 64;
     std::uint32_t& next = scratch_.next[nozzle];
     const auto runs = static_cast<std::uint32_t>(line.change.size() / 2);
     while (next < runs && line.change[2 * std::size_t{next} + 1] + shift + q <= q) ++next;
@@ -155,7 +157,7 @@ class DropSweep {
       for (std::uint32_t b = 0; b < grid_.drop_bits; ++b) {
         const bool low = (drops.low >> b & 1) != 0, high = (drops.high >> b & 1) != 0;
         if (low && high) {
-          set_pattern(row + b * plane, begin, end, allowed, allowed);
+          set_pattern(row + b * plane, begin, end, allowed, allowed, 64);
         } else if (low || high) {
           set_extra(line, zone, shift, begin, end, high ? 0 : kAll, allowed, row + b * plane);
         }
@@ -173,34 +175,52 @@ class DropSweep {
       const bool swapped = (shift & 64) != 0;
       const std::uint64_t low = (swapped ? tile[1] : tile[0]) ^ turn, high = (swapped ? tile[0] : tile[1]) ^ turn;
       const std::uint64_t even = low << by | high >> 1 >> (63 - by), odd = high << by | low >> 1 >> (63 - by);
-      return set_pattern(row, begin, end, even & allowed, odd & allowed);
+      return set_pattern(row, begin, end, even & allowed, odd & allowed, 64);
     }
     const CorePattern& core = line.patterns->core;
     const std::uint32_t first = core.of_row(line.row) - static_cast<std::uint32_t>(shift) * core.column_step;
-    set_core(row, begin, end, first, core.column_step, core.threshold, allowed);
+    set_core(row, begin, end, first, core.column_step, core.threshold, allowed, 64);
   }
 
-  LAMINA_BODY void transpose(std::uint32_t word, std::uint32_t residue, std::uint64_t q, std::uint64_t b) {
-    const std::uint32_t ticks = grid_.steps_per_pixel, of_bit = word % grid_.words();
-    const std::uint64_t* const row = scratch_.rows.data() + std::size_t{word} * 64 * block_ + b;
-    std::uint64_t square[64];
+  /// Which nozzles of a word fire at steps of a residue.
+  void mark_residues() {
+    const std::uint32_t ticks = grid_.steps_per_pixel;
+    if (ticks == 1) return;
+    scratch_.of_residue.assign(std::size_t{grid_.words()} * ticks, 0);
+    for (std::uint32_t i = 0; i < grid_.nozzles; ++i) {
+      const std::uint32_t bit = i ^ grid_.bit_order;
+      scratch_.of_residue[std::size_t{bit} / 64 * ticks + grid_.lag[i] % ticks] |= std::uint64_t{1} << (bit % 64);
+    }
+  }
+
+  /// Writes a word of the vectors of 64 steps of a residue.
+  template <class Transpose>
+  LAMINA_BODY void put(std::uint32_t word, std::uint32_t residue, std::uint64_t q, std::uint64_t b, Transpose transpose) {
+    const std::uint32_t ticks = grid_.steps_per_pixel;
+    const std::uint64_t* const rows = scratch_.rows.data() + (word * block_ + b) * 64;
+    alignas(64) std::uint64_t square[64];
     std::uint64_t any = 0, drops = 0;
-    for (std::uint32_t i = 0; i < 64; ++i) {
-      const std::uint32_t nozzle = (of_bit * 64 + i) ^ grid_.bit_order;
-      const bool here = ticks == 1 || (nozzle < grid_.nozzles && grid_.lag[nozzle] % ticks == residue);
-      square[i] = here ? row[i * block_] : 0;
-      any |= square[i];
+    if (ticks == 1) {
+      for (std::uint32_t i = 0; i < 64; ++i) any |= square[i] = rows[i];
+    } else {
+      const std::uint64_t here = scratch_.of_residue[std::size_t{word % grid_.words()} * ticks + residue];
+      for (std::uint32_t i = 0; i < 64; ++i) any |= square[i] = rows[i] & (0 - (here >> i & 1));
     }
     if (any != 0) {
+      transpose(square);
       for (std::uint32_t i = 0; i < 64; ++i) drops += static_cast<std::uint64_t>(std::popcount(square[i]));
       fired_.drops += drops << (word / grid_.words());
-      transpose_64x64(square);
     }
-    const std::uint64_t step = (q + 64 * b) * ticks + residue;
-    std::uint64_t* out = vectors_.bits.data() + word;
+    const std::uint64_t step = (q + 64 * b) * ticks + residue - vectors_.first_step;  // before the first step: very large
+    const std::size_t stride = std::size_t{ticks} * vectors_.words;
+    std::uint64_t* const out = vectors_.bits.data() + word;
+    if (step < vectors_.steps && vectors_.steps - step > 63 * ticks) {
+      std::uint64_t* at = out + step * vectors_.words;
+      for (std::uint32_t k = 0; k < 64; ++k, at += stride) *at = square[k];  // all 0 where none is set
+      return;
+    }
     for (std::uint64_t k = 0; k < 64; ++k) {
-      const std::uint64_t s = step + k * ticks - vectors_.first_step;  // before the first step: very large
-      if (s < vectors_.steps) out[s * vectors_.words] = any == 0 ? 0 : square[k];
+      if (const std::uint64_t s = step + k * ticks; s < vectors_.steps) out[s * vectors_.words] = square[k];
     }
   }
 
@@ -232,10 +252,10 @@ class DropSweep {
   std::size_t block_ = 1;  // words of a row that are held
 };
 
-void make_plain(DropSweep& sweep) { sweep.make(); }
+void make_plain(DropSweep& sweep) { sweep.make(transpose_64x64); }
 #if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 void make_avx2(DropSweep& sweep) { sweep.make(); }
-LAMINA_AVX512 void make_avx512(DropSweep& sweep) { sweep.make(); }
+LAMINA_AVX2 void make_avx2(DropSweep& sweep) { sweep.make(transpose_64x64); }
+LAMINA_AVX512 void make_avx512(DropSweep& sweep) { sweep.make(transpose_64x64_avx512); }
 #endif
 
 auto make_kernel() {

@@ -21,9 +21,10 @@ struct DropLine {
 };
 
 struct DropScratch {
-  Buffer<std::uint64_t> rows;       // lines of bits of a block of steps, for each bit of the drops
+  Buffer<std::uint64_t> rows;  // lines of bits of a block of steps, for each bit of the drops
+  Buffer<std::uint64_t> of_residue;
   std::vector<std::uint32_t> next;  // run of each nozzle
-  std::uint64_t bytes() const { return bytes_held(rows) + next.capacity() * sizeof(std::uint32_t); }
+  std::uint64_t bytes() const { return bytes_held(rows) + bytes_held(of_residue) + next.capacity() * sizeof(std::uint32_t); }
 };
 
 struct FiredDrops {

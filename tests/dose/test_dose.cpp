@@ -68,6 +68,49 @@ TEST(Erode, IsTheExactEllipticDistanceToTheNearestUnsetPixel) {
   }
 }
 
+// Reaches of many rows, over discs, holes and specks: every pixel by the rows of the reach.
+TEST(Erode, OfFarReachesIsThatOfEachPixel) {
+  const PixelGrid grid{PixelAxis(1, 100'000, 1000), PixelAxis(1, 100'000, 1000)};  // pixels of 1 um
+  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+    Random random(seed);
+    const int columns = 20 + static_cast<int>(random() % 250), rows = 20 + static_cast<int>(random() % 200);
+    Image image(static_cast<std::size_t>(rows), std::vector<int>(static_cast<std::size_t>(columns), random() % 3 != 0 ? 1 : 0));
+    const auto at = [&](int r, int c) -> int& { return image[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)]; };
+    for (unsigned disc = random() % 8; disc > 0; --disc) {
+      const int x = static_cast<int>(random() % 270), y = static_cast<int>(random() % 220),
+                radius = static_cast<int>(random() % 100);
+      const int value = random() % 2 != 0 ? 1 : 0;
+      for (int r = 0; r < rows; ++r) {
+        for (int c = 0; c < columns; ++c) {
+          if ((r - y) * (r - y) + (c - x) * (c - x) < radius * radius) at(r, c) = value;
+        }
+      }
+    }
+    for (unsigned speck = random() % 6; speck > 0; --speck)
+      at(static_cast<int>(random() % unsigned(rows)), static_cast<int>(random() % unsigned(columns))) ^= 1;
+    const std::int64_t x = random() % 60'000, y = random() % 3 == 0 ? random() % 60'000 : x;
+    const Reach reach = reach_of(grid, x, y);
+    if (reach.half_width.empty()) continue;
+    Image expected = image;
+    const int far = static_cast<int>(reach.half_width.size()) - 1;
+    for (int r = 0; r < rows; ++r) {
+      for (int j = -far; j <= far; ++j) {
+        const int width = static_cast<int>(reach.half_width[static_cast<std::size_t>(std::abs(j))]);
+        std::vector<int> set{0};  // pixels before each column
+        for (int c = 0; c < columns; ++c) set.push_back(set.back() + (r + j >= 0 && r + j < rows ? at(r + j, c) : 0));
+        for (int c = 0; c < columns; ++c) {
+          const bool within = c >= width && c + width < columns;
+          if (!within || set[static_cast<std::size_t>(c + width + 1)] - set[static_cast<std::size_t>(c - width)] <= 2 * width)
+            expected[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)] = 0;
+        }
+      }
+    }
+    Runs left;
+    erode(runs_of(image), reach, left);
+    ASSERT_EQ(image_of(left), expected) << "seed " << seed << " " << x << " " << y;
+  }
+}
+
 TEST(Erode, RadiiOfWholePixelsTakeThePixelsAtExactlyThatDistance) {
   const PixelGrid grid{PixelAxis(1, 100'000, 1000), PixelAxis(1, 100'000, 1000)};                    // pixels of 1 um
   EXPECT_EQ(reach_of(grid, 5000, 5000).half_width, (std::vector<std::uint32_t>{5, 4, 4, 4, 3, 0}));  // 3-4-5
@@ -91,7 +134,7 @@ Runs thinned(const RunsView& image, const RunsView& core, double share, std::uin
   make_core(share, layer, patterns);
   const DropImageView drops{zones, &patterns};
   Runs plane, same;
-  runs_of(DropPlane(drops, 0), plane);
+  runs_of(drops, 0, plane);
   levels_of(drops, levels);
   threshold_levels(levels, 1, same);
   EXPECT_EQ(plane.change, same.change);

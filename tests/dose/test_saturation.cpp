@@ -75,11 +75,21 @@ void expect_rows_and_counts(const DropImageView& image, const Levels& levels, st
   for (std::uint32_t drop = 0; drop < maximum; ++drop) {
     Runs plane, found{7, {0, 1}, {3}};
     threshold_levels(levels, static_cast<std::uint8_t>(drop + 1), plane);
-    runs_of(DropPlane(image, drop), found);
+    runs_of(image, drop, found);
     EXPECT_EQ(found.columns, plane.columns);
     EXPECT_EQ(found.row_offset, plane.row_offset);
     EXPECT_EQ(found.change, plane.change);
     EXPECT_EQ(totals.pixels(drop), set_pixels(plane));
+    const DropPlane rows(image, drop);
+    std::vector<std::uint64_t> words(rows.words(), 5), same(rows.words());
+    for (std::uint32_t r = 0; r < rows.rows(); ++r) {
+      std::ranges::fill(same, 0);
+      const auto row = plane.view().row(r);
+      for (std::size_t k = 0; k + 1 < row.size(); k += 2)
+        set_pattern(same.data(), row[k], row[k + 1], ~std::uint64_t{0}, ~std::uint64_t{0});
+      rows.row(r, words);
+      EXPECT_EQ(words, same);
+    }
   }
   for (std::uint32_t row = 0; row < image.zones.rows(); ++row) {
     for (std::size_t i = image.zones.row_offset[row]; i < image.zones.row_offset[row + 1]; ++i) {

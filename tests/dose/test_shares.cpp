@@ -129,7 +129,7 @@ TEST(Shares, BecomeDropsInProportionOrRounded) {
     Levels of_pixels;
     Runs plane;
     levels_of(work.drops[0], of_pixels);
-    runs_of(DropPlane(work.drops[0], 0), plane);
+    runs_of(work.drops[0], 0, plane);
     const std::vector<int> drops = share_pixels(of_pixels.view()), first = share_pixels(plane.view());
     std::uint64_t sum = 0;
     for (std::size_t i = 0; i < levels.size(); ++i) {
@@ -204,7 +204,7 @@ TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
         const std::vector<int> drops = share_pixels(of_pixels.view());
         for (std::uint32_t k = 0; k < 4; ++k) {
           Runs own;
-          runs_of(DropPlane(work.drops[1 + m], k), own);
+          runs_of(work.drops[1 + m], k, own);
           const std::vector<int> plane = share_pixels(own.view());
           for (std::size_t p = 0; p < plane.size(); ++p) EXPECT_EQ(plane[p], drops[p] > static_cast<int>(k) ? 1 : 0);
         }
