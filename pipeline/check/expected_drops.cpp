@@ -73,7 +73,7 @@ void ExpectedDrops::apply(const Layer& layer, std::vector<Runs>& images) const {
   LayerDrops drops;
   make(layer, images, drops);
   std::vector<Runs> planes(drops.planes().size());
-  for (std::size_t i = 0; i < planes.size(); ++i) runs_of(*drops.planes()[i], planes[i]);
+  for (std::uint32_t i = 0; i < planes.size(); ++i) runs_of(drops.work_.drops.front(), i, planes[i]);
   images = std::move(planes);
 }
 

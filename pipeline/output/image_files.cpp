@@ -236,8 +236,10 @@ Status ImageFiles::program(const LayerImages& images, FileWork& work, LayerRecor
   }
   if (images.bits == nullptr)
     return program_->write_layer(record.layer, images.whole, *feeds, work.program, record.program, measures);
-  Runs runs;
-  runs_of(*images.bits, runs);
+  RunsBuilder builder(images.bits->columns());
+  RowRuns rows(*images.bits);
+  for (std::uint32_t r = 0; r < rows.rows(); ++r) builder.add_changes(rows.row(r));
+  const Runs runs = builder.finish();
   return program_->write_layer(record.layer, runs, *feeds, work.program, record.program, measures);
 }
 
