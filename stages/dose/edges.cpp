@@ -273,7 +273,12 @@ Reach reach_of(const PixelGrid& grid, std::int64_t x_nm, std::int64_t y_nm) {
   return reach;
 }
 
-void erode(const RunsView& image, const Reach& reach, Runs& result) { Eroder(image, reach, result).erode(); }
+void erode(const RunsView& image, const Reach& reach, Runs& result) {
+  if (!reach.half_width.empty()) return Eroder(image, reach, result).erode();
+  result.columns = image.columns;
+  result.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
+  result.change.assign(image.change.begin(), image.change.end());
+}
 
 void dilate(const RunsView& image, const Reach& reach, Runs& result) {
   const std::int64_t rows = image.rows(), far = static_cast<std::int64_t>(reach.half_width.size()) - 1;
