@@ -260,7 +260,7 @@ TEST_F(WrongUse, InfoNamesItsOptionsAndFiles) {
 TEST_F(WrongUse, FullDiskLeavesNothingHalfUnderAFinalName) {
   const std::string disk = directory_ / "disk";
   std::filesystem::create_directory(disk);
-  if (::mount("none", disk.c_str(), "tmpfs", 0, "size=7m") != 0) {
+  if (::mount("none", disk.c_str(), "tmpfs", 0, "size=12m") != 0) {
     GTEST_SKIP() << "FULL DISK NOT TESTED: a tmpfs cannot be mounted here (" << std::strerror(errno) << "); run as root";
   }
   // What cannot fit is refused before it starts; what may fit is tried.

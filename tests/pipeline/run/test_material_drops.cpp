@@ -131,7 +131,7 @@ TEST_F(MaterialDrops, AddUpToThoseOfTheJobWithoutMaterials) {
     test::write_text(folder_ / "two.toml", text_of_two_parts(keys, second, at, true));
     test::write_text(folder_ / "one.toml", text_of_two_parts(keys, second, at, false));
     done("jet --job two.toml --quiet -o " + two);
-    done("jet --job one.toml --quiet -o " + one);
+    done("jet --job one.toml --images drops --quiet -o " + one);
     done("verify --quiet " + two);
     const Manifest of_two = manifest(two), of_one = manifest(one);
     const std::uint32_t maximum = of_one.head.max_drops;
