@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -47,6 +48,7 @@ class HeldBound {
   HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level);
   /// Of a layer between two heights, nm in the frame of the mesh, but for its scratch_bytes. cost  O(1)
   LayerBound at(std::int64_t bottom, std::int64_t top) const;
+  std::uint64_t facets_at(std::int64_t bottom, std::int64_t top) const { return at(bottom, top).facets; }
   std::uint64_t bytes() const { return slab_.capacity() * sizeof(Slab); }
 
  private:
@@ -239,7 +241,10 @@ struct Copy {
   Point3 offset;
   bool crowded;             // its box meets too many others to inspect each
   std::vector<Box> others;  // boxes of other copies that its own meets, nm, on the bed
+  std::uint32_t first_band = 0, last_band = 0;  // that it may reach; last included
 };
+
+constexpr std::uint32_t kNoFacet = UINT32_MAX;
 
 /// Boxes that each facet of a copy is compared with.
 constexpr std::size_t kMaxOthers = 64;
@@ -279,12 +284,6 @@ bool is_near_others(const Copy& copy, const Triangle& facet) {
   return std::ranges::any_of(copy.others, [&](const Box& other) { return boxes_meet(box, other); });
 }
 
-/// Facets are in the order of the mesh, and each is read once.
-void fetch(const SlabFacet& facet) {
-  const auto* bytes = reinterpret_cast<const char*>(&facet);
-  for (std::size_t at = 0; at < sizeof facet; at += 64) __builtin_prefetch(bytes + at);
-}
-
 }  // namespace
 
 struct Coverage::State {
@@ -294,14 +293,16 @@ struct Coverage::State {
   Isa isa;
   std::vector<CoveredMesh> meshes;
   std::vector<Copy> copies;
+  std::vector<std::uint32_t> from_back;  // copies by the last band that they reach, the last one first
 
   State(const PixelGrid& pixel_grid, Rule of_rows, Isa widest)
       : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(limited_isa(widest)) {}
 
   std::uint32_t bands() const { return (grid.rows() + kBandRows - 1) / kBandRows; }
   LayerBound held_in(const Layer& layer) const;
-  void gather(const Layer& layer, CoverageScratch& scratch) const;
-  void order_by_band(CoverageScratch& scratch) const;
+  std::uint64_t live_facets(const Layer& layer) const;
+  void order_copies(std::span<const Mesh> of_copies);
+  void gather(const Copy& copy, const Layer& layer, CoverageScratch& scratch, CoverageReport& report) const;
 };
 
 Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
@@ -318,6 +319,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   const auto state = std::make_shared<State>(grid, Rule{rule, levels - 1}, isa);
   for (const Instance& instance : instances) state->copies.push_back({instance.mesh, instance.offset, false, {}});
   find_others(meshes, state->copies);
+  state->order_copies(meshes);
   std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     meshes[i].blocks = blocks[i];
@@ -331,64 +333,88 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   return coverage;
 }
 
-void Coverage::State::gather(const Layer& layer, CoverageScratch& scratch) const {
-  const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
-  scratch.facets.clear();
-  ensure_capacity(scratch.facets, held_in(layer).facets);
-  SlabFacet taken;
-  Cluster slack;
-  for (const Copy& copy : copies) {
-    const CoveredMesh& mesh = meshes[copy.mesh];
-    const Point3 by = copy.offset;
-    const auto moved = [&](const Point3& p) {
-      return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
-    };
-    mesh.index.find(bottom - by.z, top - by.z - 1, [&](std::uint32_t c) {
-      const Cluster& cluster = mesh.blocks->cluster(c, slack);
-      const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
-      for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
-        const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
-        if (std::min({z0, z1, z2}) + by.z >= top || std::max({z0, z1, z2}) + by.z <= bottom) continue;
-        const Triangle t = cluster.triangle(lane);
-        const Triangle on_bed{moved(t.a), moved(t.b), moved(t.c)};
-        const bool suspect = (suspects >> lane & 1) != 0 || is_near_others(copy, on_bed);
-        if (take_facet(on_bed, suspect, bottom, top, y, taken)) scratch.facets.push_back(taken);
-      }
-    });
+void Coverage::State::order_copies(std::span<const Mesh> of_copies) {
+  for (std::uint32_t i = 0; i < copies.size(); ++i) {
+    Copy& copy = copies[i];
+    const Box box = moved(of_copies[copy.mesh].bounds, copy.offset);
+    if (box.empty()) continue;
+    copy.first_band = y.at(static_cast<double>(box.lo.y) - 1) / kBandRows;
+    copy.last_band = y.at(static_cast<double>(box.hi.y) + 1) / kBandRows;
+    from_back.push_back(i);
   }
+  std::ranges::stable_sort(from_back, std::greater(), [&](std::uint32_t i) { return copies[i].last_band; });
 }
 
-void Coverage::State::order_by_band(CoverageScratch& scratch) const {
-  scratch.begins.assign(std::size_t{bands()} + 2, 0);
-  for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row / kBandRows + 2];
-  for (std::size_t r = 1; r < scratch.begins.size(); ++r) scratch.begins[r] += scratch.begins[r - 1];
-  ensure_capacity(scratch.order, scratch.facets.size());
-  scratch.order.resize(scratch.facets.size());
-  for (std::uint32_t i = 0; i < scratch.facets.size(); ++i)
-    scratch.order[scratch.begins[scratch.facets[i].last_row / kBandRows + 1]++] = i;
+/// Takes what of the copy reaches into the layer.
+void Coverage::State::gather(const Copy& copy, const Layer& layer, CoverageScratch& scratch, CoverageReport& report) const {
+  const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
+  const auto end = static_cast<double>(grid.x.length);
+  SlabFacet taken;
+  Cluster slack;
+  const CoveredMesh& mesh = meshes[copy.mesh];
+  const Point3 by = copy.offset;
+  const auto moved = [&](const Point3& p) {
+    return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
+  };
+  const auto take = [&] {
+    std::uint32_t at = 0;
+    if (scratch.unused.empty()) {
+      at = static_cast<std::uint32_t>(scratch.facets.size());
+      scratch.facets.push_back(taken);
+      scratch.next.push_back(kNoFacet);
+    } else {
+      at = scratch.unused.back();
+      scratch.unused.pop_back();
+      scratch.facets[at] = taken;
+    }
+    std::uint32_t& first = scratch.first[taken.last_row / kBandRows];
+    scratch.next[at] = std::exchange(first, at);
+    ++report.facets;
+    report.volume_mm3 += taken.edgewise ? 0 : volume_behind(taken, end);
+  };
+  mesh.index.find(bottom - by.z, top - by.z - 1, [&](std::uint32_t c) {
+    const Cluster& cluster = mesh.blocks->cluster(c, slack);
+    const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
+      const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
+      if (std::min({z0, z1, z2}) + by.z >= top || std::max({z0, z1, z2}) + by.z <= bottom) continue;
+      const Triangle t = cluster.triangle(lane);
+      const Triangle on_bed{moved(t.a), moved(t.b), moved(t.c)};
+      const bool suspect = (suspects >> lane & 1) != 0 || is_near_others(copy, on_bed);
+      if (take_facet(on_bed, suspect, bottom, top, y, taken)) take();
+    }
+  });
 }
 
 CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Levels& out) const {
   const State& state = *state_;
   CoverageReport report;
-  state.gather(layer, scratch);
-  state.order_by_band(scratch);
-  report.facets = static_cast<std::uint32_t>(scratch.facets.size());
   out.start(state.grid.columns());
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
-  const BandSlab slab{state.grid.x,
-                      state.grid.y,
-                      state.x,
-                      state.rule,
-                      {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
-                      bottom,
-                      top,
-                      scratch.facets};
+  BandSlab slab{state.grid.x,
+                state.grid.y,
+                state.x,
+                state.rule,
+                {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
+                bottom,
+                top,
+                {}};
   scratch.maker.start(slab, state.isa, scratch.counts_held);
+  scratch.facets.clear(), scratch.next.clear(), scratch.live.clear(), scratch.unused.clear();
+  const std::uint64_t facets = state.live_facets(layer);
+  ensure_capacity(scratch.facets, facets), ensure_capacity(scratch.next, facets);
+  scratch.first.assign(state.bands(), kNoFacet);
+  std::size_t gathered = 0;
   for (std::uint32_t band = state.bands(); band-- > 0;) {
-    for (std::uint32_t k = scratch.begins[band]; k < scratch.begins[band + 1]; ++k) {
-      if (k + 4 < scratch.order.size()) fetch(scratch.facets[scratch.order[k + 4]]);
-      scratch.maker.enter(scratch.facets[scratch.order[k]], scratch.order[k], state.y);
+    for (; gathered < state.from_back.size(); ++gathered) {
+      const Copy& copy = state.copies[state.from_back[gathered]];
+      if (copy.last_band < band) break;
+      state.gather(copy, layer, scratch, report);
+    }
+    slab.facets = scratch.facets;
+    for (std::uint32_t at = scratch.first[band]; at != kNoFacet; at = scratch.next[at]) {
+      scratch.maker.enter(scratch.facets[at], at, state.y);
+      scratch.live.push_back(at);
     }
     const std::uint32_t first = band * kBandRows, rows = std::min(state.grid.rows() - first, kBandRows);
     if (scratch.maker.is_empty()) {
@@ -396,12 +422,29 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
     } else {
       scratch.maker.make(slab, first, rows, out, report);
     }
+    std::erase_if(scratch.live, [&](std::uint32_t at) {
+      const bool ends = scratch.facets[at].first_row >= first;
+      if (ends) scratch.unused.push_back(at);
+      return ends;
+    });
   }
-  const auto end = static_cast<double>(state.grid.x.length);
-  for (const SlabFacet& facet : scratch.facets) report.volume_mm3 += facet.edgewise ? 0 : volume_behind(facet, end);
   report.volume_mm3 *= 1e-18;
   report.scratch_bytes = scratch.bytes();
   return report;
+}
+
+/// The facets of copies that reach one band, at most.
+std::uint64_t Coverage::State::live_facets(const Layer& layer) const {
+  std::vector<std::int64_t> change(std::size_t{bands()} + 1);
+  for (const std::uint32_t i : from_back) {
+    const Copy& copy = copies[i];
+    const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
+    const auto facets = static_cast<std::int64_t>(meshes[copy.mesh].held.facets_at(bottom, bottom + layer.thickness));
+    change[copy.first_band] += facets, change[copy.last_band + 1] -= facets;
+  }
+  std::int64_t facets = 0, maximum = 0;
+  for (const std::int64_t by : change) maximum = std::max(maximum, facets += by);
+  return static_cast<std::uint64_t>(maximum);
 }
 
 LayerBound Coverage::State::held_in(const Layer& layer) const {
@@ -420,9 +463,10 @@ LayerBound Coverage::bound(const Layer& layer) const {
   LayerBound bound = state.held_in(layer);
   const std::uint64_t columns = state.grid.columns(), voxels = columns * state.grid.rows();
   // Samples of a row come on top where facets meet.
-  bound.scratch_bytes = (bound.facets + bound.facets / 8) * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
-                        sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2) +
-                        BandMaker::bytes_of(bound.facets, state.grid.columns());
+  const std::uint64_t facets = state.live_facets(layer);
+  bound.scratch_bytes = (facets + facets / 8) * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
+                        4 * facets * sizeof(std::uint32_t) + sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2) +
+                        BandMaker::bytes_of(facets, state.grid.columns());
   bound.voxels = std::min(bound.voxels, voxels);
   bound.runs = std::min(bound.runs, voxels);
   return bound;

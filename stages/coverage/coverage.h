@@ -36,12 +36,15 @@ namespace lamina::coverage {
 
 /// Any layer may follow any other in it.
 struct CoverageScratch {
-  Buffer<SlabFacet> facets;             // that reach into the layer
-  Buffer<std::uint32_t> begins, order;  // facets by the band of the last row they reach: where a band's begin; indices
+  Buffer<SlabFacet> facets;           // of copies that reach the band at work, and what is left over of those before
+  Buffer<std::uint32_t> first, next;  // facets by the band of the last row they reach: the first of each band; that behind each
+  Buffer<std::uint32_t> live, unused;  // facets that entered and reach further bands; positions that others may take
   BandMaker maker;
   bool counts_held = false;  // whether layers report held_voxels, which makes them slower
 
-  std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + maker.bytes(); }
+  std::uint64_t bytes() const {
+    return bytes_held(facets) + bytes_held(first) + bytes_held(next) + bytes_held(live) + bytes_held(unused) + maker.bytes();
+  }
 };
 
 // ---

@@ -166,5 +166,27 @@ TEST(LayerBound, HoldsForRealPartsAndIsNear) {
             << sums.reported_runs / sums.runs << ", scratch " << sums.reported_bytes / sums.bytes << '\n';
 }
 
+TEST(LayerBound, ManyCopiesHoldTheFacetsOfThoseThatOneBandMeets) {
+  Triangles part;
+  add_tetrahedron(part, {0, 0, 0}, {900'000, 0, 0}, {0, 900'000, 0}, {0, 0, 500'000});
+  Mesh mesh = make_mesh(part);
+  std::vector<Instance> row, column;
+  for (Nm i = 0; i < 50; ++i) {
+    row.push_back({0, {i * 1'000'000, 500'000, 0}});
+    column.push_back({0, {500'000, i * 1'000'000, 0}});
+  }
+  const PixelGrid grid{{300, 51'000'000}, {300, 51'000'000}};
+  const Layer layer{0, 0, 100'000};
+  const auto of_row = coverage::Coverage::build({&mesh, 1}, row, grid, FillRule::kNonzero, 4);
+  const auto of_column = coverage::Coverage::build({&mesh, 1}, column, grid, FillRule::kNonzero, 4);
+  ASSERT_TRUE(of_row.ok() && of_column.ok());
+  coverage::CoverageScratch scratch;
+  Levels image;
+  EXPECT_EQ(of_column->layer(layer, scratch, image).facets, 200u);
+  EXPECT_LE(scratch.facets.size(), 16u);
+  EXPECT_LT(of_column->bound(layer).scratch_bytes + 150 * sizeof(coverage::SlabFacet), of_row->bound(layer).scratch_bytes);
+  EXPECT_LE(scratch.bytes(), of_column->bound(layer).scratch_bytes);
+}
+
 }  // namespace
 }  // namespace lamina::test

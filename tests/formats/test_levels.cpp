@@ -1,9 +1,11 @@
 // Formats that carry levels: round trips, bytes that do not change, values that no level has.
 #include <gtest/gtest.h>
+#include <tiffio.h>
 #include <unistd.h>
 
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <random>
 #include <string>
 #include <vector>
@@ -128,6 +130,47 @@ TEST_P(LevelFiles, AreTheBytesThatTheyAlwaysWere) {
       std::string(LAMINA_TEST_DIR) + "/golden/write/small." + std::string(format().id) + std::string(format().extension);
   if (std::getenv("LAMINA_WRITE_GOLDEN") != nullptr) testing::save(golden, file);
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(file.data()), file.size()), testing::load(golden));
+}
+
+/// Bytes of a row of 8 bits over all its pixels, packed by libtiff.
+std::string packed_by_libtiff(const Levels& image, unsigned step, const std::string& path) {
+  const std::uint32_t rows = image.view().rows();
+  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, image.columns);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, rows);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 8);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_PACKBITS);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+  std::vector<std::uint8_t> all(std::size_t{image.columns} * rows);
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
+      std::fill(all.begin() + r * image.columns + image.change[2 * i], all.begin() + r * image.columns + image.change[2 * i + 1],
+                static_cast<std::uint8_t>(image.level[i] * step));
+    }
+  }
+  EXPECT_GT(TIFFWriteEncodedStrip(tiff, 0, all.data(), static_cast<tmsize_t>(all.size())), 0);
+  TIFFClose(tiff);
+  return testing::load(path);
+}
+
+TEST(GreyTiffs, HaveTheStripsThatLibtiffMakesOfWholeRows) {
+  const auto encoder = find_level_format("tiff-8")->make_encoder();
+  const std::string path = ::testing::TempDir() + "lamina_packed_" + std::to_string(::getpid());
+  Bytes file;
+  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+    const std::uint32_t longest[] = {2, 3, 5, 130, 300};
+    const Levels image = random_levels(seed, 1 + 97 * seed, 5, 15, longest[seed % 5]);
+    ASSERT_TRUE(encoder->encode(image, 15, 600, 600, file).ok());
+    const std::string other = packed_by_libtiff(image, 17, path);
+    // Both put the only strip behind the header of 8 bytes, and the directory behind the strip.
+    std::uint32_t end = 0;
+    std::memcpy(&end, other.data() + 4, sizeof end);
+    ASSERT_LE(end, file.size());
+    EXPECT_EQ(std::string(reinterpret_cast<const char*>(file.data()) + 8, end - 8), other.substr(8, end - 8)) << seed;
+  }
+  ::unlink(path.c_str());
 }
 
 INSTANTIATE_TEST_SUITE_P(All, LevelFiles, ::testing::Values("tiff-4", "tiff-8", "png-8"));
