@@ -53,13 +53,19 @@ TEST(ExactLevels, NeedTheFacetsNearAVoxelAlone) {
       const int scale = 1000 / step;
       return Point3{at(0, 8 * scale) * step, at(0, 8 * scale) * step, at(-2 * scale, 3 * scale) * step};
     };
+    const Point3 a = anywhere(), b = anywhere(), c = anywhere(), d = anywhere();
+    const auto cross = [&](std::int64_t u, std::int64_t v, std::int64_t w, std::int64_t x) { return u * x - v * w; };
+    const std::int64_t ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z, vx = c.x - a.x, vy = c.y - a.y, vz = c.z - a.z;
+    const std::int64_t volume =
+        (d.x - a.x) * cross(uy, uz, vy, vz) + (d.y - a.y) * cross(uz, ux, vz, vx) + (d.z - a.z) * cross(ux, uy, vx, vy);
+    if (volume == 0) continue;
     Triangles all;
-    add_tetrahedron(all, anywhere(), anywhere(), anywhere(), anywhere());
-    if (make_mesh(all).volume_mm3 < 0) all = reversed(all);
+    add_tetrahedron(all, a, b, c, d);
+    if (volume < 0) all = reversed(all);
     ++solids;
     EXPECT_EQ(differing_voxels(all, turn % 2 == 0 ? 4 : 16, random), 0) << "solid " << turn;
   }
-  EXPECT_EQ(solids, 400);
+  EXPECT_GT(solids, 300);
 }
 
 TEST(ExactLevels, DecideTiesOfOnePlaneByWhatIsOnItsSides) {
