@@ -30,13 +30,14 @@ int differing_voxels(const Triangles& all, std::uint32_t levels, std::mt19937& r
       for (const coverage::SlabFacet& facet : facets) {
         Box box;
         for (const Point3* p : {&facet.facet.a, &facet.facet.b, &facet.facet.c}) box.add(*p);
-        if (box.lo.x <= voxel.x1 && box.hi.x >= voxel.x0 && box.lo.y <= voxel.y1 && box.hi.y >= voxel.y0 && box.lo.z < voxel.z1 &&
-            box.hi.z > voxel.z0)
+        if (box.lo.x <= voxel.x1 && box.hi.x >= voxel.x0 && box.lo.y <= voxel.y1 && box.hi.y >= voxel.y0 &&
+            box.lo.z < voxel.z1 && box.hi.z > voxel.z0)
           near_facets.push_back(&facet);
       }
       const double off = (static_cast<double>(random() % 2001) - 1000) * 1e-5;
       const coverage::NearShare near_share{facts[at].share.get_d() + off, 0.01, levels - 1};
-      if (coverage::exact_level(voxel, near_facets, near_share) != oracle_level(facts[at], FillRule::kNonzero, levels)) ++differing;
+      if (coverage::exact_level(voxel, near_facets, near_share) != oracle_level(facts[at], FillRule::kNonzero, levels))
+        ++differing;
     }
   }
   return differing;
@@ -71,7 +72,8 @@ TEST(ExactLevels, NeedTheFacetsNearAVoxelAlone) {
 TEST(ExactLevels, DecideTiesOfOnePlaneByWhatIsOnItsSides) {
   std::mt19937 random(3);
   for (const Nm top : {500, 499, 501, 1, 999, 250}) {
-    for (const std::uint32_t levels : {2u, 4u, 16u}) EXPECT_EQ(differing_voxels(box({100, 200, -50}, {7700, 7600, top}), levels, random), 0) << top;
+    for (const std::uint32_t levels : {2u, 4u, 16u})
+      EXPECT_EQ(differing_voxels(box({100, 200, -50}, {7700, 7600, top}), levels, random), 0) << top;
   }
 }
 
