@@ -239,8 +239,8 @@ struct CoveredMesh {
 struct Copy {
   std::uint32_t mesh;
   Point3 offset;
-  bool crowded;             // its box meets too many others to inspect each
-  std::vector<Box> others;  // boxes of other copies that its own meets, nm, on the bed
+  bool crowded;                                 // its box meets too many others to inspect each
+  std::vector<Box> others;                      // boxes of other copies that its own meets, nm, on the bed
   std::uint32_t first_band = 0, last_band = 0;  // that it may reach; last included
 };
 

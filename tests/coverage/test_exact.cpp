@@ -30,13 +30,14 @@ int differing_voxels(const Triangles& all, std::uint32_t levels, std::mt19937& r
       for (const coverage::SlabFacet& facet : facets) {
         Box box;
         for (const Point3* p : {&facet.facet.a, &facet.facet.b, &facet.facet.c}) box.add(*p);
-        if (box.lo.x <= voxel.x1 && box.hi.x >= voxel.x0 && box.lo.y <= voxel.y1 && box.hi.y >= voxel.y0 && box.lo.z < voxel.z1 &&
-            box.hi.z > voxel.z0)
+        if (box.lo.x <= voxel.x1 && box.hi.x >= voxel.x0 && box.lo.y <= voxel.y1 && box.hi.y >= voxel.y0 &&
+            box.lo.z < voxel.z1 && box.hi.z > voxel.z0)
           near_facets.push_back(&facet);
       }
       const double off = (static_cast<double>(random() % 2001) - 1000) * 1e-5;
       const coverage::NearShare near_share{facts[at].share.get_d() + off, 0.01, levels - 1};
-      if (coverage::exact_level(voxel, near_facets, near_share) != oracle_level(facts[at], FillRule::kNonzero, levels)) ++differing;
+      if (coverage::exact_level(voxel, near_facets, near_share) != oracle_level(facts[at], FillRule::kNonzero, levels))
+        ++differing;
     }
   }
   return differing;
@@ -53,19 +54,26 @@ TEST(ExactLevels, NeedTheFacetsNearAVoxelAlone) {
       const int scale = 1000 / step;
       return Point3{at(0, 8 * scale) * step, at(0, 8 * scale) * step, at(-2 * scale, 3 * scale) * step};
     };
+    const Point3 a = anywhere(), b = anywhere(), c = anywhere(), d = anywhere();
+    const auto cross = [&](std::int64_t u, std::int64_t v, std::int64_t w, std::int64_t x) { return u * x - v * w; };
+    const std::int64_t ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z, vx = c.x - a.x, vy = c.y - a.y, vz = c.z - a.z;
+    const std::int64_t volume =
+        (d.x - a.x) * cross(uy, uz, vy, vz) + (d.y - a.y) * cross(uz, ux, vz, vx) + (d.z - a.z) * cross(ux, uy, vx, vy);
+    if (volume == 0) continue;
     Triangles all;
-    add_tetrahedron(all, anywhere(), anywhere(), anywhere(), anywhere());
-    if (make_mesh(all).volume_mm3 < 0) all = reversed(all);
+    add_tetrahedron(all, a, b, c, d);
+    if (volume < 0) all = reversed(all);
     ++solids;
     EXPECT_EQ(differing_voxels(all, turn % 2 == 0 ? 4 : 16, random), 0) << "solid " << turn;
   }
-  EXPECT_EQ(solids, 400);
+  EXPECT_GT(solids, 300);
 }
 
 TEST(ExactLevels, DecideTiesOfOnePlaneByWhatIsOnItsSides) {
   std::mt19937 random(3);
   for (const Nm top : {500, 499, 501, 1, 999, 250}) {
-    for (const std::uint32_t levels : {2u, 4u, 16u}) EXPECT_EQ(differing_voxels(box({100, 200, -50}, {7700, 7600, top}), levels, random), 0) << top;
+    for (const std::uint32_t levels : {2u, 4u, 16u})
+      EXPECT_EQ(differing_voxels(box({100, 200, -50}, {7700, 7600, top}), levels, random), 0) << top;
   }
 }
 

@@ -146,8 +146,8 @@ std::string packed_by_libtiff(const Levels& image, unsigned step, const std::str
   std::vector<std::uint8_t> all(std::size_t{image.columns} * rows);
   for (std::uint32_t r = 0; r < rows; ++r) {
     for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
-      std::fill(all.begin() + r * image.columns + image.change[2 * i], all.begin() + r * image.columns + image.change[2 * i + 1],
-                static_cast<std::uint8_t>(image.level[i] * step));
+      std::fill(all.begin() + r * image.columns + image.change[2 * i],
+                all.begin() + r * image.columns + image.change[2 * i + 1], static_cast<std::uint8_t>(image.level[i] * step));
     }
   }
   EXPECT_GT(TIFFWriteEncodedStrip(tiff, 0, all.data(), static_cast<tmsize_t>(all.size())), 0);

@@ -29,7 +29,6 @@ LAMINA_LANES Eight times(Eight a, Eight b) { return _mm512_mul_pd(a, b); }
 LAMINA_LANES Eight over(Eight a, Eight b) { return _mm512_div_pd(a, b); }
 LAMINA_LANES Eight minimum(Eight a, Eight b) { return _mm512_min_pd(a, b); }
 LAMINA_LANES Eight maximum(Eight a, Eight b) { return _mm512_max_pd(a, b); }
-LAMINA_LANES Eight absolute(Eight a) { return _mm512_abs_pd(a); }
 LAMINA_LANES Eight whole_below(Eight a) { return _mm512_floor_pd(a); }
 LAMINA_LANES Mask below(Eight a, Eight b) { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); }
 LAMINA_LANES std::uint32_t bits(Mask mask) { return mask; }
@@ -39,29 +38,9 @@ LAMINA_LANES Eight drop(Mask mask, Eight a) { return _mm512_maskz_mov_pd(static_
 LAMINA_LANES Mask first_lanes(std::uint32_t count) { return static_cast<Mask>((1u << count) - 1); }
 LAMINA_LANES Eight keep_first(std::uint32_t count, Eight a) { return _mm512_maskz_mov_pd(first_lanes(count), a); }
 LAMINA_LANES void store(double* at, Eight a) { _mm512_storeu_pd(at, a); }
-LAMINA_LANES void store_first(double* at, std::uint32_t count, Eight a) { _mm512_mask_storeu_pd(at, first_lanes(count), a); }
 LAMINA_LANES void store_whole(std::uint32_t* at, Eight a) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(at), _mm512_cvttpd_epi32(a));
 }
-LAMINA_LANES bool is_zero(Eight a, Eight b) {
-  return (_mm512_cmp_pd_mask(a, _mm512_setzero_pd(), _CMP_NEQ_UQ) | _mm512_cmp_pd_mask(b, _mm512_setzero_pd(), _CMP_NEQ_UQ)) ==
-         0;
-}
-/// Lanes 1 .. 7 of a, then lane 0 of b.
-LAMINA_LANES Eight shifted(Eight a, Eight b) {
-  return _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(b), _mm512_castpd_si512(a), 1));
-}
-template <int kBy>
-LAMINA_LANES Eight raised(Eight a) {
-  return _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(a), _mm512_setzero_si512(), 8 - kBy));
-}
-/// Each lane and all before it.
-LAMINA_LANES Eight sums_of(Eight a) {
-  a = plus(a, raised<1>(a));
-  a = plus(a, raised<2>(a));
-  return plus(a, raised<4>(a));
-}
-LAMINA_LANES double last_of(Eight a) { return _mm512_cvtsd_f64(_mm512_permutexvar_pd(_mm512_set1_epi64(7), a)); }
 LAMINA_LANES std::uint64_t bytes_of(Eight a) {
   return static_cast<std::uint64_t>(_mm_cvtsi128_si64(_mm256_cvtepi32_epi8(_mm512_cvttpd_epi32(a))));
 }

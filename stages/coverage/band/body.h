@@ -36,8 +36,8 @@ LAMINA_LANES void add_lanes(double* to, std::uint32_t begin, std::uint32_t end, 
 LAMINA_LANES Eight along(double at, double per_y, Eight from) { return plus(all(at), times(from, all(per_y))); }
 
 /// Marks columns that the piece may reach in some row; how many they are.
-LAMINA_LANES std::uint32_t mark_columns(const Trapezoid& piece, const ColumnReach& reach, std::uint32_t begin, std::uint32_t end,
-                                        BandCells& cells) {
+LAMINA_LANES std::uint32_t mark_columns(const Trapezoid& piece, const ColumnReach& reach, std::uint32_t begin,
+                                        std::uint32_t end, BandCells& cells) {
   std::uint32_t first = UINT32_MAX, last = 0;
   for (std::uint32_t lane = begin; lane < end; ++lane) {
     first = std::min(first, reach.first[lane]), last = std::max(last, reach.last[lane]);
@@ -152,8 +152,9 @@ LAMINA_LANES void add_segment(std::uint32_t first, std::uint32_t end, SweptBand&
 LAMINA_LANES void sweep_body(const BandTask& band, SweptBand& swept) {
   const ColumnMarks held = band.cells->held(), summed = band.cells->summed(), suspect = band.cells->suspect();
   const bool has_suspects = suspect.next(0) != ColumnMarks::kNone;
-  SweepState state{all(0),         load(band.area.data()), load(band.per_area.data()), load(band.off.data()),
-                   all(band.top),  all(-0.25),             all(1.25),                  (1u << band.rows) - 1};
+  SweepState state{
+      all(0),    load(band.area.data()), load(band.per_area.data()), load(band.off.data()), all(band.top), all(-0.25),
+      all(1.25), (1u << band.rows) - 1};
   ColumnSpan span;
   for (std::uint32_t c = held.next(0); c != ColumnMarks::kNone; c = held.next(span.end)) {
     span.first = c;

@@ -41,8 +41,7 @@ bool may_split(const Triangle& t, const FacetNormal& n, const Voxel& v) {
       !is_within(t.a.z, t.b.z, t.c.z, v.z0, v.z1)) {
     return false;
   }
-  const Wide reach =
-      magnitude(n.x) * (v.x1 - v.x0) + magnitude(n.y) * (v.y1 - v.y0) + magnitude(n.z) * (v.z1 - v.z0);
+  const Wide reach = magnitude(n.x) * (v.x1 - v.x0) + magnitude(n.y) * (v.y1 - v.y0) + magnitude(n.z) * (v.z1 - v.z0);
   return magnitude(side_of_centre(n, t.a, v)) < reach;
 }
 
@@ -205,8 +204,7 @@ std::uint32_t exact_level(const Voxel& voxel, std::span<const SlabFacet* const> 
   }
   if (one_plane) {
     const FacetNormal normal(plane == nullptr ? Triangle{} : plane->facet);
-    const std::optional<Fraction> part =
-        plane == nullptr ? Fraction{0, 1} : part_of(normal, plane->facet.a, voxel);
+    const std::optional<Fraction> part = plane == nullptr ? Fraction{0, 1} : part_of(normal, plane->facet.a, voxel);
     const auto level = part ? level_by_plane(*part, near_share) : std::nullopt;
     if (level) return *level;
   }

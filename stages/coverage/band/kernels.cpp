@@ -23,7 +23,8 @@ BandKernels::Split split;
 const BandKernels& band_kernels_for([[maybe_unused]] Isa isa) {
   static constexpr BandKernels kPlain{plain::deposit, plain::sweep, plain::split};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr BandKernels kAvx2{avx2::deposit, avx2::sweep, avx2::split}, kAvx512{avx512::deposit, avx512::sweep, avx512::split};
+  static constexpr BandKernels kAvx2{avx2::deposit, avx2::sweep, avx2::split},
+      kAvx512{avx512::deposit, avx512::sweep, avx512::split};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif

@@ -243,9 +243,8 @@ void RowResolver::decide(SweptBand& swept) {
     if (span != open.span) take(swept.span[open.span], lane);
     span = open.span;
     approach(open.first);
-    is_suspect |= open.suspect && std::ranges::any_of(near_, [&](const RowFacet& of_row) {
-                    return slab_->facets[of_row.index].suspect;
-                  });
+    is_suspect |=
+        open.suspect && std::ranges::any_of(near_, [&](const RowFacet& of_row) { return slab_->facets[of_row.index].suspect; });
     std::uint8_t level = 0;
     const bool is_sampled = is_suspect && count_samples(open, open.share[lane], level);
     if (!is_sampled && !is_undecided) continue;

@@ -161,8 +161,8 @@ class BandMaker {
   bool counts_held_ = false;
   BandCells cells_;
   SweptBand swept_;
-  Buffer<Trapezoid> active_;   // that reach the band, or one below it
-  Buffer<ColumnReach> reach_;  // of each active one
+  Buffer<Trapezoid> active_;      // that reach the band, or one below it
+  Buffer<ColumnReach> reach_;     // of each active one
   Buffer<std::uint32_t> column_;  // changes of each row
   Buffer<std::uint8_t> level_;
   RowResolver resolver_;

@@ -41,7 +41,6 @@ LAMINA_LANES Eight times(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i]
 LAMINA_LANES Eight over(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] / b.part[i]); }
 LAMINA_LANES Eight minimum(const Eight& a, const Eight& b) { LAMINA_EACH(min_of(a.part[i], b.part[i])); }
 LAMINA_LANES Eight maximum(const Eight& a, const Eight& b) { LAMINA_EACH(max_of(a.part[i], b.part[i])); }
-LAMINA_LANES Eight absolute(const Eight& a) { LAMINA_EACH(max_of(a.part[i], -a.part[i])); }
 /// Of less than 2^51.
 LAMINA_LANES Eight whole_below(const Eight& a) {
   Eight near;
@@ -68,46 +67,10 @@ LAMINA_LANES Mask first_lanes(std::uint32_t count) {
   return mask;
 }
 LAMINA_LANES Eight keep_first(std::uint32_t count, const Eight& a) { return keep(first_lanes(count), a); }
-LAMINA_LANES void store_first(double* at, std::uint32_t count, const Eight& a) {
-  store(at, pick(first_lanes(count), a, load(at)));
-}
 LAMINA_LANES void store_whole(std::uint32_t* at, const Eight& a) {
   for (int i = 0; i < 8; ++i) at[i] = static_cast<std::uint32_t>(static_cast<std::int32_t>(a.part[i / kWidth][i % kWidth]));
 }
-LAMINA_LANES bool is_zero(const Eight& a, const Eight& b) {
-  Whole some{};
-  for (int i = 0; i < kParts; ++i) some |= (a.part[i] != 0) | (b.part[i] != 0);
-  return signs_of((Part)some) == 0;
-}
 
-/// Lanes k .. k + kWidth - 1 of a part and the one behind it.
-template <int kFirst, class P>
-LAMINA_LANES P across(const P& a, const P& b) {
-  if constexpr (kFirst == 0) {
-    return a;
-  } else if constexpr (sizeof(P) == 16) {
-    return __builtin_shufflevector(a, b, 1, 2);
-  } else {
-    return __builtin_shufflevector(a, b, kFirst, kFirst + 1, kFirst + 2, kFirst + 3);
-  }
-}
-/// Lanes 1 .. 7 of a, then lane 0 of b.
-LAMINA_LANES Eight shifted(const Eight& a, const Eight& b) {
-  LAMINA_EACH(across<1>(a.part[i], i + 1 < kParts ? a.part[i + 1] : b.part[0]));
-}
-template <int kBy>
-LAMINA_LANES Eight raised(const Eight& a) {
-  constexpr int kSkipped = (kBy + kWidth - 1) / kWidth;
-  const auto at = [&](int i) LAMINA_TARGET { return i < 0 ? Part{} : a.part[i]; };
-  LAMINA_EACH((across<kSkipped * kWidth - kBy>(at(i - kSkipped), at(i - kSkipped + 1))));
-}
-/// Each lane and all before it.
-LAMINA_LANES Eight sums_of(Eight a) {
-  a = plus(a, raised<1>(a));
-  a = plus(a, raised<2>(a));
-  return plus(a, raised<4>(a));
-}
-LAMINA_LANES double last_of(const Eight& a) { return a.part[kParts - 1][kWidth - 1]; }
 /// Of whole numbers below 256: sums of less than 2^32 are exact.
 LAMINA_LANES std::uint64_t bytes_of(const Eight& a) {
   double weighted[8];
