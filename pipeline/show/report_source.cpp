@@ -66,7 +66,7 @@ Result<ReportLayer> read_bits(const std::string& directory, const ManifestHead& 
   auto image = formats::image(directory + "/" + name, 0, Keep::kSmaller);
   if (!image) return image.error();
   if (image->columns != head.grid.columns() || image->rows != head.grid.rows())
-    return wrong(directory, fmt::format("{}: is not of the manifest's size; run lamina verify for details", name));
+    return wrong(directory + "/" + name, "is not of the manifest's size; run lamina verify for details");
   return ReportLayer{std::move(image->runs), 0, std::move(image->bits)};
 }
 

@@ -1,6 +1,7 @@
 // Images as bits: the same files, pixels and counts as the same images as runs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -167,6 +168,35 @@ TEST(BitRows, AreCountedTurnedAndInvertedAsRunsAre) {
     BitImage turned = bits;
     invert(turned);
     EXPECT_TRUE(same_runs(runs_of_bits(turned), inverse(runs))) << runs.columns;
+  }
+}
+
+TEST(BitRows, GreyIsCountedAsItsLevels) {
+  const test::Directory folder;
+  std::mt19937 random(11);
+  for (const LevelFormat& format : level_formats()) {
+    const std::uint8_t full = format.id == "tiff-4" ? 15 : 255;
+    Levels image;
+    image.start(203);
+    for (std::uint32_t r = 0; r < 40; ++r) {
+      for (std::uint32_t at = 0; at < 203;) {
+        const std::uint32_t end = std::min(203u, at + 1 + testing::below(random, 9));
+        image.append(at, end, static_cast<std::uint8_t>(testing::below(random, 3) == 0 ? full : testing::below(random, full + 1u)));
+        at = end;
+      }
+      image.end_row();
+    }
+    Bytes file;
+    ASSERT_TRUE(format.make_encoder()->encode(image.view(), full, 600, 600, file));
+    const std::string path = folder / ("grey" + std::string(format.extension));
+    ASSERT_TRUE(write_file(path, file));
+    Levels read;
+    ASSERT_TRUE(nearest_levels(path, {255}, read).ok());
+    const auto counts = grey_counts(path, 0);
+    ASSERT_TRUE(counts.ok()) << counts.error().message;
+    EXPECT_EQ(counts->darkness, sum_of_levels(read)) << format.id;
+    EXPECT_EQ(counts->between, pixels_at(read) - pixels_at(read, 255)) << format.id;
+    EXPECT_GT(counts->between, 1000u);
   }
 }
 
