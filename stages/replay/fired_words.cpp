@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "stages/geometry/isa.h"
 #include "stages/geometry/targets.h"
@@ -87,7 +88,8 @@ void ExpectedLines::turn_all() {
       for (std::uint32_t i = 0; i < 64; ++i) square[i] = counts[i * bits_ * row_words + word];
       transpose_square(square);
       const std::size_t bit = word / row_words, first = word % row_words * 64;
-      for (std::size_t i = 0; i < 64 && first + i < columns; ++i) lines_[((first + i) * bits_ + bit) * words_ + block] = square[i];
+      for (std::size_t i = 0; i < 64 && first + i < columns; ++i)
+        lines_[((first + i) * bits_ + bit) * words_ + block] = square[i];
     }
   }
 }
@@ -175,7 +177,8 @@ void FiredWords::allow(std::uint32_t flip) {
   for (std::uint32_t n = 0; n < machine_.nozzle_.size(); ++n) {
     const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[n];
     const auto residue = static_cast<std::size_t>(nozzle.step_offset % machine_.ticks_);
-    if (!nozzle.blocked) allowed_[residue * nozzle_words_ + n / 64] |= std::uint64_t{1} << (n % 64 ^ flip);
+    if (!nozzle.blocked && machine_.machine_.head.max_drops > 0)
+      allowed_[residue * nozzle_words_ + n / 64] |= std::uint64_t{1} << (n % 64 ^ flip);
   }
 }
 
@@ -211,8 +214,13 @@ void FiredWords::turn(std::uint32_t residue, std::uint32_t word) {
     for (std::size_t chunk = 0; chunk < kChunks; ++chunk) {
       Square& square = squares[b][chunk];
       const std::uint64_t* const from = vectors_.data() + (residue * kWindow + chunk * 64) * size + b * nozzle_words_ + word;
-      for (std::size_t i = 0; i < 64; ++i) square[i] = from[i * size];
-      transpose_square(square);
+      std::uint64_t differs = 0;
+      for (std::size_t i = 0; i < 64; ++i) differs |= (square[i] = from[i * size]) ^ from[0];
+      if (differs == 0) {  // within a part, or between parts
+        for (std::size_t i = 0; i < 64; ++i) square[i] = std::uint64_t{0} - (from[0] >> i & 1);
+      } else {
+        transpose_square(square);
+      }
       count += count_(square);
     }
     drops_ += count << b;
@@ -251,13 +259,22 @@ void FiredWords::add(std::uint32_t nozzle, std::uint32_t bit, const Square (&squ
       now[b] |= squares[b][chunk][bit] << shift;
       before[b] = squares[b][chunk][bit] >> 1 >> (63 - shift);
     }
-    if (exceeding(now.data(), 1, nozzle_bits_, machine_.machine_.head.max_drops) != 0) wrong_ = true;
+    if (nozzle_bits_ > 1 && exceeding(now.data(), 1, nozzle_bits_, machine_.machine_.head.max_drops) != 0) wrong_ = true;
     add_counts(line + chunk, now);
   }
 }
 
 void FiredWords::add_counts(std::uint64_t* words, const Drops& drops) {
   std::uint64_t carry = 0, beyond = 0;
+  if (nozzle_bits_ == 1) {
+    carry = drops[0];
+    for (std::uint32_t b = 0; b < bits_ && carry != 0; ++b) {
+      const std::uint64_t had = std::exchange(words[b * stride_], words[b * stride_] ^ carry);
+      carry &= had;
+    }
+    if ((carry | (drops[0] & exceeding(words, stride_, bits_, maximum_))) != 0) wrong_ = true;
+    return;
+  }
   for (std::uint32_t b = 0; b < std::max(bits_, nozzle_bits_); ++b) {
     const std::uint64_t had = b < bits_ ? words[b * stride_] : 0, more = b < nozzle_bits_ ? drops[b] : 0;
     const std::uint64_t sum = had ^ more ^ carry;
@@ -383,7 +400,8 @@ bool FiredWords::compare_line(std::int64_t line, const std::vector<bool>& may_be
     // Drops of a blocked nozzle are those of a neighbouring line.
     std::vector<std::uint64_t> left = has;
     for (const std::int64_t next : {line - passes, line + passes}) {
-      if (next < 0 || next >= static_cast<std::int64_t>(lines_.size()) || !may_be_lost[static_cast<std::size_t>(next)]) continue;
+      if (next < 0 || next >= static_cast<std::int64_t>(lines_.size()) || !may_be_lost[static_cast<std::size_t>(next)])
+        continue;
       if (!difference(next, drops, neighbour, has)) continue;
       for (std::size_t w = 0; w < left.size(); ++w) left[w] &= ~neighbour[w];
     }
