@@ -15,34 +15,55 @@ PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin) {
   return {left, right, grid.rows() - back, grid.rows() - front};
 }
 
-void Pieces::find(const RunsView& image, bool diagonal) {
+// Runs get the number of a run above that they touch, or a new one. Numbers of one piece are merged, and the least, that of the
+// piece's first run, stands for it.
+void Pieces::label(const RunsView& image, bool diagonal) {
   const std::size_t runs = image.change.size() / 2;
-  sets_.start(runs);
-  for (std::uint32_t r = 1; r < image.rows(); ++r) {
-    for_touching(image, r - 1, image, r, diagonal, [&](std::uint32_t above, std::uint32_t run) { sets_.merge(above, run); });
-  }
   of_run.resize(runs);
-  pixels.clear();
-  box.clear();
   first.clear();
-  std::size_t roots = 0;
-  for (std::uint32_t i = 0; i < runs; ++i) roots += sets_.find(i) == i ? 1 : 0;
-  pixels.reserve(roots);
-  box.reserve(roots);
-  first.reserve(roots);
+  sets_.start(0);
+  if (runs == 0) return;
+  const std::uint32_t* const change = image.change.data();
+  const std::uint32_t reach = diagonal ? 1 : 0;
+  std::uint32_t above = 0, run = 0;
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
-      const std::uint32_t root = sets_.find(i);
-      if (root == i) {
-        of_run[i] = static_cast<std::uint32_t>(box.size());
-        box.emplace_back();
-        pixels.push_back(0);
-        first.push_back(i);
+    const std::uint32_t above_end = run, end = image.row_offset[r + 1] / 2;
+    for (; run < end; ++run) {
+      const std::uint32_t left = change[2 * run], right = change[2 * run + 1] + reach;
+      while (above < above_end && change[2 * above + 1] + reach <= left) ++above;
+      if (above == above_end || change[2 * above] >= right) {
+        of_run[run] = sets_.add();
+        first.push_back(run);
+        continue;
       }
-      const std::uint32_t piece = of_run[i] = of_run[root];
-      const std::uint32_t begin = image.change[2 * i], end = image.change[2 * i + 1];
-      pixels[piece] += end - begin;
-      box[piece].add({begin, end, r, r + 1});
+      const std::uint32_t number = of_run[run] = of_run[above];
+      while (above + 1 < above_end && change[2 * above + 2] < right) {
+        if (of_run[++above] != number) sets_.merge(number, of_run[above]);
+      }
+    }
+    above = above_end;
+  }
+}
+
+void Pieces::measure(const RunsView& image) {
+  const std::uint32_t* const change = image.change.data();
+  std::uint32_t pieces = 0;
+  sets_.number([&](std::uint32_t piece, std::uint32_t number) {
+    first[piece] = first[number];
+    ++pieces;
+  });
+  first.resize(pieces);
+  pixels.assign(pieces, 0);
+  box.assign(pieces, PixelBox());
+  for (std::uint32_t r = 0, run = 0; pieces > 0 && r < image.rows(); ++r) {
+    for (const std::uint32_t end = image.row_offset[r + 1] / 2; run < end; ++run) {
+      const std::uint32_t piece = of_run[run] = sets_.of(of_run[run]), left = change[2 * run], right = change[2 * run + 1];
+      pixels[piece] += right - left;
+      PixelBox& of = box[piece];
+      of.left = std::min(of.left, left);
+      of.right = std::max(of.right, right);
+      of.top = std::min(of.top, r);
+      of.bottom = r + 1;
     }
   }
 }

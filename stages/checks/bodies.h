@@ -85,6 +85,11 @@ class Sets {
     parent_.resize(count);
     std::iota(parent_.begin(), parent_.end(), 0u);
   }
+  /// One more number, in a set of its own.
+  std::uint32_t add() {
+    parent_.push_back(static_cast<std::uint32_t>(parent_.size()));
+    return parent_.back();
+  }
   std::uint32_t find(std::uint32_t of) {
     while (parent_[of] != of) of = parent_[of] = parent_[parent_[of]];
     return of;
@@ -97,10 +102,21 @@ class Sets {
     parent_[b] = a;
     return {a, b};
   }
+  /// Numbers the sets from 0 by their least numbers; of() is the number of a set since, and sets do not change any more.
+  /// each(number of a set, its least number)
+  template <class Each>
+  void number(const Each& each) {
+    std::uint32_t sets = 0;
+    for (std::uint32_t i = 0; i < parent_.size(); ++i) {
+      if (parent_[i] == i) each(sets, i);
+      parent_[i] = parent_[i] == i ? sets++ : parent_[parent_[i]];
+    }
+  }
+  std::uint32_t of(std::uint32_t member) const { return parent_[member]; }
   std::uint64_t bytes() const { return bytes_held(parent_); }
 
  private:
-  Buffer<std::uint32_t> parent_;
+  Buffer<std::uint32_t> parent_;  // no larger than the member
 };
 
 /// Calls visit(run of a, run of b) for runs of two rows that touch: share a column or, with `diagonal`, a corner.
@@ -120,8 +136,16 @@ void for_touching(const RunsView& a, std::uint32_t row_a, const RunsView& b, std
 class Pieces {
  public:
   /// diagonal  whether pixels that share a corner alone touch
-  void find(const RunsView& image, bool diagonal);
+  void find(const RunsView& image, bool diagonal) {
+    label(image, diagonal);
+    measure(image);
+  }
   std::size_t count() const { return box.size(); }
+  // --- the same in two steps
+  /// Sets of runs that touch; number_of() is one for each piece until measure().
+  void label(const RunsView& image, bool diagonal);
+  std::uint32_t number_of(std::uint32_t run) { return sets_.find(of_run[run]); }
+  void measure(const RunsView& image);
   std::uint64_t bytes() const {
     return sets_.bytes() + bytes_held(of_run) + bytes_held(pixels) + bytes_held(first) + box.capacity() * sizeof(PixelBox);
   }
@@ -132,7 +156,7 @@ class Pieces {
   Buffer<std::uint32_t> first;   // run of each piece
 
  private:
-  Sets sets_;
+  Sets sets_;  // of numbers that runs get first
 };
 
 /// Follows bodies through layers that are given from the bottom up, one at a time.
@@ -165,6 +189,11 @@ class Follower {
   /// That of a pixel of the last layer; null if the pixel is not set.
   Body* body_at(std::uint32_t column, std::uint32_t row);
 
+  /// The last layer.
+  RunsView below() const { return below_; }
+  /// Nothing continues: a layer without pieces changes nothing.
+  bool is_idle() const { return bodies_.empty(); }
+
   std::uint64_t bytes() const {
     return pieces_.bytes() + sets_.bytes() + bytes_of(below_) + bytes_held(body_below_) + bytes_held(number_) +
            bytes_held(hangs_) + (bodies_.capacity() + next_.capacity()) * sizeof(Body);
@@ -186,6 +215,7 @@ class Follower {
 
 template <class Rules>
 void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
+  if (is_idle() && image.change.empty()) return;
   const auto old = static_cast<std::uint32_t>(bodies_.size());
   start(layer, image);
   for (std::size_t p = old; p < bodies_.size(); ++p) rules.grow(bodies_[p]);

@@ -8,10 +8,6 @@ namespace lamina::checks {
 
 void Columns::push(ColumnSpan span) {
   if (span.begin >= span.end) return;
-  if (span.bottom <= endless_from_) {
-    span.bottom = ColumnSpan::kEndless;
-    span.first_layer = span.attached = 0;
-  }
   if (next_.size() > next_row_.back()) {
     ColumnSpan& last = next_.back();
     if (last.end == span.begin && last.first_layer == span.first_layer && last.bottom == span.bottom &&
@@ -46,16 +42,15 @@ void Columns::end_columns(std::uint32_t row, std::size_t& at, std::size_t last, 
   }
 }
 
-void Columns::add(const Layer& layer, const RunsView& image, const RunsView& base, bool endless, std::int64_t limit_nm) {
-  endless_from_ = limit_nm == INT64_MAX ? INT64_MIN : std::int64_t{layer.bottom} - limit_nm;
+void Columns::add(const Layer& layer, const RunsView& image, const RunsView& base) {
   const std::uint32_t rows = image.rows();
   if (row_.empty()) row_.assign(std::size_t{rows} + 1, 0);
   ended_.clear();
+  if (image.change.empty() && span_.empty()) return;
   next_.clear();
-  next_.reserve(bound(image, base));
   next_row_.assign(1, 0);
   ColumnSpan kind;
-  kind.bottom = endless ? ColumnSpan::kEndless : layer.bottom;
+  kind.bottom = layer.bottom;
   kind.first_layer = layer.index;
   for (std::uint32_t r = 0; r < rows; ++r) {
     const auto runs = image.row(r);
@@ -96,25 +91,6 @@ void Columns::finish() {
   }
   row_.clear();
   span_.clear();
-}
-
-void Columns::taller(std::int64_t top, std::int64_t min_nm, std::uint32_t columns, Runs& result) const {
-  result.columns = columns;
-  result.row_offset.assign(1, 0);
-  result.change.clear();
-  for (std::size_t r = 0; r + 1 < row_.size(); ++r) {
-    const std::size_t row_begin = result.change.size();
-    for (std::uint32_t i = row_[r]; i < row_[r + 1]; ++i) {
-      if (top - span_[i].bottom < min_nm) continue;
-      if (result.change.size() > row_begin && result.change.back() == span_[i].begin) {
-        result.change.back() = span_[i].end;
-      } else {
-        result.change.push_back(span_[i].begin);
-        result.change.push_back(span_[i].end);
-      }
-    }
-    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
-  }
 }
 
 namespace {

@@ -25,18 +25,14 @@ struct ColumnSpan {
 class Columns {
  public:
   /// Takes the next layer. base  what columns that begin in it are attached to: an image of the layer below, or empty.
-  /// endless  columns of the first layer have no bottom. limit_nm  columns that are as tall become endless: the neighbours of
-  /// such columns share a span, so that spans are bounded by what is below a surface and not by all of it
   /// cost  O(runs + spans)
-  void add(const Layer& layer, const RunsView& image, const RunsView& base, bool endless = false,
-           std::int64_t limit_nm = INT64_MAX);
+  void add(const Layer& layer, const RunsView& image, const RunsView& base);
   /// Ends all columns.
   void finish();
   /// Columns that ended below the last layer that was added, from the top row down, from the left.
   std::span<const ColumnSpan> ended() const { return ended_; }
-
-  /// Columns that are at least as tall at the height `top`. cost  O(spans)
-  void taller(std::int64_t top, std::int64_t min_nm, std::uint32_t columns, Runs& result) const;
+  /// Nothing continues.
+  bool is_idle() const { return span_.empty(); }
 
   /// Bytes that it holds after add(), and what ends then. of_ended  bytes that the caller keeps of each span that ends
   std::uint64_t need(const RunsView& image, const RunsView& base, std::uint64_t of_ended) const {
@@ -54,8 +50,7 @@ class Columns {
   void begin_columns(std::uint32_t begin, std::uint32_t end, std::span<const std::uint32_t> base, const ColumnSpan& kind);
   void end_columns(std::uint32_t row, std::size_t& at, std::size_t last, std::uint32_t from, std::uint32_t to);
 
-  std::int64_t endless_from_ = INT64_MIN;  // height of the bottoms up to which columns become endless
-  Buffer<std::uint32_t> row_, next_row_;   // offsets of rows
+  Buffer<std::uint32_t> row_, next_row_;  // offsets of rows
   Buffer<ColumnSpan> span_, next_, ended_;
 };
 
@@ -78,6 +73,7 @@ class ColumnBodies {
   void finish(Rules& rules) {
     follower_.finish(rules);
   }
+  bool is_idle() const { return follower_.is_idle(); }
   std::uint64_t bytes() const { return follower_.bytes() + bytes_of(footprint_) + bytes_of(grown_) + bytes_held(sums_); }
 
  private:
@@ -98,6 +94,7 @@ class ColumnBodies {
 template <class Rules>
 void ColumnBodies::add(const Layer& layer, std::span<const ColumnSpan> ended, std::uint32_t columns, std::uint32_t rows,
                        std::int64_t tall_nm, Rules& rules) {
+  if (ended.empty() && follower_.is_idle()) return;
   find(layer, ended, columns, rows, tall_nm);
   struct Counted {
     Rules& rules;

@@ -265,8 +265,8 @@ void Inspection::note_edges(const Layer& layer, const RunsView& image) {
 }
 
 std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
-  // The image, what lies around it and what is left of it; rows of these, and of four that hold little.
-  return stopped_ ? 0 : 10 * image.change.size_bytes() + 20 * image.row_offset.size_bytes();
+  // The image, what lies around it and what is left of it, chains of these; rows of these, and of four that hold little.
+  return stopped_ ? 0 : 14 * image.change.size_bytes() + 20 * image.row_offset.size_bytes();
 }
 
 void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
@@ -284,8 +284,14 @@ void Inspection::prepare(const RunsView& image, LayerInspection& inspection) con
 
 void Inspection::add_sample(const RunsView& sample, LayerInspection& inspection) const {
   if (inspection.min_bytes > 0) return;
-  copy_rows(sample, top_, top_ + all_.bottom, inspection.scratch.outside);
-  measures_.add_sample(inspection.scratch.outside, inspection.scratch, inspection.measures);
+  RunsView rows = sample;
+  if (sample.rows() < top_ + all_.bottom) {
+    copy_rows(sample, top_, top_ + all_.bottom, inspection.scratch.outside);
+    rows = inspection.scratch.outside;
+  } else {
+    rows.row_offset = sample.row_offset.subspan(top_, std::size_t{all_.bottom} + 1);
+  }
+  measures_.add_sample(rows, inspection.scratch, inspection.measures);
 }
 
 void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
@@ -316,11 +322,11 @@ void Inspection::add(const Layer& layer, const LayerInspection& inspection) {
   // The first layer that holds anything is the bottom of what it holds.
   if (!holds_) below_ = INT64_MIN;
   holds_ = holds_ || !image.change.empty();
+  measures_.add(layer, image, solid_.below(), inspection.measures, powder_);
   Solids solids{*this};
   solid_.add(layer, image, solids);
   if (solids.islands > 0) ++findings_.islands.layers;
   note_outgrown(layer);
-  measures_.add(layer, image, inspection.measures, powder_);
   Powder powder{*this};
   powder_.add(layer, between, powder);
   note_measured();
@@ -392,7 +398,8 @@ void report(const Findings& findings, std::span<const std::string> part, double 
                      of(hollows.count, "closed hollow", "closed hollows"), hollows.amount, hollows.largest, at(hollows.spot)));
   }
   if (drains.count > 0) {
-    warn("drains", drains,
+    warn(
+        "drains", drains,
         fmt::format("{} of about {:.3g} mm3 with drains narrower than {:.3g} mm, the largest of {:.3g} mm3 {}: powder stays in "
                     "them; widen the drains, or set a smaller --min-drain",
                     of(drains.count, "hollow", "hollows"), drains.amount, drain_mm, drains.largest, at(drains.spot)));

@@ -9,12 +9,77 @@
 namespace lamina::checks {
 namespace {
 
+constexpr std::array<std::uint32_t, 2> kNoRow{0, 0};
+
 std::uint64_t size_of(const Runs& runs) { return 4 * (runs.change.size() + runs.row_offset.size()); }
 
 void clear_rows(std::uint32_t columns, std::uint32_t rows, Runs& runs) {
   runs.columns = columns;
   runs.row_offset.assign(std::size_t{rows} + 1, 0);
   runs.change.clear();
+}
+
+/// Whether all pixels of one image are set in another.
+bool covers(const RunsView& image, const RunsView& of) {
+  for (std::uint32_t r = 0; r < of.rows(); ++r) {
+    const auto inner = of.row(r), outer = image.row(r);
+    for (std::size_t i = 0, j = 0; i < inner.size(); i += 2) {
+      while (j < outer.size() && outer[j + 1] <= inner[i]) j += 2;
+      if (j >= outer.size() || inner[i] < outer[j] || outer[j + 1] < inner[i + 1]) return false;
+    }
+  }
+  return true;
+}
+
+/// Set in the first image but not in the second, in the wanted rows; nothing in the others.
+template <class Wanted>
+void difference_in_rows(const RunsView& a, const RunsView& b, Wanted wanted, Runs& out) {
+  out.columns = a.columns;
+  out.row_offset.assign(1, 0);
+  out.change.clear();
+  for (std::uint32_t r = 0; r < a.rows(); ++r) {
+    if (!wanted(r)) {
+      out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
+      continue;
+    }
+    const auto row = [&](const RunsView& image) {
+      return r < image.rows() ? RunsView{a.columns, image.row_offset.subspan(r, 2), image.change}
+                              : RunsView{a.columns, kNoRow, {}};
+    };
+    append_combined(row(a), row(b), SetOperation::kDifference, out);
+  }
+}
+
+/// Rows of an image that a stencil can reach that is within the image: those near a run as wide as its widest row.
+/// returns  whether there is any
+bool keep_near_wide(const RunsView& image, const Stencil& stencil, Runs& result) {
+  std::uint32_t widest = 0;
+  for (const Stencil::StencilRow& row : stencil.rows) widest = std::max(widest, row.last - row.first + 1);
+  const std::int64_t reach = std::ssize(stencil.rows);
+  const auto is_wide = [&](std::uint32_t r) {
+    const auto row = image.row(r);
+    for (std::size_t i = 0; i < row.size(); i += 2) {
+      if (row[i + 1] - row[i] >= widest) return true;
+    }
+    return false;
+  };
+  clear_rows(image.columns, 0, result);
+  const auto append = [&](std::int64_t until, bool all) {
+    for (std::int64_t r = std::ssize(result.row_offset) - 1; r < until; ++r) {
+      if (all) {
+        const auto row = image.row(static_cast<std::uint32_t>(r));
+        result.change.insert(result.change.end(), row.begin(), row.end());
+      }
+      result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+    }
+  };
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    if (!is_wide(r)) continue;
+    append(std::int64_t{r} - reach, false);
+    append(std::min<std::int64_t>(image.rows(), r + reach), true);
+  }
+  append(image.rows(), false);
+  return !result.change.empty();
 }
 
 }  // namespace
@@ -70,8 +135,8 @@ void Measures::prepare(const RunsView& image, ThinScratch& scratch, LayerMeasure
 }
 
 void Measures::add_sample(const RunsView& sample, ThinScratch& scratch, LayerMeasures& measures) const {
+  if (covers(sample, measures.inner)) return;
   combine(measures.inner, sample, SetOperation::kDifference, scratch.left);
-  if (scratch.left.change.empty()) return;
   combine(measures.hidden, scratch.left, SetOperation::kUnion, scratch.chosen);
   std::swap(measures.hidden, scratch.chosen);
 }
@@ -82,8 +147,8 @@ std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measure
   const LayerMeasures& of = measures;
   return 3 * of.run_bytes() + thin_.columns.need(of.solid.narrow, thin_.base, kOfRegion) +
          slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) +
-         roofs_flat_.columns.need(image, {}, kOfSpan) + gaps_flat_.columns.need(of.powder, {}, kOfSpan) +
-         channel_columns_.need(of.channels, {}, kOfSpan);
+         roofs_flat_.columns.need(image, kOfSpan) + gaps_flat_.columns.need(of.powder, kOfSpan) +
+         channel_columns_.need(of.channels);
 }
 
 struct Measures::EndUpright {
@@ -201,7 +266,7 @@ void Measures::end_powder(std::uint32_t owner, bool open) {
 
 /// The layer below the last one, whose neighbours are known now.
 void Measures::add_hidden(const RunsView& inner, const RunsView& hidden) {
-  if (begun_) {
+  if (begun_ && (!hidden_.is_idle() || !latest_hidden_.change.empty())) {
     if (below_.row_offset.empty()) clear_rows(columns_, rows_, below_);
     combine(latest_hidden_, below_, SetOperation::kIntersection, between_layers_);
     combine(between_layers_, inner, SetOperation::kIntersection, below_);
@@ -215,24 +280,35 @@ void Measures::add_hidden(const RunsView& inner, const RunsView& hidden) {
 }
 
 void Measures::add_channels(const Layer& layer, const RunsView& channels, Follower& powder) {
-  channel_columns_.add(layer, channels, {}, !begun_, drain_nm_);
-  channel_columns_.taller(std::int64_t{layer.bottom} + layer.thickness, 6 * drain_nm_ / 10, columns_, tall_channels_);
-  channels_.find(tall_channels_);
+  channel_columns_.add(layer, channels, std::int64_t{layer.bottom} + layer.thickness - 6 * drain_nm_ / 10);
+  const RunsView tall = channel_columns_.tall();
+  channels_.find(tall);
   EndChannel rules{*this, powder, !begun_};
-  channels_.add(layer, tall_channels_, rules);
+  channels_.add(layer, tall, rules);
 }
 
-void Measures::add_upright(const Layer& layer, const RunsView& image, const RunsView& narrow, Measured kind, Upright& upright) {
+void Measures::add_upright(const Layer& layer, const RunsView& image, const RunsView& below, const RunsView& narrow,
+                           Measured kind, Upright& upright) {
+  if (narrow.change.empty() && upright.columns.is_idle() && upright.bodies.is_idle())
+    return clear_rows(columns_, 0, upright.below);
+  difference_in_rows(
+      below, upright.below, [&](std::uint32_t r) { return !narrow.row(r).empty(); }, upright.base);
   upright.columns.add(layer, narrow, upright.base);
-  combine(image, narrow, SetOperation::kDifference, upright.next_base);
+  const auto ended = upright.columns.ended();
+  auto next = ended.begin();
+  const auto ends_in = [&](std::uint32_t r) {
+    while (next != ended.end() && next->row < r) ++next;
+    return next != ended.end() && next->row == r;
+  };
+  difference_in_rows(image, narrow, ends_in, upright.next_base);
+  copy_runs(narrow, upright.below);
   attach(upright.columns.ended(), upright.next_base, upright.ended);
   EndUpright rules{*this, kind};
   upright.bodies.add(layer, upright.ended, columns_, rows_, 3 * min_nm_, rules);
-  std::swap(upright.base, upright.next_base);
 }
 
 void Measures::add_flat(const Layer& layer, const RunsView& image, Measured kind, bool endless, ShortColumns& flat) {
-  flat.columns.add(layer, image, {}, endless, min_nm_);
+  flat.columns.add(layer, image, std::int64_t{layer.bottom} - min_nm_, endless);
   end_flat(layer, image, kind, flat);
 }
 
@@ -255,21 +331,24 @@ void Measures::end_flat(const Layer& layer, const RunsView&, Measured kind, Shor
       std::swap(flat.all, flat.next);
     }
     if (set_pixels(flat.all) >= std::uint64_t{disc.columns} * disc.rows.size() / 2) {
-      open(flat.all, disc, flat.scratch, flat.wide);
-      clip(flat.ended, flat.wide, flat.within);
+      if (keep_near_wide(flat.all, disc, flat.next)) {
+        open(flat.next, disc, flat.scratch, flat.wide);
+        clip(flat.ended, flat.wide, flat.within);
+      }
     }
   }
   EndFlat rules{*this, kind};
   flat.bodies.add(layer, flat.within, columns_, rows_, INT64_MAX, rules);
 }
 
-void Measures::add(const Layer& layer, const RunsView& image, const LayerMeasures& measures, Follower& powder) {
+void Measures::add(const Layer& layer, const RunsView& image, const RunsView& below, const LayerMeasures& measures,
+                   Follower& powder) {
   if (min_nm_ > 0) add_hidden(measures.inner, measures.hidden);
   latest_ = layer;
   if (drain_nm_ > 0) add_channels(layer, measures.channels, powder);
   if (min_nm_ > 0) {
-    add_upright(layer, image, measures.solid.narrow, Measured::kThin, thin_);
-    add_upright(layer, measures.powder, measures.gaps.narrow, Measured::kGap, slots_upright_);
+    add_upright(layer, image, below, measures.solid.narrow, Measured::kThin, thin_);
+    add_upright(layer, measures.powder, powder.below(), measures.gaps.narrow, Measured::kGap, slots_upright_);
     add_flat(layer, image, Measured::kRoof, false, roofs_flat_);
     add_flat(layer, measures.powder, Measured::kGap, !begun_, gaps_flat_);
     necks_.find(measures.necks);
@@ -306,8 +385,8 @@ void Measures::finish() {
 std::uint64_t Measures::bytes() const {
   return thin_.bytes() + slots_upright_.bytes() + roofs_flat_.bytes() + gaps_flat_.bytes() + channel_columns_.bytes() +
          channels_.bytes() + necks_.bytes() + hidden_.bytes() + bytes_of(below_) + bytes_of(latest_inner_) +
-         bytes_of(latest_hidden_) + bytes_of(between_layers_) + bytes_of(tall_channels_) +
-         pockets_.capacity() * sizeof(Pocket) + free_.capacity() * sizeof(std::uint32_t) + found_.capacity() * sizeof(Item);
+         bytes_of(latest_hidden_) + bytes_of(between_layers_) + pockets_.capacity() * sizeof(Pocket) +
+         free_.capacity() * sizeof(std::uint32_t) + found_.capacity() * sizeof(Item);
 }
 
 }  // namespace lamina::checks

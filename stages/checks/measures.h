@@ -24,6 +24,7 @@
 #include "stages/checks/bodies.h"
 #include "stages/checks/columns.h"
 #include "stages/checks/thin.h"
+#include "stages/checks/young.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
@@ -76,8 +77,9 @@ class Measures {
   // --- in layer order
   /// Bytes that add() needs about.
   std::uint64_t need(const RunsView& image, const LayerMeasures& measures) const;
+  /// below   the image of the layer below; empty: there is none
   /// powder  its bodies, of the layers below
-  void add(const Layer& layer, const RunsView& image, const LayerMeasures& measures, Follower& powder);
+  void add(const Layer& layer, const RunsView& image, const RunsView& below, const LayerMeasures& measures, Follower& powder);
   /// Ends what does not depend on layers above.
   void finish();
   /// Two bodies of powder become one, or one ends; open  it leads outside.
@@ -93,10 +95,11 @@ class Measures {
   struct Upright {
     Columns columns;
     ColumnBodies bodies;
-    Runs base, next_base;
+    Runs base, next_base;  // in rows in which columns begin or end: what they are attached to
+    Runs below;            // narrow in the layer below
     Buffer<ColumnSpan> ended;
     std::uint64_t bytes() const {
-      return columns.bytes() + bodies.bytes() + bytes_of(base) + bytes_of(next_base) + bytes_held(ended);
+      return columns.bytes() + bodies.bytes() + bytes_of(base) + bytes_of(next_base) + bytes_of(below) + bytes_held(ended);
     }
   };
   /// Columns that are short.
@@ -105,7 +108,7 @@ class Measures {
       std::int64_t z = 0;
       Runs footprint;
     };
-    Columns columns;
+    YoungColumns columns;
     ColumnBodies bodies;
     std::deque<Strip> strips;  // of the last layers
     Runs all, next, wide;
@@ -123,7 +126,8 @@ class Measures {
     std::uint32_t next, tail;
   };
 
-  void add_upright(const Layer& layer, const RunsView& image, const RunsView& narrow, Measured kind, Upright& upright);
+  void add_upright(const Layer& layer, const RunsView& image, const RunsView& below, const RunsView& narrow, Measured kind,
+                   Upright& upright);
   void add_flat(const Layer& layer, const RunsView& image, Measured kind, bool endless, ShortColumns& flat);
   void end_flat(const Layer& layer, const RunsView& image, Measured kind, ShortColumns& flat);
   void add_hidden(const RunsView& inner, const RunsView& hidden);
@@ -142,10 +146,9 @@ class Measures {
 
   Upright thin_, slots_upright_;
   ShortColumns roofs_flat_, gaps_flat_;
-  Columns channel_columns_;
+  TallColumns channel_columns_;
   Follower channels_{false}, necks_{true}, hidden_{true};
   Runs below_, latest_inner_, latest_hidden_, between_layers_;  // inner pixels two layers below; the layer below; a result
-  Runs tall_channels_;
   std::vector<Pocket> pockets_;
   std::vector<std::uint32_t> free_;
   std::vector<Item> found_;

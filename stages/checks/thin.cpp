@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <tuple>
 
 #include "stages/geometry/combine.h"
@@ -17,7 +18,7 @@ Stencils::Stencils(const PixelGrid& grid, std::int64_t min_nm) {
   };
   // Less one: so many whole pixels in nm, rounded, are no pixel more.
   const __int128 minimum = static_cast<__int128>(min_nm - 1) * grid.x.dots * grid.y.dots;
-  Sum sum;
+  StencilSteps sum;
   sums_.push_back(sum);
   for (std::uint32_t both = 0;;) {
     const __int128 column = ends(sum.columns(), grid.x, grid.y), row = ends(sum.rows(), grid.y, grid.x);
@@ -40,13 +41,14 @@ std::uint64_t Stencils::two_squares(std::uint32_t number) const {
 }
 
 Stencil Stencils::at(std::uint32_t number) const {
-  const Sum& sum = sums_[number];
+  const StencilSteps& sum = sums_[number];
   // The point of a row that is farthest to the left lies on a diagonal step for each row beyond those that go straight down.
   const auto first = [&](std::uint32_t row) {
     if (row < sum.rising) return sum.rising - row;
     return row > sum.rising + sum.down ? row - sum.rising - sum.down : 0;
   };
   Stencil stencil;
+  stencil.steps = sum;
   stencil.columns = sum.columns();
   for (std::uint32_t row = 0; row < sum.rows(); ++row) {
     stencil.rows.push_back({first(row), stencil.columns - 1 - first(sum.rows() - 1 - row)});
@@ -87,9 +89,10 @@ PixelBox corners_in(const PixelBox& box, const Stencil& stencil) {
 
 enum class To { kPixels, kCorners };
 
-/// Of corners, all pixels of their stencils; of pixels, the corners of all stencils that hold one. Within the window.
-void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, Buffer<std::uint64_t>& spans,
-            Runs& result) {
+/// Of corners, all pixels of their stencils; of pixels, the corners of all stencils that hold one. Within the window. Row by
+/// row: for images of short chains. cost  O(rows of the stencil x runs)
+void spread_rows(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, Buffer<std::uint64_t>& spans,
+                 Runs& result) {
   begin_rows(image.columns, result);
   const std::int64_t left = window.left, right = window.right;
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
@@ -121,23 +124,36 @@ void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox
   }
 }
 
+/// The same; gaps  the pixels of the window that are in none instead.
+void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, bool gaps, ThinScratch& scratch,
+            Runs& result) {
+  if (scratch.chains.find(image, stencil.steps.rows()))
+    return scratch.chains.spread(stencil.steps, to == To::kCorners, window, gaps, result);
+  spread_rows(image, stencil, to, window, scratch.spans, gaps ? scratch.between : result);
+  if (gaps) complement(scratch.between, window, result);
+}
+
 /// Pixels of `of`, all of which are set in the image, that the stencil covers nowhere.
 void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, const Stencil& stencil, ThinScratch& scratch) {
   const PixelBox corners = corners_in(box, stencil);
-  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, marks, pieces] = scratch;
+  const auto corners_of = [&](const RunsView& pixels, bool gaps, Runs& result) {
+    spread(pixels, stencil, To::kCorners, corners, gaps, scratch, result);
+  };
+  const auto cover = [&](const RunsView& positions) {
+    spread(positions, stencil, To::kPixels, box, false, scratch, scratch.grown);
+  };
   if (&of == &image) {
-    complement(image, box, outside);
-    spread(outside, stencil, To::kCorners, corners, spans, grown);
-    complement(grown, corners, fits);
+    complement(image, box, scratch.outside);
+    corners_of(scratch.outside, true, scratch.fits);
   } else {
-    spread(of, stencil, To::kCorners, corners, spans, anchors);
-    spread(anchors, stencil, To::kPixels, box, spans, grown);
-    combine(grown, image, SetOperation::kDifference, outside);
-    spread(outside, stencil, To::kCorners, corners, spans, grown);
-    combine(anchors, grown, SetOperation::kDifference, fits);
+    corners_of(of, false, scratch.anchors);
+    cover(scratch.anchors);
+    combine(scratch.grown, image, SetOperation::kDifference, scratch.outside);
+    corners_of(scratch.outside, false, scratch.grown);
+    combine(scratch.anchors, scratch.grown, SetOperation::kDifference, scratch.fits);
   }
-  spread(fits, stencil, To::kPixels, box, spans, grown);
-  combine(of, grown, SetOperation::kDifference, left);
+  cover(scratch.fits);
+  combine(of, scratch.grown, SetOperation::kDifference, scratch.left);
 }
 
 /// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
@@ -156,18 +172,47 @@ std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t mi
   return largest;
 }
 
-/// The pieces of an image in which `marks` sets nothing.
-void unmarked(const RunsView& image, const RunsView& marks, ThinScratch& scratch, Runs& result) {
-  Pieces& pieces = scratch.pieces;
-  pieces.find(image, true);
+/// Calls visit(run of a, run of b) for runs of two images that touch at sides or corners.
+template <class Visit>
+void for_neighbours(const RunsView& a, const RunsView& b, const Visit& visit) {
+  for (std::uint32_t r = 0; r < a.rows(); ++r) {
+    if (a.row_offset[r] == a.row_offset[r + 1]) continue;
+    for (std::uint32_t next = r == 0 ? 0 : r - 1; next < std::min(r + 2, a.rows()); ++next) {
+      for_touching(a, r, b, next, true, visit);
+    }
+  }
+}
+
+/// The columns that are set in both neighbours of a row, but not in the row.
+void bridge_columns(std::span<const std::uint32_t> above, std::span<const std::uint32_t> row,
+                    std::span<const std::uint32_t> below, Buffer<std::uint64_t>& spans) {
+  std::size_t k = 0;
+  for (std::size_t i = 0, j = 0; i < above.size() && j < below.size();) {
+    const std::uint32_t begin = std::max(above[i], below[j]), end = std::min(above[i + 1], below[j + 1]);
+    if (begin < end) {
+      while (k < row.size() && row[k + 1] <= begin) k += 2;
+      const bool within = k < row.size() && row[k] <= begin && end <= row[k + 1];
+      if (!within) spans.push_back(std::uint64_t{begin} << 32 | end);
+    }
+    (above[i + 1] < below[j + 1] ? i : j) += 2;
+  }
+}
+
+/// Of the pieces of scratch.left, in scratch.pieces, those of more pixels than `minimum`, and those that touch nothing wide.
+void pick_narrow(const RunsView& wide, std::uint64_t minimum, ThinScratch& scratch, Runs& result) {
+  const RunsView left = scratch.left;
+  const Pieces& pieces = scratch.pieces;
   scratch.marks.assign(pieces.count(), 0);
-  for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    for_touching(image, r, marks, r, false, [&](std::uint32_t run, std::uint32_t) { scratch.marks[pieces.of_run[run]] = 1; });
+  for_neighbours(left, wide, [&](std::uint32_t run, std::uint32_t) { scratch.marks[pieces.of_run[run]] = 1; });
+  begin_rows(left.columns, result);
+  for (std::uint32_t r = 0; r < left.rows(); ++r) {
+    for (std::uint32_t i = left.row_offset[r] / 2; i < left.row_offset[r + 1] / 2; ++i) {
+      const std::uint32_t piece = pieces.of_run[i];
+      if (scratch.marks[piece] == 0 || pieces.pixels[piece] > minimum)
+        add_run(left.change[2 * i], left.change[2 * i + 1], result);
+    }
+    end_row(result);
   }
-  for (std::size_t p = 0; p < pieces.count(); ++p) {
-    if (scratch.marks[p] != 0) pieces.pixels[p] = 0;
-  }
-  pick(image, pieces, 0, UINT64_MAX, result);
 }
 
 /// Puts the largest in front, and no more than so many.
@@ -211,8 +256,9 @@ void complement(const RunsView& image, const PixelBox& window, Runs& result) {
 }
 
 std::uint64_t ThinScratch::bytes() const {
-  std::uint64_t total = bytes_held(spans) + bytes_held(marks) + pieces.bytes();
-  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending}) total += bytes_of(*image);
+  std::uint64_t total = bytes_held(spans) + bytes_held(marks) + pieces.bytes() + chains.bytes();
+  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending, &between})
+    total += bytes_of(*image);
   return total;
 }
 
@@ -220,32 +266,36 @@ std::uint64_t ThinScratch::bytes() const {
 // of that the pieces that are large enough for it: few corners are.
 ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch, Widths* widths) {
   ThinRegions locations;
-  if (widths != nullptr) {
+  if (stencils.count() < 2 || image.change.empty()) {
+    if (widths == nullptr) return locations;
     copy_runs(image, widths->wide);
     widths->narrow.columns = image.columns;
     widths->narrow.row_offset.assign(image.row_offset.size(), 0);
     widths->narrow.change.clear();
+    copy_runs(widths->narrow, widths->rest);
+    return locations;
   }
-  if (stencils.count() < 2 || image.change.empty()) return locations;
   const PixelBox box = box_of(image);
-  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, marks, pieces] = scratch;
+  Runs &left = scratch.left, &chosen = scratch.chosen, &waiting = scratch.waiting, &pending = scratch.pending;
+  Pieces& pieces = scratch.pieces;
   const std::uint64_t corner = stencils.two_squares(1);
   std::uint32_t number = stencils.count() - 1;
   uncovered(image, box, image, stencils.at(number), scratch);
-  if (widths != nullptr) {
-    copy_runs(grown, widths->wide);
-    unmarked(image, grown, scratch, widths->narrow);
-  }
   const auto add_narrow = [&](std::uint64_t minimum) {
-    if (widths == nullptr || pick(scratch.left, scratch.pieces, minimum, UINT64_MAX, scratch.chosen) == 0) return;
-    combine(widths->narrow, scratch.chosen, SetOperation::kUnion, scratch.grown);
+    if (widths == nullptr || pick(left, pieces, minimum, UINT64_MAX, chosen) == 0) return;
+    combine(widths->narrow, chosen, SetOperation::kUnion, scratch.grown);
     std::swap(widths->narrow, scratch.grown);
   };
   pieces.find(left, true);
   locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinRegion);
-  for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) locations.bytes += held->view().change.size_bytes();
+  for (const Runs* held : {&scratch.outside, &scratch.grown, &scratch.grown, &scratch.fits, &left})
+    locations.bytes += held->view().change.size_bytes();
   take(pieces, stencils.two_squares(number), locations);
-  add_narrow(stencils.two_squares(number));
+  if (widths != nullptr) {
+    pick_narrow(scratch.grown, stencils.two_squares(number), scratch, widths->narrow);
+    std::swap(widths->wide, scratch.grown);
+    copy_runs(left, widths->rest);
+  }
   std::uint64_t maximum = pick(left, pieces, corner, stencils.two_squares(number), pending);
   while (--number > 0) {
     const std::uint64_t minimum = stencils.two_squares(number);
@@ -265,6 +315,7 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
 }
 
 void drop_at_edge(const PixelBox& window, ThinScratch& scratch, Runs& image) {
+  if (image.change.empty()) return;
   Pieces& pieces = scratch.pieces;
   pieces.find(image, true);
   for (std::size_t p = 0; p < pieces.count(); ++p) {
@@ -278,16 +329,14 @@ void drop_at_edge(const PixelBox& window, ThinScratch& scratch, Runs& image) {
 }
 
 void erode(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners) {
-  const PixelBox within = corners_in(window, stencil);
   complement(image, window, scratch.outside);
-  spread(scratch.outside, stencil, To::kCorners, within, scratch.spans, scratch.grown);
-  complement(scratch.grown, within, corners);
+  spread(scratch.outside, stencil, To::kCorners, corners_in(window, stencil), true, scratch, corners);
 }
 
 void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, Runs& result) {
   const PixelBox box = image.change.empty() ? PixelBox{0, 0, 0, 0} : box_of(image);
   erode(image, box, stencil, scratch, scratch.fits);
-  spread(scratch.fits, stencil, To::kPixels, box, scratch.spans, result);
+  spread(scratch.fits, stencil, To::kPixels, box, false, scratch, result);
 }
 
 void inner_pixels(const RunsView& image, Runs& result) {
@@ -325,59 +374,84 @@ void Necks::mark(const RunsView& wide, const RunsView& rest, std::uint64_t minim
     if (neighbour != UINT32_MAX && neighbour != part) joins_[pieces_.of_run[run]] = 1;
     neighbour = part;
   };
-  for (std::uint32_t r = 0; r < rest.rows(); ++r) {
-    for (std::uint32_t next = r == 0 ? 0 : r - 1; next < std::min(r + 2, rest.rows()); ++next) {
-      for_touching(rest, r, wide, next, true, note);
-    }
-  }
+  for_neighbours(rest, wide, note);
 }
 
-/// The image with the pixels between two of its pixels, in rows and columns.
-void Necks::bridge(const RunsView& image) {
+/// The pixels that are not set between two that are, in rows and columns; in rows also those next to one that is in a column.
+/// returns  whether there are any
+bool Necks::bridge(const RunsView& image) {
   begin_rows(image.columns, bridged_);
-  const auto add = [&](std::int64_t begin, std::int64_t end) {
-    if (begin < end) spans_.push_back(static_cast<std::uint64_t>(begin) << 32 | static_cast<std::uint64_t>(end));
-  };
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    const std::size_t row_begin = bridged_.change.size();
+    const auto row = image.row(r);
     spans_.clear();
-    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; i += 2) add(image.change[i], image.change[i + 1]);
-    if (r > 0 && r + 1 < image.rows()) {
-      const auto above = image.row(r - 1), below = image.row(r + 1);
-      for (std::size_t i = 0, j = 0; i < above.size() && j < below.size();) {
-        add(std::max(above[i], below[j]), std::min(above[i + 1], below[j + 1]));
-        (above[i + 1] < below[j + 1] ? i : j) += 2;
+    if (r > 0 && r + 1 < image.rows()) bridge_columns(image.row(r - 1), row, image.row(r + 1), spans_);
+    bool adds = !spans_.empty();
+    for (std::size_t i = 1; i + 1 < row.size(); i += 2) adds = adds || row[i + 1] == row[i] + 1;
+    if (adds) {
+      // Spans of the row and of its columns, with the gaps of one pixel between them, less the row.
+      for (std::size_t i = 0; i + 1 < row.size(); i += 2) spans_.push_back(std::uint64_t{row[i]} << 32 | row[i + 1]);
+      std::ranges::sort(spans_);
+      joined_.clear();
+      for (const std::uint64_t span : spans_) {
+        const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
+        if (!joined_.empty() && begin <= joined_.back() + 1) {
+          joined_.back() = std::max(joined_.back(), end);
+        } else {
+          joined_.push_back(begin);
+          joined_.push_back(end);
+        }
       }
+      const std::array<std::uint32_t, 2> both{0, static_cast<std::uint32_t>(joined_.size())},
+          own{0, static_cast<std::uint32_t>(row.size())};
+      append_combined({image.columns, both, joined_}, {image.columns, own, row}, SetOperation::kDifference, bridged_);
+    } else {
+      end_row(bridged_);
     }
-    std::ranges::sort(spans_);
-    for (const std::uint64_t span : spans_) {
-      const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
-      if (bridged_.change.size() > row_begin && begin <= bridged_.change.back() + 1) {
-        bridged_.change.back() = std::max(bridged_.change.back(), end);
-      } else {
-        add_run(begin, end, bridged_);
-      }
-    }
-    end_row(bridged_);
   }
+  return !bridged_.change.empty();
+}
+
+/// Whether a piece of the rest touches wide runs of two pieces, of any size.
+bool Necks::touches_two(const RunsView& wide, const RunsView& rest) {
+  neighbour_.assign(pieces_.count(), UINT32_MAX);
+  bool two = false;
+  const auto note = [&](std::uint32_t run, std::uint32_t of_wide) {
+    const std::uint32_t part = wide_.number_of(of_wide);
+    std::uint32_t& neighbour = neighbour_[pieces_.of_run[run]];
+    two = two || (neighbour != UINT32_MAX && neighbour != part);
+    neighbour = part;
+  };
+  for_neighbours(rest, wide, note);
+  return two;
 }
 
 void Necks::find(const RunsView& image, const Widths& widths, std::uint64_t minimum, Runs& result) {
-  bridge(image);
-  combine(bridged_, widths.wide, SetOperation::kDifference, not_wide_);
-  combine(not_wide_, widths.narrow, SetOperation::kDifference, rest_);
-  wide_.find(widths.wide, false);
-  pieces_.find(rest_, true);
-  mark(widths.wide, rest_, minimum);
+  const Runs* rest = &widths.rest;
+  if (!widths.narrow.change.empty()) {
+    combine(widths.rest, widths.narrow, SetOperation::kDifference, rest_);
+    rest = &rest_;
+  }
+  if (bridge(image)) {
+    combine(*rest, bridged_, SetOperation::kUnion, added_);
+    rest = &added_;
+  }
+  pieces_.find(*rest, true);
+  wide_.label(widths.wide, false);
+  if (touches_two(widths.wide, *rest)) {
+    wide_.measure(widths.wide);
+    mark(widths.wide, *rest, minimum);
+  } else {
+    joins_.assign(pieces_.count(), 0);
+  }
   for (std::size_t p = 0; p < pieces_.count(); ++p) {
     if (joins_[p] == 0) pieces_.pixels[p] = 0;
   }
-  pick(rest_, pieces_, 0, UINT64_MAX, result);
+  pick(*rest, pieces_, 0, UINT64_MAX, result);
 }
 
 std::uint64_t Necks::bytes() const {
-  return bytes_of(rest_) + bytes_of(not_wide_) + bytes_of(bridged_) + wide_.bytes() + pieces_.bytes() + bytes_held(neighbour_) +
-         bytes_held(joins_) + bytes_held(spans_);
+  return bytes_of(rest_) + bytes_of(added_) + bytes_of(bridged_) + wide_.bytes() + pieces_.bytes() + bytes_held(neighbour_) +
+         bytes_held(joins_) + bytes_held(spans_) + bytes_held(joined_);
 }
 
 VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stages/checks/bodies.h"
+#include "stages/checks/chains.h"
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -30,6 +31,7 @@ struct Stencil {
   };
   std::uint32_t columns = 0;  // rows are rows.size()
   std::vector<StencilRow> rows;
+  StencilSteps steps;
 };
 
 class Stencils {
@@ -45,13 +47,7 @@ class Stencils {
   std::uint64_t two_squares(std::uint32_t number) const;
 
  private:
-  /// Steps of each direction since the first one.
-  struct Sum {
-    std::uint32_t right = 0, down = 0, falling = 0, rising = 0;
-    std::uint32_t columns() const { return 1 + right + falling + rising; }
-    std::uint32_t rows() const { return 1 + down + falling + rising; }
-  };
-  std::vector<Sum> sums_;
+  std::vector<StencilSteps> sums_;
 };
 
 // ---
@@ -72,18 +68,20 @@ struct ThinRegions {
 
 /// Scratch of thin_regions(); kept from layer to layer.
 struct ThinScratch {
-  Runs outside, anchors, grown, fits, left, chosen, waiting, pending;
+  Runs outside, anchors, grown, fits, left, chosen, waiting, pending, between;
+  Chains chains;
   Buffer<std::uint64_t> spans;
   Buffer<std::uint8_t> marks;
   Pieces pieces;
   std::uint64_t bytes() const;
 };
 
-/// Parts of an image. What is in neither is corners, and necks between wide parts.
+/// Parts of an image. What is neither wide nor narrow is corners, and necks between wide parts.
 struct Widths {
   Runs wide;    // what the last stencil covers
   Runs narrow;  // thin regions, and pieces that the last stencil does not fit into, of any size
-  std::uint64_t bytes() const { return bytes_of(wide) + bytes_of(narrow); }
+  Runs rest;    // what the last stencil does not cover
+  std::uint64_t bytes() const { return bytes_of(wide) + bytes_of(narrow) + bytes_of(rest); }
 };
 
 /// Places that for any of the stencils are thin: pixels that it covers nowhere where it lies on set pixels alone, and that
@@ -115,13 +113,15 @@ class Necks {
 
  private:
   void mark(const RunsView& wide, const RunsView& rest, std::uint64_t minimum);
-  void bridge(const RunsView& image);
+  bool bridge(const RunsView& image);
+  bool touches_two(const RunsView& wide, const RunsView& rest);
 
-  Runs bridged_, rest_, not_wide_;
+  Runs bridged_, rest_, added_;  // bridged: what bridges add to the image
   Pieces wide_, pieces_;
   Buffer<std::uint32_t> neighbour_;  // wide part of each piece of the rest
   Buffer<std::uint8_t> joins_;       // by piece of the rest: it touches two
   Buffer<std::uint64_t> spans_;      // of a row
+  Buffer<std::uint32_t> joined_;     // the same as a row of an image
 };
 
 /// The pixels between the runs of `image`, in rows and columns [first, last) of the window; nothing beyond it.

@@ -12,27 +12,73 @@ void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs&
   append_combined(a, b, operation, out);
 }
 
+namespace {
+
+using Row = std::span<const std::uint32_t>;
+
+std::uint32_t* put(std::uint32_t begin, std::uint32_t end, std::uint32_t* to) {
+  to[0] = begin;
+  to[1] = end;
+  return to + 2;
+}
+
+std::uint32_t* merge(Row a, Row b, std::uint32_t* to) {
+  const std::uint32_t* const first = to;
+  for (std::size_t i = 0, j = 0; i < a.size() || j < b.size();) {
+    const bool from_a = j == b.size() || (i < a.size() && a[i] < b[j]);
+    const std::uint32_t begin = from_a ? a[i] : b[j], end = from_a ? a[i + 1] : b[j + 1];
+    (from_a ? i : j) += 2;
+    if (to != first && begin <= to[-1]) {
+      to[-1] = std::max(to[-1], end);
+    } else {
+      to = put(begin, end, to);
+    }
+  }
+  return to;
+}
+
+std::uint32_t* intersect(Row a, Row b, std::uint32_t* to) {
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    const std::uint32_t begin = std::max(a[i], b[j]), end_a = a[i + 1], end_b = b[j + 1], end = std::min(end_a, end_b);
+    if (begin < end) to = put(begin, end, to);
+    (end_a < end_b ? i : j) += 2;
+  }
+  return to;
+}
+
+std::uint32_t* subtract(Row a, Row b, std::uint32_t* to) {
+  for (std::size_t i = 0, j = 0; i < a.size(); i += 2) {
+    std::uint32_t at = a[i];
+    const std::uint32_t end = a[i + 1];
+    while (j < b.size() && b[j + 1] <= at) j += 2;
+    for (; j < b.size() && b[j] < end; j += 2) {
+      if (at < b[j]) to = put(at, b[j], to);
+      at = b[j + 1];
+      if (at >= end) break;
+    }
+    if (at < end) to = put(at, end, to);
+  }
+  return to;
+}
+
+}  // namespace
+
 void append_combined(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
   const std::size_t row = out.row_offset.size(), there = out.change.size();
   const auto changes = [](const RunsView& image) { return image.row_offset.back() - image.row_offset.front(); };
   out.row_offset.resize(row + a.rows());
   out.change.resize(there + changes(a) + changes(b));
   std::uint32_t* next = out.change.data() + there;
-  const auto wanted = [operation](std::size_t in_a, std::size_t in_b) {
-    if (operation == SetOperation::kUnion) return (in_a | in_b) != 0;
-    return operation == SetOperation::kIntersection ? (in_a & in_b) != 0 : in_a > in_b;
-  };
-  for (std::uint32_t r = 0; r < a.rows(); ++r) {
-    const auto first = a.row(r), second = b.row(r);
-    // Every change turns its image on or off.
-    for (std::size_t i = 0, j = 0; i < first.size() || j < second.size();) {
-      const bool before = wanted(i & 1, j & 1);
-      const std::uint32_t column = j == second.size() || (i < first.size() && first[i] < second[j]) ? first[i] : second[j];
-      if (i < first.size() && first[i] == column) ++i;
-      if (j < second.size() && second[j] == column) ++j;
-      if (wanted(i & 1, j & 1) != before) *next++ = column;
+  const auto each_row = [&](const auto& combine_row) {
+    for (std::uint32_t r = 0; r < a.rows(); ++r) {
+      next = combine_row(a.row(r), b.row(r), next);
+      out.row_offset[row + r] = static_cast<std::uint32_t>(next - out.change.data());
     }
-    out.row_offset[row + r] = static_cast<std::uint32_t>(next - out.change.data());
+  };
+  switch (operation) {
+    case SetOperation::kUnion: each_row(merge); break;
+    case SetOperation::kIntersection: each_row(intersect); break;
+    case SetOperation::kDifference: each_row(subtract); break;
   }
   out.change.resize(static_cast<std::size_t>(next - out.change.data()));
 }

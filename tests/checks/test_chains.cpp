@@ -1,0 +1,173 @@
+// What stencils cover along chains of runs, and columns up to a height, against pixels one by one.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "stages/checks/chains.h"
+#include "stages/checks/thin.h"
+#include "stages/checks/young.h"
+#include "tests/checks/volume.h"
+
+namespace lamina::checks {
+namespace {
+
+std::uint32_t drawn(std::mt19937& random, std::uint32_t below) { return static_cast<std::uint32_t>(random() % below); }
+
+/// Layers of noise, or of boxes that move from layer to layer.
+Volume moving_shapes(std::mt19937& random, std::uint32_t columns, std::uint32_t rows, std::uint32_t layers,
+                     std::uint32_t percent) {
+  Volume volume{columns, rows, layers, std::vector<std::uint8_t>(std::size_t{columns} * rows * layers, 0)};
+  for (std::uint32_t box = 0; percent == 0 && box < 5; ++box) {
+    const std::uint32_t left = drawn(random, columns), top = drawn(random, rows), wide = 1 + drawn(random, columns / 2),
+                        high = 1 + drawn(random, rows / 2), bottom = drawn(random, layers), up = 1 + drawn(random, layers);
+    for (std::uint32_t l = bottom; l < std::min(layers, bottom + up); ++l) {
+      for (std::uint32_t r = top; r < std::min(rows, top + high); ++r) {
+        for (std::uint32_t c = left + (l + r) % 3; c < std::min(columns, left + wide); ++c)
+          volume.set[(std::size_t{l} * rows + r) * columns + c] = 1;
+      }
+    }
+  }
+  for (auto& pixel : volume.set) {
+    if (drawn(random, 100) < percent) pixel = 1;
+  }
+  return volume;
+}
+
+std::string text_of(const RunsView& runs) {
+  std::string text;
+  for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+    for (const std::uint32_t change : runs.row(r)) text += std::to_string(change) + " ";
+    text += "\n";
+  }
+  return text;
+}
+
+/// Of pixels, those of the window that the stencil covers from a set one, or whose stencil covers a set one.
+Runs covered(const Volume& image, const Stencil& stencil, bool corners, const PixelBox& window, bool gaps) {
+  Volume result{image.columns, image.rows, 1, std::vector<std::uint8_t>(std::size_t{image.columns} * image.rows, 0)};
+  for (std::uint32_t r = window.top; r < window.bottom; ++r) {
+    for (std::uint32_t c = window.left; c < window.right; ++c) {
+      bool any = false;
+      for (std::uint32_t j = 0; j < stencil.rows.size(); ++j) {
+        for (std::uint32_t k = stencil.rows[j].first; k <= stencil.rows[j].last; ++k) {
+          const std::int64_t column = corners ? std::int64_t{c} + k : std::int64_t{c} - k,
+                             row = corners ? std::int64_t{r} + j : std::int64_t{r} - j;
+          any = any || image.at(column, row, 0);
+        }
+      }
+      result.set[std::size_t{r} * image.columns + c] = any != gaps ? 1 : 0;
+    }
+  }
+  return result.layer(0);
+}
+
+TEST(Chains, CoverWhatTheirPixelsDo) {
+  std::mt19937 random(7);
+  const PixelGrid grid{PixelAxis(254, 10 * kNmPerMm), PixelAxis(254, 10 * kNmPerMm)};
+  const Stencils stencils(grid, 1'300'000);
+  Chains chains;  // the same for all, as for layers
+  Runs result;
+  for (int k = 0; k < 300; ++k) {
+    const Volume image = moving_shapes(random, 37, 29, 1, k % 3 == 0 ? 0 : k % 3 == 1 ? 4 : 60);
+    const std::uint32_t left = drawn(random, 20), top = drawn(random, 15);
+    const PixelBox window{left, left + drawn(random, 38 - left), top, top + drawn(random, 30 - top)};
+    ASSERT_TRUE(chains.find(image.layer(0), static_cast<std::uint32_t>(stencils.at(stencils.count() - 1).rows.size())));
+    for (int turn = 0; turn < 4; ++turn) {
+      const Stencil stencil = stencils.at(drawn(random, stencils.count()));
+      const bool corners = turn % 2 == 1, gaps = turn / 2 == 1;
+      chains.spread(stencil.steps, corners, window, gaps, result);
+      ASSERT_EQ(text_of(result), text_of(covered(image, stencil, corners, window, gaps)))
+          << k << " corners " << corners << " gaps " << gaps;
+    }
+  }
+}
+
+/// Chains of noise are short: it is opened row by row, with the same result.
+TEST(Chains, LeaveNoiseToRows) {
+  std::mt19937 random(8);
+  const Volume noise = moving_shapes(random, 500, 500, 1, 92);
+  const PixelGrid grid{PixelAxis(254, 50 * kNmPerMm), PixelAxis(254, 50 * kNmPerMm)};
+  const Stencils stencils(grid, 600'000);
+  const Stencil stencil = stencils.at(stencils.count() - 1);
+  Chains chains;
+  ASSERT_FALSE(chains.find(noise.layer(0), 100));
+  Volume more = noise;
+  for (auto& pixel : more.set) pixel = random() % 2 == 0 ? 1 : 0;
+  ASSERT_FALSE(chains.find(more.layer(0), static_cast<std::uint32_t>(stencil.rows.size())));
+  for (std::uint32_t r = 100; r < 300; ++r) std::fill_n(more.set.begin() + r * 500 + 50, 200 + r % 7, std::uint8_t{1});
+  ThinScratch scratch;
+  Runs opened;
+  open(more.layer(0), stencil, scratch, opened);
+  const PixelBox all{0, 500, 0, 500};
+  Volume outside = more;
+  for (auto& pixel : outside.set) pixel = pixel == 0 ? 1 : 0;
+  const Runs not_fits = covered(outside, stencil, true,
+                                {0, 500 - stencil.columns + 1, 0, 501 - static_cast<std::uint32_t>(stencil.rows.size())}, true);
+  Volume fits{500, 500, 1, std::vector<std::uint8_t>(250000, 0)};
+  for (std::uint32_t r = 0; r < 500; ++r) {
+    const auto row = not_fits.view().row(r);
+    for (std::size_t i = 0; i < row.size(); i += 2)
+      std::fill_n(fits.set.begin() + r * 500 + row[i], row[i + 1] - row[i], std::uint8_t{1});
+  }
+  EXPECT_EQ(text_of(opened), text_of(covered(fits, stencil, false, all, false)));
+}
+
+class ColumnHeights : public testing::Test {
+ protected:
+  /// The height of the column of set pixels that ends with this one; `endless` where it begins with the first layer.
+  static std::int64_t height(const Volume& volume, std::uint32_t c, std::uint32_t r, std::uint32_t l, bool endless) {
+    std::int64_t layers = 0;
+    while (volume.at(c, r, std::int64_t{l} - layers)) ++layers;
+    return endless && layers == std::int64_t{l} + 1 ? 1000 : layers;
+  }
+};
+
+TEST_F(ColumnHeights, AreThoseOfPixels) {
+  std::mt19937 random(9);
+  for (int k = 0; k < 60; ++k) {
+    const Volume volume = moving_shapes(random, 23, 11, 14, k % 3 == 0 ? 0 : k % 3 == 1 ? 30 : 85);
+    const auto from = static_cast<std::int64_t>(drawn(random, 6));  // tall: as many layers and one more
+    const bool endless = k % 2 == 1;
+    YoungColumns young;
+    TallColumns tall;
+    for (std::uint32_t l = 0; l <= volume.layers; ++l) {
+      SCOPED_TRACE(std::to_string(k) + " layer " + std::to_string(l));
+      const Layer layer{l, static_cast<Nm>(l), 1};
+      const Runs image = l < volume.layers ? volume.layer(l) : Volume{23, 11, 1, std::vector<std::uint8_t>(253, 0)}.layer(0);
+      if (l == volume.layers) {
+        young.finish();
+      } else {
+        young.add(layer, image, std::int64_t{l} - from, endless);
+        tall.add(layer, image, std::int64_t{l} - from);
+      }
+      Volume short_ended{23, 11, 1, std::vector<std::uint8_t>(253, 0)}, as_tall = short_ended, endless_tall = short_ended;
+      for (std::uint32_t r = 0; r < 11; ++r) {
+        for (std::uint32_t c = 0; c < 23; ++c) {
+          const std::int64_t below = l == 0 ? 0 : height(volume, c, r, l - 1, endless);
+          if (!volume.at(c, r, l) && below > 0 && below <= from) short_ended.set[r * 23 + c] = static_cast<std::uint8_t>(below);
+          if (height(volume, c, r, l, endless) > from) as_tall.set[r * 23 + c] = 1;
+          if (height(volume, c, r, l, true) > from) endless_tall.set[r * 23 + c] = 1;
+        }
+      }
+      Volume ended{23, 11, 1, std::vector<std::uint8_t>(253, 0)};
+      for (const ColumnSpan& span : young.ended()) {
+        EXPECT_EQ(span.first_layer, static_cast<std::uint32_t>(span.bottom));
+        for (std::uint32_t c = span.begin; c < span.end; ++c) {
+          EXPECT_EQ(ended.set[span.row * 23 + c], 0);
+          ended.set[span.row * 23 + c] = static_cast<std::uint8_t>(std::int64_t{l} - span.bottom);
+        }
+      }
+      EXPECT_EQ(ended.set, short_ended.set);
+      if (l == volume.layers) continue;
+      EXPECT_EQ(text_of(young.tall()), text_of(as_tall.layer(0)));
+      EXPECT_EQ(text_of(tall.tall()), text_of(endless_tall.layer(0)));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lamina::checks
