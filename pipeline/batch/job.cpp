@@ -49,11 +49,12 @@ std::string command_of(const fs::path& path) {
 BatchEntry entry_of_file(const fs::path& path, const fs::path& below, const std::vector<std::string>& with) {
   BatchEntry entry{path.string(), name_of(below), {}};
   if (is_job_file(path)) {
-    entry.words = {command_of(path), "--job", path.string()};
+    entry.words = std::vector<std::string>{command_of(path), "--job", path.string()};
   } else {
-    entry.words = with;
+    std::vector<std::string> words = with;
     // A name that begins with a dash still means a file.
-    entry.words.push_back(path.string().starts_with('-') ? "./" + path.string() : path.string());
+    words.push_back(path.string().starts_with('-') ? "./" + path.string() : path.string());
+    entry.words = words;
   }
   return entry;
 }
@@ -98,7 +99,7 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
     if (!words->empty() && words->front() == "lamina") words->erase(words->begin());
     if (words->empty()) continue;
     std::string name = name_of_words(*words);
-    entries.push_back({source, std::move(name), std::move(*words)});
+    entries.push_back({source, std::move(name), *words});
   }
   if (!file->status()) return file->status().error();
   if (entries.size() == before)
@@ -120,27 +121,31 @@ fs::path below_batch(const fs::path& path, const std::string& directory) {
 /// Resolves entries in order; an error of a single job becomes job.refused.
 class Preparation {
  public:
-  explicit Preparation(const BatchShare& share) : share_(share) {}
+  explicit Preparation(const BatchShare& share) : share_(share) {
+    for (const char* name : kOwnFiles) names_.insert(hash_text(name));
+  }
 
   void prepare(BatchJob& job, const ReadCall& read) {
-    Result<Call> call = read(job.entry.words);
+    const std::vector<std::string> words = job.entry.words.unpacked();
+    Result<Call> call = read(words);
     if (!call) {
       job.refused = call.error();
       return;
     }
-    job.call = std::move(*call);
-    find_output(job);
+    job.can_continue = call->can_continue;
+    job.can_replace = call->can_replace;
+    job.parsed = std::move(call->parsed);
+    find_output(*call, job);
     job.need_bytes = 16 * kMebibyte;
-    if (job.call.layer_bytes) {
-      job.layer_bytes = *job.call.layer_bytes > 0 ? *job.call.layer_bytes : share_.layer_bytes;
+    if (call->layer_bytes) {
+      job.layer_bytes = *call->layer_bytes > 0 ? *call->layer_bytes : share_.layer_bytes;
       job.need_bytes += job.layer_bytes;
     }
-    digest_inputs(job);
+    digest_inputs(words, call->inputs, job);
   }
 
  private:
-  void find_output(BatchJob& job) {
-    const Call& call = job.call;
+  void find_output(const Call& call, BatchJob& job) {
     if (!call.output.empty() && call.output_of_job_file) {
       job.output = call.output;
     } else if (!call.output.empty()) {
@@ -149,7 +154,7 @@ class Preparation {
       job.output = (fs::path(share_.directory) / given).lexically_normal().string();
     } else if (call.ending) {
       std::string name = job.entry.name;
-      for (std::uint32_t next = 2; !names_.insert(name + *call.ending).second; ++next) {
+      for (std::uint32_t next = 2; !names_.insert(hash_text(name + *call.ending)).second; ++next) {
         name = fmt::format("{}-{}", job.entry.name, next);
       }
       job.entry.name = name;
@@ -157,17 +162,20 @@ class Preparation {
     } else {
       return;
     }
-    const fs::path below = below_batch(job.output, share_.directory);
-    job.position = below.empty() ? job.output : below.string();
+    job.output.shrink_to_fit();
+    const std::string below = below_batch(job.output, share_.directory).string();
+    if (!below.empty() && job.output.ends_with(below)) job.below = static_cast<std::uint32_t>(job.output.size() - below.size());
   }
 
-  void digest_inputs(BatchJob& job) {
-    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.position);
-    for (const std::string& word : job.entry.words) identity += fmt::format("{}:{}\n", word.size(), word);
-    for (const std::string& input : std::set<std::string>(job.call.inputs.begin(), job.call.inputs.end())) {
-      const auto [known, fresh] = digests_.try_emplace(input, Error{});
-      if (fresh && is_file(input)) known->second = digest_file(input);
-      const Result<FileDigest>& digest = known->second;
+  void digest_inputs(const std::vector<std::string>& words, const std::vector<std::string>& inputs, BatchJob& job) {
+    std::string identity = fmt::format("lamina {}\n{}\n", version(), job.position());
+    for (const std::string& word : words) identity += fmt::format("{}:{}\n", word.size(), word);
+    for (const std::string& input : std::set<std::string>(inputs.begin(), inputs.end())) {
+      const auto [known, fresh] = digests_.try_emplace(hash_text(input));
+      if (fresh && is_file(input)) {
+        if (const Result<FileDigest> read = digest_file(input)) known->second = *read;
+      }
+      const std::optional<FileDigest>& digest = known->second;
       if (!digest) continue;
       identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));
       job.need_bytes += load::part_bytes(input, digest->bytes);
@@ -176,18 +184,26 @@ class Preparation {
   }
 
   const BatchShare& share_;
-  std::map<std::string, Result<FileDigest>> digests_;                // many jobs read the same files
-  std::set<std::string> names_{kOwnFiles.begin(), kOwnFiles.end()};  // of outputs named after their jobs
+  std::map<Hash128, std::optional<FileDigest>, HashOrder> digests_;  // of files by their names: many jobs read the same
+  std::set<Hash128, HashOrder> names_;                               // of outputs named after their jobs, and own files
 };
 
 bool lies_within(const fs::path& inner, const fs::path& outer) {
   return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
 }
 
+/// A path as text that is sorted by the parts of paths: what separates them comes before all else.
+std::string sortable(const fs::path& path) {
+  std::string text = path.string();
+  std::ranges::replace(text, '/', '\0');
+  text.shrink_to_fit();
+  return text;
+}
+
 /// Refuses misplaced outputs, and jobs whose outputs collide.
 /// Sorted by the parts of their paths, a directory stands right before what lies in it.
 Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directory) {
-  std::vector<std::pair<fs::path, const BatchJob*>> outputs;
+  std::vector<std::pair<std::string, const BatchJob*>> outputs;
   std::error_code ignored;
   const fs::path own = fs::weakly_canonical(fs::absolute(directory, ignored), ignored);
   for (const BatchJob& job : jobs) {
@@ -208,13 +224,13 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
       return refused(fmt::format("writes into {}, which belongs to the batch; give it another name with -o",
                                  (fs::path(directory) / name).string()));
     }
-    outputs.emplace_back(std::move(path), &job);
+    outputs.emplace_back(sortable(path), &job);
   }
-  std::ranges::stable_sort(outputs, {}, &std::pair<fs::path, const BatchJob*>::first);
+  std::ranges::stable_sort(outputs, {}, &std::pair<std::string, const BatchJob*>::first);
   for (std::size_t i = 1; i < outputs.size(); ++i) {
     const auto& [outer, first] = outputs[i - 1];
     const auto& [inner, second] = outputs[i];
-    if (lies_within(inner, outer)) {
+    if (inner.starts_with(outer) && (inner.size() == outer.size() || inner[outer.size()] == '\0' || outer.ends_with('\0'))) {
       return usage("{} and {}: both write into {}; give one of them another -o", first->entry.source, second->entry.source,
                    first->output);
     }
@@ -223,6 +239,15 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
 }
 
 }  // namespace
+
+void BatchResult::take_warnings() {
+  const Json* const list = value.find("warnings");
+  if (list == nullptr || list->empty()) return;
+  warnings = static_cast<std::uint32_t>(list->size());
+  const Json& first = list->front();
+  const Json* text = first.is_object() ? first.find("text") : &first;
+  if (text != nullptr) first_warning = text->text();
+}
 
 std::string_view outcome_name(BatchOutcome outcome) {
   constexpr std::string_view kNames[] = {"done", "kept", "failed", "time limit", "stopped", "not run"};
@@ -250,6 +275,7 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read) {
   Preparation preparation(share);
   std::vector<BatchJob> jobs;
+  jobs.reserve(entries.size());
   for (BatchEntry& entry : entries) {
     BatchJob& job = jobs.emplace_back();
     job.number = static_cast<std::uint32_t>(jobs.size());

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "pipeline/plan/progress.h"
@@ -16,11 +17,32 @@
 
 namespace lamina::pipeline {
 
+/// The words of a command line in one piece of memory: a batch has many.
+class PackedWords {
+ public:
+  PackedWords() = default;
+  PackedWords(const std::vector<std::string>& words) {
+    std::size_t bytes = 0;
+    for (const std::string& word : words) bytes += word.size() + 1;
+    text_.reserve(bytes);
+    for (const std::string& word : words) (text_ += word) += '\0';
+  }
+  std::vector<std::string> unpacked() const {
+    std::vector<std::string> words;
+    for (std::size_t at = 0; at < text_.size(); at += words.back().size() + 1) words.emplace_back(text_.c_str() + at);
+    return words;
+  }
+  std::string_view text() const { return text_; }  // a NUL byte ends each word
+
+ private:
+  std::string text_;
+};
+
 /// One job as written in its source.
 struct BatchEntry {
-  std::string source;              // where: "jobs.txt:12", "parts/bracket.stl"
-  std::string name;                // default name of the output; not unique yet
-  std::vector<std::string> words;  // command and arguments: "jet", "bracket.stl", "--dpi", "600"
+  std::string source;  // where: "jobs.txt:12", "parts/bracket.stl"
+  std::string name;    // default name of the output; not unique yet
+  PackedWords words;   // command and arguments: "jet", "bracket.stl", "--dpi", "600"
 };
 
 /// The jobs of all operands, in order:
@@ -51,20 +73,36 @@ enum class BatchOutcome {
 
 std::string_view outcome_name(BatchOutcome outcome);
 
+/// For sets and maps of names, which take less as hashes.
+struct HashOrder {
+  bool operator()(const Hash128& a, const Hash128& b) const { return std::pair(a.high, a.low) < std::pair(b.high, b.low); }
+};
+
+/// A line of the record: bytes [at, at + bytes) of the file.
+struct RecordedLine {
+  std::uint64_t at = 0;
+  std::uint32_t bytes = 0;
+};
+
 struct BatchResult {
   BatchOutcome outcome = BatchOutcome::kNotRun;
   int code = 0;        // of the command; 3 on the time limit
   std::string reason;  // one line, if the job is not done
-  Json value;          // result of the command; null if none
+  Json value;          // result of the command; null if none, or where the record has it
+  RecordedLine line;   // of the record that has the value; empty if none
+  std::uint32_t warnings = 0;
+  std::string first_warning;
   double seconds = 0;
   TreeDigest output;
   bool recognized = false;  // kept without a record: the directory holds the finished job
 
   /// Whether the job failed by itself, as opposed to being stopped with the batch.
   bool failed() const { return outcome == BatchOutcome::kFailed || outcome == BatchOutcome::kTimeLimit; }
+  /// Counts the warnings in the value.
+  void take_warnings();
 };
 
-/// A command line as a batch sees it.
+/// A command line as a batch sees it before it runs.
 struct Call {
   std::string output;               // "" if the command line names none
   bool output_of_job_file = false;  // relative to the working directory, not to the batch's directory
@@ -73,9 +111,7 @@ struct Call {
   bool can_continue = false, can_replace = false;  // output of an earlier run
   std::optional<std::uint64_t> layer_bytes;        // its layer budget; 0 if it accepts one and sets none
   std::vector<std::string> inputs;                 // words of the command line that may be input files
-  /// Runs the command; callable from any thread. Progress is reported from one thread at a time.
-  /// returns  code, reason, value, and whether all layers existed already; the queue fills in the rest
-  std::function<BatchResult(const CallSettings&, const ProgressCallback&, const std::atomic<bool>& cancel)> run;
+  PackedWords parsed;                              // for RunJob
 };
 
 /// Parses a command line of at least one word. errors  kUsage: invalid command line
@@ -84,22 +120,31 @@ using ReadCall = std::function<Result<Call>(const std::vector<std::string>& word
 struct BatchJob {
   std::uint32_t number = 0;  // from 1
   BatchEntry entry;          // its name is unique and becomes the output's unless the job names one
-  Call call;
-  std::string output;             // file or directory; empty if the command only returns a value
-  std::string position;           // output as reported: below the batch's directory, else as given
-  bool relative_output = false;   // the output was given relative to the batch's directory
-  std::uint64_t layer_bytes = 0;  // for the layers in flight
+  PackedWords parsed;        // of its Call
+  std::string output;        // file or directory; empty if the command only returns a value
+  std::uint32_t below = 0;   // length of the batch's directory in front of an output in it
+  bool relative_output = false;                    // the output was given relative to the batch's directory
+  bool can_continue = false, can_replace = false;  // output of an earlier run
+  std::uint64_t layer_bytes = 0;                   // for the layers in flight
   std::uint64_t need_bytes = 0;   // expected peak memory
   Hash128 id;                     // hash of version, words, output path and all input files
   std::optional<Error> refused;   // invalid job: it fails at its turn, the others run
+
+  /// The output as reported: below the batch's directory, else as given.
+  std::string_view position() const { return std::string_view(output).substr(below); }
 };
+
+/// Runs a job; callable from any thread. Progress is reported from one thread at a time.
+/// returns  code, reason, value, and whether all layers existed already; the queue fills in the rest
+using RunJob =
+    std::function<BatchResult(const BatchJob&, const CallSettings&, const ProgressCallback&, const std::atomic<bool>& cancel)>;
 
 struct BatchShare {
   std::string directory;          // of the batch
   std::uint64_t layer_bytes = 0;  // for each job without a budget of its own
 };
 
-/// Prepares the jobs in the order of the entries. Writes nothing.
+/// Prepares the jobs in the order of the entries. Writes nothing. Some hundred bytes a job stay.
 /// errors  kUsage: outputs of two jobs coincide or nest (both are named); an output collides with the batch's own files;
 ///         a relative output leaves the batch's directory
 /// cost    reads every input file once, to detect later changes

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "stages/support/text/readable.h"
 
@@ -30,21 +31,19 @@ bool holds_something(const std::string& output) {
   return !output.empty() && std::filesystem::exists(output, error) && !std::filesystem::is_empty(output, error);
 }
 
-/// A job's place in the queue; shared with its thread, which may outlive the batch.
+/// A running job; shared with its thread, which may outlive the batch.
 struct Slot {
-  enum class State { kWaiting, kRunning, kEnded } state = State::kWaiting;
   std::atomic<bool> cancel{false};
   std::atomic<std::uint32_t> layers_done{0}, layers{0};
   Clock::time_point begun, stop_requested;
   std::atomic<bool> overdue{false};
-  bool abandoned = false, reported = false;
-  BatchResult result;
+  bool abandoned = false;
 };
 
 class Queue : public std::enable_shared_from_this<Queue> {
  public:
-  Queue(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options)
-      : jobs_(std::move(jobs)), slots_(jobs_.size()), record_(std::move(record)), options_(options) {}
+  Queue(std::shared_ptr<const std::vector<BatchJob>> jobs, BatchRecord record, const BatchOptions& options, const RunJob& run)
+      : kept_jobs_(std::move(jobs)), results_(jobs_.size()), record_(std::move(record)), options_(options), run_(run) {}
 
   Result<BatchSummary> run(const BatchWatcher& watcher, const std::atomic<bool>& interrupt) {
     const auto start = Clock::now();
@@ -64,7 +63,6 @@ class Queue : public std::enable_shared_from_this<Queue> {
       changed_.wait_for(lock, milliseconds(100));
     }
     report(watcher, lock);
-    for (const Slot& slot : slots_) summary_.results.push_back(slot.result);
     summary_.seconds = seconds_since(start);
     // Wakes idle workers so that they exit. A worker shares ownership of this object and may exit later.
     stopped_ = true;
@@ -72,7 +70,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
     changed_.wait_for(lock, grace(), [&] { return workers_ == 0; });
     const BatchRecord released = std::move(record_);  // the next run may open it at once
     if (!record_status_) return record_status_.error();
-    return summary_;
+    summary_.results = std::move(results_);  // what jobs that were abandoned return goes nowhere
+    return std::move(summary_);
   }
 
  private:
@@ -84,22 +83,22 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   void stop_all() {
     stopped_ = true;
-    for (Slot& slot : slots_) request_stop(slot);
+    for (const auto& [i, slot] : slots_) request_stop(*slot);
     changed_.notify_all();
   }
 
   std::chrono::milliseconds grace() const { return summary_.interrupted ? kLastGrace : std::chrono::milliseconds(kGrace); }
 
   static void request_stop(Slot& slot) {
-    if (slot.state != Slot::State::kRunning || slot.cancel) return;
+    if (slot.cancel) return;
     slot.stop_requested = Clock::now();
     slot.cancel = true;
   }
 
   void check_clocks() {
-    for (std::size_t i = 0; i < jobs_.size(); ++i) {
-      Slot& slot = slots_[i];
-      if (slot.state != Slot::State::kRunning) continue;
+    std::vector<std::pair<std::size_t, BatchResult>> abandoned;
+    for (const auto& [i, shared] : slots_) {
+      Slot& slot = *shared;
       if (options_.time_limit_seconds > 0 && !slot.cancel && seconds_since(slot.begun) > options_.time_limit_seconds) {
         slot.overdue = true;
         request_stop(slot);
@@ -111,6 +110,9 @@ class Queue : public std::enable_shared_from_this<Queue> {
       result.reason = "did not stop after the stop request and was abandoned";
       result.seconds = seconds_since(slot.begun);
       stopped_by(slot, result, ", " + result.reason);
+      abandoned.emplace_back(i, std::move(result));
+    }
+    for (auto& [i, result] : abandoned) {
       end(i, std::move(result));
       if (!stopped_) start_worker();
     }
@@ -120,22 +122,15 @@ class Queue : public std::enable_shared_from_this<Queue> {
   std::size_t report(const BatchWatcher& watcher, std::unique_lock<std::mutex>& lock) {
     BatchState state;
     state.total = static_cast<std::uint32_t>(jobs_.size());
-    std::vector<std::size_t> fresh;
-    for (std::size_t i = 0; i < jobs_.size(); ++i) {
-      const Slot& slot = slots_[i];
-      if (slot.state == Slot::State::kRunning) {
-        state.running.push_back({jobs_[i].entry.name, slot.layers_done, slot.layers});
-      }
-      if (slot.state != Slot::State::kEnded) continue;
-      ++state.ended;
-      if (slot.result.outcome != BatchOutcome::kDone && slot.result.outcome != BatchOutcome::kKept) ++state.failed;
-      if (!slot.reported) fresh.push_back(i);
-    }
+    state.ended = ended_;
+    state.failed = failed_;
+    for (const auto& [i, slot] : slots_) state.running.push_back({jobs_[i].entry.name, slot->layers_done, slot->layers});
+    std::vector<std::size_t> fresh = std::exchange(fresh_, {});
+    std::ranges::sort(fresh);
     lock.unlock();
     // Ended jobs do not change any more.
     for (const std::size_t i : fresh) {
-      slots_[i].reported = true;
-      if (watcher.ended) watcher.ended(jobs_[i], slots_[i].result, state);
+      if (watcher.ended) watcher.ended(jobs_[i], results_[i], state);
     }
     if (watcher.progress) watcher.progress(state);
     lock.lock();
@@ -151,19 +146,19 @@ class Queue : public std::enable_shared_from_this<Queue> {
         continue;
       }
       const std::size_t i = next_++;
-      Slot& slot = slots_[i];
-      slot.state = Slot::State::kRunning;
-      slot.begun = Clock::now();
+      const std::shared_ptr<Slot> slot = slots_[i] = std::make_shared<Slot>();
+      slot->begun = Clock::now();
       ++running_;
       need_ += job.need_bytes;
       summary_.max_running = std::max(summary_.max_running, running_);
       summary_.max_need_bytes = std::max(summary_.max_need_bytes, need_);
       lock.unlock();
-      BatchResult result = run_job(i);
+      BatchResult result = run_job(i, *slot);
+      result.take_warnings();
       // Returns freed memory to the system before the next job starts.
       ::malloc_trim(0);
       lock.lock();
-      if (slot.abandoned) break;  // another job has its place
+      if (slot->abandoned) break;  // another job has its place
       end(i, std::move(result));
     }
     --workers_;
@@ -172,14 +167,16 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   /// Requires the lock.
   void end(std::size_t i, BatchResult result) {
-    Slot& slot = slots_[i];
-    slot.state = Slot::State::kEnded;
+    slots_.erase(i);
     --running_;
     need_ -= jobs_[i].need_bytes;
+    ++ended_;
+    if (result.outcome != BatchOutcome::kDone && result.outcome != BatchOutcome::kKept) ++failed_;
     const bool news = result.outcome != BatchOutcome::kStopped && (result.outcome != BatchOutcome::kKept || result.recognized);
-    slot.result = std::move(result);
-    if (news) note(record_.ended(jobs_[i], slot.result));
-    if (options_.fail_fast && slot.result.failed()) stop_all();
+    if (news) note(record_.ended(jobs_[i], result));
+    results_[i] = std::move(result);
+    fresh_.push_back(i);
+    if (options_.fail_fast && results_[i].failed()) stop_all();
     changed_.notify_all();
   }
 
@@ -188,18 +185,16 @@ class Queue : public std::enable_shared_from_this<Queue> {
   }
 
   /// Must be called without the lock.
-  BatchResult run_job(std::size_t i) {
+  BatchResult run_job(std::size_t i, Slot& slot) {
     const BatchJob& job = jobs_[i];
-    Slot& slot = slots_[i];
     if (job.refused) return failed(*job.refused);
     const BatchRecord::Earlier* earlier = options_.resume ? record_.earlier(job) : nullptr;
     if (earlier != nullptr && earlier->ended && earlier->begun == job.id) {
       const Result<TreeDigest> now = job.output.empty() ? TreeDigest() : digest_tree(job.output);
-      const TreeDigest& then = earlier->result.output;
+      const TreeDigest& then = earlier->output;
       if (job.output.empty() || (now && now->files == then.files && now->hash == then.hash)) {
-        BatchResult result = earlier->result;
-        result.outcome = BatchOutcome::kKept;
-        return result;
+        Result<BatchResult> result = record_.kept(*earlier);
+        return result ? std::move(*result) : failed(result.error());
       }
     }
     const bool unowned = !options_.overwrite && (earlier == nullptr || earlier->unowned) && holds_something(job.output);
@@ -222,8 +217,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
   /// command decides whether it is its own.
   CallSettings::Earlier earlier_of(const BatchJob& job, const BatchRecord::Earlier* earlier, bool unowned) const {
     const bool same = earlier != nullptr && earlier->begun == job.id;
-    if (job.call.can_continue && (unowned ? options_.resume : same)) return CallSettings::Earlier::kContinue;
-    if (!unowned && job.call.can_replace && (options_.overwrite || earlier != nullptr)) return CallSettings::Earlier::kReplace;
+    if (job.can_continue && (unowned ? options_.resume : same)) return CallSettings::Earlier::kContinue;
+    if (!unowned && job.can_replace && (options_.overwrite || earlier != nullptr)) return CallSettings::Earlier::kReplace;
     return CallSettings::Earlier::kNone;
   }
 
@@ -248,22 +243,26 @@ class Queue : public std::enable_shared_from_this<Queue> {
       slot.layers_done.store(event.done, std::memory_order_relaxed);
       slot.layers.store(event.total, std::memory_order_relaxed);
     };
-    BatchResult result = job.call.run(settings, progress, slot.cancel);
+    BatchResult result = run_(job, settings, progress, slot.cancel);
     result.seconds = seconds_since(start);
     result.outcome = result.code == 0 ? BatchOutcome::kDone : BatchOutcome::kFailed;
     if (result.code == static_cast<int>(Fault::kInterrupted)) stopped_by(slot, result);
     return result;
   }
 
-  std::vector<BatchJob> jobs_;
-  std::deque<Slot> slots_;
+  const std::shared_ptr<const std::vector<BatchJob>> kept_jobs_;
+  const std::vector<BatchJob>& jobs_ = *kept_jobs_;
+  std::vector<BatchResult> results_;                    // one a job
+  std::map<std::size_t, std::shared_ptr<Slot>> slots_;  // of running jobs
+  std::vector<std::size_t> fresh_;                      // ended and not reported yet
   BatchRecord record_;
   BatchOptions options_;
+  RunJob run_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
   std::size_t next_ = 0;
-  std::uint32_t running_ = 0, workers_ = 0;
+  std::uint32_t running_ = 0, workers_ = 0, ended_ = 0, failed_ = 0;
   std::uint64_t need_ = 0;
   bool stopped_ = false;
   Status record_status_;
@@ -277,9 +276,10 @@ std::uint64_t layer_share(std::uint64_t memory_bytes, std::uint32_t jobs) {
   return std::max(memory_bytes / (2 * std::max(jobs, 1u)), kMin);
 }
 
-Result<BatchSummary> run_batch(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options,
-                               const BatchWatcher& watcher, const std::atomic<bool>& interrupt) {
-  return std::make_shared<Queue>(std::move(jobs), std::move(record), options)->run(watcher, interrupt);
+Result<BatchSummary> run_batch(std::shared_ptr<const std::vector<BatchJob>> jobs, BatchRecord record,
+                               const BatchOptions& options, const RunJob& run, const BatchWatcher& watcher,
+                               const std::atomic<bool>& interrupt) {
+  return std::make_shared<Queue>(std::move(jobs), std::move(record), options, run)->run(watcher, interrupt);
 }
 
 }  // namespace lamina::pipeline

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,7 @@ struct BatchWatcher {
 };
 
 struct BatchSummary {
-  std::vector<BatchResult> results;  // one a job
+  std::vector<BatchResult> results;  // one a job; values that the record has are left there
   std::uint32_t max_running = 0;
   std::uint64_t max_need_bytes = 0;  // of jobs running at the same time
   double seconds = 0;
@@ -60,7 +61,9 @@ std::uint64_t layer_share(std::uint64_t memory_bytes, std::uint32_t jobs);
 
 /// Runs the jobs. `interrupt` stops the batch: running jobs are cancelled and no new job starts.
 /// errors  kOutput if the record cannot be written; finished jobs stay finished
-Result<BatchSummary> run_batch(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options,
-                               const BatchWatcher& watcher, const std::atomic<bool>& interrupt);
+/// jobs  outlive the call where a job ignores its stop
+Result<BatchSummary> run_batch(std::shared_ptr<const std::vector<BatchJob>> jobs, BatchRecord record,
+                               const BatchOptions& options, const RunJob& run, const BatchWatcher& watcher,
+                               const std::atomic<bool>& interrupt);
 
 }  // namespace lamina::pipeline

@@ -19,18 +19,6 @@ std::string cell(std::string_view text) {
   return line;
 }
 
-/// Warnings of a job's own summary.
-std::size_t warnings_of(const BatchResult& result) {
-  if (!result.value.is_object() || !result.value.contains("warnings")) return 0;
-  return result.value["warnings"].size();
-}
-
-std::string first_warning(const BatchResult& result) {
-  const Json& first = result.value["warnings"].front();
-  const Json* text = first.is_object() ? first.find("text") : &first;
-  return text == nullptr ? "" : text->text();
-}
-
 std::string warnings_text(std::size_t count) { return fmt::format("{} warning{}", count, count == 1 ? "" : "s"); }
 
 /// Totals of the batch.
@@ -50,7 +38,7 @@ BatchTotals totals_of(const std::vector<BatchResult>& results) {
     ++(totals.*kCounts[static_cast<std::size_t>(result.outcome)]);
     totals.files += result.output.files;
     totals.bytes += result.output.bytes;
-    totals.warnings += warnings_of(result);
+    totals.warnings += result.warnings;
     if (result.outcome != BatchOutcome::kKept) totals.job_seconds += result.seconds;
   }
   return totals;
@@ -71,10 +59,12 @@ std::string failure_line(const BatchJob& job, const BatchResult& result) {
   return one_line(result.reason.starts_with(source) ? result.reason : fmt::format("{}: {}", source, result.reason));
 }
 
-Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options) {
+Status write_batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
+                        std::int64_t schema, int indent, const std::function<Status(std::string_view)>& append) {
   const BatchTotals totals = totals_of(summary.results);
   const auto rounded = [](double seconds) { return std::round(seconds * 1000) / 1000; };
-  Json json = {{"command", "batch"},
+  Json json = {{"schema", schema},
+               {"command", "batch"},
                {"version", version()},
                {"directory", options.directory},
                {"code", batch_code(summary)},
@@ -93,12 +83,24 @@ Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, 
                {"max_running", summary.max_running},
                {"memory_budget_bytes", options.memory_bytes},
                {"max_need_bytes", summary.max_need_bytes},
-               {"peak_resident_bytes", peak_resident_bytes()}};
-  Json& results = json["jobs"] = Json::array();
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
-    results.push_back(result_json(jobs[i], summary.results[i]));
+               {"peak_resident_bytes", peak_resident_bytes()},
+               {"jobs", Json::array()}};
+  const std::string head = json_text(json, indent), line = indent < 0 ? "" : "\n" + std::string(indent, ' '),
+                    own_line = indent < 0 ? "" : "\n" + std::string(2 * indent, ' ');
+  const std::size_t end = head.rfind(']');  // of the jobs
+  Status status = append(std::string_view(head).substr(0, end));
+  RecordedValues values(options.directory);
+  for (std::size_t i = 0; i < jobs.size() && status; ++i) {
+    const Result<Json> value = values.of(summary.results[i]);
+    if (!value) return value.error();
+    std::string text = (i == 0 ? "" : ",") + own_line;
+    for (const char c : json_text(result_json(jobs[i], summary.results[i], *value), indent)) {
+      c == '\n' ? text += own_line : text += c;
+    }
+    status = append(text);
   }
-  return json;
+  if (!status) return status;
+  return append((jobs.empty() ? "" : line) + head.substr(end) + "\n");
 }
 
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary) {
@@ -106,7 +108,7 @@ std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& s
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
     text += fmt::format("{}\t{}\t{}\t{:.3f}\t{}\t{}\t{}\t{}\t{}\n", jobs[i].number, outcome_name(result.outcome), result.code,
-                        result.seconds, result.output.files, result.output.bytes, cell(jobs[i].position),
+                        result.seconds, result.output.files, result.output.bytes, cell(jobs[i].position()),
                         cell(jobs[i].entry.source), cell(result.reason));
   }
   return text;
@@ -120,7 +122,7 @@ std::string job_line(const BatchJob& job, const BatchResult& result, std::uint32
                         readable_bytes(result.output.bytes));
   }
   line += readable_seconds(result.seconds);
-  return warnings_of(result) > 0 ? line + ", " + warnings_text(warnings_of(result)) : line;
+  return result.warnings > 0 ? line + ", " + warnings_text(result.warnings) : line;
 }
 
 std::string progress_line(const BatchState& state) {
@@ -147,8 +149,9 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
     if (result.failed()) line(outcome_name(result.outcome), failure_line(jobs[i], result));
-    if (const std::size_t count = warnings_of(result); count > 0) {
-      line("warning", one_line(fmt::format("{}: {}; {}", jobs[i].entry.source, warnings_text(count), first_warning(result))));
+    if (result.warnings > 0) {
+      line("warning",
+           one_line(fmt::format("{}: {}; {}", jobs[i].entry.source, warnings_text(result.warnings), result.first_warning)));
     }
   }
   line("files",

@@ -13,8 +13,12 @@ namespace lamina::pipeline {
 /// job in the list.
 int batch_code(const BatchSummary& summary);
 
-/// summary.json: one object.
-Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options);
+/// summary.json: one object, in pieces. Values that the record has are read when they are written.
+/// schema  its first member
+/// indent  of json_text()
+/// errors  kOutput: the record cannot be read; of `append`
+Status write_batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
+                        std::int64_t schema, int indent, const std::function<Status(std::string_view)>& append);
 
 /// summary.tsv: a header, then one line per job: job, outcome, code, seconds, files, bytes, output, source, reason.
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary);

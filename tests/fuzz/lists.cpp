@@ -13,17 +13,18 @@ bool read_list(std::string_view text) {
   if (!entries) return check_error(entries.error()), false;
   law(!entries->empty(), "a batch without jobs");
   for (const pipeline::BatchEntry& entry : *entries) {
-    law(!entry.words.empty(), "a job without a command");
+    const std::vector<std::string> words = entry.words.unpacked();
+    law(!words.empty(), "a job without a command");
     law(entry.source.find(":") != std::string::npos, "a job of no line");
     // Quoted again, the words are the same.
     std::string line;
-    for (const std::string& word : entry.words) {
+    for (const std::string& word : words) {
       line += line.empty() ? "'" : " '";
       for (const char c : word) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
       line += "'";
     }
     const auto again = split_words(line);
-    law(again.ok() && *again == entry.words, "words that were quoted are others");
+    law(again.ok() && *again == words, "words that were quoted are others");
   }
   return true;
 }

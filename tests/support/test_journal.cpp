@@ -10,7 +10,7 @@ namespace {
 
 std::vector<std::string> lines_of(Journal& journal) {
   std::vector<std::string> lines;
-  EXPECT_TRUE(journal.read([&](const std::string& line) { lines.push_back(line); }).ok());
+  EXPECT_TRUE(journal.read([&](const std::string& line, std::uint64_t) { lines.push_back(line); }).ok());
   return lines;
 }
 

@@ -5,6 +5,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <span>
 
 #include "pipeline/batch/queue.h"
@@ -130,19 +133,69 @@ BatchResult run_call(const Command& command, const Arguments& arguments, const P
   return result;
 }
 
-/// Reads a command line: any command but batch and preview. errors  kUsage: no such command, wrong arguments, a job file
-/// that cannot be read
-/// sync  of the batch, for jobs without one of their own; "" for none
-Result<Call> read_call(const std::vector<std::string>& words, const std::string& sync) {
+/// The arguments of a command, made once: many jobs have the same.
+const CommandSpec& spec_for(const Command& command) {
+  static std::mutex mutex;
+  static std::map<const Command*, CommandSpec> specs;
+  const std::lock_guard lock(mutex);
+  const auto [found, is_new] = specs.try_emplace(&command);
+  if (is_new) found->second = spec_of(command);
+  return found->second;
+}
+
+/// A command line of a batch.
+struct CommandLine {
+  const Command* command;
+  const CommandSpec& spec;
+  Arguments arguments;
+};
+
+/// Reads a command line: any command but batch and preview. errors  kUsage: no such command, wrong arguments
+Result<CommandLine> read_command_line(const std::vector<std::string>& words) {
   const std::string& name = words.front();
   const Command* command = find_command(name);
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
   if (command == &batch_command || command->reads_itself)
     return usage("'{}' cannot be a job of a batch; run it by itself", name);
-  const CommandSpec spec = spec_of(*command);
-  const Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
+  const CommandSpec& spec = spec_for(*command);
+  Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return usage("--help is no job");
+  return CommandLine{command, spec, std::move(*read)};
+}
+
+/// What was read of a command line: the number of options, of each its number in the spec and its text, and the operands.
+PackedWords packed(const CommandLine& line) {
+  std::vector<std::string> words{std::to_string(line.arguments.options.size())};
+  for (const auto& [flag, text] : line.arguments.options) {
+    const auto option = std::ranges::find(line.spec.options, flag, &OptionSpec::flag);
+    words.push_back(std::to_string(option - line.spec.options.begin()));
+    words.push_back(text);
+  }
+  words.insert(words.end(), line.arguments.operands.begin(), line.arguments.operands.end());
+  return words;
+}
+
+/// The command line of a job that is not refused.
+CommandLine unpacked(const BatchJob& job) {
+  std::vector<std::string> given = job.entry.words.unpacked();
+  const Command* const command = find_command(given.front());
+  CommandLine line{command, spec_for(*command), {}};
+  const std::vector<std::string> words = job.parsed.unpacked();
+  const std::size_t options = 1 + 2 * std::stoul(words.front());
+  for (std::size_t i = 1; i < options; i += 2)
+    line.arguments.options.emplace_back(line.spec.options[std::stoul(words[i])].flag, words[i + 1]);
+  line.arguments.operands.assign(words.begin() + static_cast<std::ptrdiff_t>(options), words.end());
+  line.arguments.given.assign(given.begin() + 1, given.end());
+  return line;
+}
+
+/// What a batch has to know of a command line. errors  those above; kUsage: a job file that cannot be read
+Result<Call> read_call(const std::vector<std::string>& words) {
+  const Result<CommandLine> line = read_command_line(words);
+  if (!line) return line.error();
+  const auto& [command, spec, arguments] = *line;
+  const Arguments* const read = &arguments;
   Job planned;
   if (read->has("--job")) {
     if (names_stream(read->text("--job"))) return usage("--job: a job of a batch cannot read standard input; name a file");
@@ -162,6 +215,7 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
     call.layer_bytes = 0;
     if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
+  call.parsed = packed(*line);
   call.inputs = read->operands;
   for (const auto& [flag, text] : read->options) {
     if (flag.find("--output") == std::string::npos && !text.empty()) call.inputs.push_back(text);
@@ -169,11 +223,16 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
   if (read->operands.empty()) {
     for (const PartRequest& part : planned.parts) call.inputs.push_back(part.path);
   }
-  call.run = [command, spec, sync, arguments = *read](const CallSettings& settings, const ProgressCallback& progress,
-                                                      const std::atomic<bool>& cancel) {
-    return run_call(*command, with_settings(arguments, spec, settings, sync), progress, cancel);
-  };
   return call;
+}
+
+/// sync  of the batch, for jobs without one of their own; "" for none
+RunJob job_runner(const std::string& sync) {
+  return [sync](const BatchJob& job, const CallSettings& settings, const ProgressCallback& progress,
+                const std::atomic<bool>& cancel) {
+    const CommandLine line = unpacked(job);
+    return run_call(*line.command, with_settings(line.arguments, line.spec, settings, sync), progress, cancel);
+  };
 }
 
 // --- the command
@@ -249,6 +308,16 @@ Result<Durable> read_sync(const Arguments& arguments) {
   return job.sync == Sync::kOff ? Durable::kNo : Durable::kAll;
 }
 
+Status write_summary(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options,
+                     const FileOptions& how) {
+  Result<File> file = File::open(options.directory + "/summary.json", how);
+  if (!file) return file.error();
+  const auto append = [&](std::string_view piece) { return file->append(piece); };
+  if (Status status = write_batch_json(jobs, summary, options, kJsonSchema, 2, append); !status) return status;
+  const auto done = file->finish();
+  return done ? Status() : Status(done.error());
+}
+
 Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const bool quiet = arguments.has("--quiet");
   std::vector<std::string> with;
@@ -259,10 +328,10 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const BatchOptions& options = *read;
   Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
-  const auto read_words = [sync = arguments.text("--sync")](const auto& words) { return read_call(words, sync); };
-  const auto jobs =
-      prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_words);
-  if (!jobs) return jobs.error();
+  auto prepared =
+      prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_call);
+  if (!prepared) return prepared.error();
+  const auto jobs = std::make_shared<const std::vector<BatchJob>>(std::move(*prepared));
   Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
   if (!record) return record.error();
 
@@ -273,12 +342,12 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   watcher.ended = [&](const BatchJob& job, const BatchResult& result, const BatchState& state) {
     console.ended(job, result, state);
   };
-  const Result<BatchSummary> summary = run_batch(*jobs, std::move(*record), options, watcher, context.cancel());
+  const RunJob runner = job_runner(arguments.text("--sync"));
+  const Result<BatchSummary> summary = run_batch(jobs, std::move(*record), options, runner, watcher, context.cancel());
   console.clear();
   if (!summary) return summary.error();
-  const Json json = batch_json(*jobs, *summary, options);
   const FileOptions how{.follow = false, .durable = *durable};
-  Status written = write_file(options.directory + "/summary.json", json_line(with_schema(json), 2), how);
+  Status written = write_summary(*jobs, *summary, options, how);
   if (written) written = write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
@@ -286,7 +355,9 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
     context.complain({Fault::kInterrupted, "interrupted; finished jobs are kept; continue with the same command and --resume"});
   }
   if (arguments.has("--json")) {
-    if (Status status = context.give(json); !status) code = context.complain(status.error());
+    const auto print = [&](std::string_view piece) { return context.print(piece); };
+    if (Status status = write_batch_json(*jobs, *summary, options, kJsonSchema, -1, print); !status)
+      code = context.complain(status.error());
   }
   if (summary->abandoned) {  // a job that does not stop is still running
     remove_watched();

@@ -54,15 +54,17 @@ Status Journal::clear() {
   return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno);
 }
 
-Status Journal::read(const std::function<void(const std::string&)>& line) {
+Status Journal::read(const std::function<void(const std::string&, std::uint64_t at)>& line) {
   auto lines = FileReader::open(path_, {.fault = Fault::kOutput, .longest_line = kLongestLine, .any_bytes = true});
   if (!lines) return lines.error();
   for (std::string_view text; lines->next(text);) {
     torn_ = !lines->ended_by_break();
-    line(std::string(text));
+    line(std::string(text), lines->offset() - text.size() - (torn_ ? 0 : 1));
   }
   return lines->status();
 }
+
+std::uint64_t Journal::end() const { return static_cast<std::uint64_t>(::lseek(file_, 0, SEEK_CUR)); }
 
 Status Journal::append(std::string line) {
   if (torn_) line.insert(line.begin(), '\n');

@@ -4,6 +4,7 @@
 // and readers must skip incomplete lines. An open journal locks the file; the lock ends with the process.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -25,11 +26,12 @@ class Journal {
   bool empty() const;
   /// Empties the file. errors  kOutput
   Status clear();
-  /// Every line so far, in order, without its end; the last one may be torn. cost  reads the file once
+  /// Every line so far, in order, without its end, and where it begins; the last one may be torn. cost  reads the file once
   /// errors  kOutput: cannot be read, or a line of more than 64 MiB
-  Status read(const std::function<void(const std::string&)>& line);
+  Status read(const std::function<void(const std::string&, std::uint64_t at)>& line);
   /// Adds a line, which ends with a line's end. errors  kOutput: one line with the path and the system's reason
   Status append(std::string line);
+  std::uint64_t end() const;  // of the last line that was added
 
  private:
   Journal(std::string path, int file) : path_(std::move(path)), file_(file) {}
