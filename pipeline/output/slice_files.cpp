@@ -9,6 +9,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/layered_file.h"
 #include "pipeline/output/directory.h"
+#include "stages/data/growth.h"
 #include "stages/support/io/file.h"
 #include "stages/support/text/version.h"
 
@@ -106,6 +107,8 @@ Status SliceFiles::encode(const formats::SliceLayer& layer, Buffer<char>& text) 
   text.clear();
   if (!encoder_) return {};
   if (Status status = encoder_->check(head_, layer); !status) return status;
+  constexpr std::size_t kOfPoint = 22;  // bytes of its text, as a rule; growing by half would touch as much memory again
+  reserve_more(text, layer.contours.point.size() * kOfPoint);
   if (file_a_layer_) {
     formats::encode_alone(*encoder_, head_, layer, text);
   } else {

@@ -92,19 +92,20 @@ class Planner {
     return any;
   }
 
-  /// Images of layers of one thickness need no list of triangles.
-  bool takes_blocks() {
+  /// Layers of one thickness need no list of triangles.
+  MeshForm form() {
     const auto options = heights_options(job());
-    return images() && !beads_ && options && options->mode == heights::Mode::kUniform;
+    if (!options || options->mode != heights::Mode::kUniform) return MeshForm::kLists;
+    return images() && !beads_ ? MeshForm::kBlocks : MeshForm::kOrderedBlocks;
   }
 
-  Status load() { return read_parts_as(takes_blocks()); }
-  Status read_parts_as(bool blocks) {
+  Status load() { return read_parts_as(form()); }
+  Status read_parts_as(MeshForm form) {
     const Stopwatch loading;
     progress_({ProgressEvent::Stage::kLoading});
     std::future<void> neighbour;  // without a thread to spare it is never run, and the index does it
     if (images() && job().engine != Engine::kContours) neighbour = std::async(raster::BeamIndex::prepare);
-    auto scene = load_scene(job(), plan_.bed, blocks, images() ? &printer_.grid : nullptr);
+    auto scene = load_scene(job(), plan_.bed, form, images() ? &printer_.grid : nullptr);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
     for (const PlacedImages& images : plan_.scene->images) {
@@ -130,8 +131,8 @@ class Planner {
     progress_({ProgressEvent::Stage::kIndexing});
     if (machine() != nullptr) {
       Status status = check_reach(*machine(), *plan_.scene);
-      if (!status && takes_blocks()) {  // the order of the file decides which of equal positions is reported
-        if (Status listed = read_parts_as(false); !listed) return listed;
+      if (!status && form() != MeshForm::kLists) {  // the order of the file decides which of equal positions is reported
+        if (Status listed = read_parts_as(MeshForm::kLists); !listed) return listed;
         status = check_reach(*machine(), *plan_.scene);
       }
       if (!status) return status;

@@ -76,10 +76,11 @@ Point3 rebase(Mesh& mesh) {
 
 bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
 
-Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks, const std::shared_ptr<load::Scratch>& scratch,
-                         Scene& scene) {
+Result<Loaded> load_part(const Job& job, const PartRequest& request, MeshForm form,
+                         const std::shared_ptr<load::Scratch>& scratch, Scene& scene) {
   load::LoadOptions options = load_options(job, request);
-  options.blocks = blocks;
+  options.blocks = form != MeshForm::kLists;
+  options.order = form == MeshForm::kOrderedBlocks;
   options.isa = job.isa;
   options.scratch = scratch;
   Result<Part> part = load::load(request.path, options);
@@ -156,7 +157,7 @@ std::int64_t bottom_of(const PartRequest& part, const Loaded& loaded) {
 
 /// The file of each [[part]]; equal files with equal transforms are loaded once. A map's values stay where they are.
 /// errors  of load_part; kUsage: a part that reaches beyond what nm can say
-Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const PixelGrid* grid,
+Result<std::vector<const Loaded*>> load_parts(const Job& job, MeshForm form, const PixelGrid* grid,
                                               std::map<LoadKey, Loaded>& files, Scene& scene) {
   std::vector<const Loaded*> loaded;
   const auto scratch = load::make_scratch(job.isa);
@@ -179,7 +180,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
                       solid};
     auto found = files.find(key);
     if (found == files.end()) {
-      Result<Loaded> fresh = images ? load_images(job, part, grid) : load_part(job, part, blocks, scratch, scene);
+      Result<Loaded> fresh = images ? load_images(job, part, grid) : load_part(job, part, form, scratch, scene);
       if (!fresh) return fresh.error();
       found = files.emplace(key, std::move(*fresh)).first;
     }
@@ -293,10 +294,10 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request) {
   return options;
 }
 
-Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const PixelGrid* grid) {
+Result<Scene> load_scene(const Job& job, const Bed& bed, MeshForm form, const PixelGrid* grid) {
   Scene scene;
   std::map<LoadKey, Loaded> files;
-  const auto parts = load_parts(job, blocks, grid, files, scene);
+  const auto parts = load_parts(job, form, grid, files, scene);
   if (!parts) return parts.error();
   const std::vector<const Loaded*>& loaded = *parts;
   std::vector<arrange::BoxRequest> requests;

@@ -45,6 +45,9 @@ struct Scene {
   std::int64_t height = 0;                      // nm, highest point of all; > 0
 };
 
+/// How meshes come: lists; also blocks, for callers that only rasterize them; also blocks that keep the order of their files.
+enum class MeshForm { kLists, kBlocks, kOrderedBlocks };
+
 /// The load options for a part of a job.
 load::LoadOptions load_options(const Job& job, const PartRequest& request);
 
@@ -53,10 +56,10 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request);
 /// A part with a position stays there; its copies follow along x at their width plus the gap. All other parts are
 /// arranged in rows from the front left, in job order and gap_mm apart; this block is centred on the bed. Positions are
 /// whole nm.
-/// blocks  meshes may come as Mesh::blocks: for callers that only rasterize them
+/// form    blocks: binary STL files may come as Mesh::blocks, a third of the memory, without or with the order of the file
 /// grid    of the bed's pixels: parts may be images then
 /// errors  kUsage if a part does not fit the bed (with the excess and a remedy); kInput from load
-Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false, const PixelGrid* grid = nullptr);
+Result<Scene> load_scene(const Job& job, const Bed& bed, MeshForm form = MeshForm::kLists, const PixelGrid* grid = nullptr);
 
 // --- checks that a powder printer can reach the parts of a job.
 

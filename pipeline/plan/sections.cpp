@@ -331,7 +331,7 @@ std::uint64_t Sections::Work::bytes() const {
   for (const infill::Outlines& o : outlines) total += o.bytes();
   for (const Contours& c : scratch.of_source) total += of(c);
   total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + scratch.simplify.bytes() +
-           bytes_held(scratch.facets);
+           bytes_held(scratch.facets) + scratch.blocks.bytes();
   return total + bytes_held(paths.point) + bytes_held(paths.kind) + bytes_held(paths.width) + bytes_held(paths.line) +
          bytes_held(paths.offset);
 }

@@ -14,6 +14,7 @@
 #include "stages/checks/layer_warnings.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/shares.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/isa.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
@@ -310,7 +311,8 @@ void report_image_plan(const Plan& plan, Summary& summary) {
   summary.mesh_bytes = plan.images->solids.mesh_bytes();
   summary.index_bytes = plan.images->solids.index_bytes();
   if (plan.sections) {
-    for (const Mesh& mesh : plan.scene->meshes) summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle);
+    for (const Mesh& mesh : plan.scene->meshes)
+      summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle) + (mesh.blocks ? mesh.blocks->bytes() : 0);
     summary.index_bytes += plan.sections->slicer().index_bytes();
   }
   summary.head.emplace_back(

@@ -74,12 +74,14 @@ JobChecks::JobChecks(const Plan& plan, const std::atomic<bool>& cancel)
   sampling_ = sampling_of(plan.job, plan.images ? &plan.images->grid : nullptr);
   if (!plan.images) sampling_.tolerance_um = tolerance_um_of(plan.job, plan.product);
   sampling_.part = names_;
-  // The triangles of images are in clusters by then: their parts are read again.
+  // Where triangles are in clusters, parts are read again.
+  const bool in_blocks = std::ranges::any_of(plan.scene->meshes, [](const Mesh& mesh) { return mesh.blocks != nullptr; });
   checks::GroupUnion::Again again = [this]() -> Result<std::vector<Mesh>> {
-    Result<Scene> scene = load_scene(plan_.job, plan_.bed, false, &plan_.images->grid);
+    const PixelGrid* const grid = plan_.images ? &plan_.images->grid : nullptr;
+    Result<Scene> scene = load_scene(plan_.job, plan_.bed, MeshForm::kLists, grid);
     return scene ? Result<std::vector<Mesh>>(std::move(scene->meshes)) : scene.error();
   };
-  sampling_.union_mm3 = union_in(*plan.scene, *tally_, &cancel, plan.images ? again : nullptr);
+  sampling_.union_mm3 = union_in(*plan.scene, *tally_, &cancel, plan.images || in_blocks ? again : nullptr);
   count_layers();
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "stages/checks/layer_warnings.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/support/text/number_text.h"
 
 namespace lamina::checks {
@@ -378,11 +379,16 @@ std::vector<std::uint8_t> crossed_planes(std::span<const Mesh> meshes, std::span
   std::set<std::pair<std::uint32_t, Nm>> detected;
   for (const Instance& instance : instances) {
     if (!detected.emplace(instance.mesh, instance.offset.z).second) continue;
-    for (const Triangle& t : meshes[instance.mesh].triangles) {
+    const auto mark = [&](const Triangle& t) {
       const std::int64_t lowest = std::int64_t{std::min({t.a.z, t.b.z, t.c.z})} + instance.offset.z,
                          highest = std::int64_t{std::max({t.a.z, t.b.z, t.c.z})} + instance.offset.z;
       auto plane = std::ranges::lower_bound(planes, lowest);
       for (; plane != planes.end() && *plane < highest; ++plane) crossed[static_cast<std::size_t>(plane - planes.begin())] = 1;
+    };
+    const Mesh& mesh = meshes[instance.mesh];
+    for (const Triangle& t : mesh.triangles) mark(t);
+    for (std::uint32_t c = 0; mesh.blocks && c < mesh.blocks->cluster_count(); ++c) {
+      for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) mark(mesh.blocks->triangle(c, lane));
     }
   }
   return crossed;

@@ -61,7 +61,6 @@ struct VoxelStack {
     if (before + (last - first) > UINT32_MAX) return false;
     change.insert(change.end(), slice.change.begin() + static_cast<std::ptrdiff_t>(first),
                   slice.change.begin() + static_cast<std::ptrdiff_t>(last));
-    row_offset.reserve(row_offset.size() + ny);
     for (std::uint32_t r = 1; r <= ny; ++r) {
       row_offset.push_back(static_cast<std::uint32_t>(before + slice.row_offset[r] - first));
     }

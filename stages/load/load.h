@@ -42,6 +42,7 @@ struct LoadOptions {
   bool drop_bad = false;                 // drop facets with coordinates that are not finite instead of refusing the file
   bool repair = true;                    // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
   bool blocks = false;                   // closed meshes may come as Mesh::blocks, which are read in one pass, not as lists
+  bool order = false;                    // blocks know the order of the file, 2 bytes a triangle
   Isa isa = Isa::kAuto;                  // widest instructions of the loops that make blocks; no mesh depends on it
   std::shared_ptr<Scratch> scratch;      // none: each file takes its own
   bool turn_shells = true;               // shells that are inside out and overlap others are turned over (shells.h), with a note

@@ -256,7 +256,7 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   const Result<std::uint64_t> count = count_facets(source, options, header);
   if (!count || header.warning) return std::nullopt;
   const auto triangles = static_cast<std::uint32_t>(*count);
-  const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
+  const auto blocks = std::make_shared<MeshBlocks>(triangles, 0, options.order);
   Buffer<Prisms> pieces(blocks->block_count());
   const std::uint64_t share = sampled_share(triangles);
   const std::shared_ptr<Scratch> scratch = options.scratch ? options.scratch : make_scratch(options.isa);

@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "stages/data/growth.h"
+
 namespace lamina::slice {
 namespace {
 
@@ -96,47 +98,13 @@ void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> fac
   }
 }
 
-namespace {
-
-/// Finds the first plane at or above a height: a table of equal steps leads to the place, comparisons decide.
-class PlaneFinder {
- public:
-  explicit PlaneFinder(std::span<const std::int64_t> planes) : planes_(planes) {
-    if (planes.empty()) return;
-    const auto range = static_cast<std::uint64_t>(planes.back() - planes.front());
-    while ((range >> shift_) > 4 * planes.size()) ++shift_;
-    position_.resize(static_cast<std::size_t>(range >> shift_) + 1);
-    std::uint32_t plane = 0;
-    for (std::size_t cell = 0; cell < position_.size(); ++cell) {
-      while (planes[plane] < planes.front() + static_cast<std::int64_t>(cell << shift_)) ++plane;
-      position_[cell] = plane;
-    }
-  }
-
-  std::uint32_t operator()(std::int64_t z) const {
-    if (planes_.empty() || z <= planes_.front()) return 0;
-    if (z > planes_.back()) return static_cast<std::uint32_t>(planes_.size());
-    std::uint32_t plane = position_[static_cast<std::size_t>(static_cast<std::uint64_t>(z - planes_.front()) >> shift_)];
-    while (planes_[plane] < z) ++plane;
-    return plane;
-  }
-
- private:
-  std::span<const std::int64_t> planes_;
-  std::uint32_t shift_ = 0;
-  Buffer<std::uint32_t> position_;
-};
-
-}  // namespace
-
 PlaneIndex index_crossings(std::span<const Triangle> triangles, std::span<const std::int64_t> planes) {
   const PlaneFinder first_at_or_above(planes);
   return {0, static_cast<std::int64_t>(planes.size()) - 1, 0, [&](auto use) {
             for (std::uint32_t facet = 0; facet < triangles.size(); ++facet) {
               const Triangle& t = triangles[facet];
               const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
-              const std::uint32_t first = first_at_or_above(std::int64_t{low} - kPlaneReach),
-                                  last = first_at_or_above(std::int64_t{high} - kPlaneReach);
+              const auto [first, last] = first_at_or_above.crossed(low, high);
               if (first < last) use({first, last, facet});
             }
           }};
@@ -283,7 +251,12 @@ std::vector<SourceMesh> find_sources(std::span<const Mesh> meshes, std::span<con
     const auto [found, is_new] = known.emplace(std::pair(instance.mesh, z), static_cast<std::uint32_t>(sources.size()));
     if (is_new) {
       std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return std::int64_t{plane} - z; });
-      sources.push_back({instance.mesh, z, index_crossings(meshes[instance.mesh].triangles, own_planes)});
+      const Mesh& mesh = meshes[instance.mesh];
+      SourceMesh& source = sources.emplace_back(SourceMesh{instance.mesh, z, nullptr, nullptr});
+      if (mesh.blocks)
+        source.blocks = std::make_shared<const BlockPlanes>(*mesh.blocks, own_planes);
+      else
+        source.list = std::make_shared<const PlaneIndex>(index_crossings(mesh.triangles, own_planes));
     }
     source_of.push_back(found->second);
   }
@@ -291,11 +264,13 @@ std::vector<SourceMesh> find_sources(std::span<const Mesh> meshes, std::span<con
 }
 
 void append_moved(const Contours& from, Point2 by, Contours& to) {
-  to.point.reserve(to.point.size() + from.point.size());
-  for (std::uint32_t c = 0; c < from.size(); ++c) {
-    for (const Point2 p : from[c]) to.point.push_back({p.x + by.x, p.y + by.y});
-    to.close();
-  }
+  const std::size_t before = to.point.size();
+  reserve_more(to.point, from.point.size());
+  to.point.resize(before + from.point.size());
+  std::ranges::transform(from.point, to.point.begin() + static_cast<std::ptrdiff_t>(before), [by](Point2 p) {
+    return Point2{p.x + by.x, p.y + by.y};
+  });
+  for (std::uint32_t c = 1; c <= from.size(); ++c) to.offset.push_back(static_cast<std::uint32_t>(before) + from.offset[c]);
 }
 
 }  // namespace lamina::slice

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "stages/data/level_face.h"
 #include "stages/data/mesh.h"
 #include "stages/geometry/interval_table.h"
+#include "stages/slice/block_planes.h"
 
 namespace lamina::slice {
 
@@ -108,9 +110,15 @@ GapReport close_gaps(Contours& open, Nm maximum, Contours& closed);
 struct SourceMesh {
   std::uint32_t mesh;
   Nm z;
-  PlaneIndex index;
+  std::shared_ptr<const PlaneIndex> list;     // of a mesh that is a list
+  std::shared_ptr<const BlockPlanes> blocks;  // else
+
+  /// A plane crosses no more facets than this.
+  std::uint64_t max_found(std::uint32_t plane) const { return blocks ? blocks->count(plane) : list->max_found(plane); }
+  std::uint64_t bytes() const { return blocks ? blocks->bytes() : list->bytes(); }
 };
 
+/// meshes  lists, or blocks that keep the order of their files; they stay where they are
 /// The meshes at the heights at which instances stand, in the order of the instances. source_of  becomes that of each instance
 std::vector<SourceMesh> find_sources(std::span<const Mesh> meshes, std::span<const Instance> instances,
                                      std::span<const Nm> planes, std::vector<std::uint32_t>& source_of);

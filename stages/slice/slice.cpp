@@ -5,8 +5,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
+#include "stages/data/growth.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
 
@@ -18,7 +20,14 @@ void find_loops(std::span<const Triangle> triangles, const SourceMesh& source, s
                 SectionScratch& scratch, Contours& closed) {
   const std::int64_t z = std::int64_t{planes[plane]} - source.z;
   scratch.facets.clear();
-  source.index.append(plane, scratch.facets);
+  if (source.blocks) {
+    source.blocks->find(plane, scratch.blocks);
+    triangles = scratch.blocks.facets;
+    scratch.facets.resize(triangles.size());
+    std::iota(scratch.facets.begin(), scratch.facets.end(), 0u);
+  } else {
+    source.list->append(plane, scratch.facets);
+  }
   cut(triangles, scratch.facets, z, scratch.cuts);
   scratch.open.clear();
   chain(scratch.cuts, z, scratch.chain, closed, scratch.open);
@@ -72,6 +81,9 @@ void Slicer::group(std::span<const std::uint32_t> body_of) {
   std::vector<std::uint32_t> position(body_offset_.begin(), body_offset_.end() - 1);
   for (std::size_t i = 0; i < body_of.size(); ++i)
     if (body_of[i] != kLeftOut) placed_[position[body_of[i]]++] = instances_[i];
+  alone_.assign(sources_->size(), 0);
+  for (std::uint32_t b = 0; b < bodies_; ++b)
+    if (body_offset_[b + 1] - body_offset_[b] == 1) ++alone_[placed_[body_offset_[b]].source];
 }
 
 void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
@@ -119,6 +131,7 @@ Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch
         loops_of((*sources_)[only.source], plane, scratch, own, report);
         if (auto status = clean(own, scratch, report); !status) return failed(status);
         scratch.source_done[only.source] = 1;
+        reserve_more(out.contours.point, std::size_t{alone_[only.source]} * own.point.size());
       }
       append_moved(own, only.by, out.contours);
     } else {
@@ -142,7 +155,7 @@ Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch
 
 std::uint64_t Slicer::index_bytes() const {
   std::uint64_t total = 0;
-  for (const SourceMesh& source : *sources_) total += source.index.bytes();
+  for (const SourceMesh& source : *sources_) total += source.bytes();
   return total;
 }
 
@@ -150,13 +163,14 @@ std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
   // Of a cut: its two edges, hashes and point; slots, links and states; its edge in the grid; its points before and after,
   // and once more while points are left out.
   const std::uint64_t of_cut = 48 + 16 + 8 + 16 + 5 + 24 + 24 + (options_.tolerance > 0 ? 48 : 0);
+  constexpr std::uint64_t kOfBlocks = 2 * sizeof(Triangle) + 16 + 4;  // facets as found and in order, their places, clusters
   std::uint64_t maximum = 0;
   std::vector<std::uint8_t> visited(sources_->size(), 0);
   for (const Placed& placed : placed_) visited[placed.source] = 1;
   for (std::size_t s = 0; s < visited.size(); ++s)
-    if (visited[s] != 0) maximum += (*sources_)[s].index.max_found(plane) * of_cut;
+    if (visited[s] != 0) maximum += (*sources_)[s].max_found(plane) * (of_cut + ((*sources_)[s].blocks ? kOfBlocks : 0));
   std::uint64_t points = 0;
-  for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.max_found(plane);
+  for (const Placed& placed : placed_) points += (*sources_)[placed.source].max_found(plane);
   return maximum + points * sizeof(Point2);
 }
 
@@ -175,9 +189,7 @@ Result<double> surplus_area(std::span<const SharedMesh> shared, std::span<const 
   for (const auto& [triangles, source, offsets] : shared) {
     scratch.closed.clear();
     find_loops(triangles, source, planes, plane, scratch, scratch.closed);
-    // Once for all copies, and never by less than doubling: append_moved() reserves what one copy needs.
-    const std::size_t needed = all.point.size() + offsets.size() * scratch.closed.point.size();
-    if (needed > all.point.capacity()) all.point.reserve(std::max(needed, 2 * all.point.capacity()));
+    reserve_more(all.point, offsets.size() * scratch.closed.point.size());
     for (const Point2 by : offsets) append_moved(scratch.closed, by, all);
   }
   const __int128 wound = doubled_area(all);

@@ -51,6 +51,7 @@ struct SectionReport {
 /// Buffers of a layer in flight, reused.
 struct SectionScratch {
   Buffer<std::uint32_t> facets;
+  BlockScratch blocks;
   Cuts cuts;
   ChainScratch chain;
   ContactScratch contact;
@@ -107,6 +108,7 @@ class Slicer {
   std::vector<Placed> instances_;           // as given
   std::vector<Placed> placed_;              // body by body
   std::vector<std::uint32_t> body_offset_;  // bodies + 1, into placed_
+  std::vector<std::uint32_t> alone_;        // of each source, how many bodies are one instance of it
   std::uint32_t bodies_ = 0;
 };
 

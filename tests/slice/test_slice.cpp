@@ -3,6 +3,8 @@
 
 #include <random>
 
+#include "stages/data/voxels.h"
+#include "stages/geometry/blocks/block_maker.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
 #include "stages/geometry/contours/simplify.h"
@@ -219,6 +221,70 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
       ASSERT_TRUE(std::ranges::equal(found, expected)) << "plane " << p << " of " << planes.size();
     }
   }
+}
+
+TEST(PlaneIndex, OfBlocksFindsTheSameFacetsInTheSameOrderAsThatOfTheList) {
+  std::mt19937 random(4);
+  std::uniform_int_distribution<Nm> pick(-500'000, 500'000);
+  Buffer<Triangle> triangles(2 * kBlockSize + 1234);
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const Nm tall = i % 7 == 0 ? 500'000 : 4000, z = pick(random);
+    const auto corner = [&] { return Point3{pick(random), pick(random), static_cast<Nm>(z + pick(random) % tall)}; };
+    // In the second block each vertex is shared, so that it is stored by numbers.
+    const Triangle before = triangles[i == 0 ? 0 : i - 1];
+    triangles[i] = i / kBlockSize == 1 ? Triangle{before.b, before.c, before.a} : Triangle{corner(), corner(), corner()};
+    if (i / kBlockSize == 1 && i % 3 == 0) triangles[i].b = corner();
+  }
+  MeshBlocks blocks(static_cast<std::uint32_t>(triangles.size()), 0, true);
+  BlockMaker maker;
+  for (std::uint32_t b = 0; b < blocks.block_count(); ++b)
+    maker.make(std::span<const Triangle>(triangles).subspan(blocks.first_triangle(b), blocks.triangles_in(b)), blocks, b);
+  blocks.seal();
+  ASSERT_NE(blocks.indexed(MeshBlocks::kClusters).cluster, nullptr);
+  ASSERT_EQ(blocks.indexed(0).cluster, nullptr);
+  for (const std::int64_t step : {700, 9000, 200'000}) {
+    std::vector<std::int64_t> planes;
+    for (std::int64_t z = -600'000; z < 600'000; z += step) planes.push_back(z);
+    const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
+    const slice::BlockPlanes of_blocks(blocks, planes);
+    slice::BlockScratch scratch;
+    Buffer<std::uint32_t> found;
+    for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 50)) {
+      found.clear();
+      index.append(p, found);
+      of_blocks.find(p, scratch);
+      ASSERT_EQ(of_blocks.count(p), found.size());
+      ASSERT_EQ(scratch.facets.size(), found.size());
+      for (std::size_t i = 0; i < found.size(); ++i) ASSERT_EQ(scratch.facets[i], triangles[found[i]]) << p << " " << i;
+    }
+  }
+  Buffer<Triangle> list(kBlockSize);
+  for (std::uint32_t b = 0; b < blocks.block_count(); ++b) {
+    blocks.list_block(b, list);
+    for (std::uint32_t i = 0; i < blocks.triangles_in(b); ++i) ASSERT_EQ(list[i], triangles[blocks.first_triangle(b) + i]);
+  }
+}
+
+TEST(Copies, MoveTheContoursOfALayerAFewTimesOnly) {
+  Contours square, all;
+  for (const Point2 p : {Point2{0, 0}, {5, 0}, {5, 5}, {0, 5}}) square.point.push_back(p);
+  square.close();
+  VoxelStack stack(8, 8, {1, 1, 1});
+  const Buffer<std::uint32_t> offset(9, 0u);
+  std::uint32_t moves = 0, stack_moves = 0;
+  for (Nm copy = 0; copy < 10'000; ++copy) {
+    const Point2* const before = all.point.data();
+    slice::append_moved(square, {copy, 2 * copy}, all);
+    moves += all.point.data() != before;
+    const std::uint32_t* const rows_before = stack.row_offset.data();
+    ASSERT_TRUE(stack.append({8, offset, {}}));
+    stack_moves += stack.row_offset.data() != rows_before;
+  }
+  ASSERT_EQ(all.size(), 10'000u);
+  EXPECT_EQ(all[9999][2], (Point2{10'004, 20'003}));
+  // A buffer that grows by what each copy needs moves 10,000 times, and the time of a layer is the square of its copies.
+  EXPECT_LT(moves, 40u);
+  EXPECT_LT(stack_moves, 40u);
 }
 
 TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {

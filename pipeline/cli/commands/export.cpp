@@ -144,7 +144,7 @@ Outcome run_export(const Arguments& arguments, Context& context) {
     return usage("{}: is there already; replace it with --overwrite, or name another file", output);
   const Result<Bed> bed = bed_of(*job);
   if (!bed) return bed.error();
-  const Result<Scene> scene = load_scene(*job, *bed);
+  const Result<Scene> scene = load_scene(*job, *bed, *format == MeshFormat::kStl ? MeshForm::kOrderedBlocks : MeshForm::kLists);
   if (!scene) return scene.error();
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), *job, "export"); !status) return status;

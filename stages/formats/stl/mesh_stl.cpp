@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "stages/geometry/blocks/mesh_blocks.h"
+
 namespace lamina::formats::stl {
 namespace {
 
@@ -49,7 +51,7 @@ void put_facet(const Triangle& t, const Point3& by, Buffer<char>& out, double& r
 Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<const Instance> instances,
                             std::string_view program) {
   StlCounts counts;
-  for (const Instance& instance : instances) counts.triangles += meshes[instance.mesh].triangles.size();
+  for (const Instance& instance : instances) counts.triangles += triangle_count(meshes[instance.mesh]);
   if (counts.triangles > UINT32_MAX) {
     return Error{Fault::kInput, fmt::format("{} triangles are more than an STL file counts; write .3mf", counts.triangles)};
   }
@@ -61,12 +63,22 @@ Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<
   if (Status status = file.append(std::string_view(header)); !status) return status.error();
   Buffer<char> piece;
   piece.reserve(kPiece * kFacet);
-  for (const Instance& instance : instances) {
-    for (const Triangle& triangle : meshes[instance.mesh].triangles) {
-      put_facet(triangle, instance.offset, piece, counts.rounding_mm);
+  const auto put = [&](std::span<const Triangle> triangles, const Point3& by) -> Status {
+    for (const Triangle& triangle : triangles) {
+      put_facet(triangle, by, piece, counts.rounding_mm);
       if (piece.size() < kPiece * kFacet) continue;
-      if (Status status = file.append(piece); !status) return status.error();
+      if (Status status = file.append(piece); !status) return status;
       piece.clear();
+    }
+    return {};
+  };
+  Buffer<Triangle> list(kBlockSize);
+  for (const Instance& instance : instances) {
+    const Mesh& mesh = meshes[instance.mesh];
+    if (Status status = put(mesh.triangles, instance.offset); !status) return status.error();
+    for (std::uint32_t b = 0; mesh.blocks && b < mesh.blocks->block_count(); ++b) {
+      mesh.blocks->list_block(b, list);
+      if (Status status = put({list.data(), mesh.blocks->triangles_in(b)}, instance.offset); !status) return status.error();
     }
   }
   if (Status status = file.append(piece); !status) return status.error();

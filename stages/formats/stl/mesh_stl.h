@@ -18,6 +18,8 @@ struct StlCounts {
   double rounding_mm = 0;  // the farthest that a coordinate moved
 };
 
+/// Meshes are lists, or blocks that keep the order of their files.
+///
 /// Writes all instances one after the other, in mm, facets counter-clockwise viewed from outside, with their normals.
 ///
 /// STL holds floats: a coordinate of 256 mm moves by up to 8 nm. Equal corners stay equal, so a closed mesh stays closed;

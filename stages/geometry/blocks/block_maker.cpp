@@ -116,6 +116,8 @@ SortedBlock& BlockMaker::sort(std::span<const Triangle> triangles, const MeshBlo
 void BlockMaker::store(MeshBlocks& mesh, std::uint32_t number) {
   MeshBlocks::Block& block = mesh.blocks_[number];
   const bool few = vertices_.number(sorted_, kernels_);
+  if (mesh.keeps_order())
+    std::copy_n(order_.begin(), mesh.triangles_in(number), mesh.order_.begin() + mesh.first_triangle(number));
   block.clusters = sorted_.clusters();
   block.vertices = few ? vertices_.count() : 0;
   const std::span<const Cluster> clusters(sorted_.cluster.data(), block.clusters);

@@ -91,11 +91,12 @@ inline std::uint16_t hash_of(Nm x, Nm y, Nm z) {
 
 }  // namespace
 
-MeshBlocks::MeshBlocks(std::uint32_t own, std::uint32_t added)
+MeshBlocks::MeshBlocks(std::uint32_t own, std::uint32_t added, bool keeps_order)
     : own_(own),
       added_(added),
       first_cap_(clusters_for(own)),
       first_cap_block_(blocks_for(own)),
+      order_(keeps_order ? std::size_t{own} + added : 0),
       pages_(max_bytes(own) + max_bytes(added) + bytes_of_bounds(clusters_for(own) + clusters_for(added))) {
   blocks_.resize(std::size_t{first_cap_block_} + blocks_for(added));
   const std::uint32_t clusters = first_cap_ + clusters_for(added);
@@ -106,6 +107,11 @@ MeshBlocks::MeshBlocks(std::uint32_t own, std::uint32_t added)
 std::uint32_t MeshBlocks::triangles_in(std::uint32_t block) const {
   const std::uint32_t end = block < first_cap_block_ ? own_ : own_ + added_;
   return std::min(kBlockSize, end - first_triangle(block));
+}
+
+void MeshBlocks::list_block(std::uint32_t block, std::span<Triangle> list) const {
+  const std::uint32_t count = triangles_in(block), cluster = first_cluster(block), first = first_triangle(block);
+  for (std::uint32_t i = 0; i < count; ++i) list[order_[first + i]] = triangle(cluster + i / kClusterSize, i % kClusterSize);
 }
 
 void MeshBlocks::shift(const Point3& by) {

@@ -75,8 +75,9 @@ class MeshBlocks {
  public:
   static constexpr std::uint32_t kClusters = kBlockSize / kClusterSize;  // a block
 
-  /// own, added  triangles of the file, and of those the ones that repair added: they begin a cluster and a block
-  MeshBlocks(std::uint32_t own, std::uint32_t added);
+  /// own, added   triangles of the file, and of those the ones that repair added: they begin a cluster and a block
+  /// keeps_order  2 bytes a triangle more say where each is in the file
+  MeshBlocks(std::uint32_t own, std::uint32_t added, bool keeps_order = false);
 
   std::uint32_t triangle_count() const { return own_ + added_; }
   std::uint32_t cluster_count() const { return static_cast<std::uint32_t>(bounds_.size()); }
@@ -122,6 +123,17 @@ class MeshBlocks {
     return {vertex[corner[0][lane]], vertex[corner[1][lane]], vertex[corner[2][lane]]};
   }
 
+  bool keeps_order() const { return !order_.empty(); }
+  /// Where the order is kept: the number of a triangle in the file's list.
+  std::uint32_t listed_number(std::uint32_t cluster, std::uint32_t lane) const {
+    const std::uint32_t block =
+        cluster < first_cap_ ? cluster / kClusters : first_cap_block_ + (cluster - first_cap_) / kClusters;
+    const std::uint32_t first = first_triangle(block);
+    return first + order_[first + (cluster - first_cluster(block)) * kClusterSize + lane];
+  }
+  /// Where the order is kept: the triangles of a block as the file lists them. list  of at least triangles_in(block)
+  void list_block(std::uint32_t block, std::span<Triangle> list) const;
+
   /// Where indexed() or listed() points to, to be fetched early. Nothing here fetches it: compilers take a function that does
   /// nothing else for one without effect, and leave calls of it out.
   std::span<const char> stored(std::uint32_t index) const {
@@ -147,7 +159,9 @@ class MeshBlocks {
   /// Moves every vertex. Not while others read.
   void shift(const Point3& by);
 
-  std::uint64_t bytes() const { return pages_.bytes() - bounds_taken_ + bytes_held(blocks_); }  // of triangles
+  std::uint64_t bytes() const {  // of triangles
+    return pages_.bytes() - bounds_taken_ + bytes_held(blocks_) + bytes_held(order_);
+  }
   std::uint64_t bounds_bytes() const { return bounds_taken_; }
 
   std::uint32_t block_count() const { return static_cast<std::uint32_t>(blocks_.size()); }
@@ -191,6 +205,8 @@ class MeshBlocks {
 
   std::uint32_t own_, added_, first_cap_, first_cap_block_;
   Buffer<Block> blocks_;
+  Buffer<std::uint16_t>
+      order_;  // of each place in the clusters of a block, the triangle of the block's list; empty if not kept
   Pages pages_;
   std::uint64_t bounds_taken_;
   std::span<Box> bounds_;  // in pages_: written first where blocks are made, by all threads

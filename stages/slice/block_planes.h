@@ -1,0 +1,75 @@
+// stages/slice/block_planes.h: which facets of a mesh in blocks a plane crosses, for planes known beforehand.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/mesh.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/geometry/interval_table.h"
+
+namespace lamina::slice {
+
+/// Finds the first plane at or above a height: a table of equal steps leads to the place, comparisons decide.
+class PlaneFinder {
+ public:
+  /// planes  strictly increasing; they stay where they are while the finder lives
+  explicit PlaneFinder(std::span<const std::int64_t> planes);
+
+  std::uint32_t operator()(std::int64_t z) const {
+    if (planes_.empty() || z <= planes_.front()) return 0;
+    if (z > planes_.back()) return static_cast<std::uint32_t>(planes_.size());
+    std::uint32_t plane = position_[static_cast<std::size_t>(static_cast<std::uint64_t>(z - planes_.front()) >> shift_)];
+    while (planes_[plane] < z) ++plane;
+    return plane;
+  }
+  /// The planes that a facet between two heights crosses (loops.h).
+  std::pair<std::uint32_t, std::uint32_t> crossed(Nm low, Nm high) const {
+    return {(*this)(std::int64_t{low} - kPlaneReach), (*this)(std::int64_t{high} - kPlaneReach)};
+  }
+
+ private:
+  std::span<const std::int64_t> planes_;
+  std::uint32_t shift_ = 0;
+  Buffer<std::uint32_t> position_;
+};
+
+/// Buffers of a layer, reused.
+struct BlockScratch {
+  Buffer<std::uint32_t> clusters;
+  Buffer<std::pair<std::uint64_t, std::uint32_t>> order;  // of the facets that were found
+  Buffer<Triangle> found, facets;
+
+  std::uint64_t bytes() const { return bytes_held(clusters) + bytes_held(order) + bytes_held(found) + bytes_held(facets); }
+};
+
+/// An index of clusters: 12 bytes for each, where one of facets takes as many for each facet.
+class BlockPlanes {
+ public:
+  /// blocks  with the order of their file; they outlive this
+  /// planes  nm, in the frame of the blocks, strictly increasing
+  /// cost    O(T), parallel
+  BlockPlanes(const MeshBlocks& blocks, std::span<const std::int64_t> planes);
+  BlockPlanes(const BlockPlanes&) = delete;
+  BlockPlanes& operator=(const BlockPlanes&) = delete;
+
+  /// scratch.facets become those that the plane crosses, in the order in which a PlaneIndex of the file's list finds them: all
+  /// that is made of facets depends on it. cost  O(F log F)
+  void find(std::uint32_t plane, BlockScratch& scratch) const;
+
+  std::uint64_t count(std::uint32_t plane) const { return counts_[plane]; }  // of facets that it crosses
+  std::uint64_t bytes() const { return table_.bytes() + bytes_held(counts_) + planes_.size() * sizeof(std::int64_t); }
+
+ private:
+  const MeshBlocks& blocks_;
+  std::vector<std::int64_t> planes_;
+  PlaneFinder first_at_or_above_;
+  IntervalTable<std::uint32_t> table_;
+  Buffer<std::uint32_t> counts_;
+};
+
+}  // namespace lamina::slice
