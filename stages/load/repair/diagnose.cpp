@@ -8,9 +8,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <memory>
+#include <utility>
 
-#include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
@@ -134,10 +135,12 @@ Findings find_in(const BlockedRange& range, const Findings& nothing, const Inspe
 
 /// Chunk by chunk, and then the sides that several chunks share.
 EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joined) {
+  constexpr std::size_t kPiece = std::size_t{1} << 17;  // sides, 2 MiB: one list of all would move when it grows
   struct Worker {
     ChunkEdges edges;
     ChunkPieces pieces;
     Buffer<Side> odd, rest;
+    std::vector<Buffer<Side>> pieces_of_rest;
     Buffer<std::uint32_t> collapsed;
     EdgeFindings visited;
     explicit Worker(std::size_t max_reported) : visited(max_reported) {}
@@ -146,6 +149,8 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   tbb::parallel_for(std::size_t{0}, mesh.chunks(), [&](std::size_t chunk) {
     Worker& worker = *workers.local();
     const auto first = static_cast<std::uint32_t>(chunk * Numbered::kChunk);
+    if (worker.rest.size() + 3 * Numbered::kChunk > kPiece) worker.pieces_of_rest.push_back(std::exchange(worker.rest, {}));
+    if (worker.rest.empty() && mesh.chunks() > 16) worker.rest.reserve(kPiece);
     const std::span<const ChunkEdges::Pair> pairs = worker.edges.find(mesh, chunk, worker.odd, worker.rest, worker.collapsed);
     worker.pieces.join(pairs, joined.sets.parents().subspan(first, mesh.local_facets(chunk).size()), first);
     worker.visited.count += pairs.size();
@@ -155,6 +160,7 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   EdgeFindings within(positions);
   for (const std::unique_ptr<Worker>& worker : workers) {
     rest.push_back(std::move(worker->rest));
+    std::ranges::move(worker->pieces_of_rest, std::back_inserter(rest));
     within.add(worker->visited);
     within.may_repeat.insert(within.may_repeat.end(), worker->collapsed.begin(), worker->collapsed.end());
   }
@@ -172,15 +178,13 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   return visited;
 }
 
-/// The number of each facet's shell, by the smallest facets; those that use a vertex twice belong to none: UINT32_MAX.
-/// shells: how many
-Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std::uint32_t> parents, std::uint32_t& shells) {
-  Buffer<std::uint32_t> shell_of(parents.size());
-  prefer_large_pages(shell_of);
-  shells = 0;
+/// The number of each facet's shell, by the smallest facets, in place of its parent, which comes before it; those that use a
+/// vertex twice belong to none: UINT32_MAX. returns  how many
+std::uint32_t number_shells(const Numbered& mesh, std::span<std::uint32_t> parents) {
+  std::uint32_t shells = 0;
   for (std::uint32_t i = 0; i < parents.size(); ++i)
-    shell_of[i] = parents[i] != i ? shell_of[parents[i]] : mesh.collapsed(i) ? UINT32_MAX : shells++;
-  return shell_of;
+    parents[i] = parents[i] != i ? parents[parents[i]] : mesh.collapsed(i) ? UINT32_MAX : shells++;
+  return shells;
 }
 
 /// ShellFindings by their numbers.
@@ -261,8 +265,8 @@ void diagnose_edges(const Numbered& mesh, std::size_t positions, Diagnosis& resu
     result.misoriented_edges = edges.misoriented.finding();
     result.duplicate_facets = edges.duplicate.finding();
   }
-  std::uint32_t count = 0;
-  const Buffer<std::uint32_t> shell_of = numbered_shells(mesh, joined.sets.parents(), count);
+  const std::uint32_t count = number_shells(mesh, joined.sets.parents());
+  const std::span<const std::uint32_t> shell_of = joined.sets.parents();
   ShellFindings shells{std::vector<Shell>(count)};
   const auto measure = [&](const BlockedRange& range, ShellFindings& visited) {
     visited.inspect(mesh, shell_of, joined.unbalanced, result.bounds.lo, range);
@@ -289,7 +293,8 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t positions) {
 Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks) {
   Diagnosis result;
   result.triangles = blocks->triangle_count();
-  const Numbered numbered(*blocks);
+  constexpr std::uint32_t kLarge = 16;  // blocks: of few there is little to give back
+  const Numbered numbered(*blocks, blocks.use_count() == 1 && blocks->block_count() > kLarge);
   blocks.reset();
   diagnose_edges(numbered, 0, result);
   return result;

@@ -1,5 +1,5 @@
-// stages/load/repair/vertices.cpp: each chunk of the list finds its own vertices in a core's cache; an open table then finds
-// those that several chunks have.
+// stages/load/repair/vertices.cpp: each chunk of the list finds its own vertices in a core's cache. Nearly all are of one chunk
+// alone: the bits of a sketch say so of all but a few. An open table then finds which of the others several chunks have.
 //
 // Every vertex goes to the first corner that names it, whichever thread came first: the table keeps the smallest name of each
 // point. So numbers do not depend on threads.
@@ -107,7 +107,55 @@ struct ChunkGatherer {
   std::array<Point3, 3 * kChunk> points;
 };
 
-/// Points of all chunks, each in one slot, which holds its smallest name and later its number.
+/// Calls visit(i, hash) for each point of a list, after prefetch(hash) for those ahead.
+template <class Prefetch, class Visit>
+void for_each_hash(const Chunk& chunk, const Prefetch& prefetch, const Visit& visit) {
+  constexpr std::uint32_t kAhead = 16;
+  std::array<std::uint64_t, kAhead> hashes;
+  for (std::uint32_t i = 0; i < chunk.count + kAhead; ++i) {
+    if (i >= kAhead) visit(i - kAhead, hashes[i % kAhead]);
+    if (i < chunk.count) prefetch(hashes[i % kAhead] = hash_of(chunk.point[i]));
+  }
+}
+
+/// Two bits for a hash: it was noted, and it was noted again. So of a point that was noted once, and whose bits no other has,
+/// no other chunk has it.
+class Sketch {
+ public:
+  explicit Sketch(std::size_t points) {
+    while ((std::size_t{1} << bits_) < kSpread * points) ++bits_;
+    pairs_ = std::make_unique<Pages>(bytes());
+    words_ = reinterpret_cast<std::uint64_t*>(pairs_->take(bytes()));  // new pages are zero, but pieces of the heap are not
+    std::memset(words_, 0, bytes());
+    prefer_large_pages(words_, words_ + bytes() / sizeof(std::uint64_t));
+  }
+  void prefetch(std::uint64_t hashed) const { __builtin_prefetch(&words_[pair_of(hashed) / kPairs], 1); }
+  /// Any thread may.
+  void note(std::uint64_t hashed) {
+    const std::size_t pair = pair_of(hashed);
+    const std::atomic_ref<std::uint64_t> word(words_[pair / kPairs]);
+    const std::uint64_t bit = std::uint64_t{1} << 2 * (pair % kPairs);
+    if ((word.fetch_or(bit, std::memory_order_relaxed) & bit) != 0) word.fetch_or(bit << 1, std::memory_order_relaxed);
+  }
+  bool noted_once(std::uint64_t hashed) const {
+    const std::size_t pair = pair_of(hashed);
+    return (words_[pair / kPairs] >> (2 * (pair % kPairs) + 1) & 1) == 0;
+  }
+
+ private:
+  static constexpr std::size_t kSpread = 8, kPairs = 32;  // pairs of bits for each point; in a word
+  std::size_t bytes() const { return (std::size_t{2} << bits_) / 8; }
+  std::size_t pair_of(std::uint64_t hashed) const { return hashed >> (64 - bits_); }
+
+  int bits_ = 8;
+  std::unique_ptr<Pages> pairs_;
+  std::uint64_t* words_ = nullptr;
+};
+
+/// What is known of a point of a chunk.
+enum Occurrence : std::uint8_t { kLater, kFirst, kOnly };  // an earlier chunk has it; none has it; no other chunk has it
+
+/// Points that several chunks may have, each in one slot, which holds its smallest name and later its number.
 class PointTable {
  public:
   PointTable(std::span<const Chunk> chunks, std::size_t slots)
@@ -122,43 +170,43 @@ class PointTable {
 
   std::uint32_t& operator[](std::uint32_t slot) { return slots_[slot]; }
 
-  /// Enters the points of a chunk, and returns their slots; any thread may. false  it would fill the table
-  bool enter(std::uint32_t number, std::uint32_t* slots) {
+  /// Enters the points of a chunk that others may have, and returns their slots; any thread may.
+  void enter(std::uint32_t number, const std::uint8_t* occurrence, std::uint32_t* slots) {
     const Chunk& chunk = chunks_[number];
-    if (4 * (reserved_ += chunk.count) > 3 * slots_.size()) return false;
+    std::array<std::uint16_t, 3 * kChunk> shared;
+    std::uint32_t count = 0;
+    for (std::uint32_t i = 0; i < chunk.count; ++i) {
+      shared[count] = static_cast<std::uint16_t>(i);
+      count += occurrence[i] != kOnly;
+    }
     // What a slot points at is on its way when it is compared, and the slot itself before that.
     constexpr std::uint32_t kAhead = 16;
     std::array<std::uint64_t, 4 * kAhead> hashes;
-    std::uint32_t taken = 0;
-    for (std::uint32_t i = 0; i < chunk.count + 2 * kAhead; ++i) {
-      if (i < chunk.count) {
+    for (std::uint32_t i = 0; i < count + 2 * kAhead; ++i) {
+      if (i < count) {
         std::uint64_t& hashed = hashes[i % hashes.size()];
-        hashed = hash_of(chunk.point[i]);
+        hashed = hash_of(chunk.point[shared[i]]);
         __builtin_prefetch(&slots_[hashed >> shift_], 1);
       }
-      if (i >= kAhead && i - kAhead < chunk.count) {
+      if (i >= kAhead && i - kAhead < count) {
         const std::uint32_t held = std::atomic_ref<std::uint32_t>(slots_[hashes[(i - kAhead) % hashes.size()] >> shift_])
                                        .load(std::memory_order_relaxed);
         if (held != kFree) __builtin_prefetch(&point_named(held));
       }
       if (i < 2 * kAhead) continue;
-      const std::uint32_t at = i - 2 * kAhead;
-      slots[at] = slot_of(chunk.point[at], hashes[at % hashes.size()], number << kNameBits | at, taken);
+      const std::uint32_t at = i - 2 * kAhead, point = shared[at];
+      slots[point] = slot_of(chunk.point[point], hashes[at % hashes.size()], number << kNameBits | point);
     }
-    reserved_ -= chunk.count - taken;
-    return true;
   }
 
  private:
   // A slot that holds a name of a point never holds one of another point.
-  std::uint32_t slot_of(const Point3& p, std::uint64_t hashed, std::uint32_t name, std::uint32_t& taken) {
+  std::uint32_t slot_of(const Point3& p, std::uint64_t hashed, std::uint32_t name) {
     for (std::size_t at = hashed >> shift_;; at = (at + 1) & mask_) {
       const std::atomic_ref<std::uint32_t> slot(slots_[at]);
       std::uint32_t held = slot.load(std::memory_order_relaxed);
-      if (held == kFree && slot.compare_exchange_strong(held, name, std::memory_order_relaxed)) {
-        ++taken;
+      if (held == kFree && slot.compare_exchange_strong(held, name, std::memory_order_relaxed))
         return static_cast<std::uint32_t>(at);
-      }
       if (!(point_named(held) == p)) continue;
       while (name < held && !slot.compare_exchange_weak(held, name, std::memory_order_relaxed)) {
       }
@@ -173,8 +221,7 @@ class PointTable {
   Pages pages_;  // large ones: a slot is anywhere
   std::span<std::uint32_t> slots_;
   std::size_t mask_;
-  int shift_ = 64;                        // the upper bits of a hash are the slot: they depend on all of the point
-  std::atomic<std::size_t> reserved_{0};  // slots that are taken, or may be by chunks that are being entered
+  int shift_ = 64;  // the upper bits of a hash are the slot: they depend on all of the point
 };
 
 }  // namespace
@@ -218,7 +265,8 @@ class Numbering {
   }
 
   /// The chunks are blocks. Points of blocks that hold clusters as they are read go to `listed`.
-  void read(const MeshBlocks& blocks, std::vector<Buffer<Point3>>& listed) {
+  /// forget  clusters' memory goes back to the system
+  void read(const MeshBlocks& blocks, std::vector<Buffer<Point3>>& listed, bool forget) {
     Gatherers gatherers([] { return std::make_unique<ChunkGatherer>(); });
     for_each_chunk([&](std::uint32_t c) {
       const std::uint32_t cluster = c * MeshBlocks::kClusters, count = blocks.triangles_in(c);
@@ -239,40 +287,42 @@ class Numbering {
       }
       chunks_[c].point = first.vertex;
       chunks_[c].count = last + 1u;
+      if (forget) {
+        const char* const begin = blocks.stored(cluster).data();
+        forget_pages(const_cast<char*>(begin), const_cast<Point3*>(first.vertex));
+      }
     });
   }
 
   /// Numbers the points of all chunks, and gives all to `to`.
-  void join(Numbered& to) {
+  /// forget  the memory of points goes back to the system when they are numbered
+  void join(Numbered& to, bool forget = false) {
     std::size_t points = 0, slots = 64;
     for (Chunk& chunk : chunks_) chunk.before = std::exchange(points, points + chunk.count);
     slot_.resize(points);
     prefer_large_pages(slot_);
-    first_.resize(points);
-    // A closed mesh has half as many vertices as facets; where there are more, the table is made anew.
-    const std::size_t expected = std::min(points, facets_.size() / 2 + facets_.size() / 16);
-    while (2 * slots < 3 * expected) slots *= 2;
-    std::unique_ptr<PointTable> table;
-    for (;; slots *= 2) {
-      table.reset();
-      table = std::make_unique<PointTable>(chunks_, slots);
-      std::atomic<bool> all{true};
-      for_each_chunk([&](std::uint32_t c) {
-        if (all && !table->enter(c, slot_.data() + chunks_[c].before)) all = false;
-      });
-      if (all) break;
-    }
-    for_each_chunk([&](std::uint32_t c) { find_first(c, *table); });
+    occurrence_.resize(points);
+    const std::size_t shared = sketch(points);
+    while (2 * slots < 3 * shared) slots *= 2;
+    PointTable table(chunks_, slots);
+    for_each_chunk(
+        [&](std::uint32_t c) { table.enter(c, occurrence_.data() + chunks_[c].before, slot_.data() + chunks_[c].before); });
+    for_each_chunk([&](std::uint32_t c) { find_first(c, table); });
     std::uint32_t count = 0;
     for (Chunk& chunk : chunks_) chunk.numbers_from = std::exchange(count, count + chunk.numbers_from);
     Buffer<Point3> vertices(count);
     prefer_large_pages(vertices);
-    for_each_chunk([&](std::uint32_t c) { number(chunks_[c], *table, vertices); });
+    for_each_chunk([&](std::uint32_t c) {
+      number(chunks_[c], table, vertices);
+      auto* const point = const_cast<Point3*>(chunks_[c].point);
+      if (forget) forget_pages(point, point + chunks_[c].count);
+    });
     in_several_.assign(count, std::uint8_t{0});
     for_each_chunk([&](std::uint32_t c) {
       for (std::size_t i = chunks_[c].before, end = i + chunks_[c].count; i < end; ++i) {
-        slot_[i] = (*table)[slot_[i]];
-        if (first_[i] == 0) std::atomic_ref<std::uint8_t>(in_several_[slot_[i]]).store(1, std::memory_order_relaxed);
+        if (occurrence_[i] == kOnly) continue;
+        slot_[i] = table[slot_[i]];
+        if (occurrence_[i] == kLater) std::atomic_ref<std::uint8_t>(in_several_[slot_[i]]).store(1, std::memory_order_relaxed);
       }
     });
     for (const Chunk& chunk : chunks_) to.begin_.push_back(chunk.before);
@@ -298,28 +348,50 @@ class Numbering {
     chunks_[c].point = listed[c].data();
   }
 
+  /// Which points one chunk alone has, by a sketch. returns  how many are left
+  std::size_t sketch(std::size_t points) {
+    Sketch sketch(points);
+    const auto prefetch = [&](std::uint64_t hashed) { sketch.prefetch(hashed); };
+    for_each_chunk([&](std::uint32_t c) {
+      for_each_hash(chunks_[c], prefetch, [&](std::uint32_t, std::uint64_t hashed) { sketch.note(hashed); });
+    });
+    std::atomic<std::size_t> shared{0};
+    for_each_chunk([&](std::uint32_t c) {
+      std::uint8_t* const occurrence = occurrence_.data() + chunks_[c].before;
+      std::size_t left = 0;
+      for_each_hash(chunks_[c], prefetch, [&](std::uint32_t i, std::uint64_t hashed) {
+        const bool only = sketch.noted_once(hashed);
+        occurrence[i] = only ? kOnly : kFirst;
+        left += !only;
+      });
+      shared += left;
+    });
+    return shared;
+  }
   /// Which points of a chunk no earlier one has, and how many.
   void find_first(std::uint32_t c, PointTable& table) {
     Chunk& chunk = chunks_[c];
     for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      const bool is = table[slot_[chunk.before + i]] == (c << kNameBits | i);
-      first_[chunk.before + i] = is;
-      chunk.numbers_from += is;
+      std::uint8_t& occurrence = occurrence_[chunk.before + i];
+      if (occurrence != kOnly && table[slot_[chunk.before + i]] != (c << kNameBits | i)) occurrence = kLater;
+      chunk.numbers_from += occurrence != kLater;
     }
   }
-  void number(const Chunk& chunk, PointTable& table, Buffer<Point3>& vertices) const {
+  void number(const Chunk& chunk, PointTable& table, Buffer<Point3>& vertices) {
     std::uint32_t next = chunk.numbers_from;
     for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      if (first_[chunk.before + i] == 0) continue;
+      const std::uint8_t occurrence = occurrence_[chunk.before + i];
+      if (occurrence == kLater) continue;
       vertices[next] = chunk.point[i];
-      table[slot_[chunk.before + i]] = next++;
+      std::uint32_t& slot = slot_[chunk.before + i];
+      (occurrence == kOnly ? slot : table[slot]) = next++;
     }
   }
 
   Buffer<Local> facets_;
   std::vector<Chunk> chunks_;
   Buffer<std::uint32_t> slot_;       // of each point of all chunks: in the table, then its number
-  Buffer<std::uint8_t> first_;       // whether it is the first of its name
+  Buffer<std::uint8_t> occurrence_;  // of each point of all chunks
   Buffer<std::uint8_t> in_several_;  // of each vertex: several chunks have it
 };
 
@@ -444,11 +516,11 @@ Numbered::Numbered(std::span<const Triangle> triangles, const Box& bounds) {
   }
 }
 
-Numbered::Numbered(const MeshBlocks& blocks) {
+Numbered::Numbered(const MeshBlocks& blocks, bool forget) {
   Numbering numbering(blocks.triangle_count());
   std::vector<Buffer<Point3>> listed(blocks.block_count());
-  numbering.read(blocks, listed);
-  numbering.join(*this);
+  numbering.read(blocks, listed, forget);
+  numbering.join(*this, forget);
 }
 
 // Points of a list in order lie where their triangles were until vertices are known.

@@ -29,7 +29,8 @@ class Numbered {
   /// The same in the memory of the list, which goes back to the system as it is read.
   Numbered(Buffer<Triangle>&& triangles, const Box& bounds);
   /// Of blocks that hold no caps, each of which knows its own vertices already: facets count in the order of their clusters.
-  explicit Numbered(const MeshBlocks& blocks);
+  /// forget  their memory goes back to the system as they are read; nothing but their destructor may be called afterwards
+  explicit Numbered(const MeshBlocks& blocks, bool forget = false);
   Numbered(const Numbered&) = delete;
   Numbered& operator=(const Numbered&) = delete;
 
