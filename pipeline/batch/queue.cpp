@@ -193,7 +193,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
       const Result<TreeDigest> now = job.output.empty() ? TreeDigest() : digest_tree(job.output);
       const TreeDigest& then = earlier->output;
       if (job.output.empty() || (now && now->files == then.files && now->hash == then.hash)) {
-        Result<BatchResult> result = earlier->result(options_.directory);
+        Result<BatchResult> result = record_.kept(*earlier);
         return result ? std::move(*result) : failed(result.error());
       }
     }

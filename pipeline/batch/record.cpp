@@ -73,7 +73,7 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
         "{}: belongs to an earlier batch; continue it with --resume, replace it with --overwrite, or name another directory",
         path);
   }
-  BatchRecord record(std::move(*journal));
+  BatchRecord record(directory, std::move(*journal));
   if (resume) {
     const Status status =
         record.journal_.read([&](const std::string& line, std::uint64_t at) { read_line(line, at, record.earlier_); });
@@ -126,17 +126,17 @@ Result<Json> RecordedValues::at(const RecordedLine& line) try {
   return failure(Fault::kOutput, "{}: was changed by something else while the batch ran", path_);
 }
 
-Result<BatchResult> BatchRecord::Earlier::result(const std::string& directory) const {
-  Result<Json> value = RecordedValues(directory).at(line);
+Result<BatchResult> BatchRecord::kept(const Earlier& earlier) const {
+  Result<Json> value = RecordedValues(directory_).at(earlier.line);
   if (!value) return value.error();
   BatchResult found;
   found.outcome = BatchOutcome::kKept;
-  found.seconds = seconds;
-  found.output = output;
+  found.seconds = earlier.seconds;
+  found.output = earlier.output;
   found.value = std::move(*value);
   found.take_warnings();
   found.value = {};
-  found.line = line;
+  found.line = earlier.line;
   return found;
 }
 

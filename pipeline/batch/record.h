@@ -30,9 +30,6 @@ class BatchRecord {
     double seconds = 0;    // these are set if it ended
     TreeDigest output;
     RecordedLine line;
-
-    /// errors  kOutput: the record cannot be read
-    Result<BatchResult> result(const std::string& directory) const;
   };
 
   /// Opens directory/batch.jsonl and creates both if absent. `resume` reads and continues the record; otherwise it starts
@@ -42,6 +39,8 @@ class BatchRecord {
   static Result<BatchRecord> open(const std::string& directory, bool resume, bool overwrite);
 
   const Earlier* earlier(const BatchJob& job) const;
+  /// Of a job that ended and is kept; any thread may call it. errors  kOutput: the record cannot be read
+  Result<BatchResult> kept(const Earlier& earlier) const;
 
   // --- from one thread at a time; errors  kOutput
   /// unowned  the output path holds unrecorded files: a later run must not treat them as its own
@@ -50,9 +49,10 @@ class BatchRecord {
   Status ended(const BatchJob& job, BatchResult& result);
 
  private:
-  explicit BatchRecord(Journal journal) : journal_(std::move(journal)) {}
+  BatchRecord(std::string directory, Journal journal) : directory_(std::move(directory)), journal_(std::move(journal)) {}
   Status append(const std::string& line);
 
+  std::string directory_;
   Journal journal_;
   std::map<Hash128, Earlier, HashOrder> earlier_;
 };

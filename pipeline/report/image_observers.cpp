@@ -14,6 +14,7 @@
 #include "stages/checks/layer_warnings.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/shares.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/geometry/isa.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"

@@ -153,7 +153,7 @@ void sort_sides(std::span<Side> sides) {
 
 }  // namespace
 
-SideLists::SideLists(std::uint32_t vertices, std::span<const Buffer<Side>> sides) : begin_(vertices + std::size_t{1}, 0u) {
+SideLists::SideLists(std::uint32_t vertices, std::span<Buffer<Side>> sides) : begin_(vertices + std::size_t{1}, 0u) {
   for (const Buffer<Side>& some : sides) {
     for (const Side& side : some) ++begin_[side.low];
   }
@@ -161,8 +161,9 @@ SideLists::SideLists(std::uint32_t vertices, std::span<const Buffer<Side>> sides
   for (std::uint32_t& list : begin_) list = end += list;
   sides_.resize(end);
   prefer_large_pages(sides_);
-  for (const Buffer<Side>& some : sides) {
+  for (Buffer<Side>& some : sides) {
     for (const Side& side : some) sides_[--begin_[side.low]] = side;
+    Buffer<Side>().swap(some);
   }
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, vertices, 1 << 13), [&](const auto& range) {
     for (std::uint32_t v = range.begin(); v != range.end(); ++v) sort_sides({sides_.data() + begin_[v], of(v).size()});

@@ -72,8 +72,9 @@ class ChunkPieces {
 /// Sides by their lower vertex: a list a vertex, each in the order of edges and then of facets.
 class SideLists {
  public:
-  /// cost  O(V + S) and sorting each list; 16 bytes a side and 4 a vertex
-  SideLists(std::uint32_t vertices, std::span<const Buffer<Side>> sides);
+  /// sides  their memory goes as they are taken
+  /// cost   O(V + S) and sorting each list; 16 bytes a side and 4 a vertex
+  SideLists(std::uint32_t vertices, std::span<Buffer<Side>> sides);
 
   std::span<const Side> of(std::uint32_t vertex) const {
     return {sides_.data() + begin_[vertex], begin_[vertex + 1] - begin_[vertex]};

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <memory>
+#include <utility>
 
 #include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/repair/enclosed.h"
@@ -133,10 +135,12 @@ Findings find_in(const BlockedRange& range, const Findings& nothing, const Inspe
 
 /// Chunk by chunk, and then the sides that several chunks share.
 EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joined) {
+  constexpr std::size_t kPiece = std::size_t{1} << 17;  // sides, 2 MiB: one list of all would move when it grows
   struct Worker {
     ChunkEdges edges;
     ChunkPieces pieces;
     Buffer<Side> odd, rest;
+    std::vector<Buffer<Side>> pieces_of_rest;
     Buffer<std::uint32_t> collapsed;
     EdgeFindings visited;
     explicit Worker(std::size_t max_reported) : visited(max_reported) {}
@@ -145,6 +149,8 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   tbb::parallel_for(std::size_t{0}, mesh.chunks(), [&](std::size_t chunk) {
     Worker& worker = *workers.local();
     const auto first = static_cast<std::uint32_t>(chunk * Numbered::kChunk);
+    if (worker.rest.size() + 3 * Numbered::kChunk > kPiece) worker.pieces_of_rest.push_back(std::exchange(worker.rest, {}));
+    if (worker.rest.empty() && mesh.chunks() > 16) worker.rest.reserve(kPiece);
     const std::span<const ChunkEdges::Pair> pairs = worker.edges.find(mesh, chunk, worker.odd, worker.rest, worker.collapsed);
     worker.pieces.join(pairs, joined.sets.parents().subspan(first, mesh.local_facets(chunk).size()), first);
     worker.visited.count += pairs.size();
@@ -154,6 +160,7 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   EdgeFindings within(positions);
   for (const std::unique_ptr<Worker>& worker : workers) {
     rest.push_back(std::move(worker->rest));
+    std::ranges::move(worker->pieces_of_rest, std::back_inserter(rest));
     within.add(worker->visited);
     within.may_repeat.insert(within.may_repeat.end(), worker->collapsed.begin(), worker->collapsed.end());
   }
@@ -171,8 +178,8 @@ EdgeFindings edges_of(const Numbered& mesh, std::size_t positions, Joined& joine
   return visited;
 }
 
-/// The number of each facet's shell, by the smallest facets, in place of its parent, which comes before it; those that use a vertex
-/// twice belong to none: UINT32_MAX. returns  how many
+/// The number of each facet's shell, by the smallest facets, in place of its parent, which comes before it; those that use a
+/// vertex twice belong to none: UINT32_MAX. returns  how many
 std::uint32_t number_shells(const Numbered& mesh, std::span<std::uint32_t> parents) {
   std::uint32_t shells = 0;
   for (std::uint32_t i = 0; i < parents.size(); ++i)

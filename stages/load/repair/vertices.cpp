@@ -118,8 +118,8 @@ void for_each_hash(const Chunk& chunk, const Prefetch& prefetch, const Visit& vi
   }
 }
 
-/// Two bits for a hash: it was noted, and it was noted again. So of a point that was noted once, and whose bits no other has, no
-/// other chunk has it.
+/// Two bits for a hash: it was noted, and it was noted again. So of a point that was noted once, and whose bits no other has,
+/// no other chunk has it.
 class Sketch {
  public:
   explicit Sketch(std::size_t points) {
@@ -305,9 +305,8 @@ class Numbering {
     const std::size_t shared = sketch(points);
     while (2 * slots < 3 * shared) slots *= 2;
     PointTable table(chunks_, slots);
-    for_each_chunk([&](std::uint32_t c) {
-      table.enter(c, occurrence_.data() + chunks_[c].before, slot_.data() + chunks_[c].before);
-    });
+    for_each_chunk(
+        [&](std::uint32_t c) { table.enter(c, occurrence_.data() + chunks_[c].before, slot_.data() + chunks_[c].before); });
     for_each_chunk([&](std::uint32_t c) { find_first(c, table); });
     std::uint32_t count = 0;
     for (Chunk& chunk : chunks_) chunk.numbers_from = std::exchange(count, count + chunk.numbers_from);
