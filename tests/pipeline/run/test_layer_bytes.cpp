@@ -5,6 +5,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/run/layer_imager.h"
+#include "stages/geometry/drop_rows.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
 
@@ -54,8 +55,16 @@ TakenBytes expect_layers_take_no_more(const std::vector<std::string>& parts, con
     EXPECT_LE(work.runs.change.size(), drops.changes) << "layer " << i;
     EXPECT_LE(work.drops.levels.level.size(), drops.changes) << "layer " << i;
     std::uint64_t changes = 0;
-    for (const Runs& plane : work.drops.planes) changes += plane.change.size();
+    for (std::uint32_t drop = 0; work.drops.dosed() && drop < std::max(1u, plan->images->dose.max_drops()); ++drop) {
+      Runs plane;
+      runs_of(work.drops.drops[0], drop, plane);
+      EXPECT_LE(plane.change.size(), drops.changes) << "layer " << i;
+      changes += plane.change.size();
+    }
     EXPECT_LE(changes, drops.changes_of_all) << "layer " << i;
+    if (work.drops.dosed()) {
+      EXPECT_LE(work.drops.drops[0].zones.level.size(), drops.runs) << "layer " << i;
+    }
     sum.reported += static_cast<double>(reported_bytes), sum.used += static_cast<double>(work.bytes());
   }
   return sum;
