@@ -104,10 +104,10 @@ void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
 }
 
 /// Sets the bits of a bead in the band that begins with first_row, into which it reaches.
-void BeadRaster::cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t band_rows) {
+void BeadRaster::cover(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row,
+                       std::uint32_t band_rows) {
   const std::uint32_t first = std::max(first_row, deposited.first_row) - first_row;
   const std::uint32_t last = std::min(first_row + band_rows, deposited.last_row) - first_row;
-  const BeadShape shape = shape_of(deposited.a, deposited.b, deposited.width, deposited.ends, grid_.x);
   std::array<std::uint32_t, 2> line{first, last};
   std::uint64_t undecided = 0;
   if (!cover_line(shape, line, undecided)) return cover_rows(deposited, shape, first_row, first, last);
@@ -223,20 +223,29 @@ void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const Run
   for (std::uint32_t i = 0; i < beads_.size(); ++i) by_band_[band_begin_[beads_[i].first_row / kBeadBandRows]++] = i;
   band_.columns = grid_.columns();
   reaching_.clear();
+  shapes_.clear();
   // A column of words more, in which runs that end with the image do.
   touched_.assign(grid_.columns() / kBeadWordBits + 2, 0);
   words_.assign(touched_.size() * kBeadBandRows, 0);
   for (std::uint32_t b = 0, next = 0; b < bands; ++b) {
     const std::uint32_t first = b * kBeadBandRows, last = std::min(rows, first + kBeadBandRows);
-    for (; next < band_begin_[b]; ++next) reaching_.push_back(by_band_[next]);
+    for (; next < band_begin_[b]; ++next) {
+      const DepositedParts& bead = beads_[by_band_[next]];
+      reaching_.push_back(by_band_[next]);
+      shapes_.push_back(shape_of(bead.a, bead.b, bead.width, bead.ends, grid_.x));
+    }
     for (std::uint32_t r = 0; r < kBeadBandRows; ++r)
       rows_.y[r] = static_cast<double>(grid_.y.centre(std::int64_t{rows} - 1 - first - r));
     std::size_t stay = 0;
-    for (const std::uint32_t i : reaching_) {
-      cover(beads_[i], first, last - first);
-      if (beads_[i].last_row > last) reaching_[stay++] = i;
+    for (std::size_t k = 0; k < reaching_.size(); ++k) {
+      const DepositedParts& bead = beads_[reaching_[k]];
+      cover(bead, shapes_[k], first, last - first);
+      if (bead.last_row <= last) continue;
+      reaching_[stay] = reaching_[k];
+      shapes_[stay++] = shapes_[k];
     }
     reaching_.resize(stay);
+    shapes_.resize(stay);
     collect(last - first);
     take(first, band_);
   }

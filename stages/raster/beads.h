@@ -43,7 +43,8 @@ class BeadRaster {
 
   std::uint64_t bytes() const {
     return bytes_held(beads_) + bytes_held(by_band_) + bytes_held(reaching_) + bytes_held(band_begin_) + bytes_held(words_) +
-           bytes_held(touched_) + bytes_held(row_change_) + bytes_held(band_.row_offset) + bytes_held(band_.change);
+           bytes_held(touched_) + bytes_held(row_change_) + bytes_held(shapes_) + bytes_held(band_.row_offset) +
+           bytes_held(band_.change);
   }
   /// Bytes of a band: its bits, and runs of rows with so many changes.
   static std::uint64_t band_bytes(const PixelGrid& grid, std::uint64_t changes_of_row) {
@@ -58,7 +59,7 @@ class BeadRaster {
     Nm width;
     BeadEnds ends;
   };
-  void cover(const DepositedParts& deposited, std::uint32_t first_row, std::uint32_t band_rows);
+  void cover(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row, std::uint32_t band_rows);
   bool cover_line(const BeadShape& shape, std::array<std::uint32_t, 2>& rows, std::uint64_t& undecided);
   void cover_rows(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row, std::uint32_t first,
                   std::uint32_t last);
@@ -72,6 +73,7 @@ class BeadRaster {
   Buffer<DepositedParts> beads_;
   Buffer<std::uint32_t> by_band_, band_begin_;  // beads by the band of their first row; where each band's end
   Buffer<std::uint32_t> reaching_;              // into the band at work
+  Buffer<BeadShape> shapes_;                    // of these
   BeadRows rows_;                               // of the band, and of the bead at work
   Buffer<std::uint32_t> words_;                 // of the band; all 0 between bands
   Buffer<std::uint8_t> touched_;                // by column of words

@@ -69,16 +69,23 @@ LAMINA_BODY void square_block(const BeadShape& bead, const Doubles& y, Doubles& 
   right = right > -kFar ? right : Doubles{} - kFar;
 }
 
+/// Rows that reach below or above the edges along the bead, where the discs are its boundary.
 template <class Doubles>
-LAMINA_BODY void round_block(const BeadShape& bead, const Doubles& y, Doubles& left, Doubles& right) {
-  const Doubles up = y - bead.dy, from = y * bead.slope - bead.aside, to = y * bead.slope + bead.aside;
-  Doubles low = bead.radius2 - y * y, high = bead.radius2 - up * up;
-  root(low);
-  root(high);
-  left = y < bead.left[1] ? from : bead.dx - high;
-  left = y < bead.left[0] ? -low : left;
-  right = y < bead.right[1] ? to : bead.dx + high;
-  right = y < bead.right[0] ? low : right;
+LAMINA_BODY void round_block(const BeadShape& bead, const Doubles& y, bool below, bool above, Doubles& left, Doubles& right) {
+  left = y * bead.slope - bead.aside;
+  right = y * bead.slope + bead.aside;
+  if (above) {
+    const Doubles up = y - bead.dy;
+    Doubles reach = bead.radius2 - up * up;
+    root(reach);
+    left = y < bead.left[1] ? left : bead.dx - reach;
+    right = y < bead.right[1] ? right : bead.dx + reach;
+  }
+  if (!below) return;
+  Doubles reach = bead.radius2 - y * y;
+  root(reach);
+  left = y < bead.left[0] ? -reach : left;
+  right = y < bead.right[0] ? reach : right;
 }
 
 template <class Vectors>
@@ -94,11 +101,8 @@ LAMINA_BODY bool columns_body(const BeadShape& bead, std::uint32_t first, std::u
     y -= bead.y0;
     if (bead.square) {
       square_block(bead, y, left, right);
-    } else if (rows.y[r] <= high && rows.y[r + kLanes - 1] >= low) {  // between the discs
-      left = y * bead.slope - bead.aside;
-      right = y * bead.slope + bead.aside;
     } else {
-      round_block(bead, y, left, right);
+      round_block(bead, y, rows.y[r + kLanes - 1]<low, rows.y[r]> high, left, right);
     }
     whole_columns<Doubles, typename Vectors::Integers>(bead, left, right, r, rows, nearest);
   }
