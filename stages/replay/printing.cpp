@@ -183,14 +183,7 @@ const Count& Printing::finish() {
 // Drops of nozzles on pixels: Printing::fire.
 
 void Printing::fire(std::uint32_t number, std::uint32_t drops) {
-  if (purpose_ == Purpose::kTime) return;
   if (number >= machine_.nozzle_.size()) return fault(fmt::format("nozzle {} does not exist", number));
-  if (words_) {
-    one_.assign((nozzles() + 63) / 64, 0);
-    one_[number / 64] = std::uint64_t{1} << (number % 64 ^ flip_);
-    for (std::uint32_t k = 0; k < drops; ++k) fire_words(one_);
-    return;
-  }
   const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[number];
   if (nozzle.blocked) return fault(fmt::format("nozzle {} fires, which is blocked", number));
   if (!fired_here_) sweeps_.push_back({sweep_, first_line_});

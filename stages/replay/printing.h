@@ -79,8 +79,6 @@ class Printing {
   bool leaves_out_sweep() const { return left_out_.contains(sweep_); }
   bool turns_anew() const { return !left_out_.empty() && profile().motion.both_directions; }
   void at_step(std::int64_t step);
-  /// drops  in a burst, where the dialect can say several
-  void fire(std::uint32_t nozzle, std::uint32_t drops = 1);
   /// The lowest bits of words that fire are the first nozzles; else the highest ones are.
   void lowest_bits_first() { flip_ = 0; }
   /// Fires all nozzles with set bits: words for each bit of the drops, the lowest bit first.
@@ -176,6 +174,7 @@ class Printing {
   void compare_plane(const BitRows& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
                      Differences& differ) const;
   std::uint32_t max_drops(std::span<const std::uint64_t> words, std::uint32_t bits) const;
+  void fire(std::uint32_t nozzle, std::uint32_t drops);
   void fire_singly(std::span<const std::uint64_t> words, std::uint32_t bits);
   /// The 64 pixels of a word that are fired more than so many times.
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
@@ -232,7 +231,6 @@ class Printing {
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::uint32_t planes_, times_bits_, flip_ = 63;
   std::optional<FiredWords> words_;  // for kCompare
-  std::vector<std::uint64_t> one_;   // of a nozzle
   std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
   struct PositionCount {
     std::uint32_t number = 0, drops = 0;  // drops: of the pixel that gets most

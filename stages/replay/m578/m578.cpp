@@ -70,9 +70,9 @@ void fire_inkjet(const GcodeLine& line, GcodeReader& reader, Printing& printing)
   if (bits >> kInkjetBits != 0) {
     return reader.fault(fmt::format("M578 S{} fires nozzles 0 to {} alone", bits, kInkjetBits - 1));
   }
-  for (std::uint32_t bit = 0; bit < kInkjetBits; ++bit) {
-    if ((bits >> bit & 1) != 0) printing.fire(bit);
-  }
+  std::uint64_t word = 0;
+  for (std::uint32_t bit = 0; bit < kInkjetBits; ++bit) word |= std::uint64_t{bits >> bit & 1} << (63 - bit);
+  printing.fire_words({&word, 1});
   printing.takes(std::popcount(bits) * kSecondsOfNozzle);
 }
 
