@@ -211,8 +211,13 @@ void FiredWords::turn(std::uint32_t residue, std::uint32_t word) {
     for (std::size_t chunk = 0; chunk < kChunks; ++chunk) {
       Square& square = squares[b][chunk];
       const std::uint64_t* const from = vectors_.data() + (residue * kWindow + chunk * 64) * size + b * nozzle_words_ + word;
-      for (std::size_t i = 0; i < 64; ++i) square[i] = from[i * size];
-      transpose_square(square);
+      std::uint64_t differs = 0;
+      for (std::size_t i = 0; i < 64; ++i) differs |= (square[i] = from[i * size]) ^ from[0];
+      if (differs == 0) {  // within a part, or between parts
+        for (std::size_t i = 0; i < 64; ++i) square[i] = std::uint64_t{0} - (from[0] >> i & 1);
+      } else {
+        transpose_square(square);
+      }
       count += count_(square);
     }
     drops_ += count << b;
