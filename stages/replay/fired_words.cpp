@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "stages/geometry/isa.h"
 #include "stages/geometry/targets.h"
@@ -256,13 +257,22 @@ void FiredWords::add(std::uint32_t nozzle, std::uint32_t bit, const Square (&squ
       now[b] |= squares[b][chunk][bit] << shift;
       before[b] = squares[b][chunk][bit] >> 1 >> (63 - shift);
     }
-    if (exceeding(now.data(), 1, nozzle_bits_, machine_.machine_.head.max_drops) != 0) wrong_ = true;
+    if (nozzle_bits_ > 1 && exceeding(now.data(), 1, nozzle_bits_, machine_.machine_.head.max_drops) != 0) wrong_ = true;
     add_counts(line + chunk, now);
   }
 }
 
 void FiredWords::add_counts(std::uint64_t* words, const Drops& drops) {
   std::uint64_t carry = 0, beyond = 0;
+  if (nozzle_bits_ == 1) {
+    carry = drops[0];
+    for (std::uint32_t b = 0; b < bits_ && carry != 0; ++b) {
+      const std::uint64_t had = std::exchange(words[b * stride_], words[b * stride_] ^ carry);
+      carry &= had;
+    }
+    if ((carry | (drops[0] & exceeding(words, stride_, bits_, maximum_))) != 0) wrong_ = true;
+    return;
+  }
   for (std::uint32_t b = 0; b < std::max(bits_, nozzle_bits_); ++b) {
     const std::uint64_t had = b < bits_ ? words[b * stride_] : 0, more = b < nozzle_bits_ ? drops[b] : 0;
     const std::uint64_t sum = had ^ more ^ carry;
