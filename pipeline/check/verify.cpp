@@ -90,8 +90,7 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
     if (!read) return read.error().message;
     same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
     const std::vector<RunsView> planes(image->begin(), image->end());
-    const auto replay =
-        inspection.machine->replay(text, record.layer, planes, record.program.moved, record.program.lost);
+    const auto replay = inspection.machine->replay(text, record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     const ProgramRecord& says = record.program;
     const replay::Count reported{.drops = says.drops,

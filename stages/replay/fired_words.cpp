@@ -88,7 +88,8 @@ void ExpectedLines::turn_all() {
       for (std::uint32_t i = 0; i < 64; ++i) square[i] = counts[i * bits_ * row_words + word];
       transpose_square(square);
       const std::size_t bit = word / row_words, first = word % row_words * 64;
-      for (std::size_t i = 0; i < 64 && first + i < columns; ++i) lines_[((first + i) * bits_ + bit) * words_ + block] = square[i];
+      for (std::size_t i = 0; i < 64 && first + i < columns; ++i)
+        lines_[((first + i) * bits_ + bit) * words_ + block] = square[i];
     }
   }
 }
@@ -176,7 +177,8 @@ void FiredWords::allow(std::uint32_t flip) {
   for (std::uint32_t n = 0; n < machine_.nozzle_.size(); ++n) {
     const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[n];
     const auto residue = static_cast<std::size_t>(nozzle.step_offset % machine_.ticks_);
-    if (!nozzle.blocked) allowed_[residue * nozzle_words_ + n / 64] |= std::uint64_t{1} << (n % 64 ^ flip);
+    if (!nozzle.blocked && machine_.machine_.head.max_drops > 0)
+      allowed_[residue * nozzle_words_ + n / 64] |= std::uint64_t{1} << (n % 64 ^ flip);
   }
 }
 
@@ -398,7 +400,8 @@ bool FiredWords::compare_line(std::int64_t line, const std::vector<bool>& may_be
     // Drops of a blocked nozzle are those of a neighbouring line.
     std::vector<std::uint64_t> left = has;
     for (const std::int64_t next : {line - passes, line + passes}) {
-      if (next < 0 || next >= static_cast<std::int64_t>(lines_.size()) || !may_be_lost[static_cast<std::size_t>(next)]) continue;
+      if (next < 0 || next >= static_cast<std::int64_t>(lines_.size()) || !may_be_lost[static_cast<std::size_t>(next)])
+        continue;
       if (!difference(next, drops, neighbour, has)) continue;
       for (std::size_t w = 0; w < left.size(); ++w) left[w] &= ~neighbour[w];
     }

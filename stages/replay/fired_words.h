@@ -71,11 +71,11 @@ class FiredWords {
     std::uint64_t missing = 0, added = 0;  // drops, of the layer
     std::vector<std::uint64_t> lacks, has, neighbour;
   };
-  static constexpr std::uint32_t kMaxBits = 4;               // of a nozzle's drops
-  static constexpr std::size_t kChunks = 4;                  // of 64 positions
-  static constexpr std::int64_t kWindow = 64 * kChunks;      // positions that are turned over at a time
-  using Square = std::uint64_t[64];                          // nozzles, of 64 positions
-  using Drops = std::array<std::uint64_t, kMaxBits>;         // of 64 pixels, the lowest bit first
+  static constexpr std::uint32_t kMaxBits = 4;           // of a nozzle's drops
+  static constexpr std::size_t kChunks = 4;              // of 64 positions
+  static constexpr std::int64_t kWindow = 64 * kChunks;  // positions that are turned over at a time
+  using Square = std::uint64_t[64];                      // nozzles, of 64 positions
+  using Drops = std::array<std::uint64_t, kMaxBits>;     // of 64 pixels, the lowest bit first
 
   void allow(std::uint32_t flip);
   void flush();
@@ -97,8 +97,8 @@ class FiredWords {
 
   const VirtualMachine& machine_;
   ExpectedLines expected_;
-  std::uint32_t maximum_, bits_;      // drops of a pixel, and bits of their number
-  std::size_t stride_;                // words of a bit of a line, with kChunks before it and one more behind
+  std::uint32_t maximum_, bits_;  // drops of a pixel, and bits of their number
+  std::size_t stride_;            // words of a bit of a line, with kChunks before it and one more behind
   std::uint32_t nozzle_words_, nozzle_bits_;
   std::int64_t positions_;
   bool lines_flip_, positions_flip_;  // lines, positions count from the end of the image

@@ -134,18 +134,16 @@ Result<Count> VirtualMachine::replay(std::string_view program, const Layer& laye
   return count ? std::move(count) : replay_drops(program, layer, planes, moved, lost);
 }
 
-Result<Count> VirtualMachine::replay_words(std::string_view program, const Layer& layer,
-                                           std::span<const BitRows* const> planes, std::uint64_t moved,
-                                           std::uint64_t lost) const {
+Result<Count> VirtualMachine::replay_words(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
+                                           std::uint64_t moved, std::uint64_t lost) const {
   const auto fits = [&](const BitRows* plane) { return plane->columns() == columns_ && plane->rows() == rows_; };
   if (!std::ranges::all_of(planes, fits)) return Error{Fault::kVerification, "the image is of another size"};
   Printing printing(*this, layer, planes);
   return replay(program, printing, planes, moved, lost);
 }
 
-Result<Count> VirtualMachine::replay_drops(std::string_view program, const Layer& layer,
-                                           std::span<const BitRows* const> planes, std::uint64_t moved,
-                                           std::uint64_t lost) const {
+Result<Count> VirtualMachine::replay_drops(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
+                                           std::uint64_t moved, std::uint64_t lost) const {
   Printing printing(*this, layer, Purpose::kPrint, nullptr, static_cast<std::uint32_t>(planes.size()));
   return replay(program, printing, planes, moved, lost);
 }

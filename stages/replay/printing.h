@@ -230,8 +230,8 @@ class Printing {
   double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::uint32_t planes_, times_bits_, flip_ = 63;
-  std::optional<FiredWords> words_;  // for kCompare
-  std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
+  std::optional<FiredWords> words_;   // for kCompare
+  std::vector<std::uint64_t> fired_;  // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
   struct PositionCount {
     std::uint32_t number = 0, drops = 0;  // drops: of the pixel that gets most
   } position_;

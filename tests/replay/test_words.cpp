@@ -144,7 +144,8 @@ TEST(Words, AgreeWithDropsOnAnyMachineAndProgram) {
   std::size_t good = 0, bad = 0;
   for (std::uint32_t seed = 0; seed < 84; ++seed) {
     Random random(seed);
-    const WordBench bench(of_pixels(any_machine(random, seed), 60 + random() % 300, 60 + random() % 300), 1 + seed / 7 % 3, seed);
+    const WordBench bench(of_pixels(any_machine(random, seed), 60 + random() % 300, 60 + random() % 300), 1 + seed / 7 % 3,
+                          seed);
     const auto program = bench.program();
     const auto machine = bench.machine();
     const std::string name = fmt::format("{}, seed {}", bench.resolved.machine.dialect, seed);
@@ -165,7 +166,8 @@ TEST(Words, AgreeWithDropsOnAnyMachineAndProgram) {
 
 // --- planted faults
 
-bool fires_at(const HeadGrid& grid, const SweepVectors& vectors, std::uint32_t step, std::uint32_t nozzle, std::uint32_t bit = 0) {
+bool fires_at(const HeadGrid& grid, const SweepVectors& vectors, std::uint32_t step, std::uint32_t nozzle,
+              std::uint32_t bit = 0) {
   const std::uint32_t at = nozzle ^ grid.bit_order;
   return (vectors.bits[std::size_t{step} * vectors.words + bit * grid.words() + at / 64] >> (at % 64) & 1) != 0;
 }
@@ -215,8 +217,10 @@ void copy_step(SweepVectors& vectors, std::uint32_t from, std::uint32_t to) {
 
 using VectorChange = void (*)(const HeadGrid& grid, Spot spot, Sweep& sweep, SweepVectors& vectors);
 const std::pair<const char*, VectorChange> kChanges[] = {
-    {"a drop left out", [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) { set_nozzle(grid, v, at.step, at.nozzle, false); }},
-    {"a drop too many", [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) { set_nozzle(grid, v, at.step, at.nozzle + 1, true); }},
+    {"a drop left out",
+     [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) { set_nozzle(grid, v, at.step, at.nozzle, false); }},
+    {"a drop too many",
+     [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) { set_nozzle(grid, v, at.step, at.nozzle + 1, true); }},
     {"a drop of the next nozzle",
      [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) {
        set_nozzle(grid, v, at.step, at.nozzle, false);
@@ -236,7 +240,8 @@ const std::pair<const char*, VectorChange> kChanges[] = {
      [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) {
        for (std::uint32_t nozzle = 0; nozzle < grid.nozzles; ++nozzle) set_nozzle(grid, v, at.step, nozzle, false);
      }},
-    {"a step again", [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) { copy_step(v, at.step, at.step + grid.steps_per_pixel); }},
+    {"a step again",
+     [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) { copy_step(v, at.step, at.step + grid.steps_per_pixel); }},
     {"a nozzle that fires nothing",
      [](const HeadGrid& grid, Spot at, Sweep&, SweepVectors& v) {
        for (std::uint32_t step = 1; step + 1 < v.steps; ++step) set_nozzle(grid, v, step, at.nozzle, false);
@@ -270,8 +275,10 @@ TEST(Words, PlantedFaultsAreFoundAndDescribed) {
       ASSERT_NE(program.text, good.text) << name << ": " << what;
       ASSERT_FALSE(agrees(bench, machine, program.text, good.count.moved, good.count.lost, what)) << name << ": " << what;
       const auto fault = machine.replay(program.text, printed_parts::kLayer, bench.expected, good.count.moved, good.count.lost);
-      EXPECT_NE(fault.error().message.find("layer 7, swath "), std::string::npos) << name << ", " << what << ": " << fault.error().message;
-      EXPECT_NE(fault.error().message.find(", step "), std::string::npos) << name << ", " << what << ": " << fault.error().message;
+      EXPECT_NE(fault.error().message.find("layer 7, swath "), std::string::npos)
+          << name << ", " << what << ": " << fault.error().message;
+      EXPECT_NE(fault.error().message.find(", step "), std::string::npos)
+          << name << ", " << what << ": " << fault.error().message;
       ++planted;
     }
     // A sweep that is missing.
@@ -300,7 +307,8 @@ TEST(Words, FaultsOfSeveralDropsAreFound) {
         if (number != 0) return true;
         const Spot at = spot_of(grid, vectors);
         for (std::uint32_t bit = 0; bit < 4; ++bit) {
-          if ((by >> bit & 1) != 0) set_nozzle(grid, vectors, at.step, at.nozzle, !fires_at(grid, vectors, at.step, at.nozzle, bit), bit);
+          if ((by >> bit & 1) != 0)
+            set_nozzle(grid, vectors, at.step, at.nozzle, !fires_at(grid, vectors, at.step, at.nozzle, bit), bit);
         }
         find_firing(vectors);
         return true;

@@ -13,7 +13,7 @@ namespace {
 constexpr int kLevel = 4;
 // Movements of an end that share a byte; the byte of two runs that stay, and of so many; of movements that do not share one.
 constexpr std::uint64_t kSmall = 15, kStay = 225, kMaxStay = 31, kWide = 255;
-constexpr std::size_t kLongest = 11;               // bytes of a run: kWide and two numbers of 33 bits
+constexpr std::size_t kLongest = 11;  // bytes of a run: kWide and two numbers of 33 bits
 
 std::byte* put_number(std::uint64_t value, std::byte* to) {
   for (; value > 127; value >>= 7) *to++ = static_cast<std::byte>(128 | (value & 127));
