@@ -45,11 +45,11 @@ bool Chains::find(const RunsView& image, std::uint32_t stencil_rows) {
       } else {
         of_run_[run] = static_cast<std::uint32_t>(chain_.size());
         chain_.push_back({r, 1, 0, 0});
+        if (chain_.size() * (more + 4) > 2 * runs + 4096) return false;
       }
     }
     above = above_end;
   }
-  if (chain_.size() * more > 2 * runs + 4096) return false;
   std::size_t at = 0;
   for (Chain& chain : chain_) {
     chain.at = at;

@@ -271,7 +271,7 @@ std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
 
 void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
   // The image, the numbers of its runs, the layer below, and chains; the same of the powder, whose rows have one run less or more.
-  constexpr std::uint64_t kOfRun = 8 + 8 + 12 + 8;
+  constexpr std::uint64_t kOfRun = 8 + 8 + 12 + 52;
   const std::uint64_t runs = image.change.size() / 2, rows = all_.bottom, minimum = kOfRun * (2 * runs - std::min(runs, rows));
   const bool too_large = stopped_ || minimum > max_bytes_;
   copy_rows(image, top_, top_ + all_.bottom, inspection.image);
