@@ -98,11 +98,12 @@ class Planner {
     return any;
   }
 
-  /// Layers of one thickness need no list of triangles.
+  /// Images and contours of layers of one thickness need no list of triangles.
   MeshForm form() {
     const auto options = heights_options(job());
-    if (!options || options->mode != heights::Mode::kUniform) return MeshForm::kLists;
-    return images() && !beads_ ? MeshForm::kBlocks : MeshForm::kOrderedBlocks;
+    if (!options || options->mode != heights::Mode::kUniform || job().heights.per_part) return MeshForm::kLists;
+    if (plan_.product == Product::kContours) return MeshForm::kOrderedBlocks;
+    return images() && !beads_ ? MeshForm::kBlocks : MeshForm::kLists;
   }
 
   Status load() { return read_parts_as(form()); }
