@@ -8,28 +8,12 @@
 #include "stages/dose/dither.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/tiff/dither_deflate.h"
+#include "stages/geometry/drop_rows.h"
+#include "stages/geometry/run_rows.h"
 #include "tests/formats/images.h"
 
 namespace lamina {
 namespace {
-
-/// The rows of an image, made on demand.
-class RowsOfRuns : public BitRows {
- public:
-  explicit RowsOfRuns(const Runs& runs) : runs_(runs) {}
-  std::uint32_t columns() const override { return runs_.columns; }
-  std::uint32_t rows() const override { return runs_.view().rows(); }
-  void row(std::uint32_t number, std::span<std::uint64_t> words) const override {
-    std::ranges::fill(words, 0);
-    const auto change = runs_.view().row(number);
-    for (std::size_t i = 0; i + 1 < change.size(); i += 2) {
-      for (std::uint32_t c = change[i]; c < change[i + 1]; ++c) words[c / 64] |= std::uint64_t{1} << c % 64;
-    }
-  }
-
- private:
-  const Runs& runs_;
-};
 
 /// A disc, dithered to a fraction of its pixels by blue noise, or by the pattern of a core.
 Runs dithered_disc(std::uint32_t columns, std::uint32_t rows, double fraction, bool core) {
@@ -40,16 +24,13 @@ Runs dithered_disc(std::uint32_t columns, std::uint32_t rows, double fraction, b
     disc.push_back(begin < end ? formats::testing::Row{begin, end} : formats::testing::Row{});
   }
   const Runs image = formats::testing::image_of(columns, disc);
-  Runs result;
-  if (core) {
-    dose::saturate(image, image, fraction, 3, result);
-    return result;
-  }
-  Levels levels;
-  levels_of(image, 1, levels);
-  dose::DitherScratch scratch;
   const dose::Drops24 drops[] = {0, static_cast<dose::Drops24>(fraction * (1 << dose::kDropBits))};
-  dose::dither_one(levels, drops, 3, scratch, result);
+  DropPatterns patterns;
+  core ? dose::make_core(fraction, 3, patterns) : dose::make_zones(drops, 3, patterns);
+  Levels zones;
+  levels_of(image, core ? 2 : 1, zones);
+  Runs result;
+  runs_of({zones.view(), &patterns}, 0, result);
   return result;
 }
 
@@ -97,7 +78,7 @@ TEST(DitherDeflate, DitheredImagesAreReadAgainAndSmall) {
       const auto encoder = format->make_encoder();
       formats::Bytes file, of_rows, g4;
       ASSERT_TRUE(encoder->encode(runs, 600, 300, file).ok());
-      ASSERT_TRUE(encoder->encode(RowsOfRuns(runs), 600, 300, of_rows).ok());
+      ASSERT_TRUE(encoder->encode(RunRows(runs), 600, 300, of_rows).ok());
       EXPECT_TRUE(file == of_rows) << columns;
       formats::testing::save(folder / "layer.tif", file);
       const auto image = formats::image(folder / "layer.tif");
@@ -118,7 +99,7 @@ TEST(DitherDeflate, FormatsWithoutBitsOfTheirOwnEncodeRowsAsRuns) {
     const auto encoder = format.make_encoder();
     formats::Bytes of_runs, of_rows;
     ASSERT_TRUE(encoder->encode(runs, 600, 600, of_runs).ok());
-    ASSERT_TRUE(encoder->encode(RowsOfRuns(runs), 600, 600, of_rows).ok());
+    ASSERT_TRUE(encoder->encode(RunRows(runs), 600, 600, of_rows).ok());
     EXPECT_TRUE(of_runs == of_rows) << format.id;
   }
 }

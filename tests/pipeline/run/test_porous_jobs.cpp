@@ -194,7 +194,7 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       rasterizer->layer(raster::Engine::kContours, layer.plane(), raster_scratch, image);
       const auto solid = set_pixels(image);
       const pipeline::Beads& beads = *plan->images->beads;
-      const auto work = std::make_unique<pipeline::BeadWork>(grid);
+      const auto work = std::make_unique<pipeline::BeadWork>(grid, pipeline::Job().isa);
       ASSERT_TRUE(plan->sections->layer(layer.index, work->sections).ok());
       ASSERT_TRUE(beads.deposit(layer, *work).ok());
       beads.apply(image, scratch, *work);
