@@ -23,6 +23,7 @@ using Plant = std::function<bool(std::size_t number, Sweep& sweep, SweepVectors&
 /// A layer of several drops a pixel on a machine, and what its program prints of it.
 struct WordBench {
   pipeline::ResolvedMachine resolved;
+  Levels levels;  // drops of each pixel
   std::vector<Runs> planes;
   std::vector<RunRows> rows;
   std::vector<const BitRows*> expected;
@@ -31,7 +32,6 @@ struct WordBench {
     const PixelGrid& grid = resolved.grid.image;
     Random random(seed);
     const std::uint32_t part = 1 + random() % 3;
-    Levels levels;
     levels.start(grid.columns());
     for (std::uint32_t r = 0; r < grid.rows(); ++r) {
       for (std::uint32_t c = 0; c < grid.columns();) {
@@ -58,9 +58,10 @@ struct WordBench {
     writer->begin_layer(cycle, bytes);
     program::CompileScratch scratch;
     std::size_t number = 0;
-    const std::vector<RunsView> views(planes.begin(), planes.end());
+    DropPatterns patterns;
+    for (std::uint32_t n = 0; n <= planes.size(); ++n) patterns.zone.push_back({static_cast<std::uint8_t>(n)});
     const auto count = program::compile(
-        resolved.grid, views, scratch,
+        resolved.grid, {levels, &patterns}, static_cast<std::uint32_t>(planes.size()), scratch,
         [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
           Sweep own = sweep;
           SweepVectors changed = vectors;
