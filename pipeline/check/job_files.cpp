@@ -56,7 +56,7 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
 }
 
 bool is_one_bit(const ManifestHead& head) {
-  return head.max_drops <= 1 && head.full_level() == 0 && !head.grey_drops() && head.named_images() == 0;
+  return (head.max_drops <= 1 || head.geometry) && head.full_level() == 0 && !head.grey_drops() && head.named_images() == 0;
 }
 
 std::uint64_t bytes_to_read(const ManifestHead& head, const LayerRecord& record, Keep keep) {

@@ -44,7 +44,7 @@ struct Verification {
   mutable tbb::enumerable_thread_specific<LayerDrops> drops;
 
   /// Without a program to compare it with, the numbers of an image are enough.
-  Keep keep() const { return head.machine.empty() && is_one_bit(head) ? Keep::kCounts : Keep::kRuns; }
+  Keep keep() const { return head.machine.empty() && head.max_drops == 0 && is_one_bit(head) ? Keep::kCounts : Keep::kRuns; }
 };
 
 /// What is found in a layer.

@@ -77,7 +77,7 @@ std::optional<FreeSpace> free_space(const std::string& output) {
   fs::path folder = fs::absolute(output.empty() ? "." : output, error).lexically_normal();
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   const fs::space_info space = fs::space(folder, error);
-  if (error) return std::nullopt;
+  if (error || space.capacity == 0) return std::nullopt;  // as of /proc
   return FreeSpace{folder.string(), space.available};
 }
 

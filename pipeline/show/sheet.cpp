@@ -170,7 +170,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   view::picture::SheetRequest sheet;
   sheet.title = title_of(head);
   sheet.grid = head.grid;
-  sheet.maximum = head.max_of_pixel();
+  sheet.maximum = head.geometry ? 1 : head.max_of_pixel();
   sheet.whole_bed = request.whole_bed;
   sheet.width = request.width.value_or(kSheetWidth);
   sheet.memory_bytes = request.memory_bytes;

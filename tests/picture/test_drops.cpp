@@ -79,7 +79,7 @@ class DropPictures : public ::testing::Test {
   void SetUp() override { write_box(in_ / "box.stl", {0, 0, 0}, {12, 8, 1}); }
 
   void plan(const std::string& options, const std::string& out) {
-    std::vector<std::string> words = words_of("jet box.stl --layer 0.05 --machine nuferbj " + options);
+    std::vector<std::string> words = words_of("jet box.stl --layer 0.05 --machine nuferbj --images drops " + options);
     words.insert(words.end(), {"--quiet", "-o", out});
     const Outcome planned = run_lamina(words, in_.path());
     ASSERT_EQ(planned.code, 0) << planned.err;

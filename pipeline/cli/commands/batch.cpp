@@ -17,6 +17,7 @@
 #include "pipeline/job/errors.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
+#include "stages/formats/images/layer_images.h"
 #include "stages/load/load.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
@@ -111,7 +112,9 @@ Arguments with_settings(Arguments arguments, const CommandSpec& spec, const Call
   };
   if (!settings.output.empty()) add("--output", settings.output);
   if (!sync.empty() && !arguments.has("--sync")) add("--sync", sync);
-  if (!arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
+  // Info takes a limit for images alone.
+  const bool takes_memory = spec.name != "info" || std::ranges::any_of(arguments.operands, formats::names_images);
+  if (takes_memory && !arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
   // All jobs share one pool, so a job's own thread count would apply to the whole program.
   add("--threads", "0");
   add("--json");

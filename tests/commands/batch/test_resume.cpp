@@ -222,7 +222,7 @@ TEST_F(JobsInBatch, TwoBatchesInOneDirectoryAreRefused) {
 TEST_F(JobsInBatch, InterruptedItSaysHowToGoOn) {
   write_boxes(1);
   const Words words = batch_of({"part10.stl", "-o", "out", "--resume"},
-                               {"--with", "jet --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none"});
+                               {"--with", "jet --bed 400x400 --dpi 1200 --layer 0.0002"});
   const Outcome outcome = lamina(words, [&](int process) {
     for (int i = 0; i < 2000 && !fs::exists(directory_ / "out/part10/layers/000000.tif"); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -32,6 +32,7 @@ Job job_of_boxes(const test::Directory& folder, const std::string& out, double g
   job.parts.push_back({.path = folder / "box.stl", .at_mm = std::array{10.0, 10.0}});
   job.parts.push_back({.path = folder / "box.stl", .at_mm = std::array{18.0 + gap_mm, 10.0}});
   job.output = folder / out;
+  job.image_content = ImageContent::kDrops;
   return job;
 }
 

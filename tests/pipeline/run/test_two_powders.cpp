@@ -58,6 +58,7 @@ class TwoPowders : public ::testing::Test {
     made.machine.vat_rule = VatRule::kMajority;
     made.layer_mm = 1.5;
     made.output = (directory_ / out).string();
+    made.image_content = ImageContent::kDrops;
     return made;
   }
   /// A profile like a shipped one with other lines in [powder].
