@@ -64,6 +64,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     }
     report(watcher, lock);
     summary_.seconds = seconds_since(start);
+    summary_.peak_resident_bytes = peak_resident_bytes();
     // Wakes idle workers so that they exit. A worker shares ownership of this object and may exit later.
     stopped_ = true;
     changed_.notify_all();

@@ -50,6 +50,7 @@ struct BatchSummary {
   std::vector<BatchResult> results;  // one a job; values that the record has are left there
   std::uint32_t max_running = 0;
   std::uint64_t max_need_bytes = 0;  // of jobs running at the same time
+  std::uint64_t peak_resident_bytes = 0;  // of the program, when the last job has ended
   double seconds = 0;
   bool interrupted = false;
   /// A job that ignored its stop is still running: the program must exit without waiting for it.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/plan/progress.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/readable.h"
 #include "stages/support/text/version.h"
@@ -83,7 +82,7 @@ Status write_batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& s
                {"max_running", summary.max_running},
                {"memory_budget_bytes", options.memory_bytes},
                {"max_need_bytes", summary.max_need_bytes},
-               {"peak_resident_bytes", peak_resident_bytes()},
+               {"peak_resident_bytes", summary.peak_resident_bytes},
                {"jobs", Json::array()}};
   const std::string head = json_text(json, indent), line = indent < 0 ? "" : "\n" + std::string(indent, ' '),
                     own_line = indent < 0 ? "" : "\n" + std::string(2 * indent, ' ');
@@ -159,7 +158,7 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   line("time", fmt::format("{}; {:.1f} jobs/s, {} at once at most", readable_seconds(summary.seconds),
                            summary.seconds > 0 ? (totals.done + totals.failed) / summary.seconds : 0, summary.max_running));
   line("memory",
-       fmt::format("{} at most, budget {}", readable_bytes(peak_resident_bytes()), readable_bytes(options.memory_bytes)));
+       fmt::format("{} at most, budget {}", readable_bytes(summary.peak_resident_bytes), readable_bytes(options.memory_bytes)));
   return text;
 }
 
