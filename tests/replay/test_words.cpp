@@ -186,9 +186,9 @@ void find_firing(SweepVectors& vectors) {
   for (std::uint32_t s = 0; s < vectors.steps; ++s) {
     const auto begin = vectors.bits.begin() + static_cast<std::ptrdiff_t>(std::size_t{s} * vectors.words);
     if (std::all_of(begin, begin + vectors.words, [](std::uint64_t word) { return word == 0; })) continue;
-    if (vectors.firing.empty() || vectors.firing.back() != vectors.first_step + s) {
-      vectors.firing.push_back(vectors.first_step + s);
-      vectors.firing.push_back(vectors.first_step + s);
+    if (vectors.firing.empty() || vectors.firing.back() != s) {
+      vectors.firing.push_back(s);
+      vectors.firing.push_back(s);
     }
     ++vectors.firing.back();
   }

@@ -33,6 +33,7 @@ class DosesOnRecord : public ::testing::Test {
     job.machine.profile = "nuferbj";
     job.layer_mm = 0.1;
     job.output = directory_ / out;
+    job.image_content = ImageContent::kDrops;
     return job;
   }
   static void make(const Job& job) {

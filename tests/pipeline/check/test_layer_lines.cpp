@@ -173,7 +173,7 @@ TEST_F(LayerLines, TimesOfAddedSweepsAreThoseOfThePrograms) {
 }
 
 TEST_F(LayerLines, NothingLiesInAnotherPowderWhereThereIsOne) {
-  make("jet a.stl --machine nuferbj --layer 0.1 --saturation 70");
+  make("jet a.stl --machine nuferbj --layer 0.1 --saturation 70 --images drops");
   expect_found("\"unfed_pixels\": 0", "\"unfed_pixels\": 3", "the job uses one powder, the manifest says 3 pixels");
 }
 
