@@ -55,6 +55,8 @@ class ExpectedDrops {
   /// The same by the machine's profile in the job's directory. errors  of machine_of_job
   static Result<ExpectedDrops> of(const std::string& directory, const ManifestHead& head);
 
+  /// Whether drops are made again from images of the geometry.
+  bool remakes() const { return dose_ != nullptr; }
   /// images  of the drops, each within the one before, or one of the geometry; outlive the use of `drops`
   void make(const Layer& layer, std::span<const Runs> images, LayerDrops& drops) const;
   /// The same as runs, for pictures: the image of the geometry becomes the images of its drops.

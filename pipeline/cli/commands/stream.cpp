@@ -24,7 +24,7 @@ CommandSpec stream_spec() {
                   {"--quiet", "", "print errors only", "", ""}};
   spec.closing =
       "Examples:\n"
-      "  lamina stream out > /dev/ttyUSB0\n"
+      "  lamina stream out > program.planes\n"
       "  lamina stream out -o part.planes";
   return spec;
 }
