@@ -41,7 +41,7 @@ void ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, Layer
   drops.planes_.clear();
   drops.made_.clear();
   drops.runs_.clear();
-  drops.pixels = drops.drops = drops.maximum = 0;
+  drops.pixels = drops.drops = drops.requested = drops.maximum = 0;
   if (!dose_) {
     drops.runs_.reserve(images.size());
     for (const Runs& image : images) {
@@ -59,6 +59,7 @@ void ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, Layer
   if (dose_->saturates()) {
     const auto sums = dose_->saturate(layer, false, 1, images.front(), {}, drops.second_, work);
     if (!sums) return;  // only formulas fail
+    drops.requested = sums->requested_drops;
   }
   const DropTotals totals(work.drops.front(), work.counter);
   drops.pixels = totals.pixels();
@@ -82,6 +83,10 @@ std::string ExpectedDrops::fault(const ManifestHead& head, const LayerRecord& re
   if (head.max_drops > 0 && record.dosed_pixels != record.geometry_pixels) {
     return fmt::format("layer {}: its image sets {} pixels, the manifest says dosed_pixels {}", record.layer.index,
                        record.geometry_pixels, record.dosed_pixels);
+  }
+  if (head.max_drops > 0 && record.requested_drops != drops.requested) {
+    return fmt::format("layer {}: its pixels need {} drops by the job, the manifest says requested_drops {}", record.layer.index,
+                       drops.requested, record.requested_drops);
   }
   if (drops.pixels == record.set_pixels) return {};
   return fmt::format("layer {}: {} pixels of its image get drops by the job, the manifest says set_pixels {}",

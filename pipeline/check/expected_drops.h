@@ -31,6 +31,7 @@ class LayerDrops {
   std::uint64_t pixels = 0;   // with any drop
   std::uint64_t drops = 0;    // of all pixels
   std::uint32_t maximum = 0;  // of any pixel
+  std::uint64_t requested = 0;  // by the target, as LayerRecord has it; of drops that are made again
 
  private:
   friend class ExpectedDrops;

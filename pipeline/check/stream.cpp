@@ -42,10 +42,7 @@ class ProgramStream {
   /// max_bytes  of a file whose size is not on record
   Status add(const std::string& name, const Hash128& hash, std::optional<std::uint64_t> bytes, std::uint64_t max_bytes) {
     const std::string fault = fault_of_file(directory_, name, hash, bytes);
-    if (!fault.empty()) {
-      const bool named = fault.starts_with(directory_);
-      return Error{Fault::kVerification, named ? fault : fmt::format("{}/{}", directory_, fault)};
-    }
+    if (!fault.empty()) return Error{Fault::kVerification, fmt::format("{}/{}", directory_, fault)};
     return expand_file((fs::path(directory_) / name).string(), bytes.value_or(max_bytes),
                        [&](std::span<const std::byte> piece) { return out_.append(piece); });
   }

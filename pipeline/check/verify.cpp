@@ -94,13 +94,13 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
   };
   if (drops == nullptr || !inspection.machine) {
     const Result<FileDigest> digest = digest_content(path, record.program.bytes);
-    if (!digest) return digest.error().message;
+    if (!digest) return in_directory(digest.error().message, path, name);
     if (is_compressed(name) && digest->bytes != record.program.bytes) return expands_to(digest->bytes);
     same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   } else {
     std::string& text = inspection.texts.local();
     const Status read = read_content(path, is_compressed(name) ? record.program.bytes : kMaxProgramBytes, text);
-    if (!read) return read.error().message;
+    if (!read) return in_directory(read.error().message, path, name);
     if (is_compressed(name) && text.size() != record.program.bytes) return expands_to(text.size());
     same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
     const auto replay =

@@ -98,13 +98,17 @@ class PathComparison {
 
 }  // namespace
 
+std::string in_directory(const std::string& message, const std::string& path, const std::string& name) {
+  return message.starts_with(path) ? name + message.substr(path.size()) : message;
+}
+
 std::string fault_of_file(const std::string& directory, const std::string& name, const Hash128& hash,
                           std::optional<std::uint64_t> bytes) {
   const std::string path = (fs::path(directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
   const Result<FileDigest> digest = digest_content(path, bytes);
-  if (!digest) return digest.error().message;
+  if (!digest) return in_directory(digest.error().message, path, name);
   if (bytes && digest->bytes != *bytes) return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, *bytes);
   return digest->hash == hash ? "" : fmt::format("{}: its content is not what was written", name);
 }

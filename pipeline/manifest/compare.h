@@ -13,6 +13,9 @@
 
 namespace lamina {
 
+/// A message that begins with a file's path, beginning with its name in the directory instead.
+std::string in_directory(const std::string& message, const std::string& path, const std::string& name);
+
 /// "", or how the content of a file of the directory differs from its record, as in "NAME: is missing".
 /// cost  reads the file once
 std::string fault_of_file(const std::string& directory, const std::string& name, const Hash128& hash,

@@ -6,8 +6,10 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "pipeline/job/file.h"
+#include "pipeline/manifest/compare.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
@@ -119,13 +121,17 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
     const std::string program = program_file_name(record.layer.index, head.program_extension);
     if (Status status = bring(program, record.program.bytes); !status) return status;
   }
-  if (head.machine.empty() || in_place) return {};
+  if (head.machine.empty()) return {};
   // The files that all shards write identically.
-  for (const std::string& name :
-       {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
-    const fs::path from = fs::path(shard.directory) / "program" / name;
+  for (const auto& [name, hash] : {std::pair{std::string("program/machine.toml"), head.machine_profile},
+                                   {"program/start" + head.program_extension, head.program_start},
+                                   {"program/end" + head.program_extension, head.program_end}}) {
+    const fs::path from = fs::path(shard.directory) / name;
     if (Status status = check_plain(from.string()); !status) return status;
-    if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
+    if (const std::string fault = fault_of_file(shard.directory, name, hash); !fault.empty())
+      return unmatched(fmt::format("{}/{}; run its shard again with --resume", shard.directory, fault));
+    if (in_place) continue;
+    if (Status status = bring_file(from, fs::path(output) / name, report); !status) return status;
   }
   return {};
 }

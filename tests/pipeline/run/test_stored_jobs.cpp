@@ -124,6 +124,25 @@ TEST_F(StoredJobs, ResumedShardedAndMergedJobsHaveTheSamePrograms) {
   EXPECT_NE(refused(5, "verify parts").find("has bytes after its frame"), std::string::npos);
 }
 
+TEST_F(StoredJobs, AFileOfAllShardsIsComparedWhenTheyAreJoined) {
+  jet("planes", "-o first --shard 1/2");
+  jet("planes", "-o second --shard 2/2");
+  for (const std::string name : {"end.planes.zst", "start.planes.zst", "machine.toml"}) {
+    const std::string file = folder_ / ("second/program/" + name), good = test::read_text(file);
+    test::write_text(file, good + "x");
+    const std::string error = refused(5, "merge first second -o both");
+    EXPECT_NE(error.find("second/program/" + name), std::string::npos) << error;
+    EXPECT_EQ(error.find("second/second"), std::string::npos) << error;
+    test::write_text(file, good);
+    fs::remove_all(folder_ / "both");
+  }
+  done("merge first second -o both --quiet");
+  const std::string end = folder_ / "both/program/end.planes.zst";
+  test::write_text(end, test::read_text(end) + "x");
+  const std::string error = refused(5, "stream both -o new");
+  EXPECT_EQ(error.find("both/both"), std::string::npos) << error;
+}
+
 TEST_F(StoredJobs, StreamRefusesWhatIsNoWholeJob) {
   jet("planes", "-o half --layers 0:4");
   EXPECT_NE(refused(5, "stream half").find("has 4 of 11 layers"), std::string::npos);
@@ -161,7 +180,17 @@ TEST_F(StoredJobs, ImagesAreTheGeometryWhereDropsFollowFromIt) {
       done("verify " + job + " --quiet");
       done("report " + job + " --quiet --overwrite -o page.html");
     }
-    // A drop less, or another image of the geometry, is found.
+    // A drop requested less, a drop jetted less, or another image of the geometry, is found.
+    if (const std::uint64_t requested = mask->layers[4].requested_drops; requested > 0) {
+      const std::string manifest = folder_ / "mask/manifest.json", good = test::read_text(manifest);
+      std::string changed = good;
+      const std::string key = "\"requested_drops\": " + std::to_string(requested);
+      const std::size_t at = changed.find(key);
+      ASSERT_NE(at, std::string::npos);
+      test::write_text(manifest, changed.replace(at, key.size(), "\"requested_drops\": " + std::to_string(requested - 1)));
+      EXPECT_NE(refused(5, "verify mask").find("drops by the job"), std::string::npos) << dose;
+      test::write_text(manifest, good);
+    }
     jet("planes", dose + " --blocked 60 -o less --overwrite");
     fs::copy_file(folder_ / "less/program/000004.planes.zst", folder_ / "mask/program/000004.planes.zst",
                   fs::copy_options::overwrite_existing);
