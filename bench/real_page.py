@@ -1,8 +1,8 @@
 """bench/real_page.py: the page of scripts/bench real."""
 from tables import seconds, table
 
-UNITS = {"processor": "x", "wall": "x", "peak": "x", "bytes": "x", "older": "x", "above": "ms"}
-ABSOLUTE = {"peak": "MiB", "wall": "s"}
+UNITS = {"processor": "x", "wall": "x", "peak": "x", "bytes": "x", "older": "x", "above": "ms", "MiB": "MiB"}
+ABSOLUTE = {"wall": "s"}
 
 
 def figure(row, value):
