@@ -7,8 +7,8 @@
     --cache DIR --models DIR               where parts are made (default: build/bench), and from what
 
 A row has kinds of runs: the job, what it is compared with, and the job of the older build. Each kind runs once, and the answers are
-compared before any clock starts: pixels of images by decoding, print programs by their expanded bytes and `lamina verify`, texts byte
-by byte. Then kinds take turns, in an order that turns with the round. Printed are medians; the ratio is that of processor seconds,
+compared before any clock starts: pixels of images by decoding, print programs by hashes of their expanded bytes and `lamina verify`,
+texts byte by byte. Then kinds take turns, in an order that turns with the round. Printed are medians; the ratio is that of processor seconds,
 which other programs on the machine disturb least, and of wall seconds. Outputs are in memory (/dev/shm) where there is one.
 Rows of the same jobs share their runs. Jobs that take more than 20 seconds run once. Exit 1 if a row misses its target.
 """
@@ -94,7 +94,7 @@ def rows():
                       ("info", "info IN/layers/000005.png --memory 64M"), ("preview", "preview IN -o OUT.png --memory 64M"),
                       ("report", "report IN -o OUT.html --memory 64M")):
         yield Row(f"image-{name}", f"`{name}` of a dithered image of 357 megapixels, peak memory in MiB", job, None, 256, measure="MiB",
-                  first=image, answer="images" if name in ("jet", "convert") else "files")
+                  first=image, answer="images" if name in ("jet", "convert") else "none")
     yield Row("report", "`report` of 480 full-bed layers", "report IN -o OUT.html", PLATE72, 2, 1, first=[PLATE72.replace("OUT", "IN")],
               answer="page")
     yield Row("verify", "`verify` with replay, plate of 96 on production-1200, 96 layers", "verify IN", MACHINE96, 4, 2,
@@ -103,11 +103,12 @@ def rows():
         dry = f"jet PART:{part}.stl --bed 400x400 --dpi 1200 --layer 0.1 --dry-run -o OUT"
         yield Row(f"info-{part}", f"`info` of {part}, against a dry run", f"info PART:{part}.stl", dry, 3, 2, answer="text")
         yield Row(f"info-{part}-memory", "the same, peak memory", f"info PART:{part}.stl", dry, 1.2, measure="peak", answer="text")
-    for command in ("slice PART:benchies72.stl --layer 0.1 -o OUT", "heights PART:benchies72.stl --layer 0.1 -o OUT.csv --format csv",
-                    "export PART:benchies72.stl -o OUT.stl", "info PART:benchies72.stl"):
+    for command in ("slice PART:benchies72.stl --bed 400x400 --layer 0.1 -o OUT",
+                    "heights PART:benchies72.stl --layer 0.1 -o OUT.csv --format csv",
+                    "export PART:benchies72.stl --bed 400x400 -o OUT.stl", "info PART:benchies72.stl"):
         name = command.split()[0]
         yield Row(f"{name}-memory", f"`{name}` of 811 MB, peak memory in MiB", command, None, 330, measure="MiB",
-                  answer="text" if name == "info" else "files")
+                  answer={"info": "text", "slice": "contours"}.get(name, "files"))
     yield Row("batch", "100,000 batch jobs, peak memory in MiB", "batch PART:jobs.txt -o OUT --keep-going", None, 100, measure="MiB",
               answer="none", old=False)
     cube = "jet PART:cube.stl --bed 100x100 --dpi 600 --layer 0.1 -o OUT"
@@ -181,6 +182,8 @@ class Real:
         words = [word for word in self.words(job, out, source)]
         if which == "old" and "--memory" in words and words[0] not in ("jet", "extrude", "slice", "heights"):
             del words[words.index("--memory"):words.index("--memory") + 2]  # 73edc841 has it for no other command
+        if which == "old" and "--margin" in words:
+            del words[words.index("--margin"):words.index("--margin") + 2]  # 73edc841 has no margins
         quiet = [] if words[0] in ("info",) else ["--quiet"]
         wall, processor, peak = started([program, *words, *quiet])
         return {"wall": wall, "processor": processor, "peak": peak / 2**20, "bytes": written(out) if which != "unit" else 0}
