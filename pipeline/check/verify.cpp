@@ -304,40 +304,12 @@ void check_layers(const std::string& directory, const Manifest& manifest, const 
 }
 
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
-  std::vector<std::string> strays;
-  const auto inspect = [&](const std::string& folder, const auto& names) {
-    std::error_code error;
-    for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
-         entry.increment(error)) {
-      const std::string name = folder + "/" + entry->path().filename().string();
-      if (std::ranges::none_of(manifests, [&](const Manifest& manifest) { return names(manifest, name); })) {
-        strays.push_back(name);
-      }
-    }
-  };
-  const auto has_layer = [](const Manifest& manifest, std::uint32_t index) {
-    return index >= manifest.head.first_layer && index < manifest.head.first_layer + manifest.layers.size();
-  };
-  inspect("layers", [&](const Manifest& manifest, const std::string& name) {
-    LayerRecord record;
-    bool partial = false;
-    if (!read_layer_file_name(fs::path(name).filename().string(), record.layer.index, partial)) return false;
-    return !partial && has_layer(manifest, record.layer.index) &&
-           std::ranges::any_of(layer_images(manifest.head, record),
-                               [&](const LayerImageFile& image) { return image.name == name; });
-  });
-  inspect("program", [&](const Manifest& manifest, const std::string& name) {
-    const std::string& extension = manifest.head.program_extension;
-    std::uint32_t index = 0;
-    bool partial = false;
-    if (manifest.head.machine.empty()) return false;
-    if (read_program_file_name(fs::path(name).filename().string(), index, partial)) {
-      return !partial && has_layer(manifest, index) && program_file_name(index, extension) == name;
-    }
-    return name == "program/machine.toml" || name == "program/start" + extension || name == "program/end" + extension;
-  });
-  std::sort(strays.begin(), strays.end());
-  for (const std::string& name : strays) report.add(fmt::format("{}: no manifest names it", name));
+  std::vector<LayersOfJob> jobs;
+  for (const Manifest& manifest : manifests) {
+    const std::uint32_t first = manifest.head.first_layer;
+    jobs.push_back({&manifest.head, first, first + static_cast<std::uint32_t>(manifest.layers.size())});
+  }
+  for (const std::string& name : stray_files(directory, jobs)) report.add(fmt::format("{}: no manifest names it", name));
 }
 
 VerifyReport verify_paths(const std::string& name, const std::string& directory, const Manifest& manifest) {
