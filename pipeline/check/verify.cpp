@@ -181,7 +181,7 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
   const bool unknown = inspection.head.geometry && !inspection.expected.remakes();
   if (inspection.options.quick || unknown) return fault_of_program(inspection, record, nullptr, found);
   LayerDrops& drops = inspection.drops.local();
-  inspection.expected.make(record.layer, picture.planes, drops);
+  if (Status status = inspection.expected.make(record.layer, picture.planes, drops); !status) return status.error().message;
   if (std::string what = ExpectedDrops::fault(inspection.head, record, drops); !what.empty()) return what;
   if (std::string what = fault_of_drops(inspection.head, record, drops); !what.empty()) return what;
   if (std::string what = inspection.doses->fault(record, drops.pixels, levels); !what.empty()) return what;
