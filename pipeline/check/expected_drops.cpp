@@ -37,7 +37,7 @@ Result<ExpectedDrops> ExpectedDrops::of(const std::string& directory, const Mani
   return machine ? of(head, machine->profile()) : machine.error();
 }
 
-void ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, LayerDrops& drops) const {
+Status ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, LayerDrops& drops) const {
   drops.planes_.clear();
   drops.made_.clear();
   drops.runs_.clear();
@@ -51,14 +51,17 @@ void ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, Layer
       drops.maximum += set > 0 ? 1 : 0;
       drops.planes_.push_back(&drops.runs_.emplace_back(image));
     }
-    return;
+    return {};
   }
   dose::DropWork& work = drops.work_;
   work.drops.clear();
   if (dose_->thins()) dose_->thin(layer.index, images.front(), drops.second_, work);
   if (dose_->saturates()) {
     const auto sums = dose_->saturate(layer, false, 1, images.front(), {}, drops.second_, work);
-    if (!sums) return;  // only formulas fail
+    if (!sums) {
+      return Error{Fault::kVerification, fmt::format("layer {}: the drops of its image cannot be made again: {}", layer.index,
+                                                     sums.error().message)};
+    }
     drops.requested = sums->requested_drops;
   }
   const DropTotals totals(work.drops.front(), work.counter);
@@ -67,15 +70,17 @@ void ExpectedDrops::make(const Layer& layer, std::span<const Runs> images, Layer
   drops.maximum = totals.maximum();
   for (std::uint32_t drop = 0; drop < max_drops_; ++drop) drops.made_.emplace_back(work.drops.front(), drop);
   for (const DropPlane& plane : drops.made_) drops.planes_.push_back(&plane);
+  return {};
 }
 
-void ExpectedDrops::apply(const Layer& layer, std::vector<Runs>& images) const {
-  if (!dose_) return;
+Status ExpectedDrops::apply(const Layer& layer, std::vector<Runs>& images) const {
+  if (!dose_) return {};
   LayerDrops drops;
-  make(layer, images, drops);
+  if (Status status = make(layer, images, drops); !status) return status;
   std::vector<Runs> planes(drops.planes().size());
   for (std::uint32_t i = 0; i < planes.size(); ++i) runs_of(drops.work_.drops.front(), i, planes[i]);
   images = std::move(planes);
+  return {};
 }
 
 std::string ExpectedDrops::fault(const ManifestHead& head, const LayerRecord& record, const LayerDrops& drops) {

@@ -12,6 +12,7 @@
 
 #include "pipeline/manifest/manifest.h"
 #include "stages/data/bit_rows.h"
+#include "stages/data/levels.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -32,6 +33,8 @@ class LayerDrops {
   std::uint64_t drops = 0;    // of all pixels
   std::uint32_t maximum = 0;  // of any pixel
   std::uint64_t requested = 0;  // by the target, as LayerRecord has it; of drops that are made again
+  /// Of drops that are made again, those of each pixel.
+  void levels(Levels& result) const { levels_of(work_.drops.front(), result); }
 
  private:
   friend class ExpectedDrops;
@@ -59,9 +62,10 @@ class ExpectedDrops {
   /// Whether drops are made again from images of the geometry.
   bool remakes() const { return dose_ != nullptr; }
   /// images  of the drops, each within the one before, or one of the geometry; outlive the use of `drops`
-  void make(const Layer& layer, std::span<const Runs> images, LayerDrops& drops) const;
+  /// errors  kVerification: "layer 3: ...", the job's dose cannot be computed; `drops` are then none
+  Status make(const Layer& layer, std::span<const Runs> images, LayerDrops& drops) const;
   /// The same as runs, for pictures: the image of the geometry becomes the images of its drops.
-  void apply(const Layer& layer, std::vector<Runs>& images) const;
+  Status apply(const Layer& layer, std::vector<Runs>& images) const;
 
   /// "", or how the counts of a layer's record are not those of its image and its drops, in order.
   static std::string fault(const ManifestHead& head, const LayerRecord& record, const LayerDrops& drops);

@@ -10,6 +10,7 @@
 #include "pipeline/report/machine_text.h"
 #include "stages/data/levels.h"
 #include "stages/program/head_grid.h"
+#include "stages/support/hash/hash.h"
 #include "stages/support/io/compressed.h"
 #include "stages/support/io/file_reader.h"
 
@@ -23,6 +24,13 @@ std::string whole_file(const fs::path& path, std::uint64_t max_bytes) {
   auto text = read_file(path.string(), {.max_bytes = max_bytes});
   return text ? std::move(*text) : std::string();
 }
+
+/// path  of a file of the job
+Error wrong(const std::string& path, std::string_view what) {
+  return {Fault::kVerification, fmt::format("{}: {}; run lamina verify for details", path, what)};
+}
+
+Error changed(const std::string& path) { return wrong(path, "is not the file of the manifest"); }
 
 }  // namespace
 
@@ -48,11 +56,33 @@ std::string sweeps_of_job(const std::string& directory, const Manifest& manifest
   return program::sweeps_text(machine->profile(), *grid, sweeps);
 }
 
-std::string program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  const std::string name = program_file_name(record.layer.index, head.program_extension);
-  auto text =
-      read_content((fs::path(directory) / name).string(), is_compressed(name) ? record.program.bytes : kMaxProgramBytes);
-  return text ? std::move(*text) : std::string();
+Status check_images(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  for (const LayerImageFile& file : layer_images(head, record)) {
+    const std::string path = (fs::path(directory) / file.name).string();
+    const Result<FileDigest> digest = digest_file(path, file.record.bytes);
+    if (!digest) return Error{Fault::kVerification, digest.error().message + "; run lamina verify for details"};
+    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
+  }
+  return {};
+}
+
+Status check_frame(const std::string& directory, const ManifestHead& head) {
+  for (const auto& [stem, hash] : {std::pair{"start", head.program_start}, {"end", head.program_end}}) {
+    const std::string fault = fault_of_file(directory, fmt::format("program/{}{}", stem, head.program_extension), hash);
+    if (!fault.empty())
+      return Error{Fault::kVerification, fmt::format("{}/{}; run lamina verify for details", directory, fault)};
+  }
+  return {};
+}
+
+Result<std::string> program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  const std::string path = (fs::path(directory) / program_file_name(record.layer.index, head.program_extension)).string();
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return wrong(path, "is missing");
+  auto text = read_content(path, record.program.bytes);
+  if (!text) return Error{Fault::kVerification, text.error().message + "; run lamina verify for details"};
+  if (text->size() != record.program.bytes || hash_text(*text) != record.program.hash) return changed(path);
+  return text;
 }
 
 bool is_one_bit(const ManifestHead& head) {
@@ -106,17 +136,40 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
   for (std::size_t i = 0; i < files.size(); ++i) {
     LayerPicture drops;
     Levels levels;
-    auto image = read_layer_image((fs::path(directory) / files[i].name).string(), head, drops, levels);
+    const std::string path = (fs::path(directory) / files[i].name).string();
+    auto image = read_layer_image(path, head, drops, levels);
     if (!image) return image.error();
-    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
-      return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", files[i].name)};
-    }
+    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows())
+      return wrong(path, "is not of the manifest's size");
     const Status added = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
-    if (!added)
-      return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, added.error().message)};
+    if (!added) return wrong(path, "sets pixels that " + added.error().message);
   }
-  expected.apply(record.layer, picture.planes);
+  if (Status status = expected.apply(record.layer, picture.planes); !status)
+    return wrong(directory, status.error().message);
   return std::move(picture.planes);
+}
+
+Result<formats::Image> printed_pixels(const std::string& image) {
+  auto dark = formats::dark_pixels(image, are_grey_drops(image) ? 255 : 128);
+  const fs::path folder = fs::path(image).parent_path(), job = folder / "..";
+  const auto manifest = dark ? read_manifest((job / "manifest.json").string()) : dark.error();
+  if (!manifest || !manifest->head.geometry) return dark;
+  const std::string name = "layers/" + fs::path(image).filename().string();
+  for (const LayerRecord& record : manifest->layers) {
+    if (layer_images(manifest->head, record).front().name != name) continue;
+    const std::string directory = job.lexically_normal().string();
+    if (Status status = check_images(directory, manifest->head, record); !status) return status.error();
+    const auto expected = ExpectedDrops::of(directory, manifest->head);
+    if (!expected) {
+      return Error{Fault::kVerification,
+                   (job.lexically_normal() / expected.error().message).string() + "; run lamina verify for details"};
+    }
+    auto picture = picture_of_layer(directory, manifest->head, record, *expected);
+    if (!picture) return picture.error();
+    dark->runs = std::move(picture->front());
+    break;
+  }
+  return dark;
 }
 
 }  // namespace lamina::pipeline

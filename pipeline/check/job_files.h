@@ -25,8 +25,14 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
 /// The drops per pixel of a head that fires several, as planning reported them; "" for another head, or without its files.
 std::string sweeps_of_job(const std::string& directory, const Manifest& manifest);
 
-/// The text of a layer's print program, unchecked; "" if it cannot be read.
-std::string program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
+/// Compares the images of a layer with the manifest. errors  kVerification, with the file: missing, or another one
+Status check_images(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
+
+/// Compares the programs before the first and after the last layer with the manifest. errors  the same
+Status check_frame(const std::string& directory, const ManifestHead& head);
+
+/// The text of a layer's print program. errors  kVerification, with the file: missing, damaged, or not that of the manifest
+Result<std::string> program_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
 
 /// The images of a layer's drops, of all materials, each within the one before; one where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;
@@ -52,9 +58,14 @@ Status add_picture(const ManifestHead& head, std::size_t number, Runs&& image, L
                    raster::DropPlanes& picture);
 
 /// A layer on the manifest's grid; at least one image.
-/// errors  kVerification, with the file: of formats::image; wrong size; two materials in one pixel; drops without the first
+/// errors  kVerification, with the file: of formats::image; wrong size; two materials in one pixel; drops without the first;
+///         of ExpectedDrops::make
 /// expected  the drops of an image of the geometry; as made for no job: images as they are
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
                                       const ExpectedDrops& expected);
+
+/// The pixels of a layer image, anywhere, that get any drop; of the geometry of a job, by its dose and machine.
+/// errors  of formats::dark_pixels, check_images, ExpectedDrops::of and picture_of_layer
+Result<formats::Image> printed_pixels(const std::string& image);
 
 }  // namespace lamina::pipeline

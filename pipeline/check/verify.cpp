@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <tuple>
 
 #include "pipeline/check/doses.h"
@@ -51,6 +52,8 @@ struct Verification {
 struct Finding {
   std::string fault;                   // empty, or the first one
   std::optional<replay::Count> count;  // of its replayed program
+  bool by_drops = false;               // the program is replayed drop by drop, to find the place of a fault
+  bool repeat = false;                 // that is needed
 };
 
 /// "both vats feed"
@@ -82,7 +85,7 @@ std::string fault_of_feeding(const Verification& inspection, const LayerRecord& 
 // locates the difference.
 // drops  null if only its hash counts
 std::string fault_of_program(const Verification& inspection, const LayerRecord& record, const LayerDrops* drops,
-                             std::optional<replay::Count>& count) {
+                             Finding& found) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
   const std::string path = (fs::path(inspection.directory) / name).string();
@@ -103,9 +106,13 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
     if (!read) return in_directory(read.error().message, path, name);
     if (is_compressed(name) && text.size() != record.program.bytes) return expands_to(text.size());
     same = text.size() == record.program.bytes && hash_text(text) == record.program.hash;
-    const auto replay =
-        inspection.machine->replay(text, record.layer, drops->planes(), record.program.moved, record.program.lost);
-    if (!replay) return fmt::format("{}: {}", name, replay.error().message);
+    const auto replay_by = found.by_drops ? &replay::VirtualMachine::replay_drops : &replay::VirtualMachine::replay_words;
+    const auto replay = (*inspection.machine.*replay_by)(text, record.layer, drops->planes(), record.program.moved,
+                                                         record.program.lost);
+    if (!replay) {
+      found.repeat = !found.by_drops;
+      return fmt::format("{}: {}", name, replay.error().message);
+    }
     const ProgramRecord& says = record.program;
     const replay::Count reported{.drops = says.drops,
                                  .sweeps = says.sweeps,
@@ -119,7 +126,7 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
       std::string fault = fault_of_feeding(inspection, record, replay->vats);
       if (!fault.empty()) return fmt::format("{}: layer {}: {}", name, record.layer.index, fault);
     }
-    count = *replay;
+    found.count = *replay;
   }
   return same ? std::string()
               : fmt::format("{}: layer {}: its content is not what was written{}", name, record.layer.index,
@@ -158,8 +165,8 @@ std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, 
                      drops.pixels, drops.maximum, record.set_pixels, record.max_drops);
 }
 
-std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
-  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
+std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, Finding& found) {
+  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, found);  // a format without files
   raster::DropPlanes picture = planes_of(inspection.head);
   std::uint64_t levels = 0;
   const auto files = layer_images(inspection.head, record);
@@ -172,13 +179,13 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
   }
   // Without the machine, which is a fault of its own, nothing is known of drops that follow from the geometry.
   const bool unknown = inspection.head.geometry && !inspection.expected.remakes();
-  if (inspection.options.quick || unknown) return fault_of_program(inspection, record, nullptr, count);
+  if (inspection.options.quick || unknown) return fault_of_program(inspection, record, nullptr, found);
   LayerDrops& drops = inspection.drops.local();
-  inspection.expected.make(record.layer, picture.planes, drops);
+  if (Status status = inspection.expected.make(record.layer, picture.planes, drops); !status) return status.error().message;
   if (std::string what = ExpectedDrops::fault(inspection.head, record, drops); !what.empty()) return what;
   if (std::string what = fault_of_drops(inspection.head, record, drops); !what.empty()) return what;
   if (std::string what = inspection.doses->fault(record, drops.pixels, levels); !what.empty()) return what;
-  return fault_of_program(inspection, record, &drops, count);
+  return fault_of_program(inspection, record, &drops, found);
 }
 
 // Restores the machine that the programs were written for.
@@ -226,6 +233,31 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
   return inspection.machine ? replay::with_fed_by_host(inspection.machine->profile(), record.layer, count) : count;
 }
 
+/// Finds the faults of layers, as many at a time as the memory admits; those that are to be replayed drop by drop once more.
+void inspect_layers(const Verification& inspection, std::span<const LayerRecord> records, MemoryGate& gate,
+                    std::vector<Finding>& found) {
+  const ManifestHead& head = inspection.head;
+  const bool quick = inspection.options.quick;
+  const replay::VirtualMachine* machine = quick || !inspection.machine ? nullptr : &*inspection.machine;
+  const std::uint32_t planes = std::max(1u, head.max_drops);
+  const auto inspect = [&](std::size_t i, std::uint64_t replay_bytes) {
+    const auto pass = gate.enter(quick ? 0 : bytes_to_read(head, records[i], inspection.keep()) + replay_bytes);
+    found[i].count.reset();
+    // Isolated: a thread that waits within has a pass, and must not begin another layer.
+    tbb::this_task_arena::isolate([&] { found[i].fault = fault_of_layer(inspection, records[i], found[i]); });
+  };
+  const std::uint64_t bytes = machine != nullptr ? machine->bytes_of_replay(planes) : 0;
+  tbb::parallel_for(std::size_t{0}, records.size(), [&](std::size_t i) {
+    found[i].by_drops = found[i].repeat = false;
+    inspect(i, bytes);
+  });
+  tbb::parallel_for(std::size_t{0}, records.size(), [&](std::size_t i) {
+    if (!found[i].repeat) return;
+    found[i].by_drops = true;
+    inspect(i, machine->bytes_of_drops(planes));
+  });
+}
+
 void check_layers(const std::string& directory, const Manifest& manifest, const VerifyOptions& options,
                   std::optional<JobCost>& cost, std::optional<replay::VatLevels>& vats, VerifyReport& report) {
   Verification inspection{directory, manifest.head, options, std::nullopt, std::nullopt, {}, report, {}, {}};
@@ -246,13 +278,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, const 
   if (!vats && inspection.machine) vats.emplace(inspection.machine->profile());
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      const LayerRecord& record = manifest.layers[first + i];
-      const auto pass = gate.enter(options.quick ? 0 : bytes_to_read(manifest.head, record, inspection.keep()));
-      found[i].count.reset();
-      // Isolated: a thread that waits within has a pass, and must not begin another layer.
-      tbb::this_task_arena::isolate([&] { found[i].fault = fault_of_layer(inspection, record, found[i].count); });
-    });
+    inspect_layers(inspection, std::span(manifest.layers).subspan(first, count), gate, found);
     for (std::size_t i = 0; i < count; ++i) {
       const LayerRecord& record = manifest.layers[first + i];
       report.bytes += record.bytes + record.program.bytes;
@@ -278,40 +304,12 @@ void check_layers(const std::string& directory, const Manifest& manifest, const 
 }
 
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
-  std::vector<std::string> strays;
-  const auto inspect = [&](const std::string& folder, const auto& names) {
-    std::error_code error;
-    for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
-         entry.increment(error)) {
-      const std::string name = folder + "/" + entry->path().filename().string();
-      if (std::ranges::none_of(manifests, [&](const Manifest& manifest) { return names(manifest, name); })) {
-        strays.push_back(name);
-      }
-    }
-  };
-  const auto has_layer = [](const Manifest& manifest, std::uint32_t index) {
-    return index >= manifest.head.first_layer && index < manifest.head.first_layer + manifest.layers.size();
-  };
-  inspect("layers", [&](const Manifest& manifest, const std::string& name) {
-    LayerRecord record;
-    bool partial = false;
-    if (!read_layer_file_name(fs::path(name).filename().string(), record.layer.index, partial)) return false;
-    return !partial && has_layer(manifest, record.layer.index) &&
-           std::ranges::any_of(layer_images(manifest.head, record),
-                               [&](const LayerImageFile& image) { return image.name == name; });
-  });
-  inspect("program", [&](const Manifest& manifest, const std::string& name) {
-    const std::string& extension = manifest.head.program_extension;
-    std::uint32_t index = 0;
-    bool partial = false;
-    if (manifest.head.machine.empty()) return false;
-    if (read_program_file_name(fs::path(name).filename().string(), index, partial)) {
-      return !partial && has_layer(manifest, index) && program_file_name(index, extension) == name;
-    }
-    return name == "program/machine.toml" || name == "program/start" + extension || name == "program/end" + extension;
-  });
-  std::sort(strays.begin(), strays.end());
-  for (const std::string& name : strays) report.add(fmt::format("{}: no manifest names it", name));
+  std::vector<LayersOfJob> jobs;
+  for (const Manifest& manifest : manifests) {
+    const std::uint32_t first = manifest.head.first_layer;
+    jobs.push_back({&manifest.head, first, first + static_cast<std::uint32_t>(manifest.layers.size())});
+  }
+  for (const std::string& name : stray_files(directory, jobs)) report.add(fmt::format("{}: no manifest names it", name));
 }
 
 VerifyReport verify_paths(const std::string& name, const std::string& directory, const Manifest& manifest) {

@@ -61,16 +61,19 @@ bool is_program_file(std::string_view stem, std::string_view name, const program
   return name == dialect.extension;
 }
 
+bool is_program_frame(std::string_view name) {
+  return name == "machine.toml" || std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) {
+           return is_program_file("start", name, one) || is_program_file("end", name, one);
+         });
+}
+
 // The other files in program/, of any dialect, and their temporary ones.
 std::vector<fs::path> program_frames(const std::string& directory) {
   std::vector<fs::path> found;
   for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
     const std::string file = entry.path().filename().string();
-    const std::string_view named = named_by_temporary(file), name = named.empty() ? file : named;
-    const bool frame = std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) {
-      return is_program_file("start", name, one) || is_program_file("end", name, one);
-    });
-    if (frame || name == "machine.toml") found.push_back(entry.path());
+    const std::string_view named = named_by_temporary(file);
+    if (is_program_frame(named.empty() ? file : named)) found.push_back(entry.path());
   });
   return found;
 }
@@ -139,6 +142,14 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
   partial = take_temporary_end(name);
   return take_layer_index(name, index) &&
          std::ranges::any_of(program::dialects(), [&](const program::Dialect& one) { return is_program_file("", name, one); });
+}
+
+bool is_job_file_name(const fs::path& name) {
+  const std::string file = name.filename().string();
+  std::uint32_t index = 0;
+  bool partial = false;
+  if (name.parent_path() == "layers") return read_layer_file_name(file, index, partial);
+  return is_program_frame(file) || read_program_file_name(file, index, partial);
 }
 
 bool holds_layers(const std::string& directory) {

@@ -34,6 +34,9 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
 /// The same for the print program of a layer, 000042.gcode.
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial);
 
+/// Whether a file in a job's directory, program/000042.gcode, has the name of a layer, a program or its frame of any job.
+bool is_job_file_name(const std::filesystem::path& name);
+
 /// Layers and print programs of any earlier job, half-written ones too.
 std::vector<std::filesystem::path> layer_files(const std::string& directory);
 /// Whether such or other files of programs are there, whosever they are.

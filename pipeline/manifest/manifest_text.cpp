@@ -309,27 +309,43 @@ std::string tail_text(const ManifestHead& head, const FileDigest& file) {
   return "\n],\n" + text_of("whole_file") + ": " + text_of(json) + "\n}\n";
 }
 
+namespace {
+
+/// Whether a head still has the id of its lines: then it is what some lamina wrote.
+bool has_own_id(const std::string& text, const Json& json) {
+  const std::size_t lasting = text.find("\n" + text_of("id") + ": ");
+  if (lasting == std::string::npos || !json.contains("id") || !json.at("id").is_string()) return false;
+  Hash128 id;
+  return read_hex(json.at("id").text(), id) && id == hash_text(std::string_view(text).substr(0, lasting + 1));
+}
+
+}  // namespace
+
 Result<ManifestHead> read_head(const std::string& text) {
   const auto wrong = [](const std::string& what) { return Error{Fault::kVerification, what}; };
+  const auto written_by_another = [&] {
+    return wrong(
+        "was written by another version of lamina, whose manifests differ from those of this one; read it with that "
+        "version, or plan the job again with --overwrite");
+  };
   if (!json_nests_within(text)) return wrong("is no manifest of lamina");
   bool fraction = false;
   const Json json = parsed(text + "]}", fraction);
   if (!json.is_object()) return wrong("is no manifest of lamina");
   if (!json.contains("manifest") || json.at("manifest") != kManifestVersion) {
     if (!json.contains("lamina")) return wrong("is no manifest of lamina");
-    return wrong(fmt::format(
-        "was written by another version of lamina, whose manifests differ from those of this one; read it with that "
-        "version, or plan the job again with --overwrite"));
+    return written_by_another();
   }
   if (fraction) return wrong("the head has a number that is not whole; it was changed");
   ManifestHead head;
   try {
     head = head_from(json);
   } catch (const std::exception& error) {
-    return wrong(error.what());
+    return has_own_id(text, json) ? written_by_another() : wrong(error.what());
   }
   // Written again it has to be the same text: then nothing in it was changed, its id holds, and all of it was read.
-  if (head_text(head) != text) return wrong("the head is not what was written; it was changed");
+  if (head_text(head) != text)
+    return has_own_id(text, json) ? written_by_another() : wrong("the head is not what was written; it was changed");
   if (head.first_layer > head.last_layer || head.last_layer > head.layer_count) return wrong("its range of layers is invalid");
   if (std::string what = what_is_impossible(head); !what.empty()) return wrong(what);
   return head;

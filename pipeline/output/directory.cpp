@@ -167,6 +167,55 @@ Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
   return claim;
 }
 
+namespace {
+
+bool writes(const LayersOfJob& job, const fs::path& name) {
+  const ManifestHead& head = *job.head;
+  const std::string file = name.filename().string(), whole = name.generic_string();
+  LayerRecord record;
+  std::uint32_t& index = record.layer.index;
+  bool partial = false;
+  const auto has_layer = [&] { return !partial && index >= job.first && index < job.last; };
+  if (name.parent_path() == "layers") {
+    return read_layer_file_name(file, index, partial) && has_layer() &&
+           std::ranges::any_of(layer_images(head, record), [&](const LayerImageFile& image) { return image.name == whole; });
+  }
+  if (head.machine.empty()) return false;
+  if (read_program_file_name(file, index, partial))
+    return has_layer() && program_file_name(index, head.program_extension) == whole;
+  return file == "machine.toml" || file == "start" + head.program_extension || file == "end" + head.program_extension;
+}
+
+}  // namespace
+
+std::vector<std::string> stray_files(const std::string& directory, std::span<const LayersOfJob> jobs) {
+  std::vector<std::string> strays;
+  for (const char* folder : {"layers", "program"}) {
+    std::error_code error;
+    for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
+         entry.increment(error)) {
+      const fs::path name = folder / entry->path().filename();
+      if (std::ranges::none_of(jobs, [&](const LayersOfJob& job) { return writes(job, name); }))
+        strays.push_back(name.generic_string());
+    }
+  }
+  std::sort(strays.begin(), strays.end());
+  return strays;
+}
+
+Status check_no_strays(const std::string& directory, const LayersOfJob& job, bool all) {
+  std::vector<std::string> strays = stray_files(directory, {&job, 1});
+  std::erase_if(strays, [&](const std::string& name) {
+    const std::string file = fs::path(name).filename().string();
+    const bool being_written = file.ends_with(kPartial) || !named_by_temporary(file).empty();
+    return being_written || (!all && !is_job_file_name(name));
+  });
+  if (strays.empty()) return {};
+  const std::string more = strays.size() == 1 ? "" : fmt::format(", like {} more", strays.size() - 1);
+  return Error{Fault::kUsage, fmt::format("{}/{}: is not of this job{}; remove it, or name another directory", directory,
+                                          strays.front(), more)};
+}
+
 FileOptions layer_file_options(const Job& job) {
   return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? Durable::kBytes : Durable::kNo};
 }

@@ -1,6 +1,8 @@
 // pipeline/output/directory.h: checks and clears a job's directory before a run.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -40,6 +42,19 @@ Status check_shard_fits(const Job& job, const ManifestHead& head);
 /// earlier job (a shard: only its own manifest), otherwise only the half-written files of an interrupted run.
 /// errors  those of claim_output; kOutput with the system's reason
 Result<Claim> prepare_output(const Job& job, MadeFolders& made);
+
+/// Some layers of a job, [first, last).
+struct LayersOfJob {
+  const ManifestHead* head;
+  std::uint32_t first, last;
+};
+
+/// The files in layers/ and program/ of a directory, by name, that none of the jobs writes for those layers.
+std::vector<std::string> stray_files(const std::string& directory, std::span<const LayersOfJob> jobs);
+
+/// Fails if files in layers/ or program/ are not of the job: all but half-written ones, or only those named like layers,
+/// programs and their frames. errors  kUsage, with the first file
+Status check_no_strays(const std::string& directory, const LayersOfJob& job, bool all);
 
 /// How a layer's file is written in a claimed directory.
 FileOptions layer_file_options(const Job& job);

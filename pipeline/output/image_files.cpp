@@ -89,6 +89,11 @@ Status ImageFiles::open() {
     kept_ = std::move(*kept);
     for (LayerRecord& record : kept_) report_unfed(record);
   }
+  if (!plan_.undecided && (!job.overwrite || job.shard)) {
+    // Other shards have the other layers of the directory.
+    const LayersOfJob own{&head_, job.shard ? 0 : head_.first_layer, job.shard ? head_.layer_count : head_.last_layer};
+    if (Status status = check_no_strays(job.output, own, job.resume); !status) return status;
+  }
   auto kept_record = kept_.begin();
   todo_.reserve(head_.last_layer - head_.first_layer - kept_.size());
   for (std::uint32_t index = head_.first_layer; index < head_.last_layer; ++index) {

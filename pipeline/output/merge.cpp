@@ -236,6 +236,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   const auto is_known = check_output(output, head, *claim);
   if (!is_known) return is_known.error();
   sweep_partial_files(output);
+  if (Status status = check_no_strays(output, {&head, 0, head.layer_count}, true); !status) return status.error();
   if (Status status = check_stays_inside(output); !status) return status.error();
   fs::create_directories(fs::path(output) / "layers", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/layers: {}", output, error.message())};

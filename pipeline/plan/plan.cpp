@@ -330,7 +330,8 @@ class Planner {
 
 namespace {
 
-/// G4 is for areas. A dithered image gets another format, unless the job names one.
+/// G4 is for areas. A dithered image gets another format, unless the job names one. Content that is the default one anyway
+/// makes the same job, stated or not.
 Status choose_images(bool machine, Job& job) {
   const bool geometry = has_images_of_geometry(job, machine);
   if (job.image_content == ImageContent::kGeometry && !geometry) {
@@ -341,6 +342,10 @@ Status choose_images(bool machine, Job& job) {
   const bool dithers = job.dose.core < 1 || (job.dose.dithered && (job.levels > 0 || job.dose.saturation_percent));
   const bool named = std::ranges::find(job.named, "image.format") != job.named.end();
   if (job.format == Job().format && !named && dithers && !geometry) job.format = "tiff-deflate";
+  const bool dosed = job.dose.core < 1 || job.dose.saturation_percent;
+  const bool drops = dosed && job.image_content == ImageContent::kDrops;
+  job.image_content = ImageContent::kAuto;
+  if (drops && has_images_of_geometry(job, machine)) job.image_content = ImageContent::kDrops;
   return {};
 }
 

@@ -50,7 +50,7 @@ void slice_layers(const std::vector<LayerRecord>& layers, ImageStack& stack) {
 /// Pixels that get no drop because drops are few are no pores. errors  kInput: the images leave some out
 Status check_all_filled(const std::string& folder, const Manifest& manifest) {
   const ManifestHead& head = manifest.head;
-  if (head.full_level() > 0 && !head.grey_drops()) return {};  // shares of voxels
+  if (head.geometry || (head.full_level() > 0 && !head.grey_drops())) return {};  // or shares of voxels
   Job job;
   const bool known = read_job_text(head.job_toml, folder + "/manifest.json", job).ok();
   std::uint64_t without = 0, filled = 0;

@@ -284,7 +284,16 @@ class RowObserver : public ImageObserver {
 constexpr std::string_view kFacts[] = {"columns",           "rows",    "dpi",          "voxels",      "saturation",
                                        "jetting",           "use",     "inspection",   "set_pixels",  "capped_rows",
                                        "pixels_per_second", "isa",     "solid_pixels", "bead_pixels", "porosity",
-                                       "print_seconds",     "refills", "moved_pixels", "lost_pixels", "materials"};
+                                       "print_seconds",     "refills", "moved_pixels", "lost_pixels", "materials",
+                                       "images_of"};
+
+/// What the pixels of layer images are; "geometry" too if each set pixel gets one drop.
+std::string_view images_of(const Plan& plan) {
+  const DosePlan& dose = plan.images->dose;
+  if (plan.images->geometry) return "geometry";
+  if (dose.changes_image()) return "drops";
+  return plan.job.levels > 0 ? "levels" : "geometry";
+}
 
 }  // namespace
 
@@ -321,6 +330,7 @@ void report_image_plan(const Plan& plan, Summary& summary) {
   summary.facts["columns"] = grid.columns();
   summary.facts["rows"] = grid.rows();
   summary.facts["dpi"] = {grid.x.dpi(), grid.y.dpi()};
+  if (plan.job.format != "null") summary.facts["images_of"] = images_of(plan);
 }
 
 void sort_image_facts(Summary& summary) {

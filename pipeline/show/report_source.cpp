@@ -21,8 +21,6 @@ Error wrong(const std::string& path, std::string_view what) {
   return {Fault::kVerification, fmt::format("{}: {}", path, what)};
 }
 
-Error changed(const std::string& path) { return wrong(path, "is not the file of the manifest; run lamina verify for details"); }
-
 Result<Manifest> finished_manifest(const std::string& position, const std::string& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
@@ -40,28 +38,16 @@ Result<Manifest> finished_manifest(const std::string& position, const std::strin
   return manifest;
 }
 
-Status check_files(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  for (const LayerImageFile& file : layer_images(head, record)) {
-    const std::string path = directory + "/" + file.name;
-    const Result<FileDigest> digest = digest_file(path, file.record.bytes);
-    if (!digest) return digest.error();
-    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
-  }
-  return {};
-}
-
 /// Reads a layer's files into runs if they match the manifest.
 Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
                                 const ExpectedDrops& expected) {
-  if (Status status = check_files(directory, head, record); !status) return status.error();
-  auto picture = picture_of_layer(directory, head, record, expected);
-  if (picture || !picture.error().message.starts_with("layers/")) return picture;
-  return Error{Fault::kVerification, fmt::format("{}/{}; run lamina verify for details", directory, picture.error().message)};
+  if (Status status = check_images(directory, head, record); !status) return status.error();
+  return picture_of_layer(directory, head, record, expected);
 }
 
 /// The same of a layer of one image of 1 bit, as runs or bits.
 Result<ReportLayer> read_bits(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  if (Status status = check_files(directory, head, record); !status) return status.error();
+  if (Status status = check_images(directory, head, record); !status) return status.error();
   const std::string name = layer_images(head, record).front().name;
   auto image = formats::image(directory + "/" + name, 0, Keep::kSmaller);
   if (!image) return image.error();
@@ -73,14 +59,13 @@ Result<ReportLayer> read_bits(const std::string& directory, const ManifestHead& 
 /// Machine time of a layer, from replaying its program as lamina verify does.
 Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
                                 const LayerRecord& record, const LayerPicture& picture) {
-  const std::string program = program_of_layer(directory, head, record);
-  if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
-    const std::vector<RunsView> planes(picture.begin(), picture.end());
-    const auto replay = machine.replay(program, record.layer, planes, record.program.moved, record.program.lost);
-    if (replay) return replay->seconds();
-    return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
-  }
-  return changed(directory + "/" + program_file_name(record.layer.index, head.program_extension));
+  const auto program = program_of_layer(directory, head, record);
+  if (!program) return program.error();
+  const std::vector<RunsView> planes(picture.begin(), picture.end());
+  const auto replay = machine.replay(*program, record.layer, planes, record.program.moved, record.program.lost);
+  if (replay) return replay->seconds();
+  return wrong(directory + "/" + program_file_name(record.layer.index, head.program_extension),
+               replay.error().message + "; run lamina verify for details");
 }
 
 Result<ReportSource> source_of_images(const std::string& directory, ReportSource source) {
@@ -93,9 +78,11 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
   std::optional<replay::VirtualMachine> machine;
   if (!head.machine.empty()) {
     auto built = machine_of_job(directory, head);
-    if (!built) return Error{built.error().fault, fmt::format("{}/{}", directory, built.error().message)};
+    if (!built)
+      return Error{built.error().fault, fmt::format("{}/{}; run lamina verify for details", directory, built.error().message)};
     machine.emplace(std::move(*built));
     source.machine = machine->profile();
+    if (Status status = check_frame(directory, head); !status) return status.error();
   }
   auto drops = machine ? ExpectedDrops::of(head, machine->profile()) : ExpectedDrops();
   if (!drops) return Error{drops.error().fault, fmt::format("{}/{}", directory, drops.error().message)};

@@ -123,14 +123,17 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
                                             manifest.layers.front().layer.index, manifest.layers.back().layer.index)};
   }
   const auto machine = machine_of_job(directory, head);
-  if (!machine) return machine.error();
+  if (!machine) return Error{machine.error().fault, fmt::format("{}/{}; run lamina verify for details", directory, machine.error().message)};
   const auto expected = ExpectedDrops::of(head, machine->profile());
   if (!expected) return expected.error();
+  if (Status status = check_images(directory, head, *record); !status) return status.error();
   const auto image = picture_of_layer(directory, head, *record, *expected);
   if (!image) return image.error();
+  const auto program = program_of_layer(directory, head, *record);
+  if (!program) return program.error();
   replay::StepChoice step = choice;
   step.planes = std::max(1u, head.max_drops);
-  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, *record), step, head.grid);
+  const auto jetting = replay::jet_until(*machine, *program, step, head.grid);
   if (!jetting) return jetting.error();
   view::picture::SwathView view;
   view.grid = head.grid;
@@ -159,7 +162,49 @@ Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& req
   return Preview{std::move(*picture), said};
 }
 
-/// Draws images side by side.
+/// The drops of an image of the geometry, made again; those of one drop a pixel as bits.
+Result<view::picture::SheetImage> made_again(const ExpectedDrops& expected, const Layer& layer, const Runs& geometry,
+                                             bool several) {
+  LayerDrops drops;
+  if (Status status = expected.make(layer, {&geometry, 1}, drops); !status) return status.error();
+  view::picture::SheetImage made;
+  if (several) {
+    drops.levels(made.levels);
+    return made;
+  }
+  const BitRows& plane = *drops.planes().front();
+  const auto bits = std::make_shared<BitImage>(plane.columns(), plane.rows());
+  for (std::uint32_t r = 0; r < plane.rows(); ++r) plane.row(r, bits->row(r));
+  made.bits = bits;
+  return made;
+}
+
+/// Memory of what made_again() returns, at most.
+std::uint64_t bytes_made(const ManifestHead& head, const LayerRecord& record) {
+  const std::uint64_t levels = 18 * record.geometry_pixels + 4 * std::uint64_t{head.grid.rows()};
+  const std::uint64_t bits = bytes_of_bits(head.grid.columns(), head.grid.rows());
+  return head.max_of_pixel() > 1 ? levels : bits;
+}
+
+/// The image of a file; of the geometry, its drops where `expected` makes them.
+Result<view::picture::SheetImage> read_sheet_image(const ManifestHead& head, const ExpectedDrops& expected, const Layer& layer,
+                                                   const std::string& path) {
+  if (!is_one_bit(head)) {
+    auto levels = formats::image_levels(path, head.full_level());
+    if (!levels) return levels.error();
+    return view::picture::SheetImage{std::move(*levels), {}};
+  }
+  auto image = formats::image(path, 0, expected.remakes() ? Keep::kRuns : Keep::kSmaller);
+  if (!image) return image.error();
+  const bool fits = image->columns == head.grid.columns() && image->rows == head.grid.rows();  // else the sheet refuses it
+  if (expected.remakes() && fits) return made_again(expected, layer, image->runs, head.max_of_pixel() > 1);
+  if (image->bits) return view::picture::SheetImage{{}, std::move(image->bits)};
+  view::picture::SheetImage made;
+  levels_of(image->runs, 1, made.levels);
+  return made;
+}
+
+/// Draws images side by side; those of the geometry with their drops, or where the machine's profile is lost, as they are.
 Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& request) {
   std::vector<std::uint32_t> numbers;
   for (const LayerRecord& record : manifest.layers) numbers.push_back(record.layer.index);
@@ -167,19 +212,24 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   if (!chosen) return chosen.error();
   const ManifestHead& head = manifest.head;
   const std::filesystem::path folder = request.source;
+  const auto drops = ExpectedDrops::of(request.source, head);
+  const ExpectedDrops none, &expected = drops ? *drops : none;
   view::picture::SheetRequest sheet;
-  sheet.title = title_of(head);
+  sheet.title = drops ? title_of(head) : title_of(head) + "   |   geometry without drops";
   sheet.grid = head.grid;
-  sheet.maximum = head.geometry ? 1 : head.max_of_pixel();
+  sheet.maximum = drops ? head.max_of_pixel() : 1;
   sheet.whole_bed = request.whole_bed;
   sheet.width = request.width.value_or(kSheetWidth);
   sheet.memory_bytes = request.memory_bytes;
+  std::vector<Layer> layer_of;  // of each cell
   for (const std::size_t index : *chosen) {
     const LayerRecord& record = manifest.layers[index];
+    if (Status status = check_images(request.source, head, record); !status) return status.error();
     const auto images = layer_images(head, record);
     for (std::size_t first = 0; first < images.size(); first += head.drop_images()) {  // of each material
       view::picture::SheetLayer cell;
-      cell.bytes = bytes_to_read(head, record, is_one_bit(head) ? Keep::kSmaller : Keep::kRuns);
+      cell.bytes = bytes_to_read(head, record, is_one_bit(head) && !expected.remakes() ? Keep::kSmaller : Keep::kRuns);
+      if (expected.remakes()) cell.bytes += bytes_made(head, record);
       for (std::size_t drop = 0; drop < head.drop_images(); ++drop)
         cell.paths.push_back((folder / images[first + drop].name).string());
       cell.warns = images[first].record.unfed_pixels > 0;
@@ -188,20 +238,11 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
       if (cell.warns) cell.name += " in another powder";
       cell.remark = fmt::format("z {:.3f} mm", mm(record.layer.plane()));
       sheet.layers.push_back(std::move(cell));
+      layer_of.push_back(record.layer);
     }
   }
-  const auto read = [&](const std::string& path) -> Result<view::picture::SheetImage> {
-    if (!is_one_bit(head)) {
-      auto levels = formats::image_levels(path, head.full_level());
-      if (!levels) return levels.error();
-      return view::picture::SheetImage{std::move(*levels), {}};
-    }
-    auto image = formats::image(path, 0, Keep::kSmaller);
-    if (!image) return image.error();
-    if (image->bits) return view::picture::SheetImage{{}, std::move(image->bits)};
-    view::picture::SheetImage made;
-    levels_of(image->runs, 1, made.levels);
-    return made;
+  const auto read = [&](std::size_t cell, const std::string& path) {
+    return read_sheet_image(head, expected, layer_of[cell], path);
   };
   auto picture = view::picture::contact_sheet(sheet, read);
   if (!picture) return picture.error();
@@ -209,6 +250,10 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,
                                                    made == all ? "" : fmt::format(" that are there, of {}", all))};
   preview.said += readable_bytes(preview.bytes.size());
+  if (!drops) {
+    preview.warnings.push_back(fmt::format("lamina: {}/{}; the geometry of layers is drawn without their drops", request.source,
+                                           drops.error().message));
+  }
   if (!view::picture::have_font()) preview.warnings.push_back("lamina: no captions: no font; install fonts-dejavu-core");
   return preview;
 }

@@ -102,6 +102,16 @@ void ExpectedLines::line(std::uint32_t index, std::span<std::uint64_t> counts) {
 
 // What is fired.
 
+std::uint64_t FiredWords::bytes(const VirtualMachine& machine, std::uint32_t planes) {
+  const bool turned = machine.machine_.mounting.scan_axis != ScanAxis::kX;
+  const std::uint64_t bits = static_cast<std::uint64_t>(std::bit_width(planes)), lines = machine.lines_;
+  const std::uint64_t words = (std::uint64_t{machine.positions_} + 63) / 64, stride = words + 2 * kChunks + 1;
+  const std::uint64_t nozzle_words = (machine.nozzle_.size() + 127) / 128 * 2;
+  const std::uint64_t window = static_cast<std::uint64_t>(machine.ticks_) * kWindow * machine.counts().drop_bits * nozzle_words;
+  const std::uint64_t image = turned ? bits * (lines * words + lines + 64) : 0;  // with rows of a block that is turned over
+  return 8 * (machine.max_open_lines() * bits * stride + window + image) + lines * sizeof(Line);
+}
+
 FiredWords::FiredWords(const VirtualMachine& machine, std::span<const BitRows* const> planes)
     : machine_(machine),
       expected_(planes, machine.machine_.mounting.scan_axis != ScanAxis::kX),
@@ -117,6 +127,7 @@ FiredWords::FiredWords(const VirtualMachine& machine, std::span<const BitRows* c
       used_(nozzle_words_),
       below_(machine.nozzle_.size()),
       lines_(machine.lines_),
+      max_open_(machine.max_open_lines()),
       first_set_(std::int64_t{machine.lines_} - 1) {
   const auto ticks = static_cast<std::size_t>(machine.ticks_);
   vectors_.assign(ticks * kWindow * nozzle_bits_ * nozzle_words_, 0);
@@ -297,6 +308,10 @@ std::uint64_t* FiredWords::open(std::uint32_t nozzle) {
   Line& line = lines_[index_of(at)];
   if (line.state != LineState::kOpen) {
     const std::size_t size = bits_ * stride_;
+    if (free_.empty() && stock_.size() == max_open_) {
+      wrong_ = true;
+      return nullptr;
+    }
     if (free_.empty()) free_.push_back(stock_.emplace_back(std::make_unique_for_overwrite<std::uint64_t[]>(size)).get());
     line.words = free_.back();
     free_.pop_back();

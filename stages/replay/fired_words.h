@@ -41,6 +41,8 @@ class ExpectedLines {
 /// It finds whether anything is wrong, and not where: drop by drop, Printing describes the first fault.
 class FiredWords {
  public:
+  /// Memory that one takes at most.
+  static std::uint64_t bytes(const VirtualMachine& machine, std::uint32_t planes);
   /// planes  of the machine's size; outlive this object
   FiredWords(const VirtualMachine& machine, std::span<const BitRows* const> planes);
 
@@ -117,6 +119,7 @@ class FiredWords {
   std::vector<std::uint64_t*> below_;   // by nozzle: its line
 
   std::vector<Line> lines_;
+  const std::uint32_t max_open_;  // lines; a program with more counts as wrong, so that memory is bounded
   std::vector<std::unique_ptr<std::uint64_t[]>> stock_;
   std::vector<std::uint64_t*> free_;
   Buffer<std::uint64_t> wanted_;

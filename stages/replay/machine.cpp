@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 
+#include "stages/data/bit_image.h"
 #include "stages/geometry/run_rows.h"
 #include "stages/replay/printing.h"
 
@@ -161,6 +163,20 @@ Result<Count> VirtualMachine::replay(std::string_view program, Printing& printin
   if (Status status = read(machine_.dialect, program, without); !status) return status.error();
   count.added_microseconds = count.microseconds - without.finish().microseconds;
   return count;
+}
+
+std::uint32_t VirtualMachine::max_open_lines() const {
+  const auto [low, high] = std::ranges::minmax(nozzle_, {}, &Nozzle::line);
+  const auto blocked = static_cast<std::uint64_t>(std::ranges::count_if(nozzle_, &Nozzle::blocked));
+  const auto span = static_cast<std::uint64_t>(high.line - low.line) + 1;
+  const std::uint64_t swaths = lines_ / std::max<std::uint64_t>(1, nozzle_.size()) + 2;
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(lines_, 2 * span + 3 * blocked * swaths));
+}
+
+std::uint64_t VirtualMachine::bytes_of_replay(std::uint32_t planes) const { return FiredWords::bytes(*this, planes); }
+
+std::uint64_t VirtualMachine::bytes_of_drops(std::uint32_t planes) const {
+  return std::bit_width(planes) * bytes_of_bits(columns_, rows_);
 }
 
 Result<Count> VirtualMachine::timed(std::string_view program, const Layer& layer) const {

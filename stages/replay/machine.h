@@ -54,9 +54,8 @@ class VirtualMachine {
   ///           without firing, a fired pixel that is not set, wrong numbers of moved or lost pixels, a scan speed above the
   ///           nozzles' firing rate; if the dialect moves the machine: a wrong height of the build vat, a wrong dose, a
   ///           roller that does not go to its far end and back, a head that does not wait where the next layer finds it
-  /// cost      O(text + pixels / 64); where something is wrong O(text + drops) more, to find it. memory: a bit for each pixel
-  ///           below the head, while something is missing there; of columns that are scanned, and of what is wrong, for each
-  ///           pixel of the bed
+  /// cost      O(text + pixels / 64); where something is wrong O(text + drops) more, to find it. memory: bytes_of_replay(),
+  ///           then bytes_of_drops()
   Result<Count> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                        std::uint64_t lost) const;
   /// The same for pixels of several drops: plane k, from 0, holds the pixels that have to get more than k drops, and a pixel
@@ -65,11 +64,18 @@ class VirtualMachine {
                        std::uint64_t lost) const;
   Result<Count> replay(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
                        std::uint64_t moved, std::uint64_t lost) const;
-  /// What replay() does: 64 pixels at a time, whose errors do not say where; after an error drop by drop, 25 ns each.
+  /// What replay() does: 64 pixels at a time, whose errors do not say where (a program with more open lines than
+  /// max_open_lines() is one); after an error drop by drop, 25 ns each.
   Result<Count> replay_words(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
                              std::uint64_t moved, std::uint64_t lost) const;
   Result<Count> replay_drops(std::string_view program, const Layer& layer, std::span<const BitRows* const> planes,
                              std::uint64_t moved, std::uint64_t lost) const;
+
+  /// Memory that replay_words() and replay_drops() take at most, besides text and image. planes  most drops of a pixel
+  std::uint64_t bytes_of_replay(std::uint32_t planes) const;
+  std::uint64_t bytes_of_drops(std::uint32_t planes) const;
+  /// Lines of which a program has fired some drops and not all: those of two swaths, and those next to blocked nozzles.
+  std::uint32_t max_open_lines() const;
 
   /// How long a layer's program takes, by its movements alone, and its care: nothing fires on the bed. The machine stands where
   /// the layer below left it, so that layers can be timed in any order and their times add up to that of the job.

@@ -85,6 +85,46 @@ TEST_F(OneMeaning, AJobFileACommandLineAndASavedJobAgreeInEveryCommand) {
   }
 }
 
+// A default that is stated is no other job to resume or to merge.
+TEST_F(OneMeaning, ContentOfImagesThatIsTheDefaultMakesTheSameJob) {
+  const struct {
+    const char *words, *same, *images_of;
+  } rows[] = {
+      {"--bed 30x30 --dpi 100", "auto,drops", "geometry"},
+      {"--bed 30x30 --dpi 100 --shell 1 --core 0.5", "auto,drops", "drops"},
+      {"--bed 30x30 --dpi 100 --levels 4 --format tiff-4", "auto,drops", "levels"},
+      {"--machine nuferbj", "auto,geometry,drops", "geometry"},
+      {"--machine nuferbj --bleed 50", "auto,geometry,drops", "geometry"},
+      {"--machine nuferbj --saturation 40", "auto,geometry", "geometry"},
+      {"--machine nuferbj --shell 1 --core 0.5", "auto,geometry", "geometry"},
+      {"--machine nuferbj --saturation 40 --format tiff-8", "auto,drops", "drops"},
+      {"--machine nuferbj --levels 4", "auto,drops", "drops"},
+      {"--machine nuferbj --saturation 40*x/x", "auto,drops", "drops"},
+  };
+  for (const auto& row : rows) {
+    const std::string job = std::string("jet part.stl --layer 1 ") + row.words;
+    const auto json = nlohmann::json::parse(done(job + " --quiet --json --overwrite -o a").out);
+    EXPECT_EQ(json["images_of"], row.images_of) << row.words;
+    const std::string whole = tree_text(folder.path() / "a"), manifest = read_text(folder / "a/manifest.json");
+    const bool geometry = manifest.find("\"images_of\": \"geometry\"") != std::string::npos;
+    EXPECT_TRUE(!geometry || json["images_of"] == "geometry") << row.words;
+    for (const std::string images : {"auto", "geometry", "drops"}) {
+      const std::string stated = job + " --quiet --images " + images;
+      const bool same = std::string(row.same).find(images) != std::string::npos;
+      const Outcome outcome = run(stated + " --resume -o a");
+      EXPECT_EQ(outcome.code, same ? 0 : 2) << stated << "\n" << outcome.err;
+      EXPECT_EQ(tree_text(folder.path() / "a"), whole) << stated;
+      done("jet part.stl --layer 1 " + std::string(row.words) + " --quiet --overwrite --shard 1/2 -o b1");
+      if (!same) continue;
+      done(stated + " --overwrite --shard 2/2 -o b2");
+      done("merge b1 b2 -o b --quiet");
+      EXPECT_EQ(tree_text(folder.path() / "b"), whole) << stated;
+      for (const char* left : {"b", "b1", "b2"}) std::filesystem::remove_all(folder.path() / left);
+    }
+    std::filesystem::remove_all(folder.path() / "b1");
+  }
+}
+
 TEST_F(OneMeaning, ASavedJobOfHeightsIsTheOneRequested) {
   done("heights part.stl --compare --thickness 0.5,1 --quiet -o table --save-job saved.toml");
   const std::string saved = read_text(folder / "saved.toml");

@@ -206,6 +206,15 @@ TEST_F(JobsReported, WhatIsNoFinishedJobIsRefusedInOneLine) {
   write_text(directory_ / "out/layers/000007.tif", good);
   ASSERT_EQ(lamina({"jet", "part.stl", "--bed", "20x20", "--format", "null", "--quiet", "-o", "none"}).code, 0);
   refused("none", "wrote no images", 5);
+  ASSERT_EQ(lamina({"jet", "part.stl", "--machine", "nuferbj", "--layer", "1", "--quiet", "-o", "printed"}).code, 0);
+  for (const char* frame : {"printed/program/start.gcode", "printed/program/end.gcode"}) {
+    const std::string was = read_text(directory_ / frame);
+    write_text(directory_ / frame, was + "G1 X0\n");
+    refused("printed", std::string(frame) + ": its content is not what was written", 5);
+    fs::remove(directory_ / frame);
+    refused("printed", std::string(frame) + ": is missing", 5);
+    write_text(directory_ / frame, was);
+  }
   ASSERT_EQ(lamina({"slice", "part.stl", "--quiet", "-o", "sliced"}).code, 0);
   refused("sliced", "reports are of images and toolpaths", 5);
   EXPECT_EQ(lamina({"report", "out", "-o", "nowhere/report.html"}).code, 4);

@@ -253,6 +253,51 @@ TEST_F(Resume, ImagesThatNoRecordReportsAreKept) {
   EXPECT_EQ(planned("jet part.stl --layer 1 --dpi 60 --quiet -o out"), 3);  // killed before its head
 }
 
+// A resumed job is one that verify takes, or is refused with the file that verify would name.
+TEST_F(Resume, FilesThatAreNotOfTheJobAreNamedBeforeItGoesOn) {
+  const std::string job = "jet part.stl --layer 0.5 --machine xaar128-raw --quiet -o out";
+  done(job);
+  const std::string whole = read_text(directory_ / "out/manifest.json");
+  const std::string program = read_text(directory_ / "out/program/000002.raw.zst");
+  ASSERT_FALSE(program.empty());
+  for (const char* stray : {"program/000002.raw", "program/000099.raw.zst", "program/start.raw", "program/000002.gcode",
+                            "program/notes.txt", "layers/000002.png", "layers/000099.tif", "layers/000002-drop2.tif",
+                            "layers/notes.txt"}) {
+    const std::string file = std::string("out/") + stray;
+    for (const int count : {2, 6}) {  // interrupted, finished
+      fs::remove(directory_ / "out/manifest.json");
+      write_text(directory_ / (count < 6 ? "out/manifest.json.part" : "out/manifest.json"),
+                 count < 6 ? begun(whole, count) : whole);
+      write_text(directory_ / file, program);
+      refused(job + " --resume", 2, file + ": is not of this job; remove it, or name another directory");
+      fs::remove(directory_ / file);
+      done(job + " --resume");
+      done("verify out --quiet");
+    }
+  }
+  // Programs of another form are of another job.
+  refused(job + " --resume --set program.compress=false", 2, "program.compress = false");
+  // What a run that was killed before its record left is not mixed with others either.
+  fs::remove_all(directory_ / "out");
+  fs::create_directories(directory_ / "out/program");
+  write_text(directory_ / "out/program/start.raw", "x");
+  for (const char* how : {"", " --resume", " --shard 1/2"}) refused(job + how, 2, "out/program/start.raw: is not of this job");
+  done(job + " --overwrite");
+  done("verify out --quiet");
+}
+
+TEST_F(Resume, ShardsAreNotJoinedWithFilesOfOthers) {
+  const std::string job = "jet part.stl --layer 0.5 --machine xaar128-raw --quiet -o out --shard ";
+  for (const char* shard : {"1/2", "2/2"}) done(job + shard);
+  write_text(directory_ / "out/program/000001.raw", "x");
+  refused(job + "2/2 --resume", 2, "out/program/000001.raw: is not of this job");
+  refused("merge out -o out", 2, "out/program/000001.raw: is not of this job");
+  fs::remove(directory_ / "out/program/000001.raw");
+  done(job + "2/2 --resume");
+  done("merge out -o out --quiet");
+  done("verify out --quiet");
+}
+
 TEST_F(Resume, AFileInsteadOfTheFolderOfLayersIsReportedBeforeTheyAreMade) {
   fs::create_directory(directory_ / "out");
   write_text(directory_ / "out/layers", "");

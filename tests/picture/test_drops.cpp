@@ -78,8 +78,9 @@ class DropPictures : public ::testing::Test {
  protected:
   void SetUp() override { write_box(in_ / "box.stl", {0, 0, 0}, {12, 8, 1}); }
 
-  void plan(const std::string& options, const std::string& out) {
-    std::vector<std::string> words = words_of("jet box.stl --layer 0.05 --machine nuferbj --images drops " + options);
+  void plan(const std::string& options, const std::string& out, const std::string& images = "drops") {
+    std::vector<std::string> words =
+        words_of("jet box.stl --layer 0.05 --machine nuferbj --images " + images + " " + options);
     words.insert(words.end(), {"--quiet", "-o", out});
     const Outcome planned = run_lamina(words, in_.path());
     ASSERT_EQ(planned.code, 0) << planned.err;
@@ -89,6 +90,17 @@ class DropPictures : public ::testing::Test {
     const Outcome drawn = run_lamina(words_of("preview " + of + " -o " + of + ".png --quiet " + options), in_.path());
     EXPECT_EQ(drawn.code, 0) << drawn.err;
     return cells_of(read_picture(in_ / (of + ".png")));
+  }
+
+  /// Nothing is drawn; one line names the file and the next step.
+  void expect_named(const std::string& line, const std::string& file) {
+    std::filesystem::remove(in_ / "out.png");
+    const Outcome drawn = run_lamina(words_of("preview out -o out.png " + line), in_.path());
+    EXPECT_EQ(drawn.code, 5) << drawn.err;
+    EXPECT_EQ(drawn.error_lines(), 1u) << drawn.err;
+    EXPECT_NE(drawn.err.find("out/" + file + ": "), std::string::npos) << drawn.err;
+    EXPECT_NE(drawn.err.find("run lamina verify"), std::string::npos) << drawn.err;
+    EXPECT_FALSE(std::filesystem::exists(in_ / "out.png")) << line;
   }
 
   /// Drops of every pixel of a layer, from the images of its drops.
@@ -210,16 +222,45 @@ TEST_F(DropPictures, AMaterialKeepsItsColourAndOneCellALayer) {
   }
 }
 
-// No job plans such an image: a reader must not draw it as if the job could have it.
-TEST_F(DropPictures, AnImageOfMoreDropsThanTheJobHasIsNamed) {
-  plan(several_ + " --format tiff-8", "grey");
-  plan("--saturation 300 --format tiff-8", "more");  // 11 or 12 drops: of 15 levels too
-  const std::string image = "grey/layers/000010.tif";
-  std::filesystem::copy_file(in_ / "more/layers/000010.tif", in_ / image, std::filesystem::copy_options::overwrite_existing);
-  const Outcome drawn = run_lamina(words_of("preview grey -o grey.png --layer 10"), in_.path());
-  EXPECT_EQ(drawn.code, 5);
-  EXPECT_EQ(drawn.error_lines(), 1u) << drawn.err;
-  EXPECT_NE(drawn.err.find(image + ": has pixels of 12 drops, the job at most 8"), std::string::npos) << drawn.err;
+TEST_F(DropPictures, ImagesOfTheGeometryAreDrawnWithTheDropsOfTheirJob) {
+  for (const std::string& dose : {several_, std::string("--saturation 20"), std::string("--shell 1 --core 0.3")}) {
+    plan(dose + " --overwrite", "out");
+    plan(dose + " --overwrite", "made", "geometry");
+    for (const std::string options : {"--layer 10 --width 1200", "--count 3 --width 700", "--layer 10 --swath middle"}) {
+      draw("out", options);
+      draw("made", options);
+      EXPECT_TRUE(read_text(in_ / "out.png") == read_text(in_ / "made.png")) << dose << " " << options;
+    }
+  }
+  // Without the machine nothing is known of the drops.
+  std::filesystem::remove(in_ / "made/program/machine.toml");
+  const Outcome drawn = run_lamina(words_of("preview made -o made.png --layer 10"), in_.path());
+  EXPECT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_NE(drawn.err.find("made/program/machine.toml: is missing; the geometry of layers is drawn without their drops"),
+            std::string::npos)
+      << drawn.err;
+  for (const Rgb& pixel : cells_of(read_picture(in_ / "made.png")).at(0).pixel)
+    ASSERT_TRUE(pixel == kDark || pixel == kWhite) << pixel[0];
+}
+
+TEST_F(DropPictures, FilesThatAreNotThoseOfTheManifestAreNamed) {
+  plan("--saturation 20", "out", "geometry");
+  const std::string program = "program/000010.gcode", image = "layers/000010.tif";
+  const std::string was = read_text(in_ / ("out/" + program));
+  write_text(in_ / ("out/" + program), was.substr(0, was.size() / 2));
+  expect_named("--layer 10 --swath middle", program);
+  std::filesystem::remove(in_ / ("out/" + program));
+  expect_named("--layer 10 --swath middle", program);
+  write_text(in_ / ("out/" + program), was);
+  draw("out", "--layer 10 --swath middle");
+  // An image of another job, of the same size.
+  plan("--saturation 20 --at 40,40", "other", "geometry");
+  std::filesystem::copy_file(in_ / ("other/" + image), in_ / ("out/" + image),
+                             std::filesystem::copy_options::overwrite_existing);
+  expect_named("--layer 10 --swath middle", image);
+  expect_named("--layer 10", image);
+  expect_named("--every 1", image);
+  draw("out", "--layer 9");
 }
 
 }  // namespace

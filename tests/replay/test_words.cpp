@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -165,6 +167,51 @@ TEST(Words, AgreeWithDropsOnAnyMachineAndProgram) {
   EXPECT_LT(good, 400u);
 }
 
+void find_firing(SweepVectors& vectors) {
+  vectors.firing.clear();
+  for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+    const auto begin = vectors.bits.begin() + static_cast<std::ptrdiff_t>(std::size_t{s} * vectors.words);
+    if (std::all_of(begin, begin + vectors.words, [](std::uint64_t word) { return word == 0; })) continue;
+    if (vectors.firing.empty() || vectors.firing.back() != s) {
+      vectors.firing.push_back(s);
+      vectors.firing.push_back(s);
+    }
+    ++vectors.firing.back();
+  }
+}
+
+/// 100 x 100 pixels below a head of 16 nozzles: 32 lines of 2 words are open at most, each with 9 words around it.
+TEST(Words, MemoryIsThatOfTheLinesOfTwoSwaths) {
+  Machine machine = program::testing::small_machine(16, 90, 100, 100);
+  const auto bytes = [&](std::uint32_t planes) {
+    const auto built = replay::VirtualMachine::build(machine, 100, 100);
+    EXPECT_TRUE(built.ok());
+    return std::array{std::uint64_t{built->max_open_lines()}, built->bytes_of_replay(planes), built->bytes_of_drops(planes)};
+  };
+  constexpr std::uint64_t kWindow = 8 * 256 * 2, kLines = 16 * 100;
+  EXPECT_EQ(bytes(1), (std::array<std::uint64_t, 3>{32, 8 * 32 * 11 + kWindow + kLines, 8 * 2 * 100}));
+  EXPECT_EQ(bytes(3), (std::array<std::uint64_t, 3>{32, 2 * 8 * 32 * 11 + kWindow + kLines, 2 * 8 * 2 * 100}));
+  machine.head.blocked = {3};  // of each of 100 / 16 swaths and two at the edges: its line and two next to it
+  EXPECT_EQ(bytes(1)[0], 32 + 3 * 8);
+  machine.head.blocked.clear();
+  machine.mounting = {.tilt_deg = 0, .scan_axis = ScanAxis::kY, .scan_from = Side::kFront, .nozzle_0 = Side::kLeft};
+  EXPECT_EQ(bytes(1)[1], 8 * 32 * 11 + kWindow + kLines + 8 * (100 * 2 + 100 + 64)) << "the image is turned over";
+}
+
+// More lines than two swaths have lack a drop: words give up, and the place of the first is found all the same.
+TEST(Words, AFaultOnEveryLineIsOneOfItsFirst) {
+  const WordBench bench(of_pixels(program::testing::small_machine(16, 90, 100, 100), 100, 100), 1, 7);
+  const auto bad = bench.program([&](std::size_t, Sweep&, SweepVectors& vectors) {
+    for (std::uint32_t step = 40; step < 60; ++step) {
+      const auto begin = vectors.bits.begin() + static_cast<std::ptrdiff_t>(std::size_t{step} * vectors.words);
+      std::fill(begin, begin + vectors.words, 0);
+    }
+    find_firing(vectors);
+    return true;
+  });
+  EXPECT_FALSE(agrees(bench, bench.machine(), bad.text, 0, 0, "a band of steps is left out"));
+}
+
 // --- planted faults
 
 bool fires_at(const HeadGrid& grid, const SweepVectors& vectors, std::uint32_t step, std::uint32_t nozzle,
@@ -179,19 +226,6 @@ void set_nozzle(const HeadGrid& grid, SweepVectors& vectors, std::uint32_t step,
   std::uint64_t& word = vectors.bits[std::size_t{step} * vectors.words + bit * grid.words() + at / 64];
   const std::uint64_t one = std::uint64_t{1} << (at % 64);
   word = on ? word | one : word & ~one;
-}
-
-void find_firing(SweepVectors& vectors) {
-  vectors.firing.clear();
-  for (std::uint32_t s = 0; s < vectors.steps; ++s) {
-    const auto begin = vectors.bits.begin() + static_cast<std::ptrdiff_t>(std::size_t{s} * vectors.words);
-    if (std::all_of(begin, begin + vectors.words, [](std::uint64_t word) { return word == 0; })) continue;
-    if (vectors.firing.empty() || vectors.firing.back() != s) {
-      vectors.firing.push_back(s);
-      vectors.firing.push_back(s);
-    }
-    ++vectors.firing.back();
-  }
 }
 
 /// A step and a nozzle that fires there while the one after it does not, near the middle of a sweep.

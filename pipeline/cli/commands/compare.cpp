@@ -1,13 +1,12 @@
 // lamina compare: compares a photograph of a printed layer with the layer.
 #include <fmt/format.h>
 
+#include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/other_programs.h"
 #include "pipeline/job/errors.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/manifest/manifest.h"
 #include "stages/data/units.h"
-#include "stages/formats/images/image.h"
 #include "stages/support/text/json_value.h"
 
 namespace lamina::pipeline {
@@ -35,7 +34,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--pixel", {1, 2000, " um"}, photo_um); !status) return status;
   const auto machine = arguments.has("--machine") ? find_machine(arguments.text("--machine")) : Machine();
   if (!machine) return machine.error();
-  const auto layer = formats::dark_pixels(arguments.operands[0], are_grey_drops(arguments.operands[0]) ? 255 : 128);
+  const auto layer = printed_pixels(arguments.operands[0]);
   if (!layer) return layer.error();
   if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
     return failure(Fault::kInput, "{}: has no resolution; use an image that lamina wrote", arguments.operands[0]);

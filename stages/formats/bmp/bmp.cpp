@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "stages/formats/images/image_formats.h"
+#include "stages/formats/row_encoder.h"
 #include "stages/geometry/bits.h"
 
 namespace lamina::formats::bmp {
@@ -23,17 +24,9 @@ void put(Bytes& file, std::size_t at, std::uint32_t value, std::size_t bytes = 4
 
 std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>(std::lround(dpi / 0.0254)); }
 
-class BmpEncoder : public ImageEncoder {
- public:
-  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(runs, dpi_x, dpi_y, file);
-  }
-  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(rows, dpi_x, dpi_y, file);
-  }
-
+class BmpEncoder : public RowEncoder {
  private:
-  static Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) override {
     if (image.columns == 0 || image.rows == 0 || image.columns > kMaxPixelsASide || image.rows > kMaxPixelsASide) {
       return Error{Fault::kOutput, fmt::format("bmp holds no {} x {} pixels", image.columns, image.rows)};
     }

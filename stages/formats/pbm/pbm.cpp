@@ -13,22 +13,15 @@
 #include <utility>
 
 #include "stages/formats/images/image_formats.h"
+#include "stages/formats/row_encoder.h"
 #include "stages/geometry/bits.h"
 
 namespace lamina::formats::pbm {
 namespace {
 
-class PbmEncoder : public ImageEncoder {
- public:
-  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(runs, dpi_x, dpi_y, file);
-  }
-  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(rows, dpi_x, dpi_y, file);
-  }
-
+class PbmEncoder : public RowEncoder {
  private:
-  static Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) override {
     const std::string head = fmt::format("P4\n# lamina dpi {:.10g} {:.10g}\n{} {}\n", dpi_x, dpi_y, image.columns, image.rows);
     const std::size_t stride = row_bytes(image.columns);
     file.resize(head.size() + stride * image.rows);

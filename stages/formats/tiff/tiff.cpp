@@ -23,6 +23,7 @@
 #include "stages/formats/g4/decode.h"
 #include "stages/formats/g4/encode.h"
 #include "stages/formats/images/image_formats.h"
+#include "stages/formats/row_encoder.h"
 #include "stages/formats/tiff/dither_deflate.h"
 #include "stages/formats/tiff/packbits.h"
 #include "stages/geometry/bits.h"
@@ -209,7 +210,20 @@ Status write_file(Bytes& file, const TagFrame& frame, const LayerText& text, con
   return {};
 }
 
-/// The same with strips of rows that fill(row, bytes) makes. strip  scratch, kept from one image to the next
+/// Writes the strips of an image, the bytes that pack(first row, end) compresses. returns  false where libtiff does not take one
+template <class Pack>
+bool put_packed(TIFF* tiff, const TagFrame& frame, const Pack& pack) {
+  for (std::uint32_t row = 0, number = 0; row < frame.rows; ++number) {
+    const std::uint32_t end = row + std::min(frame.rows_per_strip, frame.rows - row);
+    const std::span<std::byte> strip = pack(row, end);
+    const auto length = static_cast<tmsize_t>(strip.size());
+    if (TIFFWriteRawStrip(tiff, number, strip.data(), length) != length) return false;
+    row = end;
+  }
+  return true;
+}
+
+/// A file with strips of rows that fill(row, bytes) makes. strip  scratch, kept from one image to the next
 template <class Fill>
 Status write_rows(Bytes& file, const TagFrame& frame, const LayerText& text, Bytes& strip, const Fill& fill) {
   return write_file(file, frame, text, [&](TIFF* tiff) {
@@ -360,20 +374,13 @@ class G4Encoder : public ImageEncoder {
   Ending ending_;  // of the layer before
 };
 
-class StripEncoder : public ImageEncoder {
+class StripEncoder : public RowEncoder {
  public:
   void tag(const LayerTags& tags) override { text_.take(tags); }
   explicit StripEncoder(std::uint16_t compression) : compression_(compression) {}
 
-  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(runs, dpi_x, dpi_y, file);
-  }
-  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(rows, dpi_x, dpi_y, file);
-  }
-
  private:
-  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
     const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, compression_};
     if (compression_ == COMPRESSION_NONE) {  // its size is known: nothing has to grow, and no second copy exists meanwhile
@@ -394,33 +401,24 @@ class StripEncoder : public ImageEncoder {
 };
 
 /// Deflate, strip by strip, of dithered images.
-class DeflateEncoder : public ImageEncoder {
+class DeflateEncoder : public RowEncoder {
  public:
   void tag(const LayerTags& tags) override { text_.take(tags); }
 
-  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(runs, dpi_x, dpi_y, file);
-  }
-  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(rows, dpi_x, dpi_y, file);
-  }
-
  private:
-  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
     const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
     file.resize(file.capacity());
     return write_file(file, frame, text_, [&](TIFF* tiff) {
       strip_.resize(frame.stride * frame.rows_per_strip);
       packed_.resize(DitherDeflate::bound(strip_.size()));
-      for (std::uint32_t row = 0, number = 0; row < image.rows; ++number) {
-        const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, image.rows - row);
-        for (; row < end; ++row) image.put(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
-        const auto length = static_cast<tmsize_t>(
+      return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t row = begin; row < end; ++row)
+          image.put(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
+        return std::span(packed_).first(
             deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
-        if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
-      }
-      return true;
+      });
     });
   }
 
@@ -466,17 +464,14 @@ class GreyEncoder : public LevelEncoder {
     }
     file.resize(file.capacity());
     return write_file(file, frame, text_, [&](TIFF* tiff) {
-      for (std::uint32_t row = 0, number = 0; row < frame.rows; ++number) {
+      return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
         packed_.start();
-        const std::uint32_t end = row + std::min(frame.rows_per_strip, frame.rows - row);
-        for (; row < end; ++row) {
+        for (std::uint32_t row = begin; row < end; ++row) {
           packed_.start_row(frame.stride);
           bits_ == 8 ? put_bytes(image, row, darkest_ / full, packed_) : put_nibbles(image, row, darkest_ / full, packed_);
         }
-        const auto length = static_cast<tmsize_t>(packed_.size());
-        if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
-      }
-      return true;
+        return std::span(packed_.data(), packed_.size());
+      });
     });
   }
 

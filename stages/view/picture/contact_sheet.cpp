@@ -56,10 +56,11 @@ constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208,
     kWarning{217, 72, 15};
 
 /// The levels of a layer, its images added up.
-Result<SheetImage> image_of_layer(const SheetRequest& request, const SheetLayer& layer, const ReadImage& read) {
+Result<SheetImage> image_of_layer(const SheetRequest& request, std::size_t index, const ReadImage& read) {
+  const SheetLayer& layer = request.layers[index];
   SheetImage all;
   for (const std::string& path : layer.paths) {
-    Result<SheetImage> image = read(path);
+    Result<SheetImage> image = read(index, path);
     if (!image) return image;
     if (image->columns() != request.grid.columns() || image->rows() != request.grid.rows()) {
       return Error{Fault::kVerification,
@@ -90,7 +91,7 @@ Status for_each_image(const SheetRequest& request, const ReadImage& read, const 
   Error error;
   tbb::parallel_for(std::size_t{0}, request.layers.size(), [&](std::size_t index) {
     const auto pass = gate.enter(request.layers[index].bytes);
-    const Result<SheetImage> image = image_of_layer(request, request.layers[index], read);
+    const Result<SheetImage> image = image_of_layer(request, index, read);
     if (image) return use(index, *image);
     const std::lock_guard lock(mutex);
     if (index < first_wrong) {

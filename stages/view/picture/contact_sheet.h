@@ -63,10 +63,10 @@ struct SheetImage {
 /// A PNG of the layers. All cells show the same part of the bed at the same scale; each of its pixels is as dark as
 /// the share of its area that is set, or the mean of levels / most over it. The bytes depend on the images, the request and the
 /// versions of OpenImageIO and of the font alone.
-/// read    the image of a file, 1 where one of 1 bit is set; called from any thread
+/// read    the image of a file of request.layers[layer], 1 where one of 1 bit is set; called from any thread
 /// errors  those of `read`; kVerification if an image is not of the bed's size, or a pixel has a level above the most
 /// cost    two readings of each image, on all processors; memory is the picture and the runs of the images being read
-using ReadImage = std::function<Result<SheetImage>(const std::string& path)>;
+using ReadImage = std::function<Result<SheetImage>(std::size_t layer, const std::string& path)>;
 Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read);
 
 }  // namespace lamina::view::picture

@@ -17,6 +17,12 @@
 namespace lamina::test {
 namespace {
 
+void write_photo(const std::string& path, const GreyPicture& picture) {
+  std::ofstream(path, std::ios::binary) << "P5\n"
+                                        << picture.width << ' ' << picture.height << "\n255\n"
+                                        << std::string(picture.grey.begin(), picture.grey.end());
+}
+
 /// The sheet is printed from the layer's file, not from the chart.
 TEST(CalibrateScan, APhotographBecomesAProfile) {
   Directory directory;
@@ -32,9 +38,7 @@ TEST(CalibrateScan, APhotographBecomesAProfile) {
   std::mt19937_64 random(1);
   const GreyPicture picture = photograph(print_sheet(resolved->grid, layer->runs, printing),
                                          {.pixels_a_mm = 15, .turn_deg = 100, .tilt_x = 0.03}, random);
-  std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
-                                                           << picture.width << ' ' << picture.height << "\n255\n"
-                                                           << std::string(picture.grey.begin(), picture.grey.end());
+  write_photo(directory / "photo.pgm", picture);
   const Outcome detected =
       run_lamina(words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay detected.png"),
                  directory.path());
@@ -100,13 +104,37 @@ TEST(CompareScan, AnyDropOfAGreyLayerIsInk) {
   ASSERT_TRUE(resolved && all);
   std::mt19937_64 random(1);
   const GreyPicture picture = photograph(print_sheet(resolved->grid, all->runs, {}), {.pixels_a_mm = 10}, random);
-  std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
-                                                           << picture.width << ' ' << picture.height << "\n255\n"
-                                                           << std::string(picture.grey.begin(), picture.grey.end());
+  write_photo(directory / "photo.pgm", picture);
   const Outcome detected =
       run_lamina(words_of("compare job/layers/000000.tif photo.pgm --machine jet1000-grey"), directory.path());
   ASSERT_EQ(detected.code, 0) << detected.err << detected.out;
   EXPECT_NEAR(std::stod(detected.out.substr(detected.out.find("area      ") + 10)), 45, 1) << detected.out;
+}
+
+/// A thin core of an image of the geometry is as light on the sheet as its job has it, and no missing stripe.
+TEST(CompareScan, ImagesOfTheGeometryAreComparedByTheDropsOfTheirJob) {
+  Directory directory;
+  write_box(directory / "part.stl", {0, 0, 0}, {24, 16, 0.2f});
+  const std::string job = "jet part.stl --machine nuferbj --layer 0.2 --shell 2 --core 0.3 --quiet -o ";
+  ASSERT_EQ(run_lamina(words_of(job + "job"), directory.path()).code, 0);
+  ASSERT_EQ(run_lamina(words_of(job + "drops --images drops"), directory.path()).code, 0);
+  const auto machine = pipeline::find_machine("nuferbj");
+  ASSERT_TRUE(machine);
+  const auto resolved = pipeline::resolve_profile(*machine);
+  const auto printed = formats::image(directory / "drops/layers/000000.tif");
+  ASSERT_TRUE(resolved && printed);
+  std::mt19937_64 random(1);
+  write_photo(directory / "photo.pgm", photograph(print_sheet(resolved->grid, printed->runs, {}), {.pixels_a_mm = 10}, random));
+  const auto compared = [&](const std::string& of) {
+    return run_lamina(words_of("compare " + of + "/layers/000000.tif photo.pgm --machine nuferbj"), directory.path());
+  };
+  const Outcome drops = compared("drops"), geometry = compared("job");
+  EXPECT_EQ(geometry.code, 0) << geometry.err << geometry.out;
+  EXPECT_EQ(geometry.out, drops.out);
+  std::filesystem::remove(directory / "job/program/machine.toml");
+  const Outcome lost = compared("job");
+  EXPECT_EQ(lost.code, 5);
+  EXPECT_NE(lost.err.find("job/program/machine.toml: is missing; run lamina verify"), std::string::npos) << lost.err;
 }
 
 TEST(CalibrateScan, AMassTooLargeIsReportedByItsOption) {

@@ -307,6 +307,31 @@ TEST(Manifest, OfAnotherVersionIsRefused) {
   EXPECT_NE(manifest.error().message.find("by another version of lamina"), std::string::npos) << manifest.error().message;
 }
 
+// As the head of an older build had keys of other names: its id is that of its own lines.
+TEST(Manifest, OfAnotherBuildIsDistinguishedFromOneThatWasChanged) {
+  const Directory directory;
+  write_manifest(directory / "manifest.json", some_head(0, 3));
+  const std::string whole = test::read_text(directory / "manifest.json");
+  const auto with = [&](const std::string& key, const std::string& other, bool own_id) {
+    std::string text = whole;
+    const std::string quoted = "\"" + key + "\": ";
+    EXPECT_NE(text.find(quoted), std::string::npos) << key;
+    text.replace(text.find(quoted), quoted.size(), "\"" + other + "\": ");
+    const std::size_t id = text.find("\"id\": \"");
+    if (own_id) text.replace(id + 7, 32, hex(hash_text(std::string_view(text).substr(0, id))));
+    test::write_text(directory / "other.json", text);
+    const auto manifest = read_manifest(directory / "other.json");
+    EXPECT_FALSE(manifest.ok());
+    return manifest ? "" : manifest.error().message;
+  };
+  for (const char* key : {"fill_rule", "mirror", "columns"}) {  // read, and not read
+    const std::string built = with(key, "other_key", true), changed = with(key, "other_key", false);
+    EXPECT_NE(built.find("was written by another version of lamina"), std::string::npos) << built;
+    EXPECT_NE(built.find("or plan the job again with --overwrite"), std::string::npos) << built;
+    EXPECT_EQ(changed.find("another version"), std::string::npos) << changed;
+  }
+}
+
 TEST(Manifest, KeptRecordsComeFirstAndNoLayerIsSkipped) {
   const Directory directory;
   write_manifest(directory / "whole.json", some_head());
