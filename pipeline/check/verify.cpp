@@ -350,6 +350,8 @@ VerifyReport verify_paths(const std::string& name, const std::string& directory,
 /// A toolpath file, by the manifest next to it.
 Result<VerifyReport> verify_file(const std::string& path) {
   const std::string manifest_path = path + ".json";
+  if (fs::path(path).filename() == "manifest.json")
+    return Error{Fault::kUsage, fmt::format("{}: is the manifest of a job; name its directory", path)};
   std::error_code error;
   if (!fs::is_regular_file(manifest_path, error)) {
     const bool begun = fs::is_regular_file(manifest_path + ".part", error);
