@@ -1,12 +1,13 @@
 #include "pipeline/check/verify.h"
 
 #include <fmt/format.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <tuple>
@@ -41,11 +42,35 @@ struct Verification {
   std::optional<DoseCheck> doses;
   ExpectedDrops expected;
   VerifyReport& report;
-  mutable tbb::enumerable_thread_specific<std::string> texts;  // of programs
-  mutable tbb::enumerable_thread_specific<LayerDrops> drops;
 
   /// Without a program to compare it with, the numbers of an image are enough.
   Keep keep() const { return head.machine.empty() && head.max_drops == 0 && is_one_bit(head) ? Keep::kCounts : Keep::kRuns; }
+};
+
+/// Memory of a layer in flight, used again by later ones.
+struct LayerScratch {
+  std::string text;  // of a program
+  LayerDrops drops;
+};
+
+/// As many as there were layers in flight: no thread keeps what the budget has no place for.
+class ScratchPool {
+ public:
+  std::unique_ptr<LayerScratch> take() {
+    const std::scoped_lock lock(mutex_);
+    if (idle_.empty()) return std::make_unique<LayerScratch>();
+    auto scratch = std::move(idle_.back());
+    idle_.pop_back();
+    return scratch;
+  }
+  void give_back(std::unique_ptr<LayerScratch> scratch) {
+    const std::scoped_lock lock(mutex_);
+    idle_.push_back(std::move(scratch));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<LayerScratch>> idle_;
 };
 
 /// What is found in a layer.
@@ -85,7 +110,7 @@ std::string fault_of_feeding(const Verification& inspection, const LayerRecord& 
 // locates the difference.
 // drops  null if only its hash counts
 std::string fault_of_program(const Verification& inspection, const LayerRecord& record, const LayerDrops* drops,
-                             Finding& found) {
+                             std::string& text, Finding& found) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
   const std::string path = (fs::path(inspection.directory) / name).string();
@@ -101,7 +126,6 @@ std::string fault_of_program(const Verification& inspection, const LayerRecord& 
     if (is_compressed(name) && digest->bytes != record.program.bytes) return expands_to(digest->bytes);
     same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   } else {
-    std::string& text = inspection.texts.local();
     const Status read = read_content(path, is_compressed(name) ? record.program.bytes : kMaxProgramBytes, text);
     if (!read) return in_directory(read.error().message, path, name);
     if (is_compressed(name) && text.size() != record.program.bytes) return expands_to(text.size());
@@ -165,8 +189,9 @@ std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, 
                      drops.pixels, drops.maximum, record.set_pixels, record.max_drops);
 }
 
-std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, Finding& found) {
-  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, found);  // a format without files
+std::string fault_of_layer(const Verification& inspection, const LayerRecord& record, LayerScratch& scratch, Finding& found) {
+  auto& [text, drops] = scratch;
+  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, text, found);  // a format without files
   raster::DropPlanes picture = planes_of(inspection.head);
   std::uint64_t levels = 0;
   const auto files = layer_images(inspection.head, record);
@@ -179,13 +204,12 @@ std::string fault_of_layer(const Verification& inspection, const LayerRecord& re
   }
   // Without the machine, which is a fault of its own, nothing is known of drops that follow from the geometry.
   const bool unknown = inspection.head.geometry && !inspection.expected.remakes();
-  if (inspection.options.quick || unknown) return fault_of_program(inspection, record, nullptr, found);
-  LayerDrops& drops = inspection.drops.local();
+  if (inspection.options.quick || unknown) return fault_of_program(inspection, record, nullptr, text, found);
   if (Status status = inspection.expected.make(record.layer, picture.planes, drops); !status) return status.error().message;
   if (std::string what = ExpectedDrops::fault(inspection.head, record, drops); !what.empty()) return what;
   if (std::string what = fault_of_drops(inspection.head, record, drops); !what.empty()) return what;
   if (std::string what = inspection.doses->fault(record, drops.pixels, levels); !what.empty()) return what;
-  return fault_of_program(inspection, record, &drops, found);
+  return fault_of_program(inspection, record, &drops, text, found);
 }
 
 // Restores the machine that the programs were written for.
@@ -235,7 +259,7 @@ std::optional<replay::Count> fed_of(const Verification& inspection, const LayerR
 
 /// Finds the faults of layers, as many at a time as the memory admits; those that are to be replayed drop by drop once more.
 void inspect_layers(const Verification& inspection, std::span<const LayerRecord> records, MemoryGate& gate,
-                    std::vector<Finding>& found) {
+                    ScratchPool& pool, std::vector<Finding>& found) {
   const ManifestHead& head = inspection.head;
   const bool quick = inspection.options.quick;
   const replay::VirtualMachine* machine = quick || !inspection.machine ? nullptr : &*inspection.machine;
@@ -244,7 +268,9 @@ void inspect_layers(const Verification& inspection, std::span<const LayerRecord>
     const auto pass = gate.enter(quick ? 0 : bytes_to_read(head, records[i], inspection.keep()) + replay_bytes);
     found[i].count.reset();
     // Isolated: a thread that waits within has a pass, and must not begin another layer.
-    tbb::this_task_arena::isolate([&] { found[i].fault = fault_of_layer(inspection, records[i], found[i]); });
+    auto scratch = pool.take();
+    tbb::this_task_arena::isolate([&] { found[i].fault = fault_of_layer(inspection, records[i], *scratch, found[i]); });
+    pool.give_back(std::move(scratch));
   };
   const std::uint64_t bytes = machine != nullptr ? machine->bytes_of_replay(planes) : 0;
   tbb::parallel_for(std::size_t{0}, records.size(), [&](std::size_t i) {
@@ -260,7 +286,7 @@ void inspect_layers(const Verification& inspection, std::span<const LayerRecord>
 
 void check_layers(const std::string& directory, const Manifest& manifest, const VerifyOptions& options,
                   std::optional<JobCost>& cost, std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Verification inspection{directory, manifest.head, options, std::nullopt, std::nullopt, {}, report, {}, {}};
+  Verification inspection{directory, manifest.head, options, std::nullopt, std::nullopt, {}, report};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   inspection.doses->check_heights(manifest, report);
@@ -274,11 +300,12 @@ void check_layers(const std::string& directory, const Manifest& manifest, const 
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
   MemoryGate gate(options.memory_bytes);
+  ScratchPool pool;
   std::vector<Finding> found(std::min(kPiece, manifest.layers.size()));
   if (!vats && inspection.machine) vats.emplace(inspection.machine->profile());
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
-    inspect_layers(inspection, std::span(manifest.layers).subspan(first, count), gate, found);
+    inspect_layers(inspection, std::span(manifest.layers).subspan(first, count), gate, pool, found);
     for (std::size_t i = 0; i < count; ++i) {
       const LayerRecord& record = manifest.layers[first + i];
       report.bytes += record.bytes + record.program.bytes;
@@ -323,6 +350,8 @@ VerifyReport verify_paths(const std::string& name, const std::string& directory,
 /// A toolpath file, by the manifest next to it.
 Result<VerifyReport> verify_file(const std::string& path) {
   const std::string manifest_path = path + ".json";
+  if (fs::path(path).filename() == "manifest.json")
+    return Error{Fault::kUsage, fmt::format("{}: is the manifest of a job; name its directory", path)};
   std::error_code error;
   if (!fs::is_regular_file(manifest_path, error)) {
     const bool begun = fs::is_regular_file(manifest_path + ".part", error);

@@ -416,6 +416,7 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   reported.thickness = first.thickness;
   reported.mirror = read->head.mirror;
   reported.levels = read->head.full_level() > 0 ? read->head.levels : 0;
+  reported.geometry = read->head.geometry;
   for (const LayerRecord& record : read->layers) {
     if (record.layer.thickness == first.thickness) continue;
     return Error{Fault::kInput,

@@ -144,6 +144,7 @@ struct ImagesOnRecord {
   Nm bottom = 0, thickness = 0;  // of the first layer, of all; 0: nothing is on record
   std::string mirror;            // of the job that wrote them
   std::uint32_t levels = 0;      // of shares of voxels, that they carry; 0: they are of 1 bit
+  bool geometry = false;         // they are those before the dose of their job
 };
 
 /// path  a job's directory, its layers/, or anything else, of which nothing is on record

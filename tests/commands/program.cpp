@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -84,6 +86,18 @@ void write_one_of_each_kind(const Directory& directory) {
   write_text(directory / "tops.txt", "1\n2\n3\n");
   write_text(directory / "widths.csv", "test,percent,thin_mm\nextrusion,90,0.3\n");
   write_text(directory / "list.txt", "info part.stl\n");
+}
+
+BrowserAnswer in_browser(const std::string& page, int layer) {
+  const std::string command = "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" + page + "' " +
+                              std::to_string(layer) + " 2>/dev/null";
+  BrowserAnswer answer;
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  if (pipe == nullptr) return answer;
+  std::array<char, 65536> piece{};
+  for (std::size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), pipe)) > 0;) answer.json.append(piece.data(), got);
+  answer.code = WEXITSTATUS(::pclose(pipe));
+  return answer;
 }
 
 std::string corpus_file(std::string_view name) { return std::string(LAMINA_TEST_DIR) + "/corpus/" + std::string(name); }

@@ -48,6 +48,14 @@ void write_one_of_each_kind(const Directory& directory);
 /// The path of a file of tests/corpus.
 std::string corpus_file(std::string_view name);
 
+/// What a page of lamina report says of itself in Chromium, with this layer chosen. code  kNoBrowser: there is none
+constexpr int kNoBrowser = 77;
+struct BrowserAnswer {
+  int code = -1;
+  std::string json;
+};
+BrowserAnswer in_browser(const std::string& page, int layer);
+
 std::string read_text(const std::filesystem::path& path);
 void write_text(const std::filesystem::path& path, std::string_view text);
 

@@ -153,15 +153,8 @@ TEST_F(InspectedReports, InABrowserAButtonLeadsToTheFrameOfAPosition) {
   planted();
   ASSERT_EQ(lamina(job({"--inspect"})).code, 0);
   ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
-  const std::string command =
-      "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" + directory_ / "report.html" + "' 0 2>/dev/null";
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  ASSERT_NE(pipe, nullptr);
-  std::string text;
-  std::array<char, 65536> piece{};
-  for (std::size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), pipe)) > 0;) text.append(piece.data(), got);
-  const int status = ::pclose(pipe);
-  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "NOT RUN: places in a browser; install Debian's chromium";
+  const auto [status, text] = in_browser(directory_ / "report.html", 0);
+  if (status == kNoBrowser) GTEST_SKIP() << "NOT RUN: places in a browser; install Debian's chromium";
   ASSERT_EQ(status, 0);
   const Json said = Json::parse(text);
   EXPECT_EQ(said["console"], Json::array());

@@ -125,6 +125,20 @@ TEST_F(OneMeaning, ContentOfImagesThatIsTheDefaultMakesTheSameJob) {
   }
 }
 
+TEST_F(OneMeaning, ImagesOfTheGeometryAreNamedWhereTheyAreRead) {
+  for (const std::string images : {"geometry", "drops"}) {
+    done("jet part.stl --machine nuferbj --layer 1 --shell 1 --core 0.5 --quiet -o " + images + " --images " + images);
+    const bool named = images == "geometry";
+    EXPECT_EQ(done("info " + images).out.find("; geometry before the dose") != std::string::npos, named) << images;
+    const Outcome converted = done("convert " + images + " --format png -o png-" + images);
+    EXPECT_EQ(converted.err.find("note: images of geometry are the geometry before the dose") != std::string::npos, named)
+        << converted.err;
+  }
+  const Outcome manifest = run("verify geometry/manifest.json");
+  EXPECT_EQ(manifest.code, 2);
+  EXPECT_NE(manifest.err.find("geometry/manifest.json: is the manifest of a job; name its directory"), std::string::npos);
+}
+
 TEST_F(OneMeaning, ASavedJobOfHeightsIsTheOneRequested) {
   done("heights part.stl --compare --thickness 0.5,1 --quiet -o table --save-job saved.toml");
   const std::string saved = read_text(folder / "saved.toml");

@@ -341,15 +341,8 @@ TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
   ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
   EXPECT_LT(fs::file_size(directory_ / "report.html"), 20'000'000u);
   const int index = 500, layers = 1000;
-  const std::string command = "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" +
-                              directory_ / "report.html" + "' " + std::to_string(index) + " 2>/dev/null";
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  ASSERT_NE(pipe, nullptr);
-  std::string text;
-  std::array<char, 65536> piece{};
-  for (std::size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), pipe)) > 0;) text.append(piece.data(), got);
-  const int status = ::pclose(pipe);
-  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "NOT RUN: the report in a browser; install Debian's chromium";
+  const auto [status, text] = in_browser(directory_ / "report.html", index);
+  if (status == kNoBrowser) GTEST_SKIP() << "NOT RUN: the report in a browser; install Debian's chromium";
   ASSERT_EQ(status, 0);
   const Json said = Json::parse(text);
 

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stages/data/machine.h"
@@ -151,5 +153,28 @@ class SlowHead {
   std::vector<std::vector<int>> fired;
   std::uint64_t drops = 0, outside = 0, blocked_drops = 0;
 };
+
+/// A machine of a dialect with any mounting, direction and rules, and a blocked nozzle. max_nozzles  of the dialect
+inline Machine random_machine(Random& random, std::string_view dialect, std::uint32_t min_nozzles, std::uint32_t max_nozzles) {
+  Machine machine = small_machine(std::min(min_nozzles + random() % 130, max_nozzles), 90, 100, 100);
+  machine.dialect = dialect;
+  const bool x = random() % 2 == 0;
+  auto& mounting = machine.mounting;
+  mounting.tilt_deg = std::array{90.0, 45.0, 31.0, 120.0}[random() % 4];
+  if (!x) mounting.tilt_deg = 90 - mounting.tilt_deg;
+  mounting.scan_axis = x ? ScanAxis::kX : ScanAxis::kY;
+  mounting.scan_from = x ? (random() % 2 ? Side::kLeft : Side::kRight) : (random() % 2 ? Side::kFront : Side::kBack);
+  mounting.nozzle_0 = x ? (random() % 2 ? Side::kBack : Side::kFront) : (random() % 2 ? Side::kLeft : Side::kRight);
+  mounting.first_leads = random() % 2;
+  mounting.passes = 1 + random() % 2;
+  mounting.first_swath = random() % 2 ? FirstSwath::kBed : FirstSwath::kLayer;
+  mounting.overlap_lines = random() % (machine.head.nozzles / 2 + 1);
+  mounting.joint_shift_lines = random() % 3 * 5;
+  mounting.offset_mm = {12.5, -3.25};
+  machine.motion.both_directions = random() % 2;
+  machine.head.blocked = {random() % machine.head.nozzles};
+  machine.head.blocked_rule = static_cast<BlockedRule>(random() % 3);
+  return machine;
+}
 
 }  // namespace lamina::program::testing

@@ -19,6 +19,16 @@ namespace lamina::printed_parts {
 
 inline const Layer kLayer{7, 700'000, 100'000, LayerReason::kUniform};
 
+/// That of kLayer, of nine.
+inline LayerCycle cycle_of_layer() {
+  LayerCycle cycle;
+  cycle.layer = kLayer.index;
+  cycle.layers = 9;
+  cycle.bottom_nm = kLayer.bottom;
+  cycle.thickness_nm = kLayer.thickness;
+  return cycle;
+}
+
 struct Program {
   std::string text;
   ProgramCount count;
@@ -26,11 +36,7 @@ struct Program {
 
 inline Program program_of(const pipeline::ResolvedMachine& resolved, const RunsView& image) {
   const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
-  LayerCycle cycle;
-  cycle.layer = kLayer.index;
-  cycle.layers = 9;
-  cycle.bottom_nm = kLayer.bottom;
-  cycle.thickness_nm = kLayer.thickness;
+  const LayerCycle cycle = cycle_of_layer();
   program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   writer->maintenance_of_layer(cycle, bytes);

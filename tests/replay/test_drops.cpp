@@ -29,11 +29,7 @@ Levels random_drops(const PixelGrid& grid, std::uint32_t seed) {
 printed_parts::Program program_of_drops(const pipeline::ResolvedMachine& resolved, const Levels& levels, std::uint32_t drops,
                                         std::vector<std::uint32_t>& numbers) {
   const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
-  LayerCycle cycle;
-  cycle.layer = printed_parts::kLayer.index;
-  cycle.layers = 9;
-  cycle.bottom_nm = printed_parts::kLayer.bottom;
-  cycle.thickness_nm = printed_parts::kLayer.thickness;
+  const LayerCycle cycle = printed_parts::cycle_of_layer();
   program::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   program::CompileScratch scratch;

@@ -51,11 +51,7 @@ struct WordBench {
 
   printed_parts::Program program(const Plant& plant = {}) const {
     const auto writer = program::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
-    LayerCycle cycle;
-    cycle.layer = printed_parts::kLayer.index;
-    cycle.layers = 9;
-    cycle.bottom_nm = printed_parts::kLayer.bottom;
-    cycle.thickness_nm = printed_parts::kLayer.thickness;
+    const LayerCycle cycle = printed_parts::cycle_of_layer();
     program::ProgramBytes bytes;
     writer->begin_layer(cycle, bytes);
     program::CompileScratch scratch;
@@ -113,21 +109,8 @@ bool agrees(const WordBench& bench, const replay::VirtualMachine& machine, const
 Machine any_machine(Random& random, std::uint32_t seed) {
   const auto dialects = program::dialects();
   const program::Dialect& dialect = dialects[seed % dialects.size()];
-  Machine machine = program::testing::small_machine(std::min(12 + random() % 130, dialect.max_nozzles), 90, 100, 100);
-  machine.dialect = dialect.id;
-  const bool x = random() % 2 == 0, own = machine.dialect == "planes" || machine.dialect == "raw";
-  machine.mounting.tilt_deg = std::array{90.0, 45.0, 31.0, 120.0}[random() % 4];
-  if (!x) machine.mounting.tilt_deg = 90 - machine.mounting.tilt_deg;
-  machine.mounting.scan_axis = x ? ScanAxis::kX : ScanAxis::kY;
-  machine.mounting.scan_from = x ? (random() % 2 ? Side::kLeft : Side::kRight) : (random() % 2 ? Side::kFront : Side::kBack);
-  machine.mounting.nozzle_0 = x ? (random() % 2 ? Side::kBack : Side::kFront) : (random() % 2 ? Side::kLeft : Side::kRight);
-  machine.mounting.first_leads = random() % 2;
-  machine.mounting.passes = 1 + random() % 2;
-  machine.mounting.overlap_lines = random() % (machine.head.nozzles / 2 + 1);
-  machine.mounting.joint_shift_lines = random() % 3 * 5;
-  machine.motion.both_directions = random() % 2;
-  machine.head.blocked = {random() % machine.head.nozzles};
-  machine.head.blocked_rule = static_cast<BlockedRule>(random() % 3);
+  Machine machine = program::testing::random_machine(random, dialect.id, 12, dialect.max_nozzles);
+  const bool own = machine.dialect == "planes" || machine.dialect == "raw";
   if (own && random() % 2 == 0) machine.head.max_drops = std::array{2u, 3u, 7u, 15u}[random() % 4];
   program::testing::fit_firmware(machine);
   return machine;

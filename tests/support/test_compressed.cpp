@@ -60,6 +60,7 @@ TEST_F(Compressed, ContentsOfAnySizeAndPiecesAreTheSameFrame) {
       const auto read = read_content(name(), bytes);
       ASSERT_TRUE(read.ok()) << read.error().message;
       EXPECT_TRUE(*read == content);
+      EXPECT_LE(read->capacity(), std::max(bytes, std::string().capacity())) << "no more than the content";
       const auto digest = digest_content(name(), bytes);
       ASSERT_TRUE(digest.ok());
       EXPECT_EQ(digest->hash, hash_text(content));

@@ -243,6 +243,9 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   if (!arguments.has("--quiet")) {
     context.say(fmt::format("{} images of {} x {} pixels, {} set, {} in {}", all.images.layers(), all.images.columns(),
                             all.images.rows(), readable_count(sum.set), readable_bytes(sum.bytes), output));
+    if (reported->geometry)
+      context.say(fmt::format("note: images of {} are the geometry before the dose; plan it with --images drops for its drops",
+                              one_line(stack)));
   }
   if (arguments.has("--json")) {
     return context.give(Json{{"command", "convert"},

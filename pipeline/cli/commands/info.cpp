@@ -67,9 +67,10 @@ Status report_images(const std::string& path, int threshold, std::uint64_t memor
   Json json = formats::as_json(*info);
   std::string text = formats::as_text(*info);
   if (reported->thickness > 0) {
-    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers",
+    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}{}\n", "layers",
                         number_text(mm(reported->thickness)), number_text(mm(reported->bottom)),
                         reported->levels > 0 ? fmt::format("; fill fractions of voxels in {} levels", reported->levels) : "",
+                        reported->geometry ? "; geometry before the dose" : "",
                         reported->mirror.empty() || reported->mirror == "none" ? "" : "; mirrored " + reported->mirror);
     json["layers"] = {
         {"thickness_mm", mm(reported->thickness)}, {"bottom_mm", mm(reported->bottom)}, {"levels", reported->levels}};

@@ -266,6 +266,13 @@ Status expand_file(const std::string& path, std::uint64_t max_bytes, const Take&
 Status read_content(const std::string& path, std::uint64_t max_bytes, std::string& content) {
   content.clear();
   return expand_file(path, max_bytes, [&](std::span<const std::byte> piece) {
+    if (const std::size_t size = content.size() + piece.size(); size > content.capacity()) {
+      // Never more than the maximum, where a string that grows by itself doubles.
+      std::string larger;
+      larger.reserve(std::min(static_cast<std::size_t>(max_bytes), std::max(size, 2 * content.capacity())));
+      larger += content;
+      content.swap(larger);
+    }
     content.append(reinterpret_cast<const char*>(piece.data()), piece.size());
     return Status();
   });
