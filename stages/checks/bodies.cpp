@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stages/geometry/combine.h"
+
 namespace lamina::checks {
 
 PixelBox pixels_of(const Box& box, const PixelGrid& grid, std::int64_t margin) {
@@ -28,6 +30,10 @@ void Pieces::label(const RunsView& image, bool diagonal) {
   std::uint32_t above = 0, run = 0;
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     const std::uint32_t above_end = run, end = image.row_offset[r + 1] / 2;
+    if (r > 0 && run < end && rows_aligned(image.row(r - 1), image.row(r), reach)) {
+      while (run < end) of_run[run++] = of_run[above++];
+      continue;
+    }
     for (; run < end; ++run) {
       const std::uint32_t left = change[2 * run], right = change[2 * run + 1] + reach;
       while (above < above_end && change[2 * above + 1] + reach <= left) ++above;
@@ -72,7 +78,8 @@ std::uint64_t Follower::need(const RunsView& image) const {
   const std::uint64_t pieces = pieces_.count(), nodes = bodies_.size() + pieces, runs = image.change.size() / 2;
   const std::uint64_t of_pieces =
       runs * 2 * sizeof(std::uint32_t) + pieces * (sizeof(std::uint64_t) + sizeof(std::uint32_t) + sizeof(PixelBox));
-  const std::uint64_t of_nodes = nodes * (2 * sizeof(std::uint32_t) + sizeof(Body)) + pieces * (1 + sizeof(Body));
+  const std::uint64_t of_nodes =
+      nodes * (2 * sizeof(std::uint32_t) + sizeof(Body)) + pieces * (sizeof(std::uint32_t) + sizeof(Body));
   return of_pieces + of_nodes + runs * 3 * sizeof(std::uint32_t) + image.row_offset.size_bytes();
 }
 
@@ -99,7 +106,7 @@ void Follower::start(const Layer& layer, const RunsView& image) {
     body.row = body.box.top;
   }
   sets_.start(old + pieces_.count());
-  hangs_.assign(pieces_.count(), 0);
+  hangs_.assign(pieces_.count(), Body::kNone);
 }
 
 }  // namespace lamina::checks

@@ -125,6 +125,7 @@ void for_touching(const RunsView& a, std::uint32_t row_a, const RunsView& b, std
                   const Visit& visit) {
   std::uint32_t i = a.row_offset[row_a] / 2, j = b.row_offset[row_b] / 2;
   const std::uint32_t i_end = a.row_offset[row_a + 1] / 2, j_end = b.row_offset[row_b + 1] / 2, reach = diagonal ? 1 : 0;
+  if (i == i_end || j == j_end) return;
   while (i < i_end && j < j_end) {
     const std::uint32_t end_a = a.change[2 * i + 1], end_b = b.change[2 * j + 1];
     if (a.change[2 * i] < end_b + reach && b.change[2 * j] < end_a + reach) visit(i, j);
@@ -210,7 +211,7 @@ class Follower {
   std::vector<Body> bodies_;          // that the last layer holds, then one a piece
   std::vector<Body> next_;
   Buffer<std::uint32_t> number_;  // of each node in next_
-  Buffer<std::uint8_t> hangs_;    // by piece: something is below
+  Buffer<std::uint32_t> hangs_;   // by piece: the body below that it was joined to last
 };
 
 template <class Rules>
@@ -222,7 +223,8 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   for (std::uint32_t r = 0; r < image.rows() && r < below_.view().rows(); ++r) {
     for_touching(below_, r, image, r, false, [&](std::uint32_t under, std::uint32_t over) {
       const std::uint32_t piece = pieces_.of_run[over];
-      hangs_[piece] = 1;
+      if (hangs_[piece] == body_below_[under]) return;
+      hangs_[piece] = body_below_[under];
       const auto [stays, ends] = sets_.merge(body_below_[under], old + piece);
       if (stays == ends) return;
       if (ends < old) rules.join(bodies_[stays], bodies_[ends], bodies_[old + piece]);
@@ -243,7 +245,7 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
     });
   }
   for (std::uint32_t p = 0; p < pieces_.count(); ++p) {
-    if (hangs_[p] == 0) rules.begin(bodies_[old + p]);
+    if (hangs_[p] == Body::kNone) rules.begin(bodies_[old + p]);
   }
   // Bodies that a piece of this layer belongs to continue, in the order of the pieces.
   number_.assign(bodies_.size(), Body::kNone);
@@ -261,7 +263,8 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
     if (sets_.find(b) == b && number_[b] == Body::kNone) rules.end(bodies_[b]);
   }
   body_below_.resize(pieces_.of_run.size());
-  for (std::size_t i = 0; i < body_below_.size(); ++i) body_below_[i] = number_[sets_.find(old + pieces_.of_run[i])];
+  for (std::uint32_t p = 0; p < pieces_.count(); ++p) hangs_[p] = number_[sets_.find(old + p)];
+  for (std::size_t i = 0; i < body_below_.size(); ++i) body_below_[i] = hangs_[pieces_.of_run[i]];
   std::swap(bodies_, next_);
   copy_runs(image, below_);
 }

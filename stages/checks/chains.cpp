@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/geometry/combine.h"
+
 namespace lamina::checks {
 namespace {
 
@@ -36,6 +38,10 @@ bool Chains::find(const RunsView& image, std::uint32_t stencil_rows) {
   std::uint32_t above = 0, run = 0;
   for (std::uint32_t r = 0; r < rows_; ++r) {
     const std::uint32_t above_end = run, end = image.row_offset[r + 1] / 2;
+    if (r > 0 && run < end && rows_aligned(image.row(r - 1), image.row(r))) {
+      for (; run < end; ++run) ++chain_[of_run_[run] = of_run_[above++]].length;
+      continue;
+    }
     for (; run < end; ++run) {
       const std::uint32_t left = change[2 * run], right = change[2 * run + 1];
       while (above < above_end && change[2 * above + 1] <= left) ++above;
@@ -45,26 +51,22 @@ bool Chains::find(const RunsView& image, std::uint32_t stencil_rows) {
       } else {
         of_run_[run] = static_cast<std::uint32_t>(chain_.size());
         chain_.push_back({r, 1, 0, 0});
-        if (chain_.size() * (more + 4) > 2 * runs + 4096) return false;
+        if (chain_.size() * (more + 4) > 4 * runs + 4096) return false;
       }
     }
     above = above_end;
   }
   std::size_t at = 0;
   for (Chain& chain : chain_) {
-    chain.at = at;
+    chain.at = chain.spread = at;
     at += chain.length;
   }
   end_left_.resize(at);
   end_right_.resize(at);
-  run = 0;
-  for (std::uint32_t r = 0; r < rows_; ++r) {
-    for (const std::uint32_t end = image.row_offset[r + 1] / 2; run < end; ++run) {
-      const Chain& chain = chain_[of_run_[run]];
-      const std::size_t to = chain.at + (r - chain.row);
-      end_left_[to] = static_cast<std::int32_t>(change[2 * run]);
-      end_right_[to] = -static_cast<std::int32_t>(change[2 * run + 1]);
-    }
+  for (run = 0; run < runs; ++run) {
+    const std::size_t to = chain_[of_run_[run]].spread++;
+    end_left_[to] = static_cast<std::int32_t>(change[2 * run]);
+    end_right_[to] = -static_cast<std::int32_t>(change[2 * run + 1]);
   }
   return true;
 }

@@ -270,8 +270,11 @@ std::uint64_t Inspection::bytes_needed(const RunsView& image) const {
 }
 
 void Inspection::prepare(const RunsView& image, LayerInspection& inspection) const {
-  // The image, the numbers of its runs, the layer below, and chains; the same of the powder, whose rows have one run less or more.
-  constexpr std::uint64_t kOfRun = 8 + 8 + 12 + 52;
+  // At least half of what prepare() holds of noise, whose every run is left to chains of any form; of long chains it holds
+  // less. A run: its ends, those of inner pixels and of samples, 24; simple chains of the powder, its ends and corners of
+  // drains, 45; of chains and pieces that are left, their numbers, ends and what a stencil covers, 40. The powder has at least
+  // as many runs as the image less one a row.
+  constexpr std::uint64_t kOfRun = 24 + 45 + 40;
   const std::uint64_t runs = image.change.size() / 2, rows = all_.bottom, minimum = kOfRun * (2 * runs - std::min(runs, rows));
   const bool too_large = stopped_ || minimum > max_bytes_;
   copy_rows(image, top_, top_ + all_.bottom, inspection.image);

@@ -19,18 +19,6 @@ void clear_rows(std::uint32_t columns, std::uint32_t rows, Runs& runs) {
   runs.change.clear();
 }
 
-/// Whether all pixels of one image are set in another.
-bool covers(const RunsView& image, const RunsView& of) {
-  for (std::uint32_t r = 0; r < of.rows(); ++r) {
-    const auto inner = of.row(r), outer = image.row(r);
-    for (std::size_t i = 0, j = 0; i < inner.size(); i += 2) {
-      while (j < outer.size() && outer[j + 1] <= inner[i]) j += 2;
-      if (j >= outer.size() || inner[i] < outer[j] || outer[j + 1] < inner[i + 1]) return false;
-    }
-  }
-  return true;
-}
-
 /// Set in the first image but not in the second, in the wanted rows; nothing in the others.
 template <class Wanted>
 void difference_in_rows(const RunsView& a, const RunsView& b, Wanted wanted, Runs& out) {
@@ -85,12 +73,12 @@ bool keep_near_wide(const RunsView& image, const Stencil& stencil, Runs& result)
 }  // namespace
 
 std::uint64_t LayerMeasures::run_bytes() const {
-  return size_of(powder) + size_of(channels) + size_of(necks) + size_of(solid.wide) + size_of(solid.narrow) +
-         size_of(gaps.wide) + size_of(gaps.narrow) + size_of(inner) + size_of(hidden);
+  return size_of(powder) + size_of(channels) + size_of(necks) + size_of(solid.narrow) + size_of(solid.rest) +
+         size_of(gaps.narrow) + size_of(gaps.rest) + size_of(inner) + size_of(sampled);
 }
 
 std::uint64_t Measures::ShortColumns::bytes() const {
-  std::uint64_t total = columns.bytes() + bodies.bytes() + bytes_of(all) + bytes_of(next) + bytes_of(wide) + bytes_held(ended) +
+  std::uint64_t total = bodies.bytes() + bytes_of(all) + bytes_of(next) + bytes_of(wide) + bytes_held(ended) +
                         bytes_held(within) + scratch.bytes();
   for (const Strip& strip : strips) total += bytes_of(strip.footprint);
   return total;
@@ -108,7 +96,8 @@ Measures::Measures(const PixelGrid& grid, std::int64_t min_nm, std::int64_t drai
       drain_(drains_.at(drains_.count() - 1)),
       roof_(roofs_.at(roofs_.count() - 1)),
       slot_(slots_.at(slots_.count() - 1)),
-      columns_(grid.columns()) {}
+      columns_(grid.columns()),
+      short_(min_nm) {}
 
 std::uint32_t Measures::margin() const {
   const Stencil width = widths_.at(widths_.count() - 1);
@@ -129,16 +118,22 @@ void Measures::prepare(const RunsView& image, ThinScratch& scratch, LayerMeasure
     drop_at_edge(window_, scratch, measures.gaps.narrow);
     measures.scratch.find(image, measures.solid, widths_.two_squares(widths_.count() - 1), measures.necks);
   }
-  clear_rows(image.columns, image.rows(), measures.hidden);
-  inner_pixels(image, measures.inner);
-  if (drain_nm_ > 0) erode(measures.powder, window_, drain_, scratch, measures.channels);
+  measures.has_sample = false;
+  measures.sampled.change.clear();
+  if (min_nm_ == 0 || widths_.count() < 2 || measures.powder.change.empty()) scratch.simple.find(measures.powder);
+  if (drain_nm_ > 0) erode_found(measures.powder, window_, drain_, scratch, measures.channels);
+  if (min_nm_ > 0) inner_pixels(image, measures.inner);
 }
 
 void Measures::add_sample(const RunsView& sample, ThinScratch& scratch, LayerMeasures& measures) const {
-  if (covers(sample, measures.inner)) return;
-  combine(measures.inner, sample, SetOperation::kDifference, scratch.left);
-  combine(measures.hidden, scratch.left, SetOperation::kUnion, scratch.chosen);
-  std::swap(measures.hidden, scratch.chosen);
+  if (min_nm_ == 0) return;
+  if (!measures.has_sample) {
+    copy_rows(sample, 0, rows_, measures.sampled);
+    measures.has_sample = true;
+    return;
+  }
+  combine(measures.sampled, sample, SetOperation::kIntersection, scratch.chosen);
+  std::swap(measures.sampled, scratch.chosen);
 }
 
 std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measures) const {
@@ -146,8 +141,7 @@ std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measure
   constexpr std::uint64_t kOfSpan = 40, kOfRegion = 120;
   const LayerMeasures& of = measures;
   return 3 * of.run_bytes() + thin_.columns.need(of.solid.narrow, thin_.base, kOfRegion) +
-         slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) +
-         roofs_flat_.columns.need(image, kOfSpan) + gaps_flat_.columns.need(of.powder, kOfSpan) +
+         slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) + short_.need(image, of.powder, kOfSpan) +
          channel_columns_.need(of.channels);
 }
 
@@ -264,19 +258,44 @@ void Measures::end_powder(std::uint32_t owner, bool open) {
   }
 }
 
-/// The layer below the last one, whose neighbours are known now.
-void Measures::add_hidden(const RunsView& inner, const RunsView& hidden) {
-  if (begun_ && (!hidden_.is_idle() || !latest_hidden_.change.empty())) {
-    if (below_.row_offset.empty()) clear_rows(columns_, rows_, below_);
-    combine(latest_hidden_, below_, SetOperation::kIntersection, between_layers_);
-    combine(between_layers_, inner, SetOperation::kIntersection, below_);
-    hidden_.find(below_);
-    EndHidden rules{*this};
-    hidden_.add(latest_, below_, rules);
+/// Of the layer below the last one, whose neighbours are known now, the pixels that are set around samples that are not.
+void Measures::note_hidden(const RunsView& inner) {
+  const RunsView both = both_inner_, sampled = sampled_;
+  // The pixels that are inner ones in all three layers are in a sample.
+  const auto covered = [&](std::uint32_t r) {
+    const auto a = both.row(r), b = inner.row(r), sample = sampled.row(r);
+    if (a.size() != sample.size() || !rows_aligned(a, b)) return a.empty() || b.empty();
+    std::uint32_t outside = 0;
+    for (std::size_t i = 0; i + 1 < a.size(); i += 2)
+      outside |= static_cast<std::uint32_t>(std::max(a[i], b[i]) < sample[i]) |
+                 static_cast<std::uint32_t>(sample[i + 1] < std::min(a[i + 1], b[i + 1]));
+    return outside == 0;
+  };
+  clear_rows(columns_, 0, between_layers_);
+  for (std::uint32_t r = 0; r < rows_; ++r) {
+    if (covered(r)) {
+      between_layers_.row_offset.push_back(static_cast<std::uint32_t>(between_layers_.change.size()));
+      continue;
+    }
+    const auto row = [&](const RunsView& of) { return RunsView{columns_, of.row_offset.subspan(r, 2), of.change}; };
+    combine(row(both), row(inner), SetOperation::kIntersection, row_);
+    append_combined(row_, row(sampled), SetOperation::kDifference, between_layers_);
   }
-  std::swap(below_, latest_inner_);
-  copy_runs(inner, latest_inner_);
-  copy_runs(hidden, latest_hidden_);
+}
+
+void Measures::add_hidden(const LayerMeasures& measures) {
+  const bool any = begun_ && has_sample_ && !both_inner_.row_offset.empty();
+  if (any) note_hidden(measures.inner);
+  if (begun_ && (!hidden_.is_idle() || (any && !between_layers_.change.empty()))) {
+    if (!any) clear_rows(columns_, rows_, between_layers_);
+    hidden_.find(between_layers_);
+    EndHidden rules{*this};
+    hidden_.add(latest_, between_layers_, rules);
+  }
+  if (begun_) combine(inner_, measures.inner, SetOperation::kIntersection, both_inner_);
+  copy_runs(measures.inner, inner_);
+  has_sample_ = measures.has_sample;
+  if (has_sample_) copy_runs(measures.sampled, sampled_);
 }
 
 void Measures::add_channels(const Layer& layer, const RunsView& channels, Follower& powder) {
@@ -307,16 +326,11 @@ void Measures::add_upright(const Layer& layer, const RunsView& image, const Runs
   upright.bodies.add(layer, upright.ended, columns_, rows_, 3 * min_nm_, rules);
 }
 
-void Measures::add_flat(const Layer& layer, const RunsView& image, Measured kind, bool endless, ShortColumns& flat) {
-  flat.columns.add(layer, image, std::int64_t{layer.bottom} - min_nm_, endless);
-  end_flat(layer, image, kind, flat);
-}
-
 /// Of short columns that ended below this layer, those where the disc fits into all that ended a little below.
-void Measures::end_flat(const Layer& layer, const RunsView&, Measured kind, ShortColumns& flat) {
+void Measures::end_flat(const Layer& layer, std::span<const ColumnSpan> ended, Measured kind, ShortColumns& flat) {
   const Stencil& disc = kind == Measured::kRoof ? roof_ : slot_;
   flat.ended.clear();
-  for (const ColumnSpan& span : flat.columns.ended()) {
+  for (const ColumnSpan& span : ended) {
     if (std::int64_t{layer.bottom} - span.bottom < min_nm_) flat.ended.push_back(span);
   }
   while (!flat.strips.empty() && layer.bottom - flat.strips.front().z > 2 * min_nm_) flat.strips.pop_front();
@@ -343,14 +357,15 @@ void Measures::end_flat(const Layer& layer, const RunsView&, Measured kind, Shor
 
 void Measures::add(const Layer& layer, const RunsView& image, const RunsView& below, const LayerMeasures& measures,
                    Follower& powder) {
-  if (min_nm_ > 0) add_hidden(measures.inner, measures.hidden);
+  if (min_nm_ > 0) add_hidden(measures);
   latest_ = layer;
   if (drain_nm_ > 0) add_channels(layer, measures.channels, powder);
   if (min_nm_ > 0) {
     add_upright(layer, image, below, measures.solid.narrow, Measured::kThin, thin_);
     add_upright(layer, measures.powder, powder.below(), measures.gaps.narrow, Measured::kGap, slots_upright_);
-    add_flat(layer, image, Measured::kRoof, false, roofs_flat_);
-    add_flat(layer, measures.powder, Measured::kGap, !begun_, gaps_flat_);
+    short_.add(layer, image, measures.powder, window_);
+    end_flat(layer, short_.solid(), Measured::kRoof, roofs_flat_);
+    end_flat(layer, short_.powder(), Measured::kGap, gaps_flat_);
     necks_.find(measures.necks);
     EndNeck rules{*this};
     necks_.add(layer, measures.necks, rules);
@@ -371,8 +386,8 @@ void Measures::finish() {
     upright->bodies.add(above, upright->ended, columns_, rows_, 3 * min_nm_, rules);
     upright->bodies.finish(rules);
   }
-  roofs_flat_.columns.finish();
-  end_flat(above, {}, Measured::kRoof, roofs_flat_);
+  short_.finish(above);
+  end_flat(above, short_.solid(), Measured::kRoof, roofs_flat_);
   EndFlat roof{*this, Measured::kRoof}, gap{*this, Measured::kGap};
   roofs_flat_.bodies.finish(roof);
   gaps_flat_.bodies.finish(gap);
@@ -383,10 +398,10 @@ void Measures::finish() {
 }
 
 std::uint64_t Measures::bytes() const {
-  return thin_.bytes() + slots_upright_.bytes() + roofs_flat_.bytes() + gaps_flat_.bytes() + channel_columns_.bytes() +
-         channels_.bytes() + necks_.bytes() + hidden_.bytes() + bytes_of(below_) + bytes_of(latest_inner_) +
-         bytes_of(latest_hidden_) + bytes_of(between_layers_) + pockets_.capacity() * sizeof(Pocket) +
-         free_.capacity() * sizeof(std::uint32_t) + found_.capacity() * sizeof(Item);
+  return thin_.bytes() + slots_upright_.bytes() + short_.bytes() + roofs_flat_.bytes() + gaps_flat_.bytes() +
+         channel_columns_.bytes() + channels_.bytes() + necks_.bytes() + hidden_.bytes() + bytes_of(inner_) +
+         bytes_of(both_inner_) + bytes_of(sampled_) + bytes_of(row_) + bytes_of(between_layers_) +
+         pockets_.capacity() * sizeof(Pocket) + free_.capacity() * sizeof(std::uint32_t) + found_.capacity() * sizeof(Item);
 }
 
 }  // namespace lamina::checks

@@ -23,6 +23,7 @@
 
 #include "stages/checks/bodies.h"
 #include "stages/checks/columns.h"
+#include "stages/checks/short_spans.h"
 #include "stages/checks/thin.h"
 #include "stages/checks/young.h"
 #include "stages/data/grid.h"
@@ -37,12 +38,13 @@ struct LayerMeasures {
   Runs channels;  // corners of drains in it
   Runs necks;
   Widths solid, gaps;
-  Runs inner;   // pixels of the solid without an edge nearby
-  Runs hidden;  // those of them where a sample between pixels is not set
+  Runs inner;    // pixels of the solid without an edge nearby
+  Runs sampled;  // where all samples between pixels are set
+  bool has_sample = false;
   Necks scratch;
   std::uint64_t bytes() const {
     return bytes_of(powder) + bytes_of(channels) + bytes_of(necks) + solid.bytes() + gaps.bytes() + bytes_of(inner) +
-           bytes_of(hidden) + scratch.bytes();
+           bytes_of(sampled) + scratch.bytes();
   }
   std::uint64_t run_bytes() const;  // without capacity to spare
 };
@@ -108,7 +110,6 @@ class Measures {
       std::int64_t z = 0;
       Runs footprint;
     };
-    YoungColumns columns;
     ColumnBodies bodies;
     std::deque<Strip> strips;  // of the last layers
     Runs all, next, wide;
@@ -128,9 +129,9 @@ class Measures {
 
   void add_upright(const Layer& layer, const RunsView& image, const RunsView& below, const RunsView& narrow, Measured kind,
                    Upright& upright);
-  void add_flat(const Layer& layer, const RunsView& image, Measured kind, bool endless, ShortColumns& flat);
-  void end_flat(const Layer& layer, const RunsView& image, Measured kind, ShortColumns& flat);
-  void add_hidden(const RunsView& inner, const RunsView& hidden);
+  void end_flat(const Layer& layer, std::span<const ColumnSpan> ended, Measured kind, ShortColumns& flat);
+  void add_hidden(const LayerMeasures& measures);
+  void note_hidden(const RunsView& inner);
   void add_channels(const Layer& layer, const RunsView& channels, Follower& powder);
   void keep_pocket(const Item& item, Follower& powder, std::uint32_t column, std::uint32_t row);
   double longest_nm(const Body& body) const;
@@ -145,10 +146,14 @@ class Measures {
   std::uint32_t columns_ = 0, rows_ = 0;
 
   Upright thin_, slots_upright_;
+  ShortSpans short_;
   ShortColumns roofs_flat_, gaps_flat_;
   TallColumns channel_columns_;
   Follower channels_{false}, necks_{true}, hidden_{true};
-  Runs below_, latest_inner_, latest_hidden_, between_layers_;  // inner pixels two layers below; the layer below; a result
+  Runs inner_, both_inner_,
+      sampled_;              // inner pixels of the layer below, and those of it that are also two layers below; samples
+  bool has_sample_ = false;  // of the layer below
+  Runs between_layers_, row_;
   std::vector<Pocket> pockets_;
   std::vector<std::uint32_t> free_;
   std::vector<Item> found_;

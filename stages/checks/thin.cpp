@@ -65,6 +65,10 @@ void begin_rows(std::uint32_t columns, Runs& result) {
   result.change.clear();
 }
 void end_row(Runs& result) { result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size())); }
+void clear_rows(std::uint32_t columns, std::uint32_t rows, Runs& result) {
+  begin_rows(columns, result);
+  result.row_offset.assign(std::size_t{rows} + 1, 0);
+}
 void add_run(std::uint32_t begin, std::uint32_t end, Runs& result) {
   result.change.push_back(begin);
   result.change.push_back(end);
@@ -156,6 +160,81 @@ void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, c
   combine(of, scratch.grown, SetOperation::kDifference, scratch.left);
 }
 
+/// Whether neighbouring rows of a stencil of several rows share columns.
+bool shares_columns(const Stencil& stencil) {
+  for (std::size_t j = 0; j + 1 < stencil.rows.size(); ++j) {
+    const auto &a = stencil.rows[j], &b = stencil.rows[j + 1];
+    if (std::max(a.first, b.first) > std::min(a.last, b.last)) return false;
+  }
+  return stencil.rows.size() > 1;
+}
+
+/// Pixels of an image that the stencil covers nowhere, in scratch.left.
+void uncovered(const RunsView& image, const PixelBox& box, const Stencil& stencil, ThinScratch& scratch) {
+  SimpleChains& simple = scratch.simple;
+  simple.find(image);
+  if (!shares_columns(stencil) || !simple.open(stencil.steps)) return uncovered(image, box, image, stencil, scratch);
+  simple.context(image, scratch.context);
+  if (scratch.context.change.empty()) {
+    copy_runs(scratch.context, scratch.left);
+  } else {
+    uncovered(scratch.context, box, scratch.context, stencil, scratch);
+  }
+  simple.finish(image, scratch.context, scratch.left, 0, scratch.near);
+  std::swap(scratch.near, scratch.left);
+}
+
+/// Of an image, in rows next to those of `near`, what is not in a part of it.
+void others_near(const RunsView& image, const RunsView& part, const RunsView& near, Runs& result) {
+  begin_rows(image.columns, result);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::uint32_t first = r == 0 ? 0 : r - 1, last = std::min(image.rows(), r + 2);
+    if (near.row_offset[first] == near.row_offset[last]) {
+      end_row(result);
+      continue;
+    }
+    const auto row = [&](const RunsView& of) { return RunsView{of.columns, of.row_offset.subspan(r, 2), of.change}; };
+    append_combined(row(image), row(part), SetOperation::kDifference, result);
+  }
+}
+
+/// Rows within `reach` of one that has pixels, and an empty one (UINT32_MAX) between such that are apart.
+void rows_near(const RunsView& image, std::uint32_t reach, Buffer<std::uint32_t>& rows) {
+  rows.clear();
+  std::uint32_t next = 0;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    if (image.row_offset[r] == image.row_offset[r + 1]) continue;
+    const std::uint32_t first = r < reach ? 0 : r - reach, last = std::min(image.rows(), r + reach + 1);
+    if (first > next) rows.push_back(UINT32_MAX);
+    for (next = std::max(next, first); next < last; ++next) rows.push_back(next);
+  }
+}
+
+void take_rows(const RunsView& image, std::span<const std::uint32_t> rows, Runs& result) {
+  begin_rows(image.columns, result);
+  for (const std::uint32_t row : rows) {
+    if (row != UINT32_MAX) {
+      const auto runs = image.row(row);
+      result.change.insert(result.change.end(), runs.begin(), runs.end());
+    }
+    end_row(result);
+  }
+}
+
+/// Puts them back where they were taken from.
+void return_rows(const RunsView& image, std::span<const std::uint32_t> rows, std::uint32_t count, Runs& result) {
+  begin_rows(image.columns, result);
+  std::size_t from = 0;
+  for (std::uint32_t r = 0; r < count; ++r) {
+    while (from < rows.size() && rows[from] == UINT32_MAX) ++from;
+    if (from < rows.size() && rows[from] == r) {
+      const auto runs = image.row(static_cast<std::uint32_t>(from++));
+      result.change.insert(result.change.end(), runs.begin(), runs.end());
+    }
+    end_row(result);
+  }
+}
+
 /// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
 std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t minimum, std::uint64_t maximum, Runs& result) {
   std::uint64_t largest = 0;
@@ -224,14 +303,16 @@ void keep_largest(std::vector<ThinRegion>& locations, std::size_t maximum) {
   locations.resize(std::min(locations.size(), maximum));
 }
 
-/// Takes pieces of more pixels than `least` into the places.
-void take(const Pieces& pieces, std::uint64_t minimum, ThinRegions& locations) {
+/// Takes pieces of more pixels than `least` into the places. rows  of the image, by those of the pieces; empty: the same
+void take(const Pieces& pieces, std::uint64_t minimum, std::span<const std::uint32_t> rows, ThinRegions& locations) {
   for (std::size_t p = 0; p < pieces.count(); ++p) {
     const std::uint64_t pixels = pieces.pixels[p];
     if (pixels <= minimum) continue;
     ++locations.count;
     locations.pixels += pixels;
     locations.largest.push_back({pixels, pieces.box[p]});
+    PixelBox& box = locations.largest.back().box;
+    if (!rows.empty()) box.top = rows[box.top], box.bottom = rows[box.bottom - 1] + 1;
     if (locations.largest.size() >= 4 * ThinRegions::kMax) keep_largest(locations.largest, ThinRegions::kMax);
   }
 }
@@ -256,47 +337,31 @@ void complement(const RunsView& image, const PixelBox& window, Runs& result) {
 }
 
 std::uint64_t ThinScratch::bytes() const {
-  std::uint64_t total = bytes_held(spans) + bytes_held(marks) + pieces.bytes() + chains.bytes();
-  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending, &between})
+  std::uint64_t total =
+      bytes_held(spans) + bytes_held(marks) + bytes_held(rows) + pieces.bytes() + chains.bytes() + simple.bytes();
+  for (const Runs* image :
+       {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending, &between, &near, &context, &few, &more})
     total += bytes_of(*image);
   return total;
 }
 
-// From wide to narrow. What a stencil covers is thin for no narrower one, so that each inspects what those before it left, and
-// of that the pieces that are large enough for it: few corners are.
-ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch, Widths* widths) {
-  ThinRegions locations;
-  if (stencils.count() < 2 || image.change.empty()) {
-    if (widths == nullptr) return locations;
-    copy_runs(image, widths->wide);
-    widths->narrow.columns = image.columns;
-    widths->narrow.row_offset.assign(image.row_offset.size(), 0);
-    widths->narrow.change.clear();
-    copy_runs(widths->narrow, widths->rest);
-    return locations;
-  }
-  const PixelBox box = box_of(image);
+namespace {
+
+/// From wide to narrow. What a stencil covers is thin for no narrower one, so that each inspects what those before it left, and
+/// of that the pieces that are large enough for it: few corners are. Of the image only rows near them count.
+/// maximum  pixels of the largest of the pieces that are left, which are scratch.chosen
+void thin_for_narrower(const RunsView& whole, const Stencils& stencils, std::uint64_t maximum, ThinScratch& scratch,
+                       Widths* widths, ThinRegions& locations) {
   Runs &left = scratch.left, &chosen = scratch.chosen, &waiting = scratch.waiting, &pending = scratch.pending;
+  Runs &image = scratch.few, &narrow = scratch.more;
   Pieces& pieces = scratch.pieces;
-  const std::uint64_t corner = stencils.two_squares(1);
   std::uint32_t number = stencils.count() - 1;
-  uncovered(image, box, image, stencils.at(number), scratch);
-  const auto add_narrow = [&](std::uint64_t minimum) {
-    if (widths == nullptr || pick(left, pieces, minimum, UINT64_MAX, chosen) == 0) return;
-    combine(widths->narrow, chosen, SetOperation::kUnion, scratch.grown);
-    std::swap(widths->narrow, scratch.grown);
-  };
-  pieces.find(left, true);
-  locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinRegion);
-  for (const Runs* held : {&scratch.outside, &scratch.grown, &scratch.grown, &scratch.fits, &left})
-    locations.bytes += held->view().change.size_bytes();
-  take(pieces, stencils.two_squares(number), locations);
-  if (widths != nullptr) {
-    pick_narrow(scratch.grown, stencils.two_squares(number), scratch, widths->narrow);
-    std::swap(widths->wide, scratch.grown);
-    copy_runs(left, widths->rest);
-  }
-  std::uint64_t maximum = pick(left, pieces, corner, stencils.two_squares(number), pending);
+  const std::uint64_t corner = stencils.two_squares(1);
+  rows_near(chosen, static_cast<std::uint32_t>(stencils.at(number).rows.size()), scratch.rows);
+  take_rows(whole, scratch.rows, image);
+  take_rows(chosen, scratch.rows, pending);
+  clear_rows(whole.columns, static_cast<std::uint32_t>(scratch.rows.size()), narrow);
+  const PixelBox box = box_of(image);
   while (--number > 0) {
     const std::uint64_t minimum = stencils.two_squares(number);
     if (maximum <= minimum) continue;
@@ -305,11 +370,49 @@ ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinSc
     maximum = pick(pending, pieces, corner, minimum, waiting);
     uncovered(image, box, chosen, stencils.at(number), scratch);
     pieces.find(left, true);
-    take(pieces, minimum, locations);
-    add_narrow(minimum);
+    take(pieces, minimum, scratch.rows, locations);
+    if (widths != nullptr && pick(left, pieces, minimum, UINT64_MAX, chosen) > 0) {
+      combine(narrow, chosen, SetOperation::kUnion, scratch.grown);
+      std::swap(narrow, scratch.grown);
+    }
     maximum = std::max(maximum, pick(left, pieces, corner, minimum, chosen));
     combine(waiting, chosen, SetOperation::kUnion, pending);
   }
+  if (narrow.change.empty()) return;
+  return_rows(narrow, scratch.rows, whole.rows(), chosen);
+  combine(widths->narrow, chosen, SetOperation::kUnion, scratch.grown);
+  std::swap(widths->narrow, scratch.grown);
+}
+
+}  // namespace
+
+ThinRegions thin_regions(const RunsView& image, const Stencils& stencils, ThinScratch& scratch, Widths* widths) {
+  ThinRegions locations;
+  if (stencils.count() < 2 || image.change.empty()) {
+    if (widths == nullptr) return locations;
+    widths->narrow.columns = image.columns;
+    widths->narrow.row_offset.assign(image.row_offset.size(), 0);
+    widths->narrow.change.clear();
+    copy_runs(widths->narrow, widths->rest);
+    return locations;
+  }
+  const PixelBox box = box_of(image);
+  const std::uint32_t number = stencils.count() - 1;
+  uncovered(image, box, stencils.at(number), scratch);
+  Runs& left = scratch.left;
+  scratch.pieces.find(left, true);
+  locations.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + scratch.pieces.count() * sizeof(ThinRegion);
+  for (const Runs* held : {&scratch.outside, &scratch.grown, &scratch.grown, &scratch.fits, &left})
+    locations.bytes += held->view().change.size_bytes();
+  take(scratch.pieces, stencils.two_squares(number), {}, locations);
+  if (widths != nullptr) {
+    others_near(image, left, left, scratch.near);
+    pick_narrow(scratch.near, stencils.two_squares(number), scratch, widths->narrow);
+    copy_runs(left, widths->rest);
+  }
+  const std::uint64_t maximum =
+      pick(left, scratch.pieces, stencils.two_squares(1), stencils.two_squares(number), scratch.chosen);
+  if (maximum > 0) thin_for_narrower(image, stencils, maximum, scratch, widths, locations);
   keep_largest(locations.largest, ThinRegions::kMax);
   return locations;
 }
@@ -331,6 +434,14 @@ void drop_at_edge(const PixelBox& window, ThinScratch& scratch, Runs& image) {
 void erode(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners) {
   complement(image, window, scratch.outside);
   spread(scratch.outside, stencil, To::kCorners, corners_in(window, stencil), true, scratch, corners);
+}
+
+void erode_found(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners) {
+  SimpleChains& simple = scratch.simple;
+  if (!shares_columns(stencil) || !simple.erode(stencil.steps)) return erode(image, window, stencil, scratch, corners);
+  simple.context(image, scratch.context);
+  erode(scratch.context, window, stencil, scratch, scratch.fits);
+  simple.finish(image, scratch.context, scratch.fits, stencil.rows.front().first, corners);
 }
 
 void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, Runs& result) {
@@ -356,7 +467,23 @@ void inner_pixels(const RunsView& image, Runs& result) {
   };
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     both.clear();
-    if (r > 0 && r + 1 < image.rows()) {
+    if (r > 0 && r + 1 < image.rows() && !image.row(r).empty()) {
+      const auto above = image.row(r - 1), here = image.row(r), below = image.row(r + 1);
+      if (rows_aligned(above, here) && rows_aligned(here, below)) {
+        const std::size_t size = result.change.size();
+        result.change.resize(size + here.size());
+        std::uint32_t* to = result.change.data() + size;
+        for (std::size_t i = 0; i < here.size(); i += 2) {
+          const std::uint32_t begin = std::max({above[i], here[i], below[i]}) + 1,
+                              end = std::min({above[i + 1], here[i + 1], below[i + 1]}) - 1;
+          to[0] = begin;
+          to[1] = end;
+          to += static_cast<std::int32_t>(begin) < static_cast<std::int32_t>(end) ? 2 : 0;
+        }
+        result.change.resize(static_cast<std::size_t>(to - result.change.data()));
+        end_row(result);
+        continue;
+      }
       intersect(image.row(r - 1), 1, image.row(r), 1, both);
       intersect(both, 0, image.row(r + 1), 1, result.change);
     }
@@ -436,12 +563,14 @@ void Necks::find(const RunsView& image, const Widths& widths, std::uint64_t mini
     rest = &added_;
   }
   pieces_.find(*rest, true);
-  wide_.label(widths.wide, false);
-  if (touches_two(widths.wide, *rest)) {
-    wide_.measure(widths.wide);
-    mark(widths.wide, *rest, minimum);
-  } else {
-    joins_.assign(pieces_.count(), 0);
+  joins_.assign(pieces_.count(), 0);
+  // What is connected near the rest is connected.
+  others_near(image, widths.rest, *rest, near_);
+  wide_.label(near_, false);
+  if (touches_two(near_, *rest)) {
+    combine(image, widths.rest, SetOperation::kDifference, all_wide_);
+    wide_.find(all_wide_, false);
+    mark(all_wide_, *rest, minimum);
   }
   for (std::size_t p = 0; p < pieces_.count(); ++p) {
     if (joins_[p] == 0) pieces_.pixels[p] = 0;
@@ -450,8 +579,8 @@ void Necks::find(const RunsView& image, const Widths& widths, std::uint64_t mini
 }
 
 std::uint64_t Necks::bytes() const {
-  return bytes_of(rest_) + bytes_of(added_) + bytes_of(bridged_) + wide_.bytes() + pieces_.bytes() + bytes_held(neighbour_) +
-         bytes_held(joins_) + bytes_held(spans_) + bytes_held(joined_);
+  return bytes_of(rest_) + bytes_of(near_) + bytes_of(all_wide_) + bytes_of(added_) + bytes_of(bridged_) + wide_.bytes() +
+         pieces_.bytes() + bytes_held(neighbour_) + bytes_held(joins_) + bytes_held(spans_) + bytes_held(joined_);
 }
 
 VanishedPieces vanished_pieces(const RunsView& before, const RunsView& after, std::uint64_t minimum, VanishScratch& scratch) {

@@ -8,6 +8,7 @@
 
 #include "stages/checks/bodies.h"
 #include "stages/checks/chains.h"
+#include "stages/checks/simple_chains.h"
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -70,18 +71,20 @@ struct ThinRegions {
 struct ThinScratch {
   Runs outside, anchors, grown, fits, left, chosen, waiting, pending, between;
   Chains chains;
+  SimpleChains simple;
+  Runs near, context, few, more;
+  Buffer<std::uint32_t> rows;  // those of an image that `few` has; UINT32_MAX: an empty one
   Buffer<std::uint64_t> spans;
   Buffer<std::uint8_t> marks;
   Pieces pieces;
   std::uint64_t bytes() const;
 };
 
-/// Parts of an image. What is neither wide nor narrow is corners, and necks between wide parts.
+/// Parts of an image that the last stencil does not cover. What of them is not narrow is corners, and necks between wide parts.
 struct Widths {
-  Runs wide;    // what the last stencil covers
   Runs narrow;  // thin regions, and pieces that the last stencil does not fit into, of any size
-  Runs rest;    // what the last stencil does not cover
-  std::uint64_t bytes() const { return bytes_of(wide) + bytes_of(narrow) + bytes_of(rest); }
+  Runs rest;    // all of them
+  std::uint64_t bytes() const { return bytes_of(narrow) + bytes_of(rest); }
 };
 
 /// Places that for any of the stencils are thin: pixels that it covers nowhere where it lies on set pixels alone, and that
@@ -97,6 +100,8 @@ void drop_at_edge(const PixelBox& window, ThinScratch& scratch, Runs& image);
 
 /// The top left corners of all positions in which the stencil is within the image and the window.
 void erode(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners);
+/// The same of an image within the window whose chains scratch.simple has found last.
+void erode_found(const RunsView& image, const PixelBox& window, const Stencil& stencil, ThinScratch& scratch, Runs& corners);
 /// All pixels of an image that the stencil covers where it is within the image.
 void open(const RunsView& image, const Stencil& stencil, ThinScratch& scratch, Runs& result);
 
@@ -117,6 +122,7 @@ class Necks {
   bool touches_two(const RunsView& wide, const RunsView& rest);
 
   Runs bridged_, rest_, added_;  // bridged: what bridges add to the image
+  Runs near_, all_wide_;         // wide parts of rows next to the rest, and of all
   Pieces wide_, pieces_;
   Buffer<std::uint32_t> neighbour_;  // wide part of each piece of the rest
   Buffer<std::uint8_t> joins_;       // by piece of the rest: it touches two

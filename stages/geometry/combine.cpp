@@ -38,6 +38,10 @@ std::uint32_t* merge(Row a, Row b, std::uint32_t* to) {
 }
 
 std::uint32_t* intersect(Row a, Row b, std::uint32_t* to) {
+  if (rows_aligned(a, b)) {
+    for (std::size_t i = 0; i + 1 < a.size(); i += 2) to = put(std::max(a[i], b[i]), std::min(a[i + 1], b[i + 1]), to);
+    return to;
+  }
   for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
     const std::uint32_t begin = std::max(a[i], b[j]), end_a = a[i + 1], end_b = b[j + 1], end = std::min(end_a, end_b);
     if (begin < end) to = put(begin, end, to);

@@ -8,8 +8,11 @@
 #include <vector>
 
 #include "stages/checks/chains.h"
+#include "stages/checks/short_spans.h"
+#include "stages/checks/simple_chains.h"
 #include "stages/checks/thin.h"
 #include "stages/checks/young.h"
+#include "stages/geometry/combine.h"
 #include "tests/checks/volume.h"
 
 namespace lamina::checks {
@@ -116,6 +119,57 @@ TEST(Chains, LeaveNoiseToRows) {
   EXPECT_EQ(text_of(opened), text_of(covered(fits, stencil, false, all, false)));
 }
 
+/// Long shapes that lean, split and meet, with rough sides and thin places.
+Volume leaning_shapes(std::mt19937& random, std::uint32_t columns, std::uint32_t rows) {
+  Volume volume{columns, rows, 1, std::vector<std::uint8_t>(std::size_t{columns} * rows, 0)};
+  for (int shape = 0; shape < 5; ++shape) {
+    const std::uint32_t first = drawn(random, rows), last = std::min(rows, first + rows / 2 + drawn(random, rows)),
+                        wide = 2 + drawn(random, 30), rough = drawn(random, 3), eighths = drawn(random, 12);
+    const auto set = static_cast<std::uint8_t>(shape % 3 == 2 ? 0 : 1);
+    std::int64_t left = drawn(random, columns) * 8;
+    for (std::uint32_t r = first; r < last; ++r, left += static_cast<std::int64_t>(eighths) - 6) {
+      const std::int64_t begin = left / 8 + drawn(random, rough + 1), end = begin + wide + drawn(random, rough + 1);
+      for (std::int64_t c = std::max<std::int64_t>(0, begin); c < std::min<std::int64_t>(columns, end); ++c)
+        volume.set[r * columns + static_cast<std::uint32_t>(c)] = set;
+    }
+  }
+  return volume;
+}
+
+/// What simple chains leave open is added: the sum is that of all pixels.
+TEST(SimpleChains, OpenAndErodeLikeChainsOfAnyForm) {
+  std::mt19937 random(11);
+  const PixelGrid grid{PixelAxis(254, 20 * kNmPerMm), PixelAxis(254, 20 * kNmPerMm)};
+  const Stencils stencils(grid, 1'300'000);
+  SimpleChains simple;  // the same for all, as for layers
+  ThinScratch scratch;
+  Runs context, opened, of_context, whole, expected, found;
+  std::uint32_t simply = 0;
+  for (int k = 0; k < 150; ++k) {
+    const Volume shapes = leaning_shapes(random, 90, 700);
+    const Runs image = shapes.layer(0);
+    const Stencil stencil = stencils.at(4 + drawn(random, stencils.count() - 4));
+    const PixelBox window{0, 90, 0, 700};
+    SCOPED_TRACE(k);
+    simple.find(image);
+    simply += simple.open(stencil.steps) ? 1 : 0;
+    simple.context(image, context);
+    open(context, stencil, scratch, opened);
+    combine(context, opened, SetOperation::kDifference, of_context);
+    simple.finish(image, context, of_context, 0, found);
+    open(image, stencil, scratch, whole);
+    combine(image, whole, SetOperation::kDifference, expected);
+    ASSERT_EQ(text_of(found), text_of(expected));
+    simple.erode(stencil.steps);
+    simple.context(image, context);
+    erode(context, window, stencil, scratch, of_context);
+    simple.finish(image, context, of_context, stencil.rows.front().first, found);
+    erode(image, window, stencil, scratch, expected);
+    ASSERT_EQ(text_of(found), text_of(expected));
+  }
+  EXPECT_GT(simply, 20u);  // so many pay
+}
+
 class ColumnHeights : public testing::Test {
  protected:
   /// The height of the column of set pixels that ends with this one; `endless` where it begins with the first layer.
@@ -165,6 +219,56 @@ TEST_F(ColumnHeights, AreThoseOfPixels) {
       if (l == volume.layers) continue;
       EXPECT_EQ(text_of(young.tall()), text_of(as_tall.layer(0)));
       EXPECT_EQ(text_of(tall.tall()), text_of(endless_tall.layer(0)));
+    }
+  }
+}
+
+/// Of material and of powder, where the height takes few layers and where it takes many.
+TEST_F(ColumnHeights, OfShortOnesAreThoseOfPixels) {
+  std::mt19937 random(10);
+  const PixelBox window{2, 21, 1, 10};
+  for (int k = 0; k < 120; ++k) {
+    const std::uint32_t layers = 16;
+    const Volume volume = moving_shapes(random, 23, 11, layers, k % 3 == 0 ? 0 : k % 3 == 1 ? 30 : 85);
+    const std::int64_t height_nm = k % 2 == 0 ? 1 + drawn(random, 60) : 100 + drawn(random, 100);
+    Volume powder = volume;
+    std::vector<Nm> bottom(1, 0);
+    for (std::uint32_t l = 0; l < layers; ++l) {
+      bottom.push_back(bottom.back() + 5 + static_cast<Nm>(drawn(random, 10)));
+      for (std::uint32_t i = 0; i < 253; ++i) {
+        const bool within = i % 23 >= window.left && i % 23 < window.right && i / 23 >= window.top && i / 23 < window.bottom;
+        powder.set[l * 253 + i] = within && volume.set[l * 253 + i] == 0 ? 1 : 0;
+      }
+    }
+    ShortSpans columns(height_nm);
+    for (std::uint32_t l = 0; l <= layers; ++l) {
+      SCOPED_TRACE(std::to_string(k) + " layer " + std::to_string(l));
+      const Layer layer{l, bottom[l], 1};
+      if (l < layers) {
+        columns.add(layer, volume.layer(l), powder.layer(l), window);
+      } else {
+        columns.finish(layer);
+      }
+      for (const bool set : {true, false}) {
+        if (l == layers && !set) continue;
+        const Volume& of = set ? volume : powder;
+        std::vector<std::int64_t> ended(253, -1), expected(253, -1);
+        for (std::uint32_t i = 0; i < 253; ++i) {
+          const std::int64_t below = l == 0 ? 0 : height(of, i % 23, i / 23, l - 1, !set);
+          if (of.at(i % 23, i / 23, l) || below == 0 || below > l) continue;
+          const std::int64_t first = l - below;
+          if (bottom[l] - bottom[static_cast<std::size_t>(first)] < height_nm) expected[i] = first;
+        }
+        std::uint32_t before = 0;
+        for (const ColumnSpan& span : set ? columns.solid() : columns.powder()) {
+          EXPECT_EQ(span.bottom, bottom[span.first_layer]);
+          EXPECT_GE(span.row * 23 + span.begin, before);
+          before = span.row * 23 + span.end;
+          for (std::uint32_t c = span.begin; c < span.end && bottom[l] - span.bottom < height_nm; ++c)
+            ended[span.row * 23 + c] = span.first_layer;
+        }
+        ASSERT_EQ(ended, expected) << (set ? "material" : "powder");
+      }
     }
   }
 }
