@@ -21,10 +21,20 @@ struct DropZone {
   std::uint8_t tile = 0;  // number of the tile
 };
 
+/// The pixels of a word of a core: those of the lowest value of an interval, and two that turn from a value on.
+struct CoreWord {
+  std::uint64_t bits = 0;
+  std::uint32_t turn[2] = {};
+  std::uint8_t bit[2] = {};
+};
+
 /// Pixels with column * column_step + row * row_step + first < threshold, modulo 2^32.
 struct CorePattern {
   std::uint32_t column_step = 0, row_step = 0, first = 0, threshold = 0;
   std::uint32_t of_row(std::uint32_t row) const { return row * row_step + first; }
+
+  Buffer<CoreWord> words;  // by the high bits of the value of their first pixel; empty before tabulate() (geometry/drop_rows.h)
+  std::uint32_t words_step = 0, words_threshold = 0;  // that they are of
 };
 
 struct DropPatterns {
@@ -35,7 +45,7 @@ struct DropPatterns {
   const std::uint64_t* tile_row(const DropZone& of, std::uint32_t row) const {
     return tile.data() + of.tile * std::size_t{kTileWords} + std::size_t{2} * (row % kTileSide);
   }
-  std::uint64_t bytes() const { return zone.capacity() * sizeof(DropZone) + bytes_held(tile); }
+  std::uint64_t bytes() const { return zone.capacity() * sizeof(DropZone) + bytes_held(tile) + bytes_held(core.words); }
 };
 
 /// Borrowed drops of one image. The level of a run is the number of its zone.

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "stages/dose/blue_noise.h"
+#include "stages/geometry/drop_rows.h"
 
 namespace lamina::dose {
 namespace {
@@ -72,8 +73,11 @@ void make_zones(std::span<const Drops24> drops, std::uint32_t layer, DropPattern
 
 void make_core(double share, std::uint32_t layer, DropPatterns& result) {
   result.tile.clear();
-  result.core = {2'654'435'769u, 1'300'411'463u, layer * 1'779'033'705u, core_threshold(share)};
-  const auto extra = result.core.threshold > 0 ? DropZone::Extra::kCore : DropZone::Extra::kNone;
+  CorePattern& core = result.core;
+  core.column_step = 2'654'435'769u, core.row_step = 1'300'411'463u;
+  core.first = layer * 1'779'033'705u, core.threshold = core_threshold(share);
+  tabulate(core);
+  const auto extra = core.threshold > 0 ? DropZone::Extra::kCore : DropZone::Extra::kNone;
   result.zone = {{}, {1, DropZone::Extra::kNone, 0}, {0, extra, 0}};
 }
 

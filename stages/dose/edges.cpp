@@ -5,167 +5,11 @@
 #include <numeric>
 
 #include "stages/geometry/combine.h"
-#include "stages/geometry/isa.h"
-#include "stages/geometry/targets.h"
 
 namespace lamina::dose {
 namespace {
 
 using Row = std::span<const std::uint32_t>;
-
-/// What rows leave of a piece of a row, each of which has one run over it. wide  how much shorter each makes it at both ends
-struct PieceEnds {
-  std::int32_t begin, end;
-};
-struct EdgeRows {
-  const std::int32_t *begin, *end, *wide;
-  std::size_t count;
-};
-LAMINA_BODY PieceEnds shrink_body(const EdgeRows& rows, PieceEnds piece) {
-  for (std::size_t k = 0; k < rows.count; ++k) {
-    piece.begin = std::max(piece.begin, rows.begin[k] + rows.wide[k]);
-    piece.end = std::min(piece.end, rows.end[k] - rows.wide[k]);
-  }
-  return piece;
-}
-PieceEnds shrink_plain(const EdgeRows& rows, PieceEnds piece) { return shrink_body(rows, piece); }
-#if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 PieceEnds shrink_avx2(const EdgeRows& rows, PieceEnds piece) { return shrink_body(rows, piece); }
-#endif
-auto shrink_kernel() {
-#if defined(LAMINA_WIDE_KERNELS)
-  if (widest_isa() >= Isa::kAvx2) return shrink_avx2;
-#endif
-  return shrink_plain;
-}
-
-/// Erosion of blocks of rows. All rows of a block have rows around them in common: a piece that is left by the runs of these,
-/// each made as much shorter as the farthest row of the block requires, is of one run of each. So for each row the ends of
-/// these runs are enough. Halves of a block, down to single rows, add the rows that they have in common and the block has not.
-class Eroder {
- public:
-  Eroder(const RunsView& image, const Reach& reach, Runs& result)
-      : image_(image), far_(static_cast<std::int64_t>(reach.half_width.size()) - 1), result_(result) {
-    for (std::int64_t j = -far_; j <= far_; ++j)
-      wide_.push_back(static_cast<std::int32_t>(reach.half_width[static_cast<std::size_t>(j < 0 ? -j : j)]));
-    levels_.resize(8);
-  }
-  void erode() {
-    const std::int64_t rows = image_.rows(), end = rows - far_;
-    result_.columns = image_.columns;
-    result_.row_offset.assign(1, 0);
-    result_.change.clear();
-    const std::int64_t block = std::clamp<std::int64_t>(far_, 1, 32);
-    for (std::int64_t r = far_; r < end; r += block) {
-      skip_to(r);
-      const std::int64_t last = std::min(r + block, end);
-      whole_.begin.assign(1, 0), whole_.end.assign(1, static_cast<std::int32_t>(image_.columns));
-      erode_block(0, r, last, last - 1 - far_, r + far_);
-    }
-    skip_to(rows);
-  }
-
- private:
-  struct Pieces {
-    std::vector<std::int32_t> begin, end;
-    std::vector<std::uint32_t> parent;  // of the level above
-    void clear() { begin.clear(), end.clear(), parent.clear(); }
-  };
-  struct Level {
-    Pieces pieces, next;
-    std::int64_t first = 0, count = 0;             // rows
-    std::vector<std::int32_t> run_begin, run_end;  // of each piece, row by row
-  };
-
-  void skip_to(std::int64_t row) {
-    while (static_cast<std::int64_t>(result_.row_offset.size()) <= row)
-      result_.row_offset.push_back(static_cast<std::uint32_t>(result_.change.size()));
-  }
-
-  /// The rows [begin, end), of which the rows first .. last are to be applied yet that all of them have in common.
-  void erode_block(std::size_t depth, std::int64_t begin, std::int64_t end, std::int64_t first, std::int64_t last) {
-    Level& level = levels_[depth];
-    const Pieces& above = depth == 0 ? whole_ : levels_[depth - 1].pieces;
-    level.pieces.begin = above.begin, level.pieces.end = above.end;
-    level.pieces.parent.resize(above.begin.size());
-    std::iota(level.pieces.parent.begin(), level.pieces.parent.end(), 0u);
-    level.first = first, level.count = last - first + 1;
-    // The farthest rows first: where they are empty, nothing else has to be read.
-    for (std::int64_t low = first, high = last; low <= high; ++low, --high) {
-      narrow(level, low, begin, end);
-      if (low < high) narrow(level, high, begin, end);
-      if (level.pieces.begin.empty()) return;
-    }
-    find_runs(level);
-    if (end - begin == 1) return put_row(depth, begin);
-    const std::int64_t middle = (begin + end) / 2;
-    erode_block(depth + 1, begin, middle, middle - 1 - far_, end - 2 - far_);
-    erode_block(depth + 1, middle, end, begin + far_ + 1, middle + far_);
-  }
-
-  /// Keeps of the pieces what a row leaves for the row of [begin, end) that is the farthest from it.
-  void narrow(Level& level, std::int64_t row, std::int64_t begin, std::int64_t end) {
-    const std::int64_t farthest = std::max(row - begin, end - 1 - row);
-    const std::int32_t width = wide_[static_cast<std::size_t>(far_ + farthest)];
-    const Row runs = image_.row(static_cast<std::uint32_t>(row));
-    const Pieces& kept = level.pieces;
-    level.next.clear();
-    std::size_t k = 0;
-    for (std::size_t i = 0; i + 1 < runs.size() && k < kept.begin.size(); i += 2) {
-      const std::int32_t from = static_cast<std::int32_t>(runs[i]) + width, to = static_cast<std::int32_t>(runs[i + 1]) - width;
-      if (from >= to) continue;
-      while (k < kept.begin.size() && kept.end[k] <= from) ++k;
-      for (std::size_t j = k; j < kept.begin.size() && kept.begin[j] < to; ++j) {
-        level.next.begin.push_back(std::max(from, kept.begin[j]));
-        level.next.end.push_back(std::min(to, kept.end[j]));
-        level.next.parent.push_back(kept.parent[j]);
-      }
-    }
-    std::swap(level.pieces, level.next);
-  }
-
-  void find_runs(Level& level) {
-    const auto count = static_cast<std::size_t>(level.count), pieces = level.pieces.begin.size();
-    level.run_begin.resize(pieces * count);
-    level.run_end.resize(pieces * count);
-    for (std::size_t s = 0; s < count; ++s) {
-      const Row runs = image_.row(static_cast<std::uint32_t>(level.first + static_cast<std::int64_t>(s)));
-      for (std::size_t p = 0, i = 0; p < pieces; ++p) {
-        while (static_cast<std::int32_t>(runs[i + 1]) <= level.pieces.begin[p]) i += 2;
-        level.run_begin[p * count + s] = static_cast<std::int32_t>(runs[i]);
-        level.run_end[p * count + s] = static_cast<std::int32_t>(runs[i + 1]);
-      }
-    }
-  }
-
-  void put_row(std::size_t depth, std::int64_t row) {
-    skip_to(row);
-    const Level& own = levels_[depth];
-    for (std::size_t p = 0; p < own.pieces.begin.size(); ++p) {
-      PieceEnds piece{own.pieces.begin[p], own.pieces.end[p]};
-      std::size_t of = p;
-      for (std::size_t d = depth + 1; d-- > 0;) {
-        const Level& level = levels_[d];
-        const auto count = static_cast<std::size_t>(level.count);
-        piece = shrink_({level.run_begin.data() + of * count, level.run_end.data() + of * count,
-                         wide_.data() + (level.first - row + far_), count},
-                        piece);
-        of = level.pieces.parent[of];
-      }
-      if (piece.begin >= piece.end) continue;
-      result_.change.push_back(static_cast<std::uint32_t>(piece.begin));
-      result_.change.push_back(static_cast<std::uint32_t>(piece.end));
-    }
-  }
-
-  RunsView image_;
-  std::int64_t far_;
-  Runs& result_;
-  std::vector<std::int32_t> wide_;  // of the rows -far .. far
-  Pieces whole_;
-  std::vector<Level> levels_;  // of halves of halves
-  PieceEnds (*shrink_)(const EdgeRows&, PieceEnds) = shrink_kernel();
-};
 
 /// Appends [begin, end) to runs whose begins rise; joins what touches.
 void append(std::uint32_t begin, std::uint32_t end, Buffer<std::uint32_t>& runs) {
@@ -271,13 +115,6 @@ Reach reach_of(const PixelGrid& grid, std::int64_t x_nm, std::int64_t y_nm) {
     reach.half_width.push_back(static_cast<std::uint32_t>(width));
   }
   return reach;
-}
-
-void erode(const RunsView& image, const Reach& reach, Runs& result) {
-  if (!reach.half_width.empty()) return Eroder(image, reach, result).erode();
-  result.columns = image.columns;
-  result.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
-  result.change.assign(image.change.begin(), image.change.end());
 }
 
 void dilate(const RunsView& image, const Reach& reach, Runs& result) {

@@ -4,6 +4,9 @@
 #include <bit>
 #include <cstring>
 
+#include "stages/geometry/isa.h"
+#include "stages/geometry/targets.h"
+
 namespace lamina {
 namespace {
 
@@ -15,13 +18,27 @@ std::uint64_t load_word(const std::byte* at, std::size_t bytes) {
 }
 
 /// Swaps the bits of each byte, first and last.
-std::uint64_t turn_bytes(std::uint64_t word) {
+LAMINA_BODY std::uint64_t turn_bytes(std::uint64_t word) {
   word = (word & 0xF0F0F0F0F0F0F0F0) >> 4 | (word & 0x0F0F0F0F0F0F0F0F) << 4;
   word = (word & 0xCCCCCCCCCCCCCCCC) >> 2 | (word & 0x3333333333333333) << 2;
   return (word & 0xAAAAAAAAAAAAAAAA) >> 1 | (word & 0x5555555555555555) << 1;
 }
 
 std::uint64_t turn_word(std::uint64_t word) { return turn_bytes(__builtin_bswap64(word)); }
+
+/// Sets the bits first .. last of a row.
+void set_run(std::uint32_t first, std::uint32_t last, std::byte* bytes) {
+  const std::size_t first_byte = first / 8, last_byte = last / 8;
+  const auto head = static_cast<std::byte>(0xFFu >> (first & 7));
+  const auto tail = static_cast<std::byte>(0xFF00u >> ((last & 7) + 1));
+  if (first_byte == last_byte) {
+    bytes[first_byte] |= head & tail;
+    return;
+  }
+  bytes[first_byte] |= head;
+  bytes[last_byte] |= tail;
+  std::memset(bytes + first_byte + 1, 0xFF, last_byte - first_byte - 1);
+}
 
 /// Changes of a row of words, with the pixel before the first one clear. returns  one past the last one written
 std::uint32_t* put_changes(std::span<const std::uint64_t> words, std::uint32_t columns, std::uint32_t* next) {
@@ -39,24 +56,37 @@ std::uint32_t* put_changes(std::span<const std::uint64_t> words, std::uint32_t c
   return next;
 }
 
+LAMINA_BODY void bits_body(std::span<const std::uint64_t> words, std::span<std::byte> row) {
+  const std::uint64_t* from = words.data();
+  std::byte *to = row.data(), *const whole = to + row.size() / 8 * 8;
+  const auto word_of = [](std::uint64_t word) {
+    word = turn_bytes(word);
+    return std::endian::native == std::endian::big ? __builtin_bswap64(word) : word;
+  };
+  for (; to < whole; to += 8) {
+    const std::uint64_t word = word_of(*from++);
+    std::memcpy(to, &word, sizeof word);
+  }
+  if (row.size() % 8 == 0) return;
+  const std::uint64_t word = word_of(*from);
+  std::memcpy(to, &word, row.size() % 8);
+}
+void bits_plain(std::span<const std::uint64_t> words, std::span<std::byte> row) { bits_body(words, row); }
+#if defined(LAMINA_WIDE_KERNELS)
+LAMINA_AVX2 void bits_avx2(std::span<const std::uint64_t> words, std::span<std::byte> row) { bits_body(words, row); }
+#endif
+auto bits_kernel() {
+#if defined(LAMINA_WIDE_KERNELS)
+  if (widest_isa() >= Isa::kAvx2) return bits_avx2;
+#endif
+  return bits_plain;
+}
+
 }  // namespace
 
 void expand_row(std::span<const std::uint32_t> change, std::span<std::byte> row) {
-  std::byte* const bytes = row.data();
-  std::memset(bytes, 0, row.size());
-  for (std::size_t i = 0; i + 1 < change.size(); i += 2) {
-    const std::uint32_t begin = change[i], last = change[i + 1] - 1;
-    const std::size_t first_byte = begin / 8, last_byte = last / 8;
-    const auto head = static_cast<std::byte>(0xFFu >> (begin & 7));
-    const auto tail = static_cast<std::byte>(0xFF00u >> ((last & 7) + 1));
-    if (first_byte == last_byte) {
-      bytes[first_byte] |= head & tail;
-      continue;
-    }
-    bytes[first_byte] |= head;
-    bytes[last_byte] |= tail;
-    std::memset(bytes + first_byte + 1, 0xFF, last_byte - first_byte - 1);
-  }
+  std::memset(row.data(), 0, row.size());
+  for (std::size_t i = 0; i + 1 < change.size(); i += 2) set_run(change[i], change[i + 1] - 1, row.data());
 }
 
 void add_runs(std::span<const std::uint32_t> change, std::span<std::uint64_t> words) {
@@ -73,13 +103,7 @@ void add_runs(std::span<const std::uint32_t> change, std::span<std::uint64_t> wo
   }
 }
 
-void bits_of_words(std::span<const std::uint64_t> words, std::span<std::byte> row) {
-  for (std::size_t at = 0; at < row.size(); at += 8) {
-    std::uint64_t word = turn_bytes(words[at / 8]);
-    if constexpr (std::endian::native == std::endian::big) word = __builtin_bswap64(word);
-    std::memcpy(row.data() + at, &word, std::min<std::size_t>(8, row.size() - at));
-  }
-}
+void bits_of_words(std::span<const std::uint64_t> words, std::span<std::byte> row) { bits_kernel()(words, row); }
 
 void words_of_bits(std::span<const std::byte> row, std::uint32_t columns, std::uint64_t flip, std::span<std::uint64_t> words) {
   const std::size_t bytes = row_bytes(columns);
@@ -112,6 +136,28 @@ void RowBits::put(std::uint32_t number, std::span<std::byte> row) {
   if (bits_ == nullptr) return expand_row(runs_.row(number), row);
   bits_->row(number, words_);
   bits_of_words(words_, row);
+}
+
+void RowBits::put_set(std::uint32_t number, std::span<std::byte> row, Buffer<RowSpan>& spans) {
+  constexpr std::size_t kNear = 32;  // bytes: spans that are nearer are one
+  if (bits_ == nullptr) {
+    const std::span<const std::uint32_t> change = runs_.row(number);
+    const std::size_t before = spans.size();
+    for (std::size_t i = 0; i + 1 < change.size(); i += 2) {
+      const std::uint32_t begin = change[i], last = change[i + 1] - 1;
+      set_run(begin, last, row.data());
+      if (spans.size() == before || spans.back().end + kNear < begin / 8) spans.push_back({begin / 8, 0});
+      spans.back().end = std::size_t{last} / 8 + 1;
+    }
+    return;
+  }
+  set_.clear();
+  bits_->set_words(number, words_, set_);
+  for (const RowSpan& words : set_) {
+    const RowSpan bytes{8 * words.begin, std::min(8 * words.end, row.size())};
+    bits_of_words(std::span(words_).subspan(words.begin), row.subspan(bytes.begin, bytes.end - bytes.begin));
+    spans.push_back(bytes);
+  }
 }
 
 PixelCounts counts_of(const BitRows& image) {

@@ -73,6 +73,8 @@ class RowBits {
 
   /// row  row_bytes(columns) bytes
   void put(std::uint32_t number, std::span<std::byte> row);
+  /// The same of a row whose bytes are 0. Appends the spans of bytes in which bits may be set, in order and apart.
+  void put_set(std::uint32_t number, std::span<std::byte> row, Buffer<RowSpan>& spans);
 
   const std::uint32_t columns, rows;
 
@@ -80,6 +82,7 @@ class RowBits {
   RunsView runs_;
   const BitRows* bits_ = nullptr;
   Buffer<std::uint64_t> words_;
+  Buffer<RowSpan> set_;
 };
 
 PixelCounts counts_of(const BitRows& image);

@@ -1,11 +1,8 @@
 #include "stages/geometry/drop_rows.h"
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "stages/geometry/isa.h"
 #include "stages/geometry/targets.h"
@@ -13,143 +10,133 @@
 namespace lamina {
 namespace {
 
-/// A piece of a row of a core: bits [begin, end), of which bit b has the value first + b * step.
-struct CoreTask {
-  std::uint64_t begin, end;
-  std::uint32_t first, step, threshold;
-};
-
-struct CoreRow {
-  std::uint64_t* words;
-  std::size_t stride;
-  std::uint64_t allowed;
-};
+// The values of a word's first pixel are sorted into intervals, in which at most two bits of the word turn: between bits that
+// pass the threshold, as between those that pass 0, multiples of the step are farther apart than an interval.
+constexpr unsigned kCoreBits = 9;
+constexpr std::uint32_t kCoreInterval = 1u << (32 - kCoreBits);
 
 /// Bit i: whether value + i * step is below the threshold.
-LAMINA_BODY std::uint64_t core_word(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
+std::uint64_t core_bits(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
   std::uint64_t bits = 0;
   for (std::uint32_t i = 0; i < 64; ++i, value += step) bits |= std::uint64_t{value < threshold} << i;
   return bits;
 }
 
-#if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 inline std::uint64_t core_word_avx2(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
-  const __m256i sign = _mm256_set1_epi32(INT32_MIN);
-  const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-  __m256i values = _mm256_add_epi32(_mm256_mullo_epi32(lane, _mm256_set1_epi32(static_cast<int>(step))),
-                                    _mm256_set1_epi32(static_cast<int>(value)));
-  const __m256i limit = _mm256_xor_si256(_mm256_set1_epi32(static_cast<int>(threshold)), sign),
-                by = _mm256_set1_epi32(static_cast<int>(8 * step));
-  std::uint64_t bits = 0;
-  for (int i = 0; i < 64; i += 8) {
-    const __m256i below = _mm256_cmpgt_epi32(limit, _mm256_xor_si256(values, sign));
-    bits |= std::uint64_t{static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(below)))} << i;
-    values = _mm256_add_epi32(values, by);
-  }
-  return bits;
+LAMINA_BODY std::uint64_t core_word(const CorePattern& core, std::uint32_t value) {
+  if (core.words.empty()) return core_bits(value, core.column_step, core.threshold);
+  const CoreWord& of = core.words[value / kCoreInterval];
+  const std::uint64_t first = value >= of.turn[0] ? 1 : 0, second = value >= of.turn[1] ? 1 : 0;
+  return of.bits ^ first << of.bit[0] ^ second << of.bit[1];
 }
 
-LAMINA_AVX512_BEGIN
-LAMINA_AVX512 inline std::uint64_t core_word_avx512(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
-  const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  __m512i values = _mm512_add_epi32(_mm512_mullo_epi32(lane, _mm512_set1_epi32(static_cast<int>(step))),
-                                    _mm512_set1_epi32(static_cast<int>(value)));
-  const __m512i limit = _mm512_set1_epi32(static_cast<int>(threshold)), by = _mm512_set1_epi32(static_cast<int>(16 * step));
-  std::uint64_t bits = 0;
-  for (int i = 0; i < 64; i += 16) {
-    bits |= std::uint64_t{_mm512_cmplt_epu32_mask(values, limit)} << i;
-    values = _mm512_add_epi32(values, by);
+/// Calls take(word, bits) for the words of the bits [begin, end) of a row, of which bit b has the value first + b * column_step.
+template <class Take>
+LAMINA_BODY void for_core_words(const CorePattern& core, std::uint64_t begin, std::uint64_t end, std::uint32_t first, Take take) {
+  const std::uint64_t last = (end - 1) / 64;
+  const std::uint32_t step = 64 * core.column_step;
+  std::uint64_t word = begin / 64, mask = ~std::uint64_t{0} << (begin % 64);
+  for (std::uint32_t value = first + static_cast<std::uint32_t>(word) * step; word < last; ++word, value += step) {
+    take(word, core_word(core, value) & mask);
+    mask = ~std::uint64_t{0};
   }
-  return bits;
-}
-LAMINA_AVX512_END
-#endif
-
-/// Calls take(word, bits) for the words of a piece.
-template <class Word, class Take>
-LAMINA_BODY void for_core_words(const CoreTask& task, Word word_of, Take take) {
-  const std::uint64_t first = task.begin / 64, last = (task.end - 1) / 64;
-  const std::uint64_t head = ~std::uint64_t{0} << (task.begin % 64), tail = ~std::uint64_t{0} >> (63 - (task.end - 1) % 64);
-  for (std::uint64_t word = first; word <= last; ++word) {
-    std::uint64_t bits = word_of(task.first + static_cast<std::uint32_t>(64 * word) * task.step, task.step, task.threshold);
-    if (word == first) bits &= head;
-    if (word == last) bits &= tail;
-    take(word, bits);
-  }
+  mask &= ~std::uint64_t{0} >> (63 - (end - 1) % 64);
+  take(last, core_word(core, first + static_cast<std::uint32_t>(last) * step) & mask);
 }
 
-template <class Word>
-LAMINA_BODY void set_body(const CoreTask& task, const CoreRow& row, Word word_of) {
-  for_core_words(task, word_of,
-                 [&](std::uint64_t word, std::uint64_t bits) { row.words[word * row.stride] |= bits & row.allowed; });
-}
-template <class Word>
-LAMINA_BODY std::uint64_t count_body(const CoreTask& task, Word word_of) {
+LAMINA_BODY std::uint64_t count_body(const CorePattern& core, std::uint64_t begin, std::uint64_t end, std::uint32_t first) {
   std::uint64_t count = 0;
-  for_core_words(task, word_of,
+  for_core_words(core, begin, end, first,
                  [&](std::uint64_t, std::uint64_t bits) { count += static_cast<std::uint64_t>(std::popcount(bits)); });
   return count;
 }
-
-struct CoreKernels {
-  void (*set)(const CoreTask&, const CoreRow&);
-  std::uint64_t (*count)(const CoreTask&);
-  std::uint64_t (*word)(std::uint32_t, std::uint32_t, std::uint32_t);
-};
-
-std::uint64_t word_plain(std::uint32_t value, std::uint32_t step, std::uint32_t threshold) {
-  return core_word(value, step, threshold);
+std::uint64_t count_plain(const CorePattern& core, std::uint64_t begin, std::uint64_t end, std::uint32_t first) {
+  return count_body(core, begin, end, first);
 }
-void set_plain(const CoreTask& task, const CoreRow& row) { set_body(task, row, word_plain); }
-std::uint64_t count_plain(const CoreTask& task) { return count_body(task, word_plain); }
 #if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 void set_avx2(const CoreTask& task, const CoreRow& row) { set_body(task, row, core_word_avx2); }
-LAMINA_AVX2 std::uint64_t count_avx2(const CoreTask& task) { return count_body(task, core_word_avx2); }
-LAMINA_AVX512 void set_avx512(const CoreTask& task, const CoreRow& row) { set_body(task, row, core_word_avx512); }
-LAMINA_AVX512 std::uint64_t count_avx512(const CoreTask& task) { return count_body(task, core_word_avx512); }
+LAMINA_AVX2 std::uint64_t count_avx2(const CorePattern& core, std::uint64_t begin, std::uint64_t end, std::uint32_t first) {
+  return count_body(core, begin, end, first);
+}
 #endif
-
-const CoreKernels& core_kernels() {
-  static const CoreKernels kKernels = [] {
+auto count_kernel() {
 #if defined(LAMINA_WIDE_KERNELS)
-    if (widest_isa() == Isa::kAvx512) return CoreKernels{set_avx512, count_avx512, core_word_avx512};
-    if (widest_isa() == Isa::kAvx2) return CoreKernels{set_avx2, count_avx2, core_word_avx2};
+  if (widest_isa() >= Isa::kAvx2) return count_avx2;
 #endif
-    return CoreKernels{set_plain, count_plain, word_plain};
-  }();
-  return kKernels;
+  return count_plain;
 }
 
 }  // namespace
 
-void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, std::uint32_t step,
-              std::uint32_t threshold, std::uint64_t allowed, std::size_t stride) {
-  if (begin < end) core_kernels().set({begin, end, first, step, threshold}, {row, stride, allowed});
+void tabulate(CorePattern& core) {
+  if (!core.words.empty() && core.words_step == core.column_step && core.words_threshold == core.threshold) return;
+  core.words_step = core.column_step, core.words_threshold = core.threshold;
+  core.words.resize(std::size_t{1} << kCoreBits);
+  for (std::uint32_t i = 0; i < core.words.size(); ++i) {
+    const std::uint32_t first = i * kCoreInterval, last = first + (kCoreInterval - 1);
+    CoreWord& word = core.words[i];
+    word = {core_bits(first, core.column_step, core.threshold), {first, first}, {0, 0}};
+    std::size_t turns = 0;
+    for (std::uint32_t bit = 0; bit < 64; ++bit) {
+      for (const std::uint32_t at : {0 - bit * core.column_step, core.threshold - bit * core.column_step}) {
+        if (at <= first || at > last) continue;
+        if (turns == 2) return core.words.clear();  // a step of other multiples: no table
+        word.turn[turns] = at, word.bit[turns++] = static_cast<std::uint8_t>(bit);
+      }
+    }
+    if (turns == 1) word.bits ^= 1;  // the other one always turns bit 0
+  }
+}
+
+void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, const CorePattern& core,
+              std::uint64_t allowed, std::size_t stride) {
+  if (begin >= end) return;
+  for_core_words(core, begin, end, first,
+                 [&](std::uint64_t word, std::uint64_t bits) { row[word * stride] |= bits & allowed; });
 }
 
 std::uint64_t extra_bits(const DropPatterns& patterns, const DropZone& zone, std::uint32_t row, std::uint32_t word) {
   if (zone.extra == DropZone::Extra::kNone) return 0;
   if (zone.extra == DropZone::Extra::kTile) return patterns.tile_row(zone, row)[word % 2];
   const CorePattern& core = patterns.core;
-  return core_kernels().word(core.of_row(row) + 64 * word * core.column_step, core.column_step, core.threshold);
+  return core_word(core, core.of_row(row) + 64 * word * core.column_step);
+}
+
+/// Sets the bits of a run of a zone.
+void DropPlane::add(const DropZone& zone, std::uint32_t row, std::uint32_t begin, std::uint32_t end,
+                    std::uint64_t* words) const {
+  const DropPatterns& patterns = *image_.patterns;
+  if (zone.base > drop_) {
+    set_pattern(words, begin, end, ~std::uint64_t{0}, ~std::uint64_t{0});
+  } else if (zone.base == drop_ && zone.extra == DropZone::Extra::kTile) {
+    const std::uint64_t* const tile = patterns.tile_row(zone, row);
+    set_pattern(words, begin, end, tile[0], tile[1]);
+  } else if (zone.base == drop_ && zone.extra == DropZone::Extra::kCore) {
+    const CorePattern& core = patterns.core;
+    set_core(words, begin, end, core.of_row(row), core, ~std::uint64_t{0});
+  }
 }
 
 void DropPlane::row(std::uint32_t number, std::span<std::uint64_t> words) const {
   const LevelsView& zones = image_.zones;
-  const DropPatterns& patterns = *image_.patterns;
   std::ranges::fill(words, 0);
-  for (std::uint32_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i) {
-    const DropZone& zone = patterns.zone[zones.level[i]];
-    const std::uint32_t begin = zones.change[2 * std::size_t{i}], end = zones.change[2 * std::size_t{i} + 1];
-    if (zone.base > drop_) {
-      set_pattern(words.data(), begin, end, ~std::uint64_t{0}, ~std::uint64_t{0});
-    } else if (zone.base == drop_ && zone.extra == DropZone::Extra::kTile) {
-      const std::uint64_t* const tile = patterns.tile_row(zone, number);
-      set_pattern(words.data(), begin, end, tile[0], tile[1]);
-    } else if (zone.base == drop_ && zone.extra == DropZone::Extra::kCore) {
-      const CorePattern& core = patterns.core;
-      set_core(words.data(), begin, end, core.of_row(number), core.column_step, core.threshold, ~std::uint64_t{0});
+  for (std::size_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i)
+    add(image_.patterns->zone[zones.level[i]], number, zones.change[2 * i], zones.change[2 * i + 1], words.data());
+}
+
+void DropPlane::set_words(std::uint32_t number, std::span<std::uint64_t> words, Buffer<RowSpan>& spans) const {
+  constexpr std::size_t kNear = 4;  // spans that are nearer are one
+  const LevelsView& zones = image_.zones;
+  const std::size_t before = spans.size();
+  for (std::size_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i) {
+    const std::uint32_t begin = zones.change[2 * i], end = zones.change[2 * i + 1];
+    std::size_t first = begin / 64;
+    const std::size_t last = std::size_t{end - 1} / 64 + 1;
+    if (spans.size() > before && spans.back().end + kNear >= first) {
+      first = std::exchange(spans.back().end, last);
+    } else {
+      spans.push_back({first, last});
     }
+    std::fill(words.begin() + static_cast<std::ptrdiff_t>(first), words.begin() + static_cast<std::ptrdiff_t>(last), 0);
+    add(image_.patterns->zone[zones.level[i]], number, begin, end, words.data());
   }
 }
 
@@ -266,7 +253,7 @@ std::uint64_t DropCounter::extra(std::uint8_t zone, std::uint32_t row, std::uint
   if (of.extra == DropZone::Extra::kNone || begin >= end) return 0;
   if (of.extra == DropZone::Extra::kCore) {
     const CorePattern& core = patterns_->core;
-    return core_kernels().count({begin, end, core.of_row(row), core.column_step, core.threshold});
+    return count_kernel()(core, begin, end, core.of_row(row));
   }
   const std::uint8_t* const before = before_.data() + (of.tile * std::size_t{kTileSide} + row % kTileSide) * kRow;
   const auto up_to = [&](std::uint32_t column) {

@@ -30,10 +30,12 @@ inline void set_pattern(std::uint64_t* row, std::uint64_t begin, std::uint64_t e
   row[last * stride] |= tail & of(last);
 }
 
-/// Sets the bits b of [begin, end) with first + b * step < threshold, modulo 2^32, where `allowed` has bit b % 64.
-/// cost  64 comparisons a word
-void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, std::uint32_t step,
-              std::uint32_t threshold, std::uint64_t allowed, std::size_t stride = 1);
+/// Makes the table of the pattern's words, unless it is of them: few operations a word then, in place of 64 comparisons.
+void tabulate(CorePattern& core);
+
+/// Sets the bits b of [begin, end) with first + b * column_step < threshold, modulo 2^32, where `allowed` has bit b % 64.
+void set_core(std::uint64_t* row, std::uint64_t begin, std::uint64_t end, std::uint32_t first, const CorePattern& core,
+              std::uint64_t allowed, std::size_t stride = 1);
 
 /// The bits of the 64 pixels from column 64 x word on that get a drop more than the base of their zone.
 std::uint64_t extra_bits(const DropPatterns& patterns, const DropZone& zone, std::uint32_t row, std::uint32_t word);
@@ -45,8 +47,11 @@ class DropPlane final : public BitRows {
   std::uint32_t columns() const override { return image_.zones.columns; }
   std::uint32_t rows() const override { return image_.zones.rows(); }
   void row(std::uint32_t number, std::span<std::uint64_t> words) const override;
+  void set_words(std::uint32_t number, std::span<std::uint64_t> words, Buffer<RowSpan>& spans) const override;
 
  private:
+  void add(const DropZone& zone, std::uint32_t row, std::uint32_t begin, std::uint32_t end, std::uint64_t* words) const;
+
   DropImageView image_;
   std::uint32_t drop_;
 };

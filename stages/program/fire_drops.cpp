@@ -179,7 +179,7 @@ class DropSweep {
     }
     const CorePattern& core = line.patterns->core;
     const std::uint32_t first = core.of_row(line.row) - static_cast<std::uint32_t>(shift) * core.column_step;
-    set_core(row, begin, end, first, core.column_step, core.threshold, allowed, 64);
+    set_core(row, begin, end, first, core, allowed, 64);
   }
 
   /// Which nozzles of a word fire at steps of a residue.

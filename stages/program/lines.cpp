@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/geometry/drop_rows.h"
+
 namespace lamina::program {
 namespace {
 
@@ -109,6 +111,7 @@ void turn(const HeadGrid& grid, const DropPatterns& patterns, bool swapped, bool
   };
   if (grid.lines_from_end) reverse(core.row_step, grid.lines);
   if (positions_reversed) reverse(core.column_step, grid.positions);
+  if (!core.words.empty()) tabulate(core);
 }
 
 }  // namespace

@@ -159,6 +159,29 @@ TEST(Saturate, TheShareOfSetPixelsIsTheRequestedOneWithinATenthOfAPercent) {
   }
 }
 
+// Shares whose pixels begin and end at one value in pairs, and steps of turned images, with and without a table.
+TEST(Saturate, WordsOfTheTableAreThoseOfEachPixel) {
+  Random random(8);
+  for (const double share : {0.0, 1e-9, 0.0137, 0.381966011, 0.5, 0.6180339887, 0.93, 1.0}) {
+    for (const std::uint32_t step : {2'654'435'769u, 0u - 2'654'435'769u, 1'300'411'463u, 0u - 1'300'411'463u, 1u << 20}) {
+      DropPatterns patterns;
+      CorePattern& core = patterns.core;
+      core.column_step = step, core.row_step = 1, core.threshold = core_threshold(share);
+      const DropZone zone{0, DropZone::Extra::kCore, 0};
+      tabulate(core);
+      EXPECT_EQ(core.words.empty(), step == 1u << 20);
+      for (std::uint32_t i = 0; i < 3000; ++i) {
+        // At and next to the values from which on a pixel turns, and anywhere.
+        const std::uint32_t bit = i % 64, near = i / 64 % 4 - 2, at = i % 2 != 0 ? core.threshold : 0;
+        core.first = i < 1000 ? at - bit * step + near : static_cast<std::uint32_t>(random());
+        std::uint64_t expected = 0;
+        for (std::uint32_t c = 0; c < 64; ++c) expected |= std::uint64_t{core.first + c * step < core.threshold} << c;
+        ASSERT_EQ(extra_bits(patterns, zone, 0, 0), expected) << share << " " << step << " " << core.first;
+      }
+    }
+  }
+}
+
 TEST(Saturate, NoPixelColumnIsAStreakInAnyDirection) {
   for (const double share : {0.2, 0.5, 0.7}) {
     const std::uint32_t threshold = core_threshold(share);

@@ -14,6 +14,7 @@
 #include "stages/dose/dither.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
+#include "stages/geometry/bits.h"
 #include "stages/geometry/drop_rows.h"
 #include "stages/support/hash/hash.h"
 #include "tests/dose/void_and_cluster.h"
@@ -65,6 +66,26 @@ Levels dithered(const RunsView& image, Drops24 drops, std::uint32_t layer) {
   return drops_of_pixels(zones, table, layer);
 }
 
+/// The bytes of rows that are written where they may be set, of which no span touches another.
+void expect_set_bytes(const DropPlane& rows, RowBits image) {
+  RowBits all(rows);
+  for (std::uint32_t r = 0; r < rows.rows(); ++r) {
+    std::vector<std::byte> set(row_bytes(rows.columns())), whole(set.size());
+    Buffer<RowSpan> spans;
+    image.put_set(r, set, spans);
+    all.put(r, whole);
+    EXPECT_EQ(set, whole);
+    std::size_t next = 0;
+    for (const RowSpan& of : spans) {
+      EXPECT_LT(of.begin, of.end);
+      EXPECT_TRUE(std::all_of(set.data() + next, set.data() + of.begin, [](std::byte byte) { return byte == std::byte{0}; }));
+      next = of.end;
+    }
+    EXPECT_LE(next, set.size());
+    EXPECT_TRUE(std::all_of(set.data() + next, set.data() + set.size(), [](std::byte byte) { return byte == std::byte{0}; }));
+  }
+}
+
 /// Rows of words, runs and counts of a drop image, against the drops of its pixels.
 void expect_rows_and_counts(const DropImageView& image, const Levels& levels, std::uint32_t maximum) {
   DropCounter counter;
@@ -89,7 +110,14 @@ void expect_rows_and_counts(const DropImageView& image, const Levels& levels, st
         set_pattern(same.data(), row[k], row[k + 1], ~std::uint64_t{0}, ~std::uint64_t{0});
       rows.row(r, words);
       EXPECT_EQ(words, same);
+      std::vector<std::uint64_t> written(words.size(), 7), set(words.size(), 0);
+      Buffer<RowSpan> spans;
+      rows.set_words(r, written, spans);
+      for (const RowSpan& of : spans) std::copy(&written[of.begin], written.data() + of.end, &set[of.begin]);
+      EXPECT_EQ(set, same);
     }
+    expect_set_bytes(rows, rows);
+    expect_set_bytes(rows, plane.view());
   }
   for (std::uint32_t row = 0; row < image.zones.rows(); ++row) {
     for (std::size_t i = image.zones.row_offset[row]; i < image.zones.row_offset[row + 1]; ++i) {

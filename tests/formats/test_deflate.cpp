@@ -60,7 +60,12 @@ TEST(DitherDeflate, AnyBytesComeBackWithinTheBound) {
                               : '\xFF';
       }
       std::vector<std::byte> out(deflate.bound(bytes) + 16, std::byte{0xA5});
-      const std::size_t made = deflate.compress(std::as_bytes(std::span(text)), out.data());
+      std::vector<RowSpan> set{{0, bytes}};
+      if (kind == 4) {
+        set.clear();
+        for (std::size_t at = 0; at < bytes; at += 600) set.push_back({at, std::min(bytes, at + 300)});
+      }
+      const std::size_t made = deflate.compress(std::as_bytes(std::span(text)), 41, set, out.data());
       ASSERT_LE(made, deflate.bound(bytes));
       EXPECT_EQ(out[deflate.bound(bytes)], std::byte{0xA5});
       EXPECT_TRUE(expanded(std::span(out).first(made), bytes) == text) << bytes << " bytes of kind " << kind;
@@ -88,7 +93,7 @@ TEST(DitherDeflate, DitheredImagesAreReadAgainAndSmall) {
       EXPECT_TRUE(image->runs.row_offset == runs.row_offset && image->runs.change == runs.change) << columns << core;
       if (columns < 3000) continue;
       ASSERT_TRUE(formats::find_image_format("tiff-g4")->make_encoder()->encode(runs, 600, 300, g4).ok());
-      EXPECT_LT(file.size(), g4.size() / (core ? 3 : 6));
+      EXPECT_LT(file.size(), g4.size() / (core ? 12 : 6));
     }
   }
 }

@@ -410,21 +410,29 @@ class DeflateEncoder : public RowEncoder {
     if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
     const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
     file.resize(file.capacity());
+    strip_.assign(frame.stride * frame.rows_per_strip, std::byte{0});
+    packed_.resize(DitherDeflate::bound(strip_.size()));
     return write_file(file, frame, text_, [&](TIFF* tiff) {
-      strip_.resize(frame.stride * frame.rows_per_strip);
-      packed_.resize(DitherDeflate::bound(strip_.size()));
-      return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
-        for (std::uint32_t row = begin; row < end; ++row)
-          image.put(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
-        return std::span(packed_).first(
-            deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
+return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
+        set_.clear();
+        for (std::uint32_t row = begin; row < end; ++row) put_row(image, row, frame.stride * (row - begin), frame.stride);
+        const std::size_t length = deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), frame.stride, set_, packed_.data());
+        for (const RowSpan& set : set_) std::memset(strip_.data() + set.begin, 0, set.end - set.begin);
+        return std::span(packed_).first(length);
       });
     });
+  }
+  /// at  offset of the row in the strip
+  void put_row(RowBits& image, std::uint32_t row, std::size_t at, std::size_t stride) {
+    const std::size_t before = set_.size();
+    image.put_set(row, std::span(strip_).subspan(at, stride), set_);
+    for (RowSpan& set : std::span(set_).subspan(before)) set.begin += at, set.end += at;
   }
 
   LayerText text_;
   DitherDeflate deflate_;
   Bytes strip_, packed_;
+  Buffer<RowSpan> set_;  // of the strip, where it is not 0
 };
 
 }  // namespace
