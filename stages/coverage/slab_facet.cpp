@@ -126,6 +126,7 @@ void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& ro
   piece.facet = index;
   piece.edgewise = facet.edgewise;
   piece.suspect = facet.suspect;
+  piece.level = facet.facet.a.z == facet.facet.b.z && facet.facet.a.z == facet.facet.c.z;
   const auto append = [&] {
     piece.first_row = rows.at(piece.from_y + piece.low - kSlack);
     piece.last_row = rows.at(piece.from_y + piece.high + kSlack);

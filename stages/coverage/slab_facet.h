@@ -154,6 +154,7 @@ struct Trapezoid {
   std::uint32_t facet;                // its index in the layer
   std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included
   bool edgewise, suspect;             // as SlabFacet has them
+  bool level;                         // horizontal
 };
 
 /// Appends the trapezoids of a facet, up to one less than it has corners, from the highest down; one without height if the

@@ -45,6 +45,7 @@ LAMINA_LANES std::uint32_t mark_columns(const Trapezoid& piece, const ColumnReac
   cells.held().mark(first, last);
   if (!piece.edgewise) cells.summed().mark(first, last);
   if (piece.suspect) cells.suspect().mark(first, last);
+  if (!piece.level) cells.sloped().mark(first, last);
   return last - first + 1;
 }
 
