@@ -56,6 +56,7 @@ void make_tile(std::uint32_t fraction, std::uint32_t layer, std::uint64_t* bits)
 
 void make_zones(std::span<const Drops24> drops, std::uint32_t layer, DropPatterns& result) {
   result.zone.assign(drops.size(), DropZone());
+  result.edges_alone = false;
   std::size_t tiles = 0;
   for (std::size_t level = 1; level < drops.size(); ++level) {
     DropZone& zone = result.zone[level];
@@ -72,6 +73,7 @@ void make_zones(std::span<const Drops24> drops, std::uint32_t layer, DropPattern
 
 void make_core(double share, std::uint32_t layer, DropPatterns& result) {
   result.tile.clear();
+  result.edges_alone = false;
   result.core = {2'654'435'769u, 1'300'411'463u, layer * 1'779'033'705u, core_threshold(share)};
   const auto extra = result.core.threshold > 0 ? DropZone::Extra::kCore : DropZone::Extra::kNone;
   result.zone = {{}, {1, DropZone::Extra::kNone, 0}, {0, extra, 0}};

@@ -45,6 +45,8 @@ class DropPlane final : public BitRows {
   std::uint32_t columns() const override { return image_.zones.columns; }
   std::uint32_t rows() const override { return image_.zones.rows(); }
   void row(std::uint32_t number, std::span<std::uint64_t> words) const override;
+  bool has_spans() const override { return image_.patterns->edges_alone; }
+  void spans(std::uint32_t number, WordSpans& spans) const override;
 
  private:
   DropImageView image_;

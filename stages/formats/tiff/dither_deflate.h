@@ -11,17 +11,14 @@
 #include <span>
 #include <vector>
 
-#include "stages/formats/png/deflate.h"
+#include "stages/formats/tiff/strip_code.h"
 
 namespace lamina::formats::tiff {
 
 /// One compressor per thread; keeps its scratch.
 class DitherDeflate {
  public:
-  /// Upper bound of a stream: no code of all symbols takes more than 9 bits a symbol.
-  static constexpr std::size_t bound(std::size_t bytes) { return bytes + bytes / 4 + 1024; }
-
-  /// Writes the zlib stream of `bytes` to `out`, which has bound() bytes. returns  those written
+  /// Writes the zlib stream of `bytes` to `out`, which has StripCode::bound() bytes. returns  those written
   /// cost  one read of the bytes, and two more of those that do not repeat
   std::size_t compress(std::span<const std::byte> bytes, std::byte* out);
 
@@ -30,16 +27,10 @@ class DitherDeflate {
     std::uint32_t literals, match;  // so many bytes, and then a match of so many
   };
   void find_pieces(std::span<const std::byte> bytes);
-  void make_code();
-  void put_head(png::BitWriter& writer) const;
-  void put_pieces(std::span<const std::byte> bytes, png::BitWriter& writer) const;
 
   std::vector<Piece> pieces_;
-  std::array<std::uint32_t, png::kSymbols> weights_{};
-  std::array<std::uint8_t, png::kSymbols> lengths_{};
-  std::array<png::BitString, 256> byte_{};
-  std::array<png::BitString, png::kLongestMatch + 1> match_{};
-  png::BitString end_;
+  StripWeights weights_{};
+  StripCode code_{false};
 };
 
 }  // namespace lamina::formats::tiff

@@ -24,6 +24,7 @@
 #include "stages/formats/g4/encode.h"
 #include "stages/formats/images/image_formats.h"
 #include "stages/formats/tiff/dither_deflate.h"
+#include "stages/formats/tiff/edge_deflate.h"
 #include "stages/formats/tiff/packbits.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
@@ -95,6 +96,8 @@ TiffHandle open_for_writing(MemoryFile& file, std::string& message) {
 /// A strip of bits is at most this long, unless a row is longer: it stays in the second-level cache between being
 /// filled and being read, and a reader needs no more memory than that.
 constexpr std::size_t kStripBytes = 256 * 1024;
+/// Bits of such a strip are never made where edges alone are dithered, and each strip has a code to be made.
+constexpr std::size_t kEdgeStripBytes = 1024 * 1024;
 /// Room for the directory and what it points to, so that libtiff's last writes do not grow the buffer.
 constexpr std::size_t kDirectoryBytes = 1024;
 
@@ -402,22 +405,42 @@ class DeflateEncoder : public ImageEncoder {
     return encode_rows(runs, dpi_x, dpi_y, file);
   }
   Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
-    return encode_rows(rows, dpi_x, dpi_y, file);
+    if (!rows.has_spans()) return encode_rows(rows, dpi_x, dpi_y, file);
+    return encode_strips(rows.columns(), rows.rows(), {dpi_x, dpi_y}, kEdgeStripBytes, file,
+                         [&](std::uint32_t begin, std::uint32_t end, std::size_t stride) {
+                           edges_.start();
+                           for (std::uint32_t row = begin; row < end; ++row) {
+                             rows.spans(row, spans_);
+                             edges_.add(spans_, stride);
+                           }
+                           return edges_.finish(packed_.data());
+                         });
   }
 
  private:
   Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
-    if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
-    const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
+    return encode_strips(image.columns, image.rows, {dpi_x, dpi_y}, kStripBytes, file,
+                         [&](std::uint32_t begin, std::uint32_t end, std::size_t stride) {
+                           strip_.resize(stride * (end - begin));
+                           for (std::uint32_t row = begin; row < end; ++row)
+                             image.put(row, std::span(strip_).subspan(stride * (row - begin), stride));
+                           return deflate_.compress(strip_, packed_.data());
+                         });
+  }
+
+  /// put_strip(first row, end, bytes of a row)  writes a strip to packed_ and returns its length
+  template <class PutStrip>
+  Status encode_strips(std::uint32_t columns, std::uint32_t rows, std::array<double, 2> dpi, std::size_t strip_bytes,
+                       Bytes& file, const PutStrip& put_strip) {
+    if (Status status = check_size("TIFF", columns, rows); !status) return status;
+    TagFrame frame{columns, rows, dpi[0], dpi[1], 1, COMPRESSION_ADOBE_DEFLATE};
+    frame.rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(strip_bytes / frame.stride, 1, rows));
     file.resize(file.capacity());
     return write_file(file, frame, text_, [&](TIFF* tiff) {
-      strip_.resize(frame.stride * frame.rows_per_strip);
-      packed_.resize(DitherDeflate::bound(strip_.size()));
-      for (std::uint32_t row = 0, number = 0; row < image.rows; ++number) {
-        const std::uint32_t begin = row, end = row + std::min(frame.rows_per_strip, image.rows - row);
-        for (; row < end; ++row) image.put(row, std::span(strip_).subspan(frame.stride * (row - begin), frame.stride));
-        const auto length = static_cast<tmsize_t>(
-            deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), packed_.data()));
+      packed_.resize(StripCode::bound(frame.stride * frame.rows_per_strip));
+      for (std::uint32_t row = 0, number = 0; row < rows; row += frame.rows_per_strip, ++number) {
+        const auto length =
+            static_cast<tmsize_t>(put_strip(row, row + std::min(frame.rows_per_strip, rows - row), frame.stride));
         if (TIFFWriteRawStrip(tiff, number, packed_.data(), length) != length) return false;
       }
       return true;
@@ -426,6 +449,8 @@ class DeflateEncoder : public ImageEncoder {
 
   LayerText text_;
   DitherDeflate deflate_;
+  EdgeDeflate edges_;
+  WordSpans spans_;
   Bytes strip_, packed_;
 };
 
