@@ -98,8 +98,8 @@ bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::
     last = std::max(last, out.y[i]);
   }
   if (out.corners == 0) return false;
-  out.first_row = rows.at(front + first - kSlack);
-  out.last_row = rows.at(front + last + kSlack);
+  out.first_row = rows.before(front + first - kSlack);
+  out.last_row = rows.behind(front + last + kSlack);
   return true;
 }
 
@@ -126,9 +126,10 @@ void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& ro
   piece.facet = index;
   piece.edgewise = facet.edgewise;
   piece.suspect = facet.suspect;
+  piece.level = facet.facet.a.z == facet.facet.b.z && facet.facet.a.z == facet.facet.c.z;
   const auto append = [&] {
-    piece.first_row = rows.at(piece.from_y + piece.low - kSlack);
-    piece.last_row = rows.at(piece.from_y + piece.high + kSlack);
+    piece.first_row = rows.before(piece.from_y + piece.low - kSlack);
+    piece.last_row = rows.behind(piece.from_y + piece.high + kSlack);
     to.push_back(piece);
   };
   const std::size_t before = to.size();

@@ -49,6 +49,10 @@ class Edges {
   std::uint32_t count() const { return count_; }
   std::uint64_t bytes() const { return bytes_held(edge_) + bytes_held(per_width_); }
 
+  /// The pixel in which `nm` lies, or the one before it; the one behind: both without a read, and the nearest ones of the bed.
+  std::uint32_t before(double nm) const { return bounded(nm * per_nm_); }
+  std::uint32_t behind(double nm) const { return bounded((nm + kBehind) * per_nm_); }
+
   /// The pixel in which `nm` lies, the one behind if it lies on an edge; the nearest one of the bed.
   std::uint32_t at(double nm) const {
     const double guess = nm * per_nm_;
@@ -59,6 +63,10 @@ class Edges {
   }
 
  private:
+  std::uint32_t bounded(double pixel) const {
+    return static_cast<std::uint32_t>(std::min(std::max(pixel, 0.0), static_cast<double>(count_ - 1)));
+  }
+
   double per_nm_;
   std::uint32_t count_;
   double widest_ = 0, narrowest_ = 0;
@@ -154,6 +162,7 @@ struct Trapezoid {
   std::uint32_t facet;                // its index in the layer
   std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included
   bool edgewise, suspect;             // as SlabFacet has them
+  bool level;                         // horizontal
 };
 
 /// Appends the trapezoids of a facet, up to one less than it has corners, from the highest down; one without height if the

@@ -41,6 +41,7 @@ struct DropPatterns {
   std::vector<DropZone> zone;  // by level; [0] is not read
   Buffer<std::uint64_t> tile;  // kTileWords each: bit c % 64 of word 2 (r % 128) + c / 64 % 2 is column c of row r
   CorePattern core;
+  bool edges_alone = false;  // full voxels get whole drops: tiles are those of the edges of parts
 
   const std::uint64_t* tile_row(const DropZone& of, std::uint32_t row) const {
     return tile.data() + of.tile * std::size_t{kTileWords} + std::size_t{2} * (row % kTileSide);

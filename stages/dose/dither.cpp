@@ -57,6 +57,7 @@ void make_tile(std::uint32_t fraction, std::uint32_t layer, std::uint64_t* bits)
 
 void make_zones(std::span<const Drops24> drops, std::uint32_t layer, DropPatterns& result) {
   result.zone.assign(drops.size(), DropZone());
+  result.edges_alone = false;
   std::size_t tiles = 0;
   for (std::size_t level = 1; level < drops.size(); ++level) {
     DropZone& zone = result.zone[level];
@@ -73,6 +74,7 @@ void make_zones(std::span<const Drops24> drops, std::uint32_t layer, DropPattern
 
 void make_core(double share, std::uint32_t layer, DropPatterns& result) {
   result.tile.clear();
+  result.edges_alone = false;
   CorePattern& core = result.core;
   core.column_step = 2'654'435'769u, core.row_step = 1'300'411'463u;
   core.first = layer * 1'779'033'705u, core.threshold = core_threshold(share);

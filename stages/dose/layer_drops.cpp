@@ -228,6 +228,7 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
   std::vector<Drops24> drops(std::size_t{2} * full + 1);
   drops_of_zones(dose, full, rules.dithered, drops);
   dither_zones(drops, layer, work);
+  work.patterns.edges_alone = rules.full > 0 && drops[full] % kOneDrop == 0 && drops[2 * full] % kOneDrop == 0;
   return sums_of(work.zones, full, dose);
 }
 

@@ -6,21 +6,39 @@
 namespace lamina::dose {
 namespace {
 
-bool is_set(std::span<const std::uint32_t> row, std::int64_t column) {
+/// Pixels from one on, in one row of an image whose pixels are all unset beyond it.
+struct AlikePixels {
+  bool alike;         // it and both next to it have the value
+  std::int64_t stop;  // the first pixel that is not so, or that may be so
+};
+
+AlikePixels alike_pixels(std::span<const std::uint32_t> row, std::int64_t column, bool value) {
+  constexpr std::int64_t kNone = INT64_MAX;
   const auto after = std::ranges::upper_bound(row, column, {}, [](std::uint32_t at) { return std::int64_t{at}; });
-  return ((after - row.begin()) & 1) != 0;
+  const std::int64_t end = after == row.end() ? kNone : std::int64_t{*after};
+  if (((after - row.begin()) & 1) != (value ? 1 : 0)) return {false, end == kNone ? kNone : end + 1};
+  if ((after != row.begin() && *(after - 1) == column) || end == column + 1) return {false, column + 1};
+  return {true, end == kNone ? kNone : end - 1};
 }
 
-/// Whether all nine pixels around one are equal; beyond the image nothing is set.
-bool alike_around(const RunsView& image, std::uint32_t row, std::uint32_t column) {
-  const bool here = is_set(image.row(row), column);
-  for (std::int64_t r = std::int64_t{row} - 1; r <= std::int64_t{row} + 1; ++r) {
-    const bool outside = r < 0 || r >= image.rows();
-    for (std::int64_t c = std::int64_t{column} - 1; c <= std::int64_t{column} + 1; ++c) {
-      if ((!outside && is_set(image.row(static_cast<std::uint32_t>(r)), c)) != here) return false;
+/// Pixels of [begin, end) whose eight neighbours have their value, which is one for all of them.
+std::uint64_t pixels_away_from_edges(const RunsView& image, std::uint32_t row, std::int64_t begin, std::int64_t end, bool value) {
+  std::uint64_t found = 0;
+  for (std::int64_t at = begin; at < end;) {
+    std::int64_t stop = end, candidate = at;
+    for (std::int64_t r = std::int64_t{row} - 1; r <= std::int64_t{row} + 1; ++r) {
+      const bool outside = r < 0 || r >= image.rows();
+      const auto near = alike_pixels(outside ? std::span<const std::uint32_t>() : image.row(static_cast<std::uint32_t>(r)), at, value);
+      if (near.alike) {
+        stop = std::min(stop, near.stop);
+      } else {
+        candidate = std::max(candidate, near.stop);
+      }
     }
+    if (candidate == at) found += static_cast<std::uint64_t>(stop - at);
+    at = candidate == at ? stop : candidate;
   }
-  return true;
+  return found;
 }
 
 /// The runs with what `level_in` gives for each inside of the mask, and `level_out` outside.
@@ -222,10 +240,11 @@ Difference difference(const RunsView& a, const RunsView& b) {
     std::uint32_t from = 0;
     while (i < one.size() || k < other.size()) {
       const bool first = k == other.size() || (i < one.size() && one[i] <= other[k]);
+      const std::size_t changes_before = i;
       const std::uint32_t at = first ? one[i++] : other[k++];
-      for (; differs && from < at; ++from) {
-        ++found.pixels;
-        found.far += alike_around(a, r, from) ? 1 : 0;
+      if (differs && from < at) {
+        found.pixels += at - from;
+        found.far += pixels_away_from_edges(a, r, from, at, (changes_before & 1) != 0);
       }
       differs = !differs;
       from = at;

@@ -75,9 +75,9 @@ constexpr Count max_png(Count columns, Count rows, Count changes) {
 constexpr Count max_bmp(Count columns, Count rows, Count) { return kFileOverhead + (columns + 31) / 32 * 4 * rows; }
 constexpr Count max_null(Count, Count, Count) { return 0; }
 
-/// A strip in addition to the file, as bits and as deflate (DitherDeflate::bound).
+/// In addition to the file a strip, as literals (EdgeDeflate) or bits, and as deflate (StripCode::bound).
 constexpr Count max_deflate(Count columns, Count rows, Count changes) {
-  return max_strips(columns, rows, changes) * 5 / 4 + 512 * 1024;
+  return max_strips(columns, rows, changes) * 5 / 4 + std::min(max_bits(columns, rows, changes) * 4, Count{4} * 1024 * 1024) + 512 * 1024;
 }
 
 constexpr std::array<ImageFormat, 8> kFormats = {{

@@ -17,13 +17,6 @@ std::uint64_t load_word(const std::byte* at, std::size_t bytes) {
   return word;
 }
 
-/// Swaps the bits of each byte, first and last.
-LAMINA_BODY std::uint64_t turn_bytes(std::uint64_t word) {
-  word = (word & 0xF0F0F0F0F0F0F0F0) >> 4 | (word & 0x0F0F0F0F0F0F0F0F) << 4;
-  word = (word & 0xCCCCCCCCCCCCCCCC) >> 2 | (word & 0x3333333333333333) << 2;
-  return (word & 0xAAAAAAAAAAAAAAAA) >> 1 | (word & 0x5555555555555555) << 1;
-}
-
 std::uint64_t turn_word(std::uint64_t word) { return turn_bytes(__builtin_bswap64(word)); }
 
 /// Sets the bits first .. last of a row.

@@ -11,6 +11,7 @@
 #include "stages/data/bit_rows.h"
 #include "stages/data/runs.h"
 #include "stages/data/units.h"
+#include "stages/geometry/targets.h"
 
 namespace lamina {
 
@@ -20,6 +21,13 @@ inline constexpr std::uint32_t kMaxPixelsASide =
     static_cast<std::uint32_t>(ceil_div(kNmReach * std::int64_t{25'400}, kNmPerInch));
 
 constexpr std::size_t row_bytes(std::uint32_t columns) { return (std::size_t{columns} + 7) / 8; }
+
+/// Swaps the bits of each byte, first and last.
+LAMINA_BODY constexpr std::uint64_t turn_bytes(std::uint64_t word) {
+  word = (word & 0xF0F0F0F0F0F0F0F0) >> 4 | (word & 0x0F0F0F0F0F0F0F0F) << 4;
+  word = (word & 0xCCCCCCCCCCCCCCCC) >> 2 | (word & 0x3333333333333333) << 2;
+  return (word & 0xAAAAAAAAAAAAAAAA) >> 1 | (word & 0x5555555555555555) << 1;
+}
 
 /// Sets the bits of the runs of one row; all others, those after the last column too, become 0.
 /// change  as in data/runs.h; row  row_bytes(columns) bytes

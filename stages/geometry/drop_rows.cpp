@@ -140,6 +140,35 @@ void DropPlane::set_words(std::uint32_t number, std::span<std::uint64_t> words, 
   }
 }
 
+void DropPlane::spans(std::uint32_t number, WordSpans& spans) const {
+  const LevelsView& zones = image_.zones;
+  const DropPatterns& patterns = *image_.patterns;
+  spans.span.clear(), spans.mixed.clear();
+  std::uint32_t at = 0;  // the word that is being made
+  std::uint64_t word = 0;
+  for (std::uint32_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i) {
+    const DropZone& zone = patterns.zone[zones.level[i]];
+    const bool tile = zone.base == drop_ && zone.extra == DropZone::Extra::kTile;
+    if (zone.base <= drop_ && !tile) continue;
+    static constexpr std::uint64_t kFull[2] = {~std::uint64_t{0}, ~std::uint64_t{0}};
+    const std::uint64_t* const pattern = tile ? patterns.tile_row(zone, number) : kFull;
+    const std::uint32_t begin = zones.change[2 * std::size_t{i}], end = zones.change[2 * std::size_t{i} + 1];
+    const std::uint32_t first = begin / 64, last = (end - 1) / 64;
+    const std::uint64_t head = ~std::uint64_t{0} << begin % 64, tail = ~std::uint64_t{0} >> (63 - (end - 1) % 64);
+    if (first != at) spans.add(std::exchange(at, first), std::exchange(word, 0));
+    if (first == last) {
+      word |= head & tail & pattern[first % 2];
+      continue;
+    }
+    spans.add(first, word | (head & pattern[first % 2]));
+    if (!tile) spans.add_span(first + 1, last, true);
+    for (std::uint32_t w = first + 1; tile && w < last; ++w) spans.add(w, pattern[w % 2]);
+    at = last;
+    word = tail & pattern[last % 2];
+  }
+  spans.add(at, word);
+}
+
 namespace {
 
 /// A row of runs while it is made; the last run is open.

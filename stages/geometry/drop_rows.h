@@ -48,6 +48,8 @@ class DropPlane final : public BitRows {
   std::uint32_t rows() const override { return image_.zones.rows(); }
   void row(std::uint32_t number, std::span<std::uint64_t> words) const override;
   void set_words(std::uint32_t number, std::span<std::uint64_t> words, Buffer<RowSpan>& spans) const override;
+  bool has_spans() const override { return image_.patterns->edges_alone; }
+  void spans(std::uint32_t number, WordSpans& spans) const override;
 
  private:
   void add(const DropZone& zone, std::uint32_t row, std::uint32_t begin, std::uint32_t end, std::uint64_t* words) const;

@@ -59,15 +59,15 @@ TEST(DitherDeflate, AnyBytesComeBackWithinTheBound) {
                   : kind == 4 ? (i % 600 < 300 ? noise : '\0')
                               : '\xFF';
       }
-      std::vector<std::byte> out(deflate.bound(bytes) + 16, std::byte{0xA5});
+      std::vector<std::byte> out(formats::tiff::StripCode::bound(bytes) + 16, std::byte{0xA5});
       std::vector<RowSpan> set{{0, bytes}};
       if (kind == 4) {
         set.clear();
         for (std::size_t at = 0; at < bytes; at += 600) set.push_back({at, std::min(bytes, at + 300)});
       }
       const std::size_t made = deflate.compress(std::as_bytes(std::span(text)), 41, set, out.data());
-      ASSERT_LE(made, deflate.bound(bytes));
-      EXPECT_EQ(out[deflate.bound(bytes)], std::byte{0xA5});
+      ASSERT_LE(made, formats::tiff::StripCode::bound(bytes));
+      EXPECT_EQ(out[formats::tiff::StripCode::bound(bytes)], std::byte{0xA5});
       EXPECT_TRUE(expanded(std::span(out).first(made), bytes) == text) << bytes << " bytes of kind " << kind;
     }
   }
@@ -96,6 +96,78 @@ TEST(DitherDeflate, DitheredImagesAreReadAgainAndSmall) {
       EXPECT_LT(file.size(), g4.size() / (core ? 12 : 6));
     }
   }
+}
+
+/// A disc of full voxels with edges of levels 1 and 2 of 3 in between, and a row of all kinds of words.
+Levels disc_of_levels(std::uint32_t columns, std::uint32_t rows, std::mt19937& random) {
+  Levels zones;
+  zones.start(columns);
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const double y = (r + 0.5) / rows * 2 - 1, half = std::sqrt(1 - y * y) * columns / 2;
+    auto at = static_cast<std::uint32_t>(columns / 2.0 - half);
+    const auto end = static_cast<std::uint32_t>(columns / 2.0 + half);
+    while (at < end && r % 7 != 3) {
+      const std::uint32_t lengths[] = {1, 3, 9, 64, 200, 700}, stop = std::min(end, at + lengths[random() % 6]);
+      zones.append(at, stop, static_cast<std::uint8_t>(random() % 3 == 0 ? random() % 4 : 3));
+      at = stop;
+    }
+    zones.end_row();
+  }
+  return zones;
+}
+
+TEST(EdgeDeflate, ImagesWhoseEdgesAloneAreDitheredAreReadAgainAndSmaller) {
+  const auto* format = formats::find_image_format("tiff-deflate");
+  const formats::testing::Folder folder;
+  const dose::Drops24 one = dose::kOneDrop, drops[] = {0, one / 3, 2 * one / 3, one};
+  DropPatterns patterns;
+  dose::make_zones(drops, 3, patterns);
+  std::mt19937 random(3);
+  for (const std::uint32_t columns : {1u, 64u, 129u, 511u, 512u, 3001u, 9000u}) {
+    const Levels zones = disc_of_levels(columns, 1200, random);
+    Runs runs;
+    runs_of({zones.view(), &patterns}, 0, runs);
+    const auto encoder = format->make_encoder();
+    formats::Bytes plain, file;
+    ASSERT_TRUE(encoder->encode(DropPlane({zones.view(), &patterns}, 0), 600, 300, plain).ok());
+    patterns.edges_alone = true;
+    for (int turn = 0; turn < 2; ++turn) {
+      ASSERT_TRUE(encoder->encode(DropPlane({zones.view(), &patterns}, 0), 600, 300, file).ok());
+      formats::testing::save(folder / "layer.tif", file);
+      const auto image = formats::image(folder / "layer.tif");
+      ASSERT_TRUE(image.ok()) << image.error().message;
+      EXPECT_TRUE(image->runs.row_offset == runs.row_offset && image->runs.change == runs.change) << columns;
+      EXPECT_LE(file.size(), format->max_bytes(columns, 1200, runs.change.size()));
+    }
+    patterns.edges_alone = false;
+    if (columns > 3000) {
+      EXPECT_LT(file.size(), plain.size() * 9 / 10);
+    }
+  }
+}
+
+TEST(EdgeDeflate, SpansOfARowAreItsWordsThatAreNotEmpty) {
+  const dose::Drops24 drops[] = {0, dose::kOneDrop / 2, dose::kOneDrop};
+  DropPatterns patterns;
+  dose::make_zones(drops, 0, patterns);
+  Levels zones;
+  zones.start(700);
+  zones.append(60, 64, 2), zones.append(64, 320, 2), zones.append(321, 322, 2), zones.append(400, 560, 1), zones.append(640, 700, 2);
+  zones.end_row();
+  const DropPlane plane({zones.view(), &patterns}, 0);
+  WordSpans spans;
+  plane.spans(0, spans);
+  ASSERT_EQ(spans.span.size(), 4u);  // word 0; words 1 to 4, which are full; 5 to 8; 10
+  EXPECT_EQ(spans.span[0].end, 1u);
+  EXPECT_TRUE(spans.span[1].first == 1 && spans.span[1].end == 5 && spans.span[1].full);
+  EXPECT_TRUE(spans.span[2].first == 5 && spans.span[2].end == 9 && !spans.span[2].full);
+  ASSERT_EQ(spans.mixed.size(), 6u);
+  EXPECT_EQ(spans.mixed[0], std::uint64_t{0xF} << 60);
+  EXPECT_EQ(spans.mixed[1], 2u);
+  EXPECT_EQ(spans.mixed.back(), (std::uint64_t{1} << 60) - 1);
+  std::vector<std::uint64_t> words(plane.words());
+  plane.row(0, words);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(spans.mixed[1 + i], words[5 + i]);
 }
 
 TEST(DitherDeflate, FormatsWithoutBitsOfTheirOwnEncodeRowsAsRuns) {

@@ -30,13 +30,16 @@ LAMINA_LANES Eight over(Eight a, Eight b) { return _mm512_div_pd(a, b); }
 LAMINA_LANES Eight minimum(Eight a, Eight b) { return _mm512_min_pd(a, b); }
 LAMINA_LANES Eight maximum(Eight a, Eight b) { return _mm512_max_pd(a, b); }
 LAMINA_LANES Eight whole_below(Eight a) { return _mm512_floor_pd(a); }
+LAMINA_LANES Eight nearest(Eight a) { return _mm512_roundscale_pd(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+LAMINA_LANES Eight magnitude(Eight a) { return _mm512_abs_pd(a); }
+LAMINA_LANES double lowest_of(Eight a) { return _mm512_reduce_min_pd(a); }
+LAMINA_LANES double highest_of(Eight a) { return _mm512_reduce_max_pd(a); }
 LAMINA_LANES Mask below(Eight a, Eight b) { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); }
 LAMINA_LANES std::uint32_t bits(Mask mask) { return mask; }
 LAMINA_LANES Eight pick(Mask mask, Eight a, Eight b) { return _mm512_mask_blend_pd(mask, b, a); }
 LAMINA_LANES Eight keep(Mask mask, Eight a) { return _mm512_maskz_mov_pd(mask, a); }
 LAMINA_LANES Eight drop(Mask mask, Eight a) { return _mm512_maskz_mov_pd(static_cast<Mask>(~mask), a); }
 LAMINA_LANES Mask first_lanes(std::uint32_t count) { return static_cast<Mask>((1u << count) - 1); }
-LAMINA_LANES Eight keep_first(std::uint32_t count, Eight a) { return _mm512_maskz_mov_pd(first_lanes(count), a); }
 LAMINA_LANES void store(double* at, Eight a) { _mm512_storeu_pd(at, a); }
 LAMINA_LANES void store_whole(std::uint32_t* at, Eight a) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(at), _mm512_cvttpd_epi32(a));

@@ -29,24 +29,13 @@ LAMINA_LANES Eight behind(const Tent& t, Eight x) {
   const Eight part = times(times(pick(rises, t.rise, t.fall), from), times(from, from));
   return plus(drop(rises, times(t.area, less(x, t.mean))), part);
 }
-LAMINA_LANES void add_lanes(double* to, std::uint32_t begin, std::uint32_t end, Eight value) {
-  store(to, plus(load(to), less(keep_first(end, value), keep_first(begin, value))));
-}
-
 LAMINA_LANES Eight along(double at, double per_y, Eight from) { return plus(all(at), times(from, all(per_y))); }
 
-/// Marks columns that the piece may reach in some row; how many they are.
-LAMINA_LANES std::uint32_t mark_columns(const Trapezoid& piece, const ColumnReach& reach, std::uint32_t begin,
-                                        std::uint32_t end, BandCells& cells) {
-  std::uint32_t first = UINT32_MAX, last = 0;
-  for (std::uint32_t lane = begin; lane < end; ++lane) {
-    first = std::min(first, reach.first[lane]), last = std::max(last, reach.last[lane]);
-  }
-  cells.held().mark(first, last);
-  if (!piece.edgewise) cells.summed().mark(first, last);
-  if (piece.suspect) cells.suspect().mark(first, last);
-  return last - first + 1;
+/// The value in lanes [begin, end), another one in the others.
+LAMINA_LANES Eight in_lanes(std::uint32_t begin, std::uint32_t end, Eight value, Eight other) {
+  return pick(first_lanes(end), pick(first_lanes(begin), other, value), other);
 }
+LAMINA_LANES void add_to(double* to, Eight value) { store(to, plus(load(to), value)); }
 
 LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells,
                            ColumnReach& reach, BandSums& sums) {
@@ -74,9 +63,16 @@ LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const E
 
   const std::uint32_t begin = piece.first_row > rows.first ? piece.first_row - rows.first : 0;
   const std::uint32_t end = std::min(piece.last_row - rows.first + 1, rows.count);
-  add_lanes(sums.size.data(), begin, end, all(piece.size));
-  add_lanes(sums.columns.data(), begin, end, all(1 + mark_columns(piece, reach, begin, end, cells)));
-  add_lanes(sums.count.data(), begin, end, all(1));
+  const auto first = static_cast<std::uint32_t>(lowest_of(in_lanes(begin, end, first_column, last_column)));
+  const auto last = static_cast<std::uint32_t>(highest_of(in_lanes(begin, end, end_column, all(0))));
+  cells.held().mark(first, last);
+  if (!piece.edgewise) cells.summed().mark(first, last);
+  if (piece.suspect) cells.suspect().mark(first, last);
+  if (!piece.level) cells.sloped().mark(first, last);
+  const Eight one = in_lanes(begin, end, all(1), all(0));
+  add_to(sums.size.data(), times(one, all(piece.size)));
+  add_to(sums.columns.data(), times(one, all(last - first + 2)));
+  add_to(sums.count.data(), one);
   if (piece.edgewise || bits(has_height) == 0) return;
   const Eight half = keep(has_height, times(less(high, low), all(0.5)));
   const auto height = [&](Eight on, Eight back) LAMINA_TARGET {
@@ -84,11 +80,6 @@ LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const E
   };
   const Eight upper = times(height(on_high, back_high), half), lower = times(height(on_low, back_low), half);
   const Tent a = tent_of(x_back_high, x_on_high, x_back_low, upper), b = tent_of(x_back_low, x_on_low, x_on_high, lower);
-  std::uint32_t first = UINT32_MAX, last = 0;
-  for (std::uint32_t with_height = bits(has_height); with_height != 0; with_height &= with_height - 1) {
-    const auto lane = static_cast<std::uint32_t>(std::countr_zero(with_height));
-    first = std::min(first, reach.first[lane]), last = std::max(last, reach.last[lane]);
-  }
   double* cell = cells.column(first);
   const double* edges = columns.data() + first;
   const auto behind_both = [&](double x) LAMINA_TARGET {
@@ -106,17 +97,16 @@ LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const E
 
 /// Levels of one column in each row; what is not decided is noted.
 struct SweepState {
-  Eight cover, area, per_area, off, top, lowest_inside, highest_inside;
+  Eight cover, area, per_area, off, top;
   std::uint32_t rows;  // a bit each
 };
 
+/// A level is decided where its position is further than the bound of errors from a whole number.
 LAMINA_LANES std::uint64_t levels_at(const SweepState& state, Eight share, std::uint32_t& undecided, std::uint32_t& outside) {
-  const Eight position = plus(times(share, state.top), all(0.5));
-  const Eight lowest = whole_below(maximum(minimum(less(position, state.off), state.top), all(0)));
-  const Eight highest = whole_below(maximum(minimum(plus(position, state.off), state.top), all(0)));
-  undecided = bits(below(lowest, highest)) & state.rows;
-  outside = (bits(below(share, state.lowest_inside)) | bits(below(state.highest_inside, share))) & state.rows;
-  return bytes_of(lowest);
+  const Eight position = plus(times(share, state.top), all(0.5)), near = nearest(position);
+  undecided = ~bits(below(state.off, magnitude(less(position, near)))) & state.rows;
+  outside = bits(below(all(0.75), magnitude(less(share, all(0.5))))) & state.rows;
+  return bytes_of(maximum(minimum(pick(below(position, near), less(near, all(1)), near), state.top), all(0)));
 }
 
 /// Columns of one share, with numbers if they are a single one.
@@ -152,9 +142,8 @@ LAMINA_LANES void add_segment(std::uint32_t first, std::uint32_t end, SweptBand&
 LAMINA_LANES void sweep_body(const BandTask& band, SweptBand& swept) {
   const ColumnMarks held = band.cells->held(), summed = band.cells->summed(), suspect = band.cells->suspect();
   const bool has_suspects = suspect.next(0) != ColumnMarks::kNone;
-  SweepState state{
-      all(0),    load(band.area.data()), load(band.per_area.data()), load(band.off.data()), all(band.top), all(-0.25),
-      all(1.25), (1u << band.rows) - 1};
+  SweepState state{all(0),        load(band.area.data()), load(band.per_area.data()), load(band.off.data()),
+                   all(band.top), (1u << band.rows) - 1};
   ColumnSpan span;
   for (std::uint32_t c = held.next(0); c != ColumnMarks::kNone; c = held.next(span.end)) {
     span.first = c;

@@ -76,16 +76,14 @@ std::optional<Fraction> part_of(const FacetNormal& n, const Point3& on, const Vo
   return std::nullopt;
 }
 
-std::optional<std::uint32_t> level_by_plane(const Fraction& part, const NearShare& near_share) {
+PlaneLevels levels_of(const Fraction& part, std::uint32_t top_level) {
   const std::array<Fraction, 4> shares{{{0, 1}, part, {part.below - part.above, part.below}, {1, 1}}};
-  std::optional<std::uint32_t> level;
-  for (const Fraction& share : shares) {
-    if (std::abs(share.value() - near_share.share) > near_share.off + 0x1p-50) continue;
-    const std::uint32_t of_share = share.level(near_share.top_level);
-    if (level && *level != of_share) return std::nullopt;
-    level = of_share;
+  PlaneLevels levels{};
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    levels.share[i] = shares[i].value();
+    levels.level[i] = shares[i].level(top_level);
   }
-  return level;
+  return levels;
 }
 
 // --- any facets: volumes in rationals.
@@ -205,10 +203,14 @@ std::uint32_t exact_level(const Voxel& voxel, std::span<const SlabFacet* const> 
   if (one_plane) {
     const FacetNormal normal(plane == nullptr ? Triangle{} : plane->facet);
     const std::optional<Fraction> part = plane == nullptr ? Fraction{0, 1} : part_of(normal, plane->facet.a, voxel);
-    const auto level = part ? level_by_plane(*part, near_share) : std::nullopt;
+    const auto level = part ? levels_of(*part, near_share.top_level).near(near_share.share, near_share.off) : std::nullopt;
     if (level) return *level;
   }
   return level_by_volume(voxel, near_facets, near_share);
+}
+
+PlaneLevels levels_of_height(std::int64_t z, std::int64_t z0, std::int64_t z1, std::uint32_t top_level) {
+  return levels_of({z - z0, z1 - z0}, top_level);
 }
 
 }  // namespace lamina::coverage

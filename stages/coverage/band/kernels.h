@@ -88,10 +88,12 @@ class BandCells {
   /// First nm^3 that facets add within the column, then nm^2 of facets that end before it: they add this times the width to it
   /// and all behind.
   double* column(std::uint32_t column) { return first_ + std::size_t{column} * 2 * kLanes; }
-  /// Columns that hold facets, in any row; those that have numbers; those with facets that meet others.
+  /// Columns that hold facets, in any row; those that have numbers; those with facets that meet others; those with facets that
+  /// are not horizontal.
   ColumnMarks held() { return marks(0); }
   ColumnMarks summed() { return marks(1); }
   ColumnMarks suspect() { return marks(2); }
+  ColumnMarks sloped() { return marks(3); }
   static std::uint64_t bytes_of(std::uint32_t columns) {
     BandCells cells;
     cells.size(columns);
@@ -100,7 +102,7 @@ class BandCells {
   std::uint64_t bytes() const { return bytes_held(value_) + bytes_held(word_) + bytes_held(group_); }
 
  private:
-  static constexpr std::uint32_t kMarks = 3;
+  static constexpr std::uint32_t kMarks = 4;
   ColumnMarks marks(std::uint32_t kind) {
     return {word_.data() + std::size_t{kind} * words_, group_.data() + std::size_t{kind} * groups_, words_};
   }

@@ -127,6 +127,16 @@ class RowResolver {
 
 // ---
 
+/// The height of the horizontal facets of a band, if they have one.
+struct BandFaces {
+  std::uint32_t heights = 0;  // 0, 1, or more than one
+  Nm z = 0;
+  void add(Nm at) {
+    if (heights == 0) z = at;
+    if (heights == 0 || at != z) ++heights;
+  }
+};
+
 /// One band of rows after the other, from the back of the bed; keeps its buffers.
 ///
 /// A facet adds to a column the volume behind it there, and to all columns behind its area along x: their volume is area x
@@ -145,7 +155,7 @@ class BandMaker {
 
   std::uint64_t bytes() const {
     return cells_.bytes() + swept_.bytes() + resolver_.bytes() + bytes_held(active_) + bytes_held(reach_) +
-           bytes_held(column_) + bytes_held(level_);
+           bytes_held(column_) + bytes_held(level_) + bytes_held(sloped_);
   }
   /// Bound of bytes(), for a layer of so many facets on a grid of so many columns.
   static std::uint64_t bytes_of(std::uint64_t facets, std::uint32_t columns);
@@ -153,18 +163,22 @@ class BandMaker {
  private:
   void deposit(const BandSlab& slab, BandSums& sums);
   BandTask task(const BandSlab& slab, const BandSums& sums);
-  void resolve(const BandSlab& slab, CoverageReport& report);
+  void resolve(const BandSlab& slab, const BandTask& task, CoverageReport& report);
+  void mark_sloped(std::uint32_t columns);
+  void resolve_faces(const BandSlab& slab, const BandTask& task, CoverageReport& report);
   void append(const Changes& changes, std::uint32_t columns, Levels& out) const;
 
   const BandKernels* kernels_ = nullptr;
   BandRows rows_;
   bool counts_held_ = false;
+  BandFaces faces_;
   BandCells cells_;
   SweptBand swept_;
   Buffer<Trapezoid> active_;      // that reach the band, or one below it
   Buffer<ColumnReach> reach_;     // of each active one
   Buffer<std::uint32_t> column_;  // changes of each row
   Buffer<std::uint8_t> level_;
+  Buffer<std::uint8_t> sloped_;  // rows of each column that facets reach which are not horizontal, as bits
   RowResolver resolver_;
 };
 

@@ -41,11 +41,22 @@ LAMINA_LANES Eight times(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i]
 LAMINA_LANES Eight over(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] / b.part[i]); }
 LAMINA_LANES Eight minimum(const Eight& a, const Eight& b) { LAMINA_EACH(min_of(a.part[i], b.part[i])); }
 LAMINA_LANES Eight maximum(const Eight& a, const Eight& b) { LAMINA_EACH(max_of(a.part[i], b.part[i])); }
-/// Of less than 2^51.
+/// Of less than 2^51, as the next.
+LAMINA_LANES Eight nearest(const Eight& a) { LAMINA_EACH((a.part[i] + 0x1.8p52) - 0x1.8p52); }
 LAMINA_LANES Eight whole_below(const Eight& a) {
-  Eight near;
-  for (int i = 0; i < kParts; ++i) near.part[i] = (a.part[i] + 0x1.8p52) - 0x1.8p52;
+  const Eight near = nearest(a);
   LAMINA_EACH(near.part[i] > a.part[i] ? near.part[i] - 1 : near.part[i]);
+}
+LAMINA_LANES Eight magnitude(const Eight& a) { LAMINA_EACH(max_of(a.part[i], -a.part[i])); }
+LAMINA_LANES double lowest_of(const Eight& a) {
+  double lowest = a.part[0][0];
+  for (int i = 1; i < 8; ++i) lowest = std::min(lowest, a.part[i / kWidth][i % kWidth]);
+  return lowest;
+}
+LAMINA_LANES double highest_of(const Eight& a) {
+  double highest = a.part[0][0];
+  for (int i = 1; i < 8; ++i) highest = std::max(highest, a.part[i / kWidth][i % kWidth]);
+  return highest;
 }
 LAMINA_LANES Mask below(const Eight& a, const Eight& b) {
   Mask mask;
@@ -66,7 +77,6 @@ LAMINA_LANES Mask first_lanes(std::uint32_t count) {
   for (int i = 0; i < kParts; ++i) mask.part[i] = reinterpret_cast<const LooseWhole*>(kOnes + 8 - count + i * kWidth)->value;
   return mask;
 }
-LAMINA_LANES Eight keep_first(std::uint32_t count, const Eight& a) { return keep(first_lanes(count), a); }
 LAMINA_LANES void store_whole(std::uint32_t* at, const Eight& a) {
   for (int i = 0; i < 8; ++i) at[i] = static_cast<std::uint32_t>(static_cast<std::int32_t>(a.part[i / kWidth][i % kWidth]));
 }

@@ -14,10 +14,6 @@
 namespace lamina::formats::tiff {
 namespace {
 
-using png::BitString;
-using png::BitWriter;
-
-constexpr std::size_t kMaxCode = 15;
 constexpr std::size_t kTile = 16, kCore = 18, kWindow = 32'768;
 /// Rows up and bytes to the left at which a core nearly repeats: one of 300 bytes differs, of 120; of 85, of 50. Where a core
 /// begins, what repeats is to the right of it, and where it ends, to the left.
@@ -84,15 +80,6 @@ auto lanes_kernel() {
   return lanes_plain;
 }
 
-/// As png::word_lengths() of at most 15 bits: weights are flattened until that is so.
-std::array<std::uint8_t, png::kSymbols> code_lengths(std::array<std::uint32_t, png::kSymbols> weights) {
-  while (true) {
-    const auto lengths = png::word_lengths(weights);
-    if (*std::ranges::max_element(lengths) <= kMaxCode) return lengths;
-    for (std::uint32_t& weight : weights) weight = (weight + 1) / 2 + 1;
-  }
-}
-
 /// Of RFC 1950: a sum of bytes, and the sum of its values on the way, both modulo 65521. parts  outside of them bytes are 0
 std::uint32_t adler_of(std::span<const std::byte> bytes, std::span<const RowSpan> parts) {
   constexpr std::uint64_t kModulus = 65'521;
@@ -149,27 +136,17 @@ void DitherDeflate::choose_distances(std::span<const std::byte> bytes, std::size
       tile += as_tile && !as_core, core += as_core && !as_tile;
     }
   }
-  distances_ = 0;
-  if (core <= 2 * tile) return add_distance(kTile);
-  add_distance(kCore);
+  code_.clear_distances();
+  if (core <= 2 * tile) return code_.add_distance(kTile);
+  code_.add_distance(kCore);
   for (const auto& choices : kBack) {
     for (const RowsBack& of : choices) {
       const std::size_t distance = of.rows * stride + static_cast<std::size_t>(of.bytes);  // of small rows: very large
       if (distance <= kCore || distance > kWindow) continue;
-      add_distance(distance);
+      code_.add_distance(distance);
       break;
     }
   }
-}
-
-/// As deflate states it (RFC 1951, 3.2.5), unless another one has its symbol.
-void DitherDeflate::add_distance(std::size_t bytes) {
-  const auto less = static_cast<std::uint32_t>(bytes - 1);
-  const auto extra_bits = static_cast<std::uint32_t>(std::bit_width(less)) - 2;
-  const std::uint32_t symbol = 2 * extra_bits + (less >> extra_bits);
-  const auto others = std::span(distance_).first(distances_);
-  if (std::ranges::find(others, symbol, &DitherDistance::symbol) != others.end()) return;
-  distance_[distances_++] = {bytes, symbol, less & ((1u << extra_bits) - 1), extra_bits, {}};
 }
 
 /// The longest of the matches that begin at `at`; of one that is long enough no other distance is compared.
@@ -178,17 +155,18 @@ DitherDeflate::Match DitherDeflate::longest_match(std::span<const std::byte> byt
                                                   std::size_t& part) const {
   constexpr std::ptrdiff_t kLongEnough = 64;
   const std::byte *const data = bytes.data(), *const end = data + bytes.size();
+  const auto distances = code_.distances();
   Match longest{at, 0};
   for (const std::byte* stop = at;;) {
     while (part < parts_.size() && data + parts_[part].end <= stop) ++part;
     if (part == parts_.size()) return {end, 0};
     const std::byte* const part_end = data + parts_[part].end;
-    longest.end = stop = repeats_end(std::max(stop, data + parts_[part].begin), part_end, end, distance_[0].bytes);
+    longest.end = stop = repeats_end(std::max(stop, data + parts_[part].begin), part_end, end, distances[0].bytes);
     if (stop < part_end) break;
   }
-  for (std::uint32_t d = 1; d < distances_ && longest.end - at < kLongEnough; ++d) {
-    if (at - data < static_cast<std::ptrdiff_t>(distance_[d].bytes)) continue;
-    const std::byte* const stop = repeats_end(at, end, end, distance_[d].bytes);
+  for (std::uint32_t d = 1; d < distances.size() && longest.end - at < kLongEnough; ++d) {
+    if (at - data < static_cast<std::ptrdiff_t>(distances[d].bytes)) continue;
+    const std::byte* const stop = repeats_end(at, end, end, distances[d].bytes);
     if (stop > longest.end) longest = {stop, d};
   }
   return longest;
@@ -196,7 +174,7 @@ DitherDeflate::Match DitherDeflate::longest_match(std::span<const std::byte> byt
 
 /// Whether no distance repeats the 8 bytes at `at`.
 bool DitherDeflate::is_new(std::span<const std::byte> bytes, const std::byte* at) const {
-  for (const DitherDistance& distance : std::span(distance_).first(distances_)) {
+  for (const StripDistance& distance : code_.distances()) {
     if (at - bytes.data() >= static_cast<std::ptrdiff_t>(distance.bytes) && word_at(at) == word_at(at - distance.bytes))
       return false;
   }
@@ -205,16 +183,17 @@ bool DitherDeflate::is_new(std::span<const std::byte> bytes, const std::byte* at
 
 void DitherDeflate::find_pieces(std::span<const std::byte> bytes) {
   pieces_.clear();
+  const auto distances = code_.distances();
   std::array<std::array<std::uint32_t, 256>, 4> counts{};
   const std::byte* const end = bytes.data() + bytes.size();
-  const std::byte *literals = bytes.data(), *at = literals + std::min(distance_[0].bytes, bytes.size());
+  const std::byte *literals = bytes.data(), *at = literals + std::min(distances[0].bytes, bytes.size());
   std::size_t part = 0;
   weights_.fill(1);
   while (true) {
     while (end - at >= 8 && is_new(bytes, at)) at += 8;
     if (end - at < 8) at = end;
     const Match match = longest_match(bytes, at, part);
-    const auto distance = static_cast<std::ptrdiff_t>(distance_[match.distance].bytes);
+    const auto distance = static_cast<std::ptrdiff_t>(distances[match.distance].bytes);
     const std::byte* begin = at;
     if (match.end > at) {
       while (begin > literals && begin - bytes.data() > distance && *(begin - 1) == *(begin - 1 - distance)) --begin;
@@ -226,78 +205,20 @@ void DitherDeflate::find_pieces(std::span<const std::byte> bytes) {
       for (std::size_t i = 0; i < 4; ++i) ++counts[i][static_cast<std::uint8_t>(literal[i])];
     }
     for (; literal < begin; ++literal) ++counts[0][static_cast<std::uint8_t>(*literal)];
-    if (length > 0) {
-      weights_[285] += length / png::kLongestMatch;
-      const std::uint32_t rest = length % png::kLongestMatch;
-      if (rest >= png::kShortestMatch) ++weights_[png::length_class(rest).symbol];
-    }
+    count_match(length, weights_);
     literals = at = match.end;
     if (at == end) break;
   }
   for (std::size_t b = 0; b < 256; ++b) weights_[b] += counts[0][b] + counts[1][b] + counts[2][b] + counts[3][b];
 }
 
-void DitherDeflate::make_code() {
-  lengths_ = code_lengths(weights_);
-  const auto words = png::words_of(lengths_);
-  for (std::size_t b = 0; b < 256; ++b) byte_[b] = words[b];
-  end_ = words[png::kEndOfBlock];
-  // Distances have the words 0; 0 and 1; or 0, 10 and 11: those of lower symbols come first.
-  std::array<std::uint8_t, kDistanceSymbols> of_distance{};
-  for (std::size_t d = 0; d < distances_; ++d) of_distance[distance_[d].symbol] = d == 0 || distances_ == 2 ? 1 : 2;
-  distance_lengths_ = of_distance;
-  const auto backs = png::words_of(of_distance);
-  for (DitherDistance& of : std::span(distance_).first(distances_))
-    of.word = join(backs[of.symbol], BitString(of.extra, of.extra_bits));
-  for (std::uint32_t length = png::kShortestMatch; length <= png::kLongestMatch; ++length) {
-    const png::LengthClass found = png::length_class(length);
-    match_[length] = join(words[found.symbol], BitString(found.extra, found.extra_bits));
-  }
-}
-
-/// One block, which states its code (RFC 1951, 3.2.7): lengths of all symbols and of distances, without repeats.
-void DitherDeflate::put_head(BitWriter& writer) const {
-  constexpr std::size_t kLengthSymbols = 19;
-  std::array<std::uint32_t, kLengthSymbols> weights{};
-  for (const std::uint8_t length : lengths_) ++weights[length];
-  std::size_t last = kDistanceSymbols - 1;
-  while (distance_lengths_[last] == 0) --last;
-  const auto of_distances = std::span(distance_lengths_).first(last + 1);
-  for (const std::uint8_t length : of_distances) ++weights[length];
-  auto lengths = png::word_lengths(weights);
-  while (*std::ranges::max_element(lengths) > 7) {
-    for (std::uint32_t& weight : weights) weight = weight > 0 ? weight / 2 + 1 : 0;
-    lengths = png::word_lengths(weights);
-  }
-  const auto words = png::words_of(lengths);
-  constexpr std::array<std::uint8_t, kLengthSymbols> kOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
-                                                               11, 4,  12, 3, 13, 2, 14, 1, 15};
-  writer.put(BitString(1, 1));  // the last block
-  writer.put(BitString(2, 2));  // which states its code
-  writer.put(BitString(png::kSymbols - 257, 5));
-  writer.put(BitString(last, 5));
-  writer.put(BitString(kLengthSymbols - 4, 4));
-  for (const std::uint8_t symbol : kOrder) writer.put(BitString(lengths[symbol], 3));
-  for (const std::uint8_t length : lengths_) writer.put(words[length]);
-  for (const std::uint8_t length : of_distances) writer.put(words[length]);
-}
-
-void DitherDeflate::put_pieces(std::span<const std::byte> bytes, BitWriter& writer) const {
+void DitherDeflate::put_pieces(std::span<const std::byte> bytes, png::BitWriter& writer) const {
   const std::byte* at = bytes.data();
-  const auto word = [&](const std::byte* of) { return byte_[static_cast<std::uint8_t>(*of)]; };
   for (const Piece& piece : pieces_) {
-    const std::byte* const end = at + piece.literals;
-    for (; end - at >= 3; at += 3) writer.put(join(join(word(at), word(at + 1)), word(at + 2)));
-    for (; at < end; ++at) writer.put(word(at));
-    const BitString back = distance_[piece.distance].word, longest = join(match_[png::kLongestMatch], back);
-    std::uint32_t left = piece.match;
-    for (; left >= png::kLongestMatch; left -= png::kLongestMatch) writer.put(longest);
-    if (left >= png::kShortestMatch) {
-      writer.put(join(match_[left], back));
-    } else {
-      for (std::uint32_t i = 0; i < left; ++i) writer.put(word(at + piece.match - left + i));
-    }
-    at += piece.match;
+    code_.put(at, piece.literals, writer);
+    at += piece.literals + piece.match;
+    const std::uint32_t rest = code_.put_match(piece.match, piece.distance, writer);
+    code_.put(at - rest, rest, writer);
   }
 }
 
@@ -306,17 +227,10 @@ std::size_t DitherDeflate::compress(std::span<const std::byte> bytes, std::size_
   find_parts(bytes.size(), set);
   choose_distances(bytes, stride);
   find_pieces(bytes);
-  make_code();
-  out[0] = std::byte{0x78};  // a window of 32 KiB
-  out[1] = std::byte{0x01};
-  BitWriter writer(out + 2);
-  put_head(writer);
+  code_.make(weights_);
+  png::BitWriter writer = code_.start(out);
   put_pieces(bytes, writer);
-  writer.put(end_);
-  std::byte* end = writer.finish();
-  const std::uint32_t check = adler_of(bytes, parts_);
-  for (int shift = 24; shift >= 0; shift -= 8) *end++ = static_cast<std::byte>(check >> shift & 0xFF);
-  return static_cast<std::size_t>(end - out);
+  return static_cast<std::size_t>(code_.finish(adler_of(bytes, parts_), writer) - out);
 }
 
 }  // namespace lamina::formats::tiff

@@ -25,6 +25,7 @@
 #include "stages/formats/images/image_formats.h"
 #include "stages/formats/row_encoder.h"
 #include "stages/formats/tiff/dither_deflate.h"
+#include "stages/formats/tiff/edge_deflate.h"
 #include "stages/formats/tiff/packbits.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
@@ -96,6 +97,8 @@ TiffHandle open_for_writing(MemoryFile& file, std::string& message) {
 /// A strip of bits is at most this long, unless a row is longer: it stays in the second-level cache between being
 /// filled and being read, and a reader needs no more memory than that.
 constexpr std::size_t kStripBytes = 256 * 1024;
+/// Bits of such a strip are never made where edges alone are dithered, and each strip has a code to be made.
+constexpr std::size_t kEdgeStripBytes = 1024 * 1024;
 /// Room for the directory and what it points to, so that libtiff's last writes do not grow the buffer.
 constexpr std::size_t kDirectoryBytes = 1024;
 
@@ -401,26 +404,40 @@ class StripEncoder : public RowEncoder {
 };
 
 /// Deflate, strip by strip, of dithered images.
-class DeflateEncoder : public RowEncoder {
+class DeflateEncoder : public ImageEncoder {
  public:
   void tag(const LayerTags& tags) override { text_.take(tags); }
 
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    return encode_rows(runs, dpi_x, dpi_y, file);
+  }
+  Status encode(const BitRows& rows, double dpi_x, double dpi_y, Bytes& file) override {
+    if (!rows.has_spans()) return encode_rows(rows, dpi_x, dpi_y, file);
+    return encode_strips(rows.columns(), rows.rows(), {dpi_x, dpi_y}, kEdgeStripBytes, file,
+                         [&](std::uint32_t begin, std::uint32_t end, std::size_t stride) {
+                           edges_.start();
+                           for (std::uint32_t row = begin; row < end; ++row) {
+                             rows.spans(row, spans_);
+                             edges_.add(spans_, stride);
+                           }
+                           return edges_.finish(packed_.data());
+                         });
+  }
+
  private:
-  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) override {
-    if (Status status = check_size("TIFF", image.columns, image.rows); !status) return status;
-    const TagFrame frame{image.columns, image.rows, dpi_x, dpi_y, 1, COMPRESSION_ADOBE_DEFLATE};
-    file.resize(file.capacity());
-    strip_.assign(frame.stride * frame.rows_per_strip, std::byte{0});
-    packed_.resize(DitherDeflate::bound(strip_.size()));
-    return write_file(file, frame, text_, [&](TIFF* tiff) {
-return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
-        set_.clear();
-        for (std::uint32_t row = begin; row < end; ++row) put_row(image, row, frame.stride * (row - begin), frame.stride);
-        const std::size_t length = deflate_.compress(std::span(strip_).first(frame.stride * (end - begin)), frame.stride, set_, packed_.data());
-        for (const RowSpan& set : set_) std::memset(strip_.data() + set.begin, 0, set.end - set.begin);
-        return std::span(packed_).first(length);
-      });
-    });
+  Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
+    strip_.clear();
+    return encode_strips(image.columns, image.rows, {dpi_x, dpi_y}, kStripBytes, file,
+                         [&](std::uint32_t begin, std::uint32_t end, std::size_t stride) {
+                           const std::size_t size = stride * (end - begin);
+                           if (strip_.size() < size) strip_.assign(size, std::byte{0});  // by the first strip
+                           set_.clear();
+                           for (std::uint32_t row = begin; row < end; ++row) put_row(image, row, stride * (row - begin), stride);
+                           const auto strip = std::span(strip_).first(size);
+                           const std::size_t length = deflate_.compress(strip, stride, set_, packed_.data());
+                           for (const RowSpan& set : set_) std::memset(strip.data() + set.begin, 0, set.end - set.begin);
+                           return length;
+                         });
   }
   /// at  offset of the row in the strip
   void put_row(RowBits& image, std::uint32_t row, std::size_t at, std::size_t stride) {
@@ -429,8 +446,26 @@ return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
     for (RowSpan& set : std::span(set_).subspan(before)) set.begin += at, set.end += at;
   }
 
+  /// put_strip(first row, end, bytes of a row)  writes a strip to packed_ and returns its length
+  template <class PutStrip>
+  Status encode_strips(std::uint32_t columns, std::uint32_t rows, std::array<double, 2> dpi, std::size_t strip_bytes,
+                       Bytes& file, const PutStrip& put_strip) {
+    if (Status status = check_size("TIFF", columns, rows); !status) return status;
+    TagFrame frame{columns, rows, dpi[0], dpi[1], 1, COMPRESSION_ADOBE_DEFLATE};
+    frame.rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(strip_bytes / frame.stride, 1, rows));
+    file.resize(file.capacity());
+    return write_file(file, frame, text_, [&](TIFF* tiff) {
+      packed_.resize(StripCode::bound(frame.stride * frame.rows_per_strip));
+      return put_packed(tiff, frame, [&](std::uint32_t begin, std::uint32_t end) {
+        return std::span(packed_).first(put_strip(begin, end, frame.stride));
+      });
+    });
+  }
+
   LayerText text_;
   DitherDeflate deflate_;
+  EdgeDeflate edges_;
+  WordSpans spans_;
   Bytes strip_, packed_;
   Buffer<RowSpan> set_;  // of the strip, where it is not 0
 };
