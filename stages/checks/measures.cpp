@@ -13,7 +13,7 @@ constexpr std::array<std::uint32_t, 2> kNoRow{0, 0};
 
 std::uint64_t size_of(const Runs& runs) { return 4 * (runs.change.size() + runs.row_offset.size()); }
 
-void clear_rows(std::uint32_t columns, std::uint32_t rows, Runs& runs) {
+void make_empty(std::uint32_t columns, std::uint32_t rows, Runs& runs) {
   runs.columns = columns;
   runs.row_offset.assign(std::size_t{rows} + 1, 0);
   runs.change.clear();
@@ -51,7 +51,7 @@ bool keep_near_wide(const RunsView& image, const Stencil& stencil, Runs& result)
     }
     return false;
   };
-  clear_rows(image.columns, 0, result);
+  make_empty(image.columns, 0, result);
   const auto append = [&](std::int64_t until, bool all) {
     for (std::int64_t r = std::ssize(result.row_offset) - 1; r < until; ++r) {
       if (all) {
@@ -271,7 +271,7 @@ void Measures::note_hidden(const RunsView& inner) {
                  static_cast<std::uint32_t>(sample[i + 1] < std::min(a[i + 1], b[i + 1]));
     return outside == 0;
   };
-  clear_rows(columns_, 0, between_layers_);
+  make_empty(columns_, 0, between_layers_);
   for (std::uint32_t r = 0; r < rows_; ++r) {
     if (covered(r)) {
       between_layers_.row_offset.push_back(static_cast<std::uint32_t>(between_layers_.change.size()));
@@ -287,7 +287,7 @@ void Measures::add_hidden(const LayerMeasures& measures) {
   const bool any = begun_ && has_sample_ && !both_inner_.row_offset.empty();
   if (any) note_hidden(measures.inner);
   if (begun_ && (!hidden_.is_idle() || (any && !between_layers_.change.empty()))) {
-    if (!any) clear_rows(columns_, rows_, between_layers_);
+    if (!any) make_empty(columns_, rows_, between_layers_);
     hidden_.find(between_layers_);
     EndHidden rules{*this};
     hidden_.add(latest_, between_layers_, rules);
@@ -309,7 +309,7 @@ void Measures::add_channels(const Layer& layer, const RunsView& channels, Follow
 void Measures::add_upright(const Layer& layer, const RunsView& image, const RunsView& below, const RunsView& narrow,
                            Measured kind, Upright& upright) {
   if (narrow.change.empty() && upright.columns.is_idle() && upright.bodies.is_idle())
-    return clear_rows(columns_, 0, upright.below);
+    return make_empty(columns_, 0, upright.below);
   difference_in_rows(
       below, upright.below, [&](std::uint32_t r) { return !narrow.row(r).empty(); }, upright.base);
   upright.columns.add(layer, narrow, upright.base);
@@ -379,7 +379,7 @@ void Measures::finish() {
   for (const auto& [kind, upright] : {std::pair(Measured::kThin, &thin_), std::pair(Measured::kGap, &slots_upright_)}) {
     upright->columns.finish();
     // Above the last layer is powder alone.
-    clear_rows(columns_, rows_, upright->next_base);
+    make_empty(columns_, rows_, upright->next_base);
     if (kind == Measured::kGap) complement(upright->next_base, {0, columns_, 0, rows_}, upright->base);
     attach(upright->columns.ended(), kind == Measured::kGap ? upright->base : upright->next_base, upright->ended);
     EndUpright rules{*this, kind};
