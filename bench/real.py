@@ -66,8 +66,9 @@ def rows():
               measure="wall", answer="program", old=False)
     yield Row("levels-plate", "`--levels 4`, plate of 96", PLATE + " --levels 4", PLATE, 8, 5)
     yield Row("levels-benchy", "`--levels 4`, 3DBenchy x 1.5", BENCHY + " --levels 4", BENCHY, 8, 5)
-    yield Row("levels-faces", "`--levels 4`, the plate with horizontal faces at mid-layer, against the plate without",
-              PLATE.replace("crowns96", "steps_tie") + " --levels 4", PLATE.replace("crowns96", "steps") + " --levels 4", 1.3, 1.1)
+    steps = PLATE.replace("crowns96", "steps") + " --levels 4"
+    yield Row("levels-faces", "`--levels 4`, round steps with horizontal faces at mid-layer, against faces 7 um higher",
+              steps.replace("steps", "steps_tie"), steps, 1.3, 1.1)
     pins = "jet PART:pins.stl --bed 100x100 --dpi 1200 --layer 0.1 --levels 4 --at AT:pins.stl -o OUT"
     yield Row("levels-pins", "`--levels 4`, 6,400 square pins on a face at mid-layer, against a face 7 um higher",
               pins.replace("pins", "pins_tie"), pins, 1.5)

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -234,6 +235,7 @@ struct CoveredMesh {
   IntervalTable<Nm> index;
   Suspects suspects;
   HeldBound held;
+  std::uint32_t copies = 0;
 };
 
 struct Copy {
@@ -302,6 +304,8 @@ struct Coverage::State {
   LayerBound held_in(const Layer& layer) const;
   std::uint64_t live_facets(const Layer& layer) const;
   void order_copies(std::span<const Mesh> of_copies);
+  std::uint64_t shape_facets(const Layer& layer) const;
+  void make_shape(std::uint32_t of_mesh, std::int64_t bottom, std::int64_t top, CoverageScratch& scratch) const;
   void gather(const Copy& copy, const Layer& layer, CoverageScratch& scratch, CoverageReport& report) const;
 };
 
@@ -328,6 +332,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
     HeldBound held(*blocks[i], suspects, grid, levels - 1);
     state->meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
   }
+  for (const Copy& copy : state->copies) ++state->meshes[copy.mesh].copies;
   Coverage coverage;
   coverage.state_ = state;
   return coverage;
@@ -345,18 +350,42 @@ void Coverage::State::order_copies(std::span<const Mesh> of_copies) {
   std::ranges::stable_sort(from_back, std::greater(), [&](std::uint32_t i) { return copies[i].last_band; });
 }
 
+/// Calls take(triangle, whether it meets others) for the facets of a mesh between two heights, all in its frame.
+template <class Take>
+void for_facets(const CoveredMesh& mesh, std::int64_t bottom, std::int64_t top, const Take& take) {
+  Cluster slack;
+  mesh.index.find(bottom, top - 1, [&](std::uint32_t c) {
+    const Cluster& cluster = mesh.blocks->cluster(c, slack);
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
+      const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
+      if (std::min({z0, z1, z2}) >= top || std::max({z0, z1, z2}) <= bottom) continue;
+      take(cluster.triangle(lane), (mesh.suspects[c] >> lane & 1) != 0);
+    }
+  });
+}
+
+/// Cuts the facets of a mesh once for its copies at one height.
+void Coverage::State::make_shape(std::uint32_t of_mesh, std::int64_t bottom, std::int64_t top, CoverageScratch& scratch) const {
+  const CoveredMesh& mesh = meshes[of_mesh];
+  SlabShape& shape = scratch.shape[of_mesh];
+  shape = {bottom, static_cast<std::uint32_t>(scratch.shape_facets.size()), 0, true};
+  SlabFacet facet;
+  for_facets(mesh, bottom, top, [&](const Triangle& t, bool suspect) {
+    if (!take_facet(t, suspect, bottom, top, y, facet)) return;
+    facet.first_piece = static_cast<std::uint32_t>(scratch.shape_pieces.size());
+    cut_trapezoids(facet, 0, y, scratch.shape_pieces);
+    facet.piece_count = static_cast<std::uint32_t>(scratch.shape_pieces.size()) - facet.first_piece;
+    scratch.shape_facets.push_back(facet);
+  });
+  shape.end = static_cast<std::uint32_t>(scratch.shape_facets.size());
+}
+
 /// Takes what of the copy reaches into the layer.
 void Coverage::State::gather(const Copy& copy, const Layer& layer, CoverageScratch& scratch, CoverageReport& report) const {
-  const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
-  const auto end = static_cast<double>(grid.x.length);
-  SlabFacet taken;
-  Cluster slack;
-  const CoveredMesh& mesh = meshes[copy.mesh];
   const Point3 by = copy.offset;
-  const auto moved = [&](const Point3& p) {
-    return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
-  };
-  const auto take = [&] {
+  const std::int64_t bottom = std::int64_t{layer.bottom} - by.z, top = bottom + layer.thickness;
+  const auto end = static_cast<double>(grid.x.length);
+  const auto take = [&](const SlabFacet& taken) {
     std::uint32_t at = 0;
     if (scratch.unused.empty()) {
       at = static_cast<std::uint32_t>(scratch.facets.size());
@@ -370,19 +399,24 @@ void Coverage::State::gather(const Copy& copy, const Layer& layer, CoverageScrat
     std::uint32_t& first = scratch.first[taken.last_row / kBandRows];
     scratch.next[at] = std::exchange(first, at);
     ++report.facets;
-    report.volume_mm3 += taken.edgewise ? 0 : volume_behind(taken, end);
+    report.volume_mm3 += taken.volume_behind(end);
   };
-  mesh.index.find(bottom - by.z, top - by.z - 1, [&](std::uint32_t c) {
-    const Cluster& cluster = mesh.blocks->cluster(c, slack);
-    const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
-    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
-      const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
-      if (std::min({z0, z1, z2}) + by.z >= top || std::max({z0, z1, z2}) + by.z <= bottom) continue;
-      const Triangle t = cluster.triangle(lane);
-      const Triangle on_bed{moved(t.a), moved(t.b), moved(t.c)};
-      const bool suspect = (suspects >> lane & 1) != 0 || is_near_others(copy, on_bed);
-      if (take_facet(on_bed, suspect, bottom, top, y, taken)) take();
+  const auto meets_others = [&](const Triangle& on_bed) { return copy.crowded || is_near_others(copy, on_bed); };
+  if (meshes[copy.mesh].copies > 1 && !scratch.shape[copy.mesh].made) make_shape(copy.mesh, bottom, top, scratch);
+  const SlabShape shape = scratch.shape[copy.mesh];
+  SlabFacet taken;
+  if (shape.made && shape.bottom == bottom) {
+    for (std::uint32_t i = shape.first; i < shape.end; ++i) {
+      taken = scratch.shape_facets[i];
+      taken.move(by, y);
+      taken.suspect |= meets_others(taken.facet);
+      take(taken);
     }
+    return;
+  }
+  for_facets(meshes[copy.mesh], bottom, top, [&](Triangle t, bool suspect) {
+    for (Point3* p : {&t.a, &t.b, &t.c}) *p = {p->x + by.x, p->y + by.y, p->z + by.z};
+    if (take_facet(t, suspect || meets_others(t), layer.bottom, std::int64_t{layer.bottom} + layer.thickness, y, taken)) take(taken);
   });
 }
 
@@ -404,6 +438,10 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
   const std::uint64_t facets = state.live_facets(layer);
   ensure_capacity(scratch.facets, facets), ensure_capacity(scratch.next, facets);
   scratch.first.assign(state.bands(), kNoFacet);
+  scratch.shape.assign(state.meshes.size(), {});
+  scratch.shape_facets.clear(), scratch.shape_pieces.clear();
+  const std::uint64_t shared = state.shape_facets(layer);
+  ensure_capacity(scratch.shape_facets, shared), ensure_capacity(scratch.shape_pieces, BandMaker::kMaxPieces * shared);
   std::size_t gathered = 0;
   for (std::uint32_t band = state.bands(); band-- > 0;) {
     for (; gathered < state.from_back.size(); ++gathered) {
@@ -413,7 +451,8 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
     }
     slab.facets = scratch.facets;
     for (std::uint32_t at = scratch.first[band]; at != kNoFacet; at = scratch.next[at]) {
-      scratch.maker.enter(scratch.facets[at], at, state.y);
+      const SlabFacet& facet = scratch.facets[at];
+      scratch.maker.enter(facet, at, state.y, std::span(scratch.shape_pieces).subspan(facet.first_piece, facet.piece_count));
       scratch.live.push_back(at);
     }
     const std::uint32_t first = band * kBandRows, rows = std::min(state.grid.rows() - first, kBandRows);
@@ -447,6 +486,17 @@ std::uint64_t Coverage::State::live_facets(const Layer& layer) const {
   return static_cast<std::uint64_t>(maximum);
 }
 
+/// Facets of shapes that copies share, at most.
+std::uint64_t Coverage::State::shape_facets(const Layer& layer) const {
+  std::vector<std::uint64_t> maximum(meshes.size());
+  for (const Copy& copy : copies) {
+    const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
+    if (meshes[copy.mesh].copies < 2) continue;
+    maximum[copy.mesh] = std::max(maximum[copy.mesh], meshes[copy.mesh].held.facets_at(bottom, bottom + layer.thickness));
+  }
+  return std::accumulate(maximum.begin(), maximum.end(), std::uint64_t{0});
+}
+
 LayerBound Coverage::State::held_in(const Layer& layer) const {
   LayerBound held;
   for (const Copy& copy : copies) {
@@ -466,7 +516,9 @@ LayerBound Coverage::bound(const Layer& layer) const {
   const std::uint64_t facets = state.live_facets(layer);
   bound.scratch_bytes = (facets + facets / 8) * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
                         4 * facets * sizeof(std::uint32_t) + sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2) +
-                        BandMaker::bytes_of(facets, state.grid.columns());
+                        BandMaker::bytes_of(facets, state.grid.columns()) + state.meshes.size() * sizeof(SlabShape);
+  const std::uint64_t shared = state.shape_facets(layer);
+  bound.scratch_bytes += (shared + shared / 8) * (sizeof(SlabFacet) + BandMaker::kMaxPieces * sizeof(Trapezoid));
   bound.voxels = std::min(bound.voxels, voxels);
   bound.runs = std::min(bound.runs, voxels);
   return bound;

@@ -34,8 +34,18 @@ namespace lamina::coverage {
 
 // --- memory of one layer in flight.
 
+/// What of a mesh lies in a layer, in its frame; copies at one height share it.
+struct SlabShape {
+  std::int64_t bottom = 0;           // of the layer, in the frame of the mesh
+  std::uint32_t first = 0, end = 0;  // its facets
+  bool made = false;
+};
+
 /// Any layer may follow any other in it.
 struct CoverageScratch {
+  Buffer<SlabShape> shape;         // of each mesh
+  Buffer<SlabFacet> shape_facets;  // of all shapes
+  Buffer<Trapezoid> shape_pieces;
   Buffer<SlabFacet> facets;           // of copies that reach the band at work, and what is left over of those before
   Buffer<std::uint32_t> first, next;  // facets by the band of the last row they reach: the first of each band; that behind each
   Buffer<std::uint32_t> live, unused;  // facets that entered and reach further bands; positions that others may take
@@ -43,7 +53,7 @@ struct CoverageScratch {
   bool counts_held = false;  // whether layers report held_voxels, which makes them slower
 
   std::uint64_t bytes() const {
-    return bytes_held(facets) + bytes_held(first) + bytes_held(next) + bytes_held(live) + bytes_held(unused) + maker.bytes();
+    return bytes_held(shape) + bytes_held(shape_facets) + bytes_held(shape_pieces) + bytes_held(facets) + bytes_held(first) + bytes_held(next) + bytes_held(live) + bytes_held(unused) + maker.bytes();
   }
 };
 

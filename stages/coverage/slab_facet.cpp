@@ -89,28 +89,40 @@ bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::
     piece = &within;
   }
   out.corners = std::min<std::uint32_t>(piece->size, 5);
-  double first = static_cast<double>(depth), last = 0;
+  out.front = static_cast<double>(depth), out.back = 0;
   for (std::uint32_t i = 0; i < out.corners; ++i) {
     out.x[i] = piece->corner[i].x;
     out.y[i] = piece->corner[i].y;
     out.z[i] = piece->corner[i].z;
-    first = std::min(first, out.y[i]);
-    last = std::max(last, out.y[i]);
+    out.front = std::min(out.front, out.y[i]);
+    out.back = std::max(out.back, out.y[i]);
   }
   if (out.corners == 0) return false;
-  out.first_row = rows.before(front + first - kSlack);
-  out.last_row = rows.behind(front + last + kSlack);
+  out.area = out.moment = 0;
+  for (std::uint32_t k = 1; k + 1 < out.corners && !out.edgewise; ++k) {
+    const auto corner = [&](std::uint32_t i) { return Corner<double>{out.x[i], out.y[i], out.z[i]}; };
+    const double area = area_along_x(corner(0), corner(k), corner(k + 1));
+    out.area += area;
+    out.moment += area * (out.x[0] + out.x[k] + out.x[k + 1]) / 3;
+  }
+  out.piece_count = 0;
+  out.find_rows(rows);
   return true;
 }
 
-double volume_behind(const SlabFacet& facet, double end) {
-  double sum = 0;
-  const auto corner = [&](std::uint32_t i) { return Corner<double>{facet.x[i], facet.y[i], facet.z[i]}; };
-  for (std::uint32_t k = 1; k + 1 < facet.corners; ++k) {
-    const Corner<double> a = corner(0), b = corner(k), c = corner(k + 1);
-    sum += area_along_x(a, b, c) * (end - facet.low.x - (a.x + b.x + c.x) / 3);
-  }
-  return sum;
+void SlabFacet::find_rows(const Edges& rows) {
+  first_row = rows.before(low.y + front - kSlack);
+  last_row = rows.behind(low.y + back + kSlack);
+}
+
+void SlabFacet::move(const Point3& by, const Edges& rows) {
+  for (Point3* p : {&facet.a, &facet.b, &facet.c, &low}) *p = {p->x + by.x, p->y + by.y, p->z + by.z};
+  find_rows(rows);
+}
+
+void Trapezoid::find_rows(const Edges& rows) {
+  first_row = rows.before(from_y + low - kSlack);
+  last_row = rows.behind(from_y + high + kSlack);
 }
 
 void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& rows, Buffer<Trapezoid>& to) {
@@ -128,8 +140,7 @@ void cut_trapezoids(const SlabFacet& facet, std::uint32_t index, const Edges& ro
   piece.suspect = facet.suspect;
   piece.level = facet.facet.a.z == facet.facet.b.z && facet.facet.a.z == facet.facet.c.z;
   const auto append = [&] {
-    piece.first_row = rows.before(piece.from_y + piece.low - kSlack);
-    piece.last_row = rows.behind(piece.from_y + piece.high + kSlack);
+    piece.find_rows(rows);
     to.push_back(piece);
   };
   const std::size_t before = to.size();

@@ -130,6 +130,15 @@ struct SlabFacet {
   std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included
   std::array<double, 5> x, y, z;      // of the piece within the layer, from `low`
   std::uint32_t corners;
+  double front, back;                              // y that the piece reaches, from `low`
+  double area, moment;                             // along x, nm^2 and nm^3; 0 if edgewise
+  std::uint32_t first_piece = 0, piece_count = 0;  // its trapezoids, if they are cut already
+
+  /// What lies behind the piece within the layer, up to where x is `end`, nm^3; negative behind facets that +x leaves through.
+  double volume_behind(double end) const { return area * (end - low.x) - moment; }
+  void find_rows(const Edges& rows);
+  /// To where another copy stands.
+  void move(const Point3& by, const Edges& rows);
 };
 
 /// A facet in a row.
@@ -137,9 +146,6 @@ struct RowFacet {
   std::uint32_t first = 0, last = 0;  // columns that it may reach; last included
   std::uint32_t index = 0;            // among those of the layer
 };
-
-/// What lies behind the piece within the layer, up to where x is `end`, nm^3; negative behind facets that +x leaves through.
-double volume_behind(const SlabFacet& facet, double end);
 
 /// Fills in everything; false if nothing of the facet lies between the heights, or it has no area at all.
 bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::int64_t top, const Edges& rows, SlabFacet& out);
@@ -163,6 +169,8 @@ struct Trapezoid {
   std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included
   bool edgewise, suspect;             // as SlabFacet has them
   bool level;                         // horizontal
+
+  void find_rows(const Edges& rows);
 };
 
 /// Appends the trapezoids of a facet, up to one less than it has corners, from the highest down; one without height if the

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <utility>
 
 #include "stages/geometry/isa.h"
@@ -268,12 +269,17 @@ void DropCounter::start(const DropPatterns& patterns) {
   before_.resize(rows * kRow);
   for (std::size_t row = 0; row < rows; ++row) {
     std::uint8_t* const before = before_.data() + row * kRow;
-    std::uint8_t count = 0;
-    for (std::uint32_t c = 0; c < kTileSide; ++c) {
-      before[c] = count;
-      count = static_cast<std::uint8_t>(count + (patterns.tile[2 * row + c / 64] >> (c % 64) & 1));
+    std::uint64_t count = 0;  // eight columns at once: a bit becomes a byte, and a product their sums
+    constexpr std::uint64_t kOnes = 0x0101'0101'0101'0101, kDiagonal = 0x8040'2010'0804'0201;
+    for (std::uint32_t c = 0; c < kTileSide; c += 8) {
+      const std::uint64_t bits = patterns.tile[2 * row + c / 64] >> c % 64 & 255;
+      const std::uint64_t ones = ((bits * kOnes & kDiagonal) + 127 * kOnes) >> 7 & kOnes;
+      std::uint64_t sums = count * kOnes + (ones * kOnes << 8);
+      count += static_cast<std::uint64_t>(std::popcount(bits));
+      if constexpr (std::endian::native == std::endian::big) sums = __builtin_bswap64(sums);
+      std::memcpy(before + c, &sums, sizeof sums);
     }
-    before[kTileSide] = count;
+    before[kTileSide] = static_cast<std::uint8_t>(count);
   }
 }
 

@@ -1,6 +1,7 @@
 // Levels of solids of few facets against the contract, voxel for voxel.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <iostream>
 #include <numbers>
@@ -282,6 +283,44 @@ TEST(CoverageShapes, CopiesThatOverlapAreSampledOnlyWhereTheirBoxesMeet) {
     EXPECT_GT(sampled, 0u);
     EXPECT_LT(10 * inspected, 6 * held);  // two of three copies as a whole would be more
   }
+}
+
+TEST(CoverageShapes, CopiesOfSeveralMeshesAtAnyHeightAreAsOneMeshOfTheirFacets) {
+  const PixelGrid grid{{254, 6'000'000}, {508, 3'300'000}};
+  const Triangles ball_part = ball({0, 0, 0}, 300'000, 14), pin = box({0, 0, 0}, {170'000, 130'000, 333'000});
+  std::array<Mesh, 2> meshes{make_mesh(ball_part), make_mesh(pin)};
+  std::vector<Instance> instances;
+  Triangles all;
+  for (std::uint32_t i = 0; i < 14; ++i) {
+    const auto n = static_cast<Nm>(i);
+    const Point3 by{400'000 + 390'013 * n, 500'000 + 1'100'007 * (n % 3), 310'000 + (i % 4 == 3 ? 21'001 : 0)};
+    instances.push_back({i % 3 == 1 ? 1u : 0u, by});
+    for (Triangle t : i % 3 == 1 ? pin : ball_part) {
+      for (Point3* p : {&t.a, &t.b, &t.c}) *p = {p->x + by.x, p->y + by.y, p->z + by.z};
+      all.push_back(t);
+    }
+  }
+  Mesh joined_mesh = make_mesh(all);
+  const Instance only{0, {0, 0, 0}};
+  auto copies = coverage::Coverage::build(meshes, instances, grid, FillRule::kNonzero, 16);
+  auto together = coverage::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, FillRule::kNonzero, 16);
+  coverage::CoverageScratch kept, of_all_scratch;
+  Levels of_copies, of_all, again;
+  double volume = 0;
+  for (const Layer& layer : layers_of(90'000, 8)) {
+    coverage::CoverageScratch scratch;  // what layers before it left counts for them
+    const auto report = copies->layer(layer, scratch, of_copies);
+    copies->layer(layer, kept, again);
+    EXPECT_TRUE(of_copies.change == again.change && of_copies.level == again.level);
+    const auto expected = together->layer(layer, of_all_scratch, of_all);
+    EXPECT_EQ(report.facets, expected.facets);
+    EXPECT_NEAR(report.volume_mm3, expected.volume_mm3, 1e-9);
+    EXPECT_TRUE(of_copies.row_offset == of_all.row_offset && of_copies.change == of_all.change && of_copies.level == of_all.level)
+        << "layer " << layer.index;
+    EXPECT_LE(report.scratch_bytes, copies->bound(layer).scratch_bytes);
+    volume += report.volume_mm3;
+  }
+  EXPECT_NEAR(volume, volume_of(all), 1e-6);
 }
 
 /// Whether a pixel or one of its eight neighbours differs from it.

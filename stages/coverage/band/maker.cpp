@@ -65,8 +65,6 @@ double spoilt_share(const BandSlab& slab, double depth, double scale, double add
 
 // ---
 
-/// A facet's piece in the layer has up to five corners, and one trapezoid less.
-constexpr std::uint64_t kMaxPieces = 4;
 constexpr std::size_t kExtraCapacity = 64;
 
 }  // namespace
@@ -297,9 +295,17 @@ void BandMaker::start(const BandSlab& slab, Isa isa, bool counts_held) {
   level_.resize(kBandRows * columns);
 }
 
-void BandMaker::enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows) {
+void BandMaker::enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows, std::span<const Trapezoid> pieces) {
   if (active_.size() + kMaxPieces > active_.capacity()) active_.reserve(active_.size() + active_.size() / 8 + kExtraCapacity);
-  cut_trapezoids(facet, index, rows, active_);
+  if (pieces.empty()) return cut_trapezoids(facet, index, rows, active_);
+  for (const Trapezoid& piece : pieces) {
+    active_.push_back(piece);
+    Trapezoid& moved = active_.back();
+    moved.from_x = facet.low.x, moved.from_y = facet.low.y;
+    moved.facet = index;
+    moved.suspect = facet.suspect;
+    moved.find_rows(rows);
+  }
 }
 
 /// All that reaches the band goes into its cells.

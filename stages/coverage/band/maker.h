@@ -144,10 +144,13 @@ struct BandFaces {
 /// facets, and rationals read no further back.
 class BandMaker {
  public:
+  /// A facet's piece in the layer has up to five corners, and one trapezoid less.
+  static constexpr std::uint64_t kMaxPieces = 4;
   /// slab  outlives the layer. isa  one that this processor has, not kAuto. counts_held  CoverageScratch::counts_held
   void start(const BandSlab& slab, Isa isa, bool counts_held);
-  /// The facet's last row lies in the band that is made next. rows  edges of all
-  void enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows);
+  /// The facet's last row lies in the band that is made next. rows  edges of all; pieces  its trapezoids where they are cut,
+  /// of any copy
+  void enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows, std::span<const Trapezoid> pieces);
   bool is_empty() const { return active_.empty(); }
   /// Appends the rows of geometry rows [first, first + rows), the last one first, to `out`; adds to `report`. Its volume_mm3 is
   /// in nm^3, and gets the change of the facets' volume by the rule and samples.

@@ -97,8 +97,7 @@ TiffHandle open_for_writing(MemoryFile& file, std::string& message) {
 /// A strip of bits is at most this long, unless a row is longer: it stays in the second-level cache between being
 /// filled and being read, and a reader needs no more memory than that.
 constexpr std::size_t kStripBytes = 256 * 1024;
-/// Bits of such a strip are never made where edges alone are dithered, and each strip has a code to be made.
-constexpr std::size_t kEdgeStripBytes = 1024 * 1024;
+constexpr std::size_t kEdgeStripBytes = 1024 * 1024;  // where edges alone are dithered: never made as bits, and a code each
 /// Room for the directory and what it points to, so that libtiff's last writes do not grow the buffer.
 constexpr std::size_t kDirectoryBytes = 1024;
 
@@ -416,10 +415,7 @@ class DeflateEncoder : public ImageEncoder {
     return encode_strips(rows.columns(), rows.rows(), {dpi_x, dpi_y}, kEdgeStripBytes, file,
                          [&](std::uint32_t begin, std::uint32_t end, std::size_t stride) {
                            edges_.start();
-                           for (std::uint32_t row = begin; row < end; ++row) {
-                             rows.spans(row, spans_);
-                             edges_.add(spans_, stride);
-                           }
+                           for (std::uint32_t row = begin; row < end; ++row) rows.spans(row, spans_), edges_.add(spans_, stride);
                            return edges_.finish(packed_.data());
                          });
   }
