@@ -45,7 +45,7 @@ class Inspector : public ImageObserver {
     inspection_->add(layer, layer_inspection);
   }
   /// In addition to the inspection of layers.
-  std::uint64_t bytes() const { return on() ? inspection_->bytes() : 0; }
+  std::uint64_t bytes() const { return on() ? inspection_->bytes() + inspection_->scratch_bytes() : 0; }
 
   // --- observer
   /// The image of a layer of an earlier run is not available: bodies cannot be followed.
@@ -224,7 +224,12 @@ void PartCounter::share_out(const ImageWork& work, const std::vector<std::uint64
 class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, JobChecks& checks, const FlowLimits& limits)
-      : plan_(plan), checks_(checks), imager_(plan, true), files_(plan), work_(limits.max_in_flight), made_(limits.record_slots) {
+      : plan_(plan),
+        checks_(checks),
+        imager_(plan, true),
+        files_(plan),
+        work_(limits.max_in_flight),
+        made_(limits.record_slots) {
     if (plan.images->machine) parts_.emplace(plan);
     observe_pixels(plan, observers_);
     inspector_ = &observers_.add<Inspector>(plan);
@@ -390,7 +395,8 @@ class ImageMaker : public Maker {
   }
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, images.materials.image, images.drops.drops, images.drops.shares, images.bits ? &*images.bits : nullptr};
+    return {images.runs, images.materials.image, images.drops.drops, images.drops.shares,
+            images.bits ? &*images.bits : nullptr};
   }
 
   const Plan& plan_;

@@ -10,22 +10,6 @@ namespace {
 
 constexpr std::int32_t kFar = 1 << 30;
 
-/// Minima over windows that end at each element, of `count` elements with `slope` more for each step back. other  scratch;
-/// both swap
-void slide_minimum(std::uint32_t count, std::int32_t slope, std::size_t size, std::int32_t*& values, std::int32_t*& other) {
-  for (std::uint32_t window = 1; window < count;) {
-    const std::uint32_t step = std::min(window, count - window);
-    const std::int32_t more = slope * static_cast<std::int32_t>(step);
-    const std::size_t first = std::min<std::size_t>(step, size);
-    const std::int32_t* const from = values;
-    std::int32_t* const to = other;
-    std::copy(from, from + first, to);
-    for (std::size_t i = first; i < size; ++i) to[i] = std::min(from[i], from[i - step] + more);
-    std::swap(values, other);
-    window += step;
-  }
-}
-
 }  // namespace
 
 bool Chains::find(const RunsView& image, std::uint32_t stencil_rows) {
@@ -69,24 +53,6 @@ bool Chains::find(const RunsView& image, std::uint32_t stencil_rows) {
     end_right_[to] = -static_cast<std::int32_t>(change[2 * run + 1]);
   }
   return true;
-}
-
-void Chains::slide(const Chain& chain) {
-  const std::size_t size = chain.length + stencil_.rows() - 1;
-  one_.resize(size);
-  other_.resize(size);
-  const auto side = [&](const std::int32_t* ends, std::int32_t* result, std::uint32_t rising, std::uint32_t falling) {
-    std::int32_t *values = one_.data(), *other = other_.data();
-    const auto more = static_cast<std::int32_t>(rising);
-    std::transform(ends, ends + chain.length, values, [&](std::int32_t end) { return end + more; });
-    std::fill(values + chain.length, values + size, kFar);
-    slide_minimum(rising + 1, -1, size, values, other);
-    slide_minimum(falling + 1, 1, size, values, other);
-    slide_minimum(stencil_.down + 1, 0, size, values, other);
-    std::copy(values, values + size, result);
-  };
-  side(end_left_.data() + chain.at, left_.data() + chain.spread, stencil_.rising, stencil_.falling);
-  side(end_right_.data() + chain.at, less_right_.data() + chain.spread, stencil_.falling, stencil_.rising);
 }
 
 /// Takes the chains that begin up to an output row, and drops those that ended.
@@ -147,7 +113,18 @@ void Chains::spread(const StencilSteps& stencil, bool corners, const PixelBox& w
   }
   left_.resize(all);
   less_right_.resize(all);
-  for (const Chain& chain : chain_) slide(chain);
+  // Between the ends of chains so many rows as a stencil has more than one are beyond all columns.
+  const std::size_t more = stencil.rows() - 1;
+  one_.resize(all + more);
+  for (const auto& [ends, covered] : {std::pair(&end_left_, &left_), std::pair(&end_right_, &less_right_)}) {
+    std::int32_t* to = one_.data();
+    for (const Chain& chain : chain_) {
+      to = std::fill_n(to, more, kFar);
+      to = std::copy_n(ends->data() + chain.at, chain.length, to);
+    }
+    std::fill_n(to, more, kFar);
+    slide_minima(one_.data(), all, 1, profile(stencil, covered == &less_right_), other_, covered->data());
+  }
   const auto wide = static_cast<std::int32_t>(stencil.columns() - 1);
   const std::int64_t shift = corners ? 1 - static_cast<std::int64_t>(stencil.rows()) : 0;
   const RowEdges edges{static_cast<std::int32_t>(window.left), static_cast<std::int32_t>(window.right), corners ? -wide : 0,

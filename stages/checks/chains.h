@@ -13,17 +13,11 @@
 #include <cstdint>
 
 #include "stages/checks/bodies.h"
+#include "stages/checks/windows.h"
 #include "stages/data/buffer.h"
 #include "stages/data/runs.h"
 
 namespace lamina::checks {
-
-/// Steps of a stencil in each direction from its first pixel: it is the sum of these four segments (thin.h).
-struct StencilSteps {
-  std::uint32_t right = 0, down = 0, falling = 0, rising = 0;
-  std::uint32_t columns() const { return 1 + right + falling + rising; }
-  std::uint32_t rows() const { return 1 + down + falling + rising; }
-};
 
 /// Kept from image to image.
 class Chains {
@@ -54,7 +48,6 @@ class Chains {
     std::int32_t left, right, to_left, to_right;
   };
 
-  void slide(const Chain& chain);
   std::uint32_t* fill_row(std::uint32_t row, const RowEdges& edges, bool gaps, std::uint32_t* to) const;
   void enter(std::int64_t row, std::int64_t shift, std::size_t& next);
 
@@ -64,7 +57,7 @@ class Chains {
   Buffer<Chain> chain_;
   Buffer<std::int32_t> end_left_, end_right_;  // of runs, by chain; right ends negated
   Buffer<std::int32_t> left_, less_right_;     // of what the stencil covers
-  Buffer<std::int32_t> one_, other_;           // of a chain
+  Buffer<std::int32_t> one_, other_;           // scratch
   Buffer<Active> active_, begin_;
 };
 

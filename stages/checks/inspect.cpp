@@ -279,7 +279,10 @@ void Inspection::prepare(const RunsView& image, LayerInspection& inspection) con
   const bool too_large = stopped_ || minimum > max_bytes_;
   copy_rows(image, top_, top_ + all_.bottom, inspection.image);
   inspection.min_bytes = !too_large ? 0 : stopped_ ? minimum : expected_bytes(inspection.image, all_);
-  if (!too_large) return measures_.prepare(inspection.image, inspection.scratch, inspection.measures);
+  if (!too_large) {
+    BorrowedScratch scratch(*this);
+    return measures_.prepare(inspection.image, *scratch, inspection.measures);
+  }
   const std::uint64_t bytes = inspection.min_bytes;
   inspection = {};
   inspection.min_bytes = bytes;
@@ -287,14 +290,37 @@ void Inspection::prepare(const RunsView& image, LayerInspection& inspection) con
 
 void Inspection::add_sample(const RunsView& sample, LayerInspection& inspection) const {
   if (inspection.min_bytes > 0) return;
+  BorrowedScratch scratch(*this);
   RunsView rows = sample;
   if (sample.rows() < top_ + all_.bottom) {
-    copy_rows(sample, top_, top_ + all_.bottom, inspection.scratch.outside);
-    rows = inspection.scratch.outside;
+    copy_rows(sample, top_, top_ + all_.bottom, (*scratch).outside);
+    rows = (*scratch).outside;
   } else {
     rows.row_offset = sample.row_offset.subspan(top_, std::size_t{all_.bottom} + 1);
   }
-  measures_.add_sample(rows, inspection.scratch, inspection.measures);
+  measures_.add_sample(rows, *scratch, inspection.measures);
+}
+
+Inspection::BorrowedScratch::BorrowedScratch(const Inspection& inspection) : inspection_(inspection) {
+  const std::scoped_lock lock(inspection_.scratch_mutex_);
+  if (inspection_.scratch_.empty()) {
+    scratch_ = std::make_unique<ThinScratch>();
+  } else {
+    scratch_ = std::move(inspection_.scratch_.back());
+    inspection_.scratch_.pop_back();
+  }
+}
+
+Inspection::BorrowedScratch::~BorrowedScratch() {
+  const std::scoped_lock lock(inspection_.scratch_mutex_);
+  if (!inspection_.stopped_) inspection_.scratch_.push_back(std::move(scratch_));
+}
+
+std::uint64_t Inspection::scratch_bytes() const {
+  const std::scoped_lock lock(scratch_mutex_);
+  std::uint64_t total = 0;
+  for (const std::unique_ptr<ThinScratch>& one : scratch_) total += one->bytes();
+  return total;
 }
 
 void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
@@ -306,6 +332,10 @@ void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
 
 void Inspection::leave() {
   stopped_ = true;
+  {
+    const std::scoped_lock lock(scratch_mutex_);
+    scratch_.clear();
+  }
   solid_ = Follower(true);
   powder_ = Follower(false);
   measures_ = Measures(grid_, 0, 0);

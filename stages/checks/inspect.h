@@ -17,6 +17,8 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -86,10 +88,9 @@ struct Findings {
 /// The inspection of a layer on its own, before its turn; kept from layer to layer.
 struct LayerInspection {
   Runs image;
-  ThinScratch scratch;
   LayerMeasures measures;
   std::uint64_t min_bytes = 0;  // to inspect it, if above the limit: then the rest is empty
-  std::uint64_t bytes() const { return bytes_of(image) + scratch.bytes() + measures.bytes(); }
+  std::uint64_t bytes() const { return bytes_of(image) + measures.bytes(); }
 };
 
 /// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
@@ -122,7 +123,9 @@ class Inspection {
   const Findings& finish();
   const Findings& findings() const { return findings_; }
 
-  /// Without LayerInspection.
+  /// Held by prepare() and add_sample(), for as many layers as they work on at a time.
+  std::uint64_t scratch_bytes() const;
+  /// Without that and LayerInspection.
   std::uint64_t bytes() const { return solid_.bytes() + powder_.bytes() + measures_.bytes(); }
 
  private:
@@ -142,7 +145,22 @@ class Inspection {
   void note_outgrown(const Layer& layer);
   void note_edges(const Layer& layer, const RunsView& image);
 
+  /// Scratch that no layer uses now, or new one; it returns when it is no longer used.
+  class BorrowedScratch {
+   public:
+    explicit BorrowedScratch(const Inspection& inspection);
+    ~BorrowedScratch();
+    BorrowedScratch(const BorrowedScratch&) = delete;
+    ThinScratch& operator*() { return *scratch_; }
+
+   private:
+    const Inspection& inspection_;
+    std::unique_ptr<ThinScratch> scratch_;
+  };
+
   const PixelGrid& grid_;
+  mutable std::mutex scratch_mutex_;
+  mutable std::vector<std::unique_ptr<ThinScratch>> scratch_;
   std::vector<checks::Solid> placed_parts_;  // by bottom
   std::vector<PixelBox> window_;
   PixelBox all_;           // of all placed parts, as wide as Measures needs

@@ -1,88 +1,14 @@
 #include "stages/checks/simple_chains.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <span>
 
+#include "stages/checks/windows.h"
 #include "stages/geometry/combine.h"
-#include "stages/geometry/isa.h"
-#include "stages/geometry/targets.h"
 
 namespace lamina::checks {
 namespace {
-
-/// Minima of values in a sliding window, each with what the window adds to it; several windows one after the other.
-struct Windows {
-  struct WindowStep {
-    std::uint32_t further;
-    std::int32_t more;
-  };
-  std::array<WindowStep, 96> step;
-  std::uint32_t steps = 0, reach = 0;
-  std::int32_t added = 0;  // to all values
-
-  /// A window of `count` more elements with `slope` more for each.
-  void add(std::uint32_t count, std::int32_t slope) {
-    for (std::uint32_t window = 1; window < count + 1;) {
-      const std::uint32_t further = std::min(window, count + 1 - window);
-      step[steps++] = {further, slope * static_cast<std::int32_t>(further)};
-      window += further;
-    }
-    reach += count;
-  }
-};
-
-/// The left ends of a stencil's rows from the first one on, or from the last one back.
-Windows profile(const StencilSteps& stencil, bool from_first) {
-  Windows windows;
-  const std::uint32_t first = from_first ? stencil.rising : stencil.falling,
-                      last = from_first ? stencil.falling : stencil.rising;
-  windows.added = static_cast<std::int32_t>(first);
-  windows.add(first, -1);
-  windows.add(stencil.down, 0);
-  windows.add(last, 1);
-  return windows;
-}
-
-constexpr std::size_t kBlock = 2048;
-
-/// values  windows.reach more than `count`. sign  1, or -1: of their negatives
-LAMINA_BODY void slide_body(const std::int32_t* values, std::size_t count, std::int32_t sign, const Windows& windows,
-                            std::int32_t* held, std::int32_t* result) {
-  for (std::size_t base = 0; base < count; base += kBlock) {
-    const std::size_t size = std::min(kBlock, count - base);
-    std::size_t left = size + windows.reach;
-    for (std::size_t i = 0; i < left; ++i) held[i] = sign * values[base + i] + windows.added;
-    for (std::uint32_t s = 0; s < windows.steps; ++s) {
-      const auto [further, more] = windows.step[s];
-      left -= further;
-      const std::int32_t* const next = held + further;
-#pragma GCC ivdep
-      for (std::size_t i = 0; i < left; ++i) held[i] = std::min(held[i], next[i] + more);
-    }
-    std::copy(held, held + size, result + base);
-  }
-}
-
-using Slide = void (*)(const std::int32_t*, std::size_t, std::int32_t, const Windows&, std::int32_t*, std::int32_t*);
-void slide_plain(const std::int32_t* values, std::size_t count, std::int32_t sign, const Windows& windows, std::int32_t* held,
-                 std::int32_t* result) {
-  slide_body(values, count, sign, windows, held, result);
-}
-#if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 void slide_avx2(const std::int32_t* values, std::size_t count, std::int32_t sign, const Windows& windows,
-                            std::int32_t* held, std::int32_t* result) {
-  slide_body(values, count, sign, windows, held, result);
-}
-#endif
-
-Slide slide_function() {
-#if defined(LAMINA_WIDE_KERNELS)
-  if (widest_isa() != Isa::kPlain) return slide_avx2;
-#endif
-  return slide_plain;
-}
 
 using Row = std::span<const std::uint32_t>;
 
@@ -113,6 +39,7 @@ void SimpleChains::link(const RunsView& image, std::uint32_t row) {
 
 void SimpleChains::find(const RunsView& image) {
   const std::size_t runs = image.change.size() / 2;
+  ensure_capacity(of_run_, runs);
   of_run_.resize(runs);
   chain_.clear();
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
@@ -136,6 +63,7 @@ void SimpleChains::find(const RunsView& image) {
     next_[c] = static_cast<std::uint32_t>(at);
     at += chain_[c].length;
   }
+  for (Buffer<std::int32_t>* values : {&left_, &right_, &first_, &last_, &begin_, &end_}) ensure_capacity(*values, at + 256);
   left_.resize(at);
   right_.resize(at);
   for (std::size_t run = 0; run < runs; ++run) {
@@ -148,19 +76,17 @@ void SimpleChains::find(const RunsView& image) {
 /// Corners of stencils, of all chains at once: where the window reaches into the next chain the result has no meaning.
 void SimpleChains::slide(const StencilSteps& stencil) {
   const std::size_t runs = of_run_.size(), reach = stencil.rows() - 1;
-  static const Slide minima = slide_function();
   for (Buffer<std::int32_t>* values : {&left_, &right_}) {
     values->resize(runs);
     values->resize(runs + reach, 0);
     std::fill(values->begin() + static_cast<std::ptrdiff_t>(runs), values->end(), 0);
   }
-  held_.resize(kBlock + reach);
   first_.resize(runs + reach);
   last_.resize(runs + reach);
-  minima(left_.data(), runs, 1, profile(stencil, true), held_.data(), first_.data());
+  slide_minima(left_.data(), runs, 1, profile(stencil, true), held_, first_.data());
   Windows right = profile(stencil, false);
   right.added -= static_cast<std::int32_t>(stencil.columns());
-  minima(right_.data(), runs, 1, right, held_.data(), last_.data());
+  slide_minima(right_.data(), runs, 1, right, held_, last_.data());
   open_.assign(runs, 0);
   found_.clear();
   rows_of_stencil_ = stencil.rows();
@@ -177,13 +103,12 @@ bool SimpleChains::open(const StencilSteps& stencil) {
   slide(stencil);
   erodes_ = false;
   const std::size_t runs = of_run_.size(), rows = stencil.rows(), reach = rows - 1;
-  static const Slide minima = slide_function();
   std::fill(first_.begin() + static_cast<std::ptrdiff_t>(runs), first_.end(), 0);
   std::fill(last_.begin() + static_cast<std::ptrdiff_t>(runs), last_.end(), 0);
   begin_.resize(runs);
   end_.resize(runs);
-  minima(first_.data(), runs, -1, profile(stencil, false), held_.data(), begin_.data());
-  minima(last_.data(), runs, -1, profile(stencil, true), held_.data(), end_.data());
+  slide_minima(first_.data(), runs, -1, profile(stencil, false), held_, begin_.data());
+  slide_minima(last_.data(), runs, -1, profile(stencil, true), held_, end_.data());
   const auto columns = static_cast<std::int32_t>(stencil.columns());
   std::size_t left_open = 0;
   for (const Chain& chain : chain_) {
@@ -257,18 +182,6 @@ void SimpleChains::sort_found(std::uint32_t rows) {
   }
 }
 
-void SimpleChains::sorted_runs(std::uint32_t columns, std::uint32_t rows, Runs& result) {
-  sort_found(rows);
-  result.columns = columns;
-  result.row_offset.assign(1, 0);
-  for (std::uint32_t r = 0; r < rows; ++r) result.row_offset.push_back(2 * next_[r]);
-  result.change.resize(2 * sorted_.size());
-  for (std::size_t i = 0; i < sorted_.size(); ++i) {
-    result.change[2 * i] = sorted_[i].begin;
-    result.change[2 * i + 1] = sorted_[i].end;
-  }
-}
-
 void SimpleChains::context(const RunsView& image, Runs& result) {
   std::swap(found_, kept_);
   found_.clear();
@@ -285,9 +198,26 @@ void SimpleChains::context(const RunsView& image, Runs& result) {
       }
     }
   }
-  sorted_runs(image.columns, image.rows(), result);
+  sort_found(image.rows());
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  rows_.clear();
+  for (std::uint32_t r = 0, before = 0; r < image.rows(); before = next_[r++]) {
+    if (next_[r] == before) continue;
+    if (!rows_.empty() && rows_.back() + 1 != r) {
+      rows_.push_back(r - 1);
+      result.row_offset.push_back(2 * before);
+    }
+    rows_.push_back(r);
+    result.row_offset.push_back(2 * next_[r]);
+  }
+  result.change.resize(2 * sorted_.size());
   of_context_.resize(sorted_.size());
-  for (std::size_t i = 0; i < sorted_.size(); ++i) of_context_[i] = static_cast<std::uint8_t>(sorted_[i].open);
+  for (std::size_t i = 0; i < sorted_.size(); ++i) {
+    result.change[2 * i] = sorted_[i].begin;
+    result.change[2 * i + 1] = sorted_[i].end;
+    of_context_[i] = static_cast<std::uint8_t>(sorted_[i].open);
+  }
   std::swap(found_, kept_);
 }
 
@@ -297,14 +227,22 @@ void SimpleChains::finish(const RunsView& image, const RunsView& context, const 
     const Row found = of_context.row(r), within = context.row(r);
     for (std::size_t i = 0, j = 0; i < found.size(); i += 2) {
       while (within[j + 1] <= found[i] + shift) j += 2;
-      if ((of_context_[(context.row_offset[r] + j) / 2] & 1) != 0) found_.push_back({r, found[i], found[i + 1], 0});
+      if ((of_context_[(context.row_offset[r] + j) / 2] & 1) != 0) found_.push_back({rows_[r], found[i], found[i + 1], 0});
     }
   }
-  if (!erodes_) return sorted_runs(image.columns, image.rows(), result);
   sort_found(image.rows());
   result.columns = image.columns;
   result.row_offset.assign(1, 0);
   result.change.clear();
+  if (!erodes_) {
+    for (std::uint32_t r = 0; r < image.rows(); ++r) result.row_offset.push_back(2 * next_[r]);
+    result.change.reserve(2 * sorted_.size());
+    for (const ChainPart& one : sorted_) {
+      result.change.push_back(one.begin);
+      result.change.push_back(one.end);
+    }
+    return;
+  }
   result.change.resize(image.change.size() + 2 * sorted_.size());
   std::uint32_t* to = result.change.data();
   std::size_t next = 0;
@@ -332,7 +270,8 @@ void SimpleChains::finish(const RunsView& image, const RunsView& context, const 
 
 std::uint64_t SimpleChains::bytes() const {
   std::uint64_t total = bytes_held(of_run_) + bytes_held(chain_) + bytes_held(open_) + bytes_held(of_context_) +
-                        bytes_held(touched_) + bytes_held(next_) + bytes_held(found_) + bytes_held(kept_) + bytes_held(sorted_);
+                        bytes_held(rows_) + bytes_held(touched_) + bytes_held(next_) + bytes_held(found_) + bytes_held(kept_) +
+                        bytes_held(sorted_);
   for (const Buffer<std::int32_t>* values : {&left_, &right_, &first_, &last_, &begin_, &end_, &held_})
     total += bytes_held(*values);
   return total;

@@ -31,7 +31,8 @@ class SimpleChains {
   bool erode(const StencilSteps& stencil);
 
   // --- after one of them
-  /// The runs that decide on what is left open: for those rows the rest of the image might as well be empty.
+  /// The runs that decide on what is left open: for those rows the rest of the image might as well be empty. Rows without any
+  /// are left out, but for an empty one where others are.
   void context(const RunsView& image, Runs& result);
   /// All that was found, and what belongs to rows that were left open. of_context  the same result of context()
   /// shift  columns from a run of the result to a pixel of the run that it belongs to
@@ -52,7 +53,6 @@ class SimpleChains {
   void slide(const StencilSteps& stencil);
   void leave(const Chain& chain, std::int64_t first, std::int64_t last, std::int64_t reach);
   void sort_found(std::uint32_t rows);
-  void sorted_runs(std::uint32_t columns, std::uint32_t rows, Runs& result);
 
   Buffer<std::uint32_t> of_run_;  // chain of each run
   Buffer<Chain> chain_;
@@ -62,6 +62,7 @@ class SimpleChains {
   Buffer<std::int32_t> held_;          // of a block
   Buffer<std::uint8_t> open_;          // by chain: 1 the row is left open, 2 it belongs to the context
   Buffer<std::uint8_t> of_context_;    // the same, by run of the context
+  Buffer<std::uint32_t> rows_;         // of the image, by row of the context
   Buffer<std::uint32_t> touched_, next_;
   Buffer<ChainPart> found_, kept_, sorted_;
   bool erodes_ = false;

@@ -178,7 +178,8 @@ void uncovered(const RunsView& image, const PixelBox& box, const Stencil& stenci
   if (scratch.context.change.empty()) {
     copy_runs(scratch.context, scratch.left);
   } else {
-    uncovered(scratch.context, box, scratch.context, stencil, scratch);
+    const PixelBox all{box.left, box.right, 0, scratch.context.view().rows()};
+    uncovered(scratch.context, all, scratch.context, stencil, scratch);
   }
   simple.finish(image, scratch.context, scratch.left, 0, scratch.near);
   std::swap(scratch.near, scratch.left);
@@ -440,7 +441,7 @@ void erode_found(const RunsView& image, const PixelBox& window, const Stencil& s
   SimpleChains& simple = scratch.simple;
   if (!shares_columns(stencil) || !simple.erode(stencil.steps)) return erode(image, window, stencil, scratch, corners);
   simple.context(image, scratch.context);
-  erode(scratch.context, window, stencil, scratch, scratch.fits);
+  erode(scratch.context, {window.left, window.right, 0, scratch.context.view().rows()}, stencil, scratch, scratch.fits);
   simple.finish(image, scratch.context, scratch.fits, stencil.rows.front().first, corners);
 }
 

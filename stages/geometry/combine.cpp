@@ -75,7 +75,12 @@ void append_combined(const RunsView& a, const RunsView& b, SetOperation operatio
   std::uint32_t* next = out.change.data() + there;
   const auto each_row = [&](const auto& combine_row) {
     for (std::uint32_t r = 0; r < a.rows(); ++r) {
-      next = combine_row(a.row(r), b.row(r), next);
+      const bool empty_a = a.row_offset[r] == a.row_offset[r + 1], empty_b = b.row_offset[r] == b.row_offset[r + 1];
+      if (!empty_a && !empty_b) {
+        next = combine_row(a.row(r), b.row(r), next);
+      } else if ((!empty_a && operation != SetOperation::kIntersection) || (!empty_b && operation == SetOperation::kUnion)) {
+        next = std::ranges::copy(empty_a ? b.row(r) : a.row(r), next).out;
+      }
       out.row_offset[row + r] = static_cast<std::uint32_t>(next - out.change.data());
     }
   };

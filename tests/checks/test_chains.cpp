@@ -162,7 +162,7 @@ TEST(SimpleChains, OpenAndErodeLikeChainsOfAnyForm) {
     ASSERT_EQ(text_of(found), text_of(expected));
     simple.erode(stencil.steps);
     simple.context(image, context);
-    erode(context, window, stencil, scratch, of_context);
+    erode(context, {0, 90, 0, context.view().rows()}, stencil, scratch, of_context);
     simple.finish(image, context, of_context, stencil.rows.front().first, found);
     erode(image, window, stencil, scratch, expected);
     ASSERT_EQ(text_of(found), text_of(expected));
