@@ -103,8 +103,9 @@ def rows():
         dry = f"jet PART:{part}.stl --bed 400x400 --dpi 1200 --layer 0.1 --dry-run -o OUT"
         yield Row(f"info-{part}", f"`info` of {part}, against a dry run", f"info PART:{part}.stl", dry, 3, 2, answer="text")
         yield Row(f"info-{part}-memory", "the same, peak memory", f"info PART:{part}.stl", dry, 1.2, measure="peak", answer="text")
-    for command in ("slice PART:benchies72.stl --layer 0.1 -o OUT", "heights PART:benchies72.stl --layer 0.1 -o OUT.csv --format csv",
-                    "export PART:benchies72.stl -o OUT.stl", "info PART:benchies72.stl"):
+    for command in ("slice PART:benchies72.stl --bed 400x400 --layer 0.1 -o OUT",
+                    "heights PART:benchies72.stl --layer 0.1 -o OUT.csv --format csv",
+                    "export PART:benchies72.stl --bed 400x400 -o OUT.stl", "info PART:benchies72.stl"):
         name = command.split()[0]
         yield Row(f"{name}-memory", f"`{name}` of 811 MB, peak memory in MiB", command, None, 330, measure="peak",
                   answer="text" if name == "info" else "files")

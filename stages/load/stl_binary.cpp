@@ -227,7 +227,7 @@ bool read_block(const Source& source, const Snapper& snapper, std::uint32_t bloc
   SortedBlock& sorted = worker.maker.sort({worker.facets.data(), count}, blocks, block);
   worker.kernels.census(sorted, share, worker.sums);
   prisms = worker.kernels.prisms(sorted, worker.facets.front().a.z);
-  worker.maker.store(blocks, block);
+  worker.maker.store({worker.facets.data(), count}, blocks, block);
   return true;
 }
 
