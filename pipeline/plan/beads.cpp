@@ -81,8 +81,8 @@ void Beads::apply(Runs& image, Runs& scratch, BeadWork& work) const {
 Beads::Expected Beads::expected(std::uint32_t index) const {
   const Layer layer = sections_->layers()[index].own();
   const double rows_per_mm = grid_.y.pixels_per_nm() * kNmPerMm;
-  // The slicer needs about 140 bytes per cut, which gives the number of corners in walls and closed curves.
-  const double corners = static_cast<double>(sections_->slicer().layer_bytes_bound(index)) / 140;
+  // Of walls and closed curves.
+  const auto corners = static_cast<double>(sections_->slicer().cut_bound(index).cuts);
   double beads = 1, spans = 1;
   for (const Sections::Area& area : sections_->areas()) {
     const Box& box = area.box;

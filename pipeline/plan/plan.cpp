@@ -98,11 +98,11 @@ class Planner {
     return any;
   }
 
-  /// Images and contours of layers of one thickness need no list of triangles.
+  /// Contours, and images of layers of one thickness, need no list of triangles.
   MeshForm form() {
+    if (plan_.product == Product::kContours) return MeshForm::kOrderedBlocks;
     const auto options = heights_options(job());
     if (!options || options->mode != heights::Mode::kUniform || job().heights.per_part) return MeshForm::kLists;
-    if (plan_.product == Product::kContours) return MeshForm::kOrderedBlocks;
     return images() && !beads_ ? MeshForm::kBlocks : MeshForm::kLists;
   }
 

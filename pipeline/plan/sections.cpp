@@ -230,11 +230,24 @@ double Sections::area_mm2(const Area& area, const Work& work) const {
   return sum;
 }
 
-Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                               slice::LayerContours& out) const {
-  auto report = slicer.layer(scheduled.low, work.scratch, out);
+std::unique_ptr<slice::SectionScratch> Sections::Scratches::take() {
+  const std::lock_guard lock(mutex);
+  if (idle.empty()) return std::make_unique<slice::SectionScratch>();
+  auto scratch = std::move(idle.back());
+  idle.pop_back();
+  return scratch;
+}
+
+void Sections::Scratches::give_back(std::unique_ptr<slice::SectionScratch> scratch) {
+  const std::lock_guard lock(mutex);
+  idle.push_back(std::move(scratch));
+}
+
+Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled,
+                                               slice::SectionScratch& scratch, Work& work, slice::LayerContours& out) const {
+  auto report = slicer.layer(scheduled.low, scratch, out);
   if (!report || containment_ == Containment::kAcross) return report;
-  const auto high = slicer.layer(scheduled.high, work.scratch, work.highest);
+  const auto high = slicer.layer(scheduled.high, scratch, work.highest);
   if (!high) return high.error();
   report->cuts += high->cuts;
   report->merged += high->merged;
@@ -254,7 +267,7 @@ Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, cons
     }
     if (!region) return region.error();
     order_by_outer(*region);
-    simplify(*region, tolerance_, work.scratch.simplify);
+    simplify(*region, tolerance_, scratch.simplify);
     both.contours.append(*region);
     both.body.push_back(both.contours.size());
   }
@@ -262,20 +275,31 @@ Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, cons
   return report;
 }
 
-Status Sections::contours(std::uint32_t index, Work& work) const {
+Status Sections::slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const {
   const ScheduledLayer& scheduled = schedule_.layers[index];
-  const Layer own = scheduled.own();
-  auto report = section(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part], scheduled, work, work.contours);
+  const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
+  auto report = section(slicer, scheduled, scratch, work, work.contours);
   if (!report) return report.error();
   // Bodies of other parts have nothing in this layer.
   work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
   work.report = *report;
+  if (!part_slicer_) return {};
+  const auto again = section(*part_slicer_, scheduled, scratch, work, work.parts);
+  return again ? Status() : Status(again.error());
+}
+
+Status Sections::contours(std::uint32_t index, Work& work) const {
+  const Layer own = schedule_.layers[index].own();
+  auto scratch = scratches_->take();
+  const Status sliced = slice_layer(index, *scratch, work);
+  work.lent = scratch->bytes();
+  scratches_->give_back(std::move(scratch));
+  if (!sliced) return sliced;
   work.paths.clear();
   work.path_body.clear();
   work.path_area.clear();
   if (!fills_) return {};
   if (part_slicer_) {
-    if (auto again = section(*part_slicer_, scheduled, work, work.parts); !again) return again.error();
     work.surface.resize(part_slicer_->bodies());
     for (std::size_t a = 0; a < areas_.size(); ++a) {
       const Area& area = areas_[a];
@@ -308,6 +332,7 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
 }
 
 Status Sections::fill(std::uint32_t index, Work& work) const {
+  work.lent = 0;
   if (!fills_) return {};
   const Layer layer = schedule_.layers[index].own();
   work.path_body.push_back(0);
@@ -380,13 +405,9 @@ Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work
 
 std::uint64_t Sections::Work::bytes() const {
   const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
-  std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) +
-                        of(scratch.open) + bytes_held(text);
+  std::uint64_t total = lent + of(contours.contours) + of(highest.contours) + of(parts.contours) + bytes_held(text);
   for (const Contours& c : surface) total += of(c);
   for (const infill::Outlines& o : outlines) total += o.bytes();
-  for (const Contours& c : scratch.of_source) total += of(c);
-  total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + scratch.simplify.bytes() +
-           bytes_held(scratch.facets) + scratch.blocks.bytes();
   return total + bytes_held(paths.point) + bytes_held(paths.kind) + bytes_held(paths.width) + bytes_held(paths.line) +
          bytes_held(paths.offset) + bytes_held(original);
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,7 +51,7 @@ class Sections {
 
   /// Scratch of a layer in flight.
   struct Work {
-    slice::SectionScratch scratch;
+    std::uint64_t lent = 0;  // bytes of the scratch that its contours were made with, until they are filled
     slice::LayerContours contours;
     slice::LayerContours highest;            // section at the layer's top, if steps must stay on one side
     slice::LayerContours parts;              // of areas in bodies with several parts, merged part by part
@@ -106,7 +108,16 @@ class Sections {
   Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const;
 
  private:
-  Sections() = default;
+  /// Scratch of slicing, lent to a layer while it is sliced: no more of it than layers that are sliced at once.
+  struct Scratches {
+    std::mutex mutex;
+    std::vector<std::unique_ptr<slice::SectionScratch>> idle;
+    std::unique_ptr<slice::SectionScratch> take();
+    void give_back(std::unique_ptr<slice::SectionScratch> scratch);
+  };
+
+  Sections() : scratches_(std::make_unique<Scratches>()) {}
+  std::unique_ptr<Scratches> scratches_;
   const Scene* scene_ = nullptr;
   LayerSchedule schedule_;
   Containment containment_ = Containment::kAcross;
@@ -118,10 +129,11 @@ class Sections {
   std::vector<Area> areas_;
   std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
+  Status slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const;
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
-  Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                       slice::LayerContours& out) const;
+  Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled,
+                                       slice::SectionScratch& scratch, Work& work, slice::LayerContours& out) const;
   void find_copies(const std::vector<std::uint32_t>& body);
   bool is_moved(const Area& copy, const Area& original, const Work& work) const;
   ContoursView contours_of(const Area& area, Work& work) const;

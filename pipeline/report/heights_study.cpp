@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
 #include "stages/support/text/readable.h"
@@ -92,12 +93,16 @@ std::vector<std::pair<double, double>> outline(const Parts& parts, double top_nm
       }
     }
   };
+  Buffer<Triangle> scratch;
   for (const Instance& instance : parts.instances) {
-    for (const Triangle& t : parts.meshes[instance.mesh].triangles) {
-      edge(t.a, t.b, instance.offset);
-      edge(t.b, t.c, instance.offset);
-      edge(t.c, t.a, instance.offset);
-    }
+    const Mesh& mesh = parts.meshes[instance.mesh];
+    each_listed(mesh, 0, triangle_count(mesh), scratch, [&](std::span<const Triangle> facets) {
+      for (const Triangle& t : facets) {
+        edge(t.a, t.b, instance.offset);
+        edge(t.b, t.c, instance.offset);
+        edge(t.c, t.a, instance.offset);
+      }
+    });
   }
   return reach;
 }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "stages/load/diagnosis/chunk_edges.h"
+#include "stages/load/diagnosis/sound_survey.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/support/text/json_text.h"
 #include "stages/support/text/json_value.h"
@@ -69,30 +71,30 @@ Status plan(const Part& part, std::span<const Diagnosis> diagnosis, const Surplu
   return {};
 }
 
-/// Nothing is wrong but that facets may be degenerate.
-bool is_sound(const Diagnosis& found) {
-  return found.balanced && found.open_edges.count + found.non_manifold_edges.count + found.misoriented_edges.count == 0 &&
-         found.duplicate_facets.count == 0 && found.inverted_shells == 0;
-}
-
-/// Loads a part as it is in the file and diagnoses it. A sound mesh that comes as blocks is diagnosed as such: where shells lie
-/// apart, its list is never made. `sound` is true then: repair would change nothing.
+/// Loads a part as it is in the file and diagnoses it. Of a mesh in one file that is sound, and whose shells are apart, no list
+/// is ever made. `sound` is true then: repair would change nothing.
 Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& options, Description& description, bool& sound) {
   load::DegenerateFacets degenerate(kPositions);
+  load::SoundSurvey survey;
   LoadOptions as_is = options;
   as_is.repair = false;
-  as_is.blocks = true;
-  Result<Part> part = load::load(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.inspect(first, facets); });
+  as_is.blocks = as_is.shown_only = true;
+  Result<Part> part = load::load(path, as_is, [&](std::uint32_t first, std::span<const Triangle> facets) {
+    degenerate.inspect(first, facets);
+    return survey.inspect(facets);
+  });
   if (!part) return part;
   as_is.blocks = false;
   sound = false;
-  if (part->meshes.size() == 1 && part->meshes.front().blocks) {
-    Diagnosis found = load::diagnose_blocks(std::exchange(part->meshes.front().blocks, nullptr));
-    found.degenerate_facets = degenerate.finding();
-    sound = is_sound(found);
-    if (!sound || !found.shells_apart) part = load::load(path, as_is);
+  if (part->meshes.size() == 1 && part->meshes.front().triangles.empty()) {
+    std::optional<Diagnosis> found = survey.finish();
+    sound = found.has_value();
+    if (!sound || !found->shells_apart) part = load::load(path, as_is);
     if (!part) return part;
-    if (sound) description.diagnosis.push_back(std::move(found));
+    if (sound) {
+      found->degenerate_facets = degenerate.finding();
+      description.diagnosis.push_back(std::move(*found));
+    }
   }
   description.copies.resize(part->meshes.size(), 0);
   for (const Instance& instance : part->instances) ++description.copies[instance.mesh];

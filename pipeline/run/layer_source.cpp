@@ -114,10 +114,11 @@ formats::LayerTags LayerSource::tags(std::uint32_t index) const { return tags_of
 Result<Contours> LayerSource::contours(std::uint32_t index) const {
   const auto sections = state_->sections();
   if (!sections) return sections.error();
-  Sections::Work work;
-  const auto report = (*sections)->slicer().layer(index, work.scratch, work.contours);
+  slice::SectionScratch scratch;
+  slice::LayerContours contours;
+  const auto report = (*sections)->slicer().layer(index, scratch, contours);
   if (!report) return report.error();
-  return std::move(work.contours.contours);
+  return std::move(contours.contours);
 }
 
 Result<std::vector<Layer>> layers_of(const Job& job) {

@@ -225,6 +225,9 @@ class ContourMaker : public Maker {
     if (Status status = files_.record(view_of(record.layer, work), work.text, record); !status) return status;
     observers_.layer(record, &work.report);
     checks_.record(record.layer.index, record.paths->contours > 0);
+    // Layers that are admitted and not begun hold slots: each would keep the memory of the largest layer that it had.
+    constexpr std::uint64_t kLarge = 1 << 20;
+    if (work.bytes() > kLarge) let_go(ticket.work);
     return {};
   }
   void add_kept(const LayerRecord& record) override {

@@ -37,13 +37,6 @@ Normal normal_of(const Triangle& t) {
           static_cast<double>(Wide{ux} * vy - Wide{uy} * vx)};
 }
 
-struct Limits {
-  double horizontal;  // |n_z| from which a facet is horizontal
-  Nm tolerance;
-  double min_mm2;
-  bool nominal_cusps;
-};
-
 // Joins facets at the same height that come soon after each other: a terrain of whole metres has a hundred thousand of
 // them at a hundred heights. A place for each height that another height may take; what loses its place is listed.
 class FlatJoiner {
@@ -114,54 +107,67 @@ Steepness rounded_up(double up) {
   return static_cast<Steepness>(whole + (whole < scaled));
 }
 
-// A mesh that is stretched by factors other than 1 gets angles of its own, and with Limits::nominal_cusps also steps.
-MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits, const ScaleFactors& scale) {
-  const bool is_scaled = scale != ScaleFactors{1, 1, 1}, steps = is_scaled && limits.nominal_cusps;
-  MeshSlopes slopes;
-  const std::size_t count = mesh.triangles.size();
-  slopes.facets = mesh.triangles;
-  slopes.steepness.resize(count);
-  if (is_scaled) slopes.nominal.resize(count);
-  if (steps) slopes.step_share = 1 / (scale[0] * scale[1] * scale[2]);
+// At most kGroup facets, measured. A mesh that is stretched by factors other than 1 gets angles of its own, and with
+// SlopeRule::shrunk_steps also steps.
+struct MeasuredGroup {
+  FacetBatch batch;
+  Steepness steps[kGroup], angles[kGroup];  // angles: of a stretched mesh only
+  std::uint32_t level[kGroup], levels;      // horizontal facets
+
+  // area  of facets that are not horizontal is added to it, mm2, where steps are considered
+  void measure(const Triangle* facets, std::size_t count, const SlopeRule& rule, double& area) {
+    const bool is_scaled = rule.is_scaled();
+    batch.measure(facets, count);
+    if (is_scaled) batch.undo(rule.scale, count);
+    const double* angle = is_scaled ? batch.angle : batch.up;
+    const double* surface = rule.shrunk_steps ? batch.whole : batch.length;
+    levels = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const bool counts = (batch.z[k] != 0) & (batch.length[k] * 0.5e-12 >= rule.min_mm2);
+      const bool flat = counts & (angle[k] >= rule.horizontal) & (std::int64_t{batch.hi[k]} - batch.lo[k] <= rule.tolerance);
+      level[levels] = static_cast<std::uint32_t>(k);
+      levels += flat;
+      area += flat ? 0 : surface[k] * 0.5e-12;
+      steps[k] = rounded_up((counts & !flat) ? batch.up[k] : 0);
+    }
+    for (std::size_t k = 0; is_scaled && k < count; ++k) {
+      const bool slope = steps[k] != 0;
+      angles[k] = rounded_up(slope ? angle[k] : 0);
+      // The step of a layer that shrinks with the part; factors below a half are no shrinkage.
+      if (rule.shrunk_steps) steps[k] = rounded_up(slope ? std::min(angle[k] / rule.scale[2], 1.999) : 0);
+    }
+  }
+};
+
+MeshSlopes slopes_of(const Mesh& mesh, const SlopeRule& rule) {
+  MeshSlopes slopes{&mesh, rule, {}, {}, {}};
+  const std::size_t count = slopes.facets(), listed = mesh.triangles.size();
+  slopes.steepness.resize(listed);
+  if (rule.is_scaled()) slopes.nominal.resize(listed);
+  if (rule.shrunk_steps) slopes.step_share = 1 / (rule.scale[0] * rule.scale[1] * rule.scale[2]);
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   std::vector<std::vector<FlatFacet>> flats(blocks);
   std::vector<double> areas(blocks);
-  const Triangle* triangles = mesh.triangles.data();
-  Steepness* to_steepness = slopes.steepness.data();
-  Steepness* to_nominal = slopes.nominal.data();
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
-    double block_area = 0;
     FlatJoiner joiner(flats[block]);
-    FacetBatch g;
-    const std::size_t block_end = std::min(count, (block + 1) * kBlock);
-    for (std::size_t first = block * kBlock; first < block_end; first += kGroup) {
-      const std::size_t group = std::min(kGroup, block_end - first);
-      g.measure(triangles + first, group);
-      if (is_scaled) g.undo(scale, group);
-      const double* angle = is_scaled ? g.angle : g.up;
-      const double* surface = steps ? g.whole : g.length;
-      std::uint32_t level[kGroup], levels = 0;
-      for (std::size_t k = 0; k < group; ++k) {
-        const bool counts = (g.z[k] != 0) & (g.length[k] * 0.5e-12 >= limits.min_mm2);
-        const bool flat = counts & (angle[k] >= limits.horizontal) & (std::int64_t{g.hi[k]} - g.lo[k] <= limits.tolerance);
-        level[levels] = static_cast<std::uint32_t>(k);
-        levels += flat;
-        block_area += flat ? 0 : surface[k] * 0.5e-12;
-        to_steepness[first + k] = rounded_up((counts & !flat) ? g.up[k] : 0);
+    MeasuredGroup group;
+    Buffer<Triangle> list;
+    std::size_t at = block * kBlock;
+    each_listed(mesh, at, std::min(count, at + kBlock), list, [&](std::span<const Triangle> facets) {
+      for (std::size_t first = 0; first < facets.size(); first += kGroup) {
+        const std::size_t size = std::min(kGroup, facets.size() - first);
+        group.measure(facets.data() + first, size, rule, areas[block]);
+        if (listed > 0) std::copy_n(group.steps, size, slopes.steepness.data() + at);
+        if (!slopes.nominal.empty()) std::copy_n(group.angles, size, slopes.nominal.data() + at);
+        at += size;
+        for (std::uint32_t l = 0; l < group.levels; ++l) {
+          const FacetBatch& batch = group.batch;
+          const std::uint32_t k = group.level[l];
+          const auto middle = static_cast<Nm>(batch.lo[k] + (std::int64_t{batch.hi[k]} - batch.lo[k]) / 2);
+          joiner.add({middle, batch.z[k] > 0, batch.length[k] * 0.5e-12});
+        }
       }
-      for (std::size_t k = 0; is_scaled && k < group; ++k) {
-        const bool slope = to_steepness[first + k] != 0;
-        to_nominal[first + k] = rounded_up(slope ? angle[k] : 0);
-        // The step of a layer that shrinks with the part; factors below a half are no shrinkage.
-        if (steps) to_steepness[first + k] = rounded_up(slope ? std::min(angle[k] / scale[2], 1.999) : 0);
-      }
-      for (std::uint32_t l = 0; l < levels; ++l) {
-        const std::size_t k = level[l];
-        const auto middle = static_cast<Nm>(g.lo[k] + (std::int64_t{g.hi[k]} - g.lo[k]) / 2);
-        joiner.add({middle, g.z[k] > 0, g.length[k] * 0.5e-12});
-      }
-    }
-    areas[block] = block_area;
+    });
   });
   for (std::size_t block = 0; block < blocks; ++block) {
     slopes.flats.insert(slopes.flats.end(), flats[block].begin(), flats[block].end());
@@ -326,10 +332,22 @@ double angle_of(Steepness steepness) {
   return std::asin(static_cast<double>(steepness) / kHorizontal) * 180 / std::numbers::pi;
 }
 
+const Steepness* measure_slopes(std::span<const Triangle> facets, const SlopeRule& rule, Slope slope, Buffer<Steepness>& out) {
+  MeasuredGroup group;
+  double unused = 0;
+  out.resize(facets.size());
+  for (std::size_t first = 0; first < facets.size(); first += kGroup) {
+    const std::size_t size = std::min(kGroup, facets.size() - first);
+    group.measure(facets.data() + first, size, rule, unused);
+    std::copy_n(slope == Slope::kAngles && rule.is_scaled() ? group.angles : group.steps, size, out.data() + first);
+  }
+  return out.data();
+}
+
 std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries) {
   std::size_t facets = 0;
   for (const PartSurface& part : parts) {
-    for (const PlacedSurface& placed : part.placed) facets += index.meshes[placed.mesh].steepness.size();
+    for (const PlacedSurface& placed : part.placed) facets += index.meshes[placed.mesh].facets();
   }
   constexpr std::size_t kFacetsAnEntry = 1, kMax = 32;
   return static_cast<std::uint32_t>(std::clamp<std::size_t>(facets / (kFacetsAnEntry * entries + 1), 1, kMax));
@@ -338,12 +356,14 @@ std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartS
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
                            const SurfaceOptions& options, std::span<const ScaleFactors> scale) {
-  const Limits limits{std::sin(options.peak_angle_deg * std::numbers::pi / 180) - options.normal_tolerance,
-                      options.flat_tolerance, options.min_facet_mm2, options.nominal_cusps};
   SurfaceIndex index;
   index.meshes.reserve(meshes.size());
   for (std::size_t m = 0; m < meshes.size(); ++m) {
-    index.meshes.push_back(slopes_of(meshes[m], limits, scale.empty() ? ScaleFactors{1, 1, 1} : scale[m]));
+    SlopeRule rule{std::sin(options.peak_angle_deg * std::numbers::pi / 180) - options.normal_tolerance, options.flat_tolerance,
+                   options.min_facet_mm2};
+    if (!scale.empty()) rule.scale = scale[m];
+    rule.shrunk_steps = rule.is_scaled() && options.nominal_cusps;
+    index.meshes.push_back(slopes_of(meshes[m], rule));
   }
 
   std::map<std::tuple<std::uint32_t, std::uint32_t, Nm>, std::uint32_t> copies;  // (part, mesh, raise)

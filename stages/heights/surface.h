@@ -11,6 +11,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/candidate_heights.h"
 
 namespace lamina::heights {
@@ -55,20 +56,34 @@ struct FlatFacet {
   double mm2;
 };
 
-/// The facets of one mesh, in its own coordinates. Those that are vertical, horizontal, degenerate or too small have
-/// steepness 0 and are to be passed over. 4 bytes a facet, 8 where the mesh is stretched: heights and areas are read from
-/// the mesh again, which costs less than memory for them.
-struct MeshSlopes {
-  std::span<const Triangle> facets;  // of the mesh, which has to outlive the index
-  Buffer<Steepness> steepness;       // of each facet; a layer's thickness times it is its step
-  Buffer<Steepness> nominal;         // of each facet before the stretch, for angles; empty where that is the same
-  std::vector<FlatFacet> flats;      // in no order; the same for any number of threads
-  double area_mm2 = 0;               // of all facets that are not horizontal, where steps are considered
-  double step_share = 1;             // of a facet's projected area in sums of steps; 1 but for steps of a part that has shrunk
-};
-
 /// Which steepness of a facet is requested.
 enum class Slope { kSteps, kAngles };
+
+/// Which facets are slopes of one mesh, and how steep they are.
+struct SlopeRule {
+  double horizontal = 1;  // |n_z| from which a facet is horizontal
+  Nm tolerance = 0;       // nm: a horizontal facet may be that much out of level
+  double min_mm2 = 0;
+  ScaleFactors scale{1, 1, 1};
+  bool shrunk_steps = false;  // steps as they are left once the mesh has shrunk by `scale`
+
+  bool is_scaled() const { return scale != ScaleFactors{1, 1, 1}; }
+};
+
+/// The facets of one mesh, in its own coordinates. Those that are vertical, horizontal, degenerate or too small have
+/// steepness 0 and are to be passed over. 4 bytes a facet of a list, 8 where the mesh is stretched: heights and areas are read
+/// from the mesh again, which costs less than memory for them. Of blocks nothing is kept, and each pass measures their facets.
+struct MeshSlopes {
+  const Mesh* mesh;  // which has to outlive the index; blocks keep the order of the file
+  SlopeRule rule;
+  Buffer<Steepness> steepness;   // of each facet of a list; a layer's thickness times it is its step
+  Buffer<Steepness> nominal;     // of each facet before the stretch, for angles; empty where that is the same
+  std::vector<FlatFacet> flats;  // in no order; the same for any number of threads
+  double area_mm2 = 0;           // of all facets that are not horizontal, where steps are considered
+  double step_share = 1;         // of a facet's projected area in sums of steps; 1 but for steps of a part that has shrunk
+
+  std::uint64_t facets() const { return triangle_count(*mesh); }
+};
 
 /// A mesh at a height; copies that stand on the same level count as one with a larger area.
 struct PlacedSurface {
@@ -91,7 +106,7 @@ struct SurfaceIndex {
 
   /// Whether angles differ from the slopes that leave steps.
   bool has_nominal() const {
-    return std::ranges::any_of(meshes, [](const MeshSlopes& mesh) { return !mesh.nominal.empty(); });
+    return std::ranges::any_of(meshes, [](const MeshSlopes& mesh) { return mesh.rule.is_scaled(); });
   }
 };
 
@@ -99,11 +114,11 @@ struct SurfaceIndex {
 ///
 /// instances, part_of_instance  of equal length; the offset's z is the height above the bed
 /// angles come from the corners of the facets, never from the normals that a file may hold
-/// meshes       are referred to by the index
+/// meshes       are referred to by the index; lists, or blocks that keep the order of their files
 /// stretch      of each mesh, or empty if none is stretched. Angles, and whether a facet is horizontal, are those of the mesh
 ///              before it; heights and areas of flats are those of the mesh as it stands there
 /// source  M. V. A. de Lima (2009), Appendix B: the angles of a job with factors 1.007, 1.007, 1 are those of the STL file
-/// cost  O(facets); 4 bytes a facet, 8 of a stretched mesh
+/// cost  O(facets); 4 bytes a facet of a list, 8 of a stretched one
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
                            const SurfaceOptions& options, std::span<const ScaleFactors> scale = {});
@@ -112,21 +127,27 @@ SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instanc
 /// of its own: 1 where filling them would cost more than the facets. The same for any number of threads.
 std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries);
 
+/// The steepness of each facet, in `out`. returns  its elements. cost  O(facets): a root and a quotient each
+const Steepness* measure_slopes(std::span<const Triangle> facets, const SlopeRule& rule, Slope slope, Buffer<Steepness>& out);
+
 /// Calls visit(lo, hi, steepness, projected) for each sloped facet of one of `shares` shares of a mesh that stands
 /// somewhere: heights in nm above the bed, mm2 of all copies, negative where the facet faces down.
 template <class Visit>
 void for_each_slope(const MeshSlopes& mesh, const PlacedSurface& placed, std::uint32_t share, std::uint32_t shares,
                     const Visit& visit, Slope slope = Slope::kSteps) {
-  const Triangle* facets = mesh.facets.data();
-  const bool nominal = slope == Slope::kAngles && !mesh.nominal.empty();
-  const Steepness* steepness = nominal ? mesh.nominal.data() : mesh.steepness.data();
-  const std::size_t count = mesh.steepness.size(), end = count * (share + 1) / shares;
-  for (std::size_t i = count * share / shares; i < end; ++i) {
-    if (steepness[i] == 0) continue;
-    const Triangle& t = facets[i];
-    const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
-    visit(lo + placed.raise, hi + placed.raise, steepness[i], projected_mm2(t) * placed.copies);
-  }
+  const std::uint64_t count = mesh.facets(), first = count * share / shares, end = count * (share + 1) / shares;
+  const Steepness* listed = (slope == Slope::kAngles && mesh.rule.is_scaled() ? mesh.nominal : mesh.steepness).data() + first;
+  Buffer<Triangle> list;
+  Buffer<Steepness> measured;
+  each_listed(*mesh.mesh, first, end, list, [&](std::span<const Triangle> facets) {
+    const Steepness* const steepness = mesh.mesh->blocks ? measure_slopes(facets, mesh.rule, slope, measured) : listed;
+    for (std::size_t i = 0; i < facets.size(); ++i) {
+      if (steepness[i] == 0) continue;
+      const Triangle& t = facets[i];
+      const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
+      visit(lo + placed.raise, hi + placed.raise, steepness[i], projected_mm2(t) * placed.copies);
+    }
+  });
 }
 
 /// The same for all meshes of a part.

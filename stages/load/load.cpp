@@ -319,11 +319,10 @@ Result<Facets> read_facets(const Source& source, Format format, const LoadOption
 }
 
 /// Refuses what cannot leave a single pixel.
-Status check_extent(const Source& source, const Part& part) {
-  const bool any_area = std::any_of(part.meshes.begin(), part.meshes.end(), [](const Mesh& mesh) {
-    // Blocks come of meshes that enclose something.
-    return mesh.blocks != nullptr || std::any_of(mesh.triangles.begin(), mesh.triangles.end(), has_area);
-  });
+Status check_extent(const Source& source, const Part& part, bool sound) {
+  const bool any_area = sound || std::any_of(part.meshes.begin(), part.meshes.end(), [](const Mesh& mesh) {
+                          return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), has_area);
+                        });
   if (part.bounds.empty()) return source.error("holds no facets");
   if (part.bounds.height() == 0)
     return source.error(fmt::format("has no height: nothing to print (all of it lies at z = {:.6g} mm)", mm(part.bounds.lo.z)));
@@ -361,7 +360,7 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options,
   Part part;
   part.path = path;
   Format format{};
-  bool was_gzip = false;
+  bool was_gzip = false, sound = false;  // sound: it encloses something
   const Result<Source> source = open_plain(path, options, format, was_gzip);
   if (!source) return source.error();
   if (format == Format::k3mf) {
@@ -377,21 +376,22 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options,
       part.meshes.push_back(std::move(*mesh));
     }
   } else {
-    std::optional<Mesh> sound;
+    std::optional<Mesh> only;
     if (options.blocks && format == Format::kBinaryStl)
-      sound = read_sound_stl(*source, Snapper(options.transform, options.unit_mm), options, see, part.notes);
-    if (!sound) {
+      only = read_sound_stl(*source, Snapper(options.transform, options.unit_mm), options, see, part.notes);
+    sound = only.has_value();
+    if (!only) {
       Result<Facets> facets = read_facets(*source, format, options);
       if (!facets) return facets.error();
       Result<Mesh> mesh = finish(*source, path, "", std::move(*facets), options, part.notes);
       if (!mesh) return mesh.error();
-      sound = std::move(*mesh);
+      only = std::move(*mesh);
     }
-    part.meshes.push_back(std::move(*sound));
+    part.meshes.push_back(std::move(*only));
     part.instances.push_back({0, {0, 0, 0}});
   }
   if (const Status within = add_bounds(*source, part); !within) return within.error();
-  if (const Status extent = check_extent(*source, part); !extent) return extent.error();
+  if (const Status extent = check_extent(*source, part, sound); !extent) return extent.error();
   if (format != Format::k3mf) hint_at_unit(part);
   return part;
 }

@@ -38,22 +38,25 @@ std::shared_ptr<Scratch> make_scratch(Isa isa = Isa::kAuto);
 
 struct LoadOptions {
   Transform transform;
-  double unit_mm = 1.0;                  // mm per unit of files that carry none (STL, OBJ); 3MF states its own
-  bool drop_bad = false;                 // drop facets with coordinates that are not finite instead of refusing the file
-  bool repair = true;                    // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
-  bool blocks = false;                   // closed meshes may come as Mesh::blocks, which are read in one pass, not as lists
-  bool order = false;                    // blocks know the order of the file, 2 bytes a triangle
-  Isa isa = Isa::kAuto;                  // widest instructions of the loops that make blocks; no mesh depends on it
-  std::shared_ptr<Scratch> scratch;      // none: each file takes its own
-  bool turn_shells = true;               // shells that are inside out and overlap others are turned over (shells.h), with a note
-  bool winding = false;                  // close such a mesh by its winding number instead of caps: approximate
-  std::int64_t weld_nm = kWeldByItself;  // repair joins open edges that are at most this far apart
+  double unit_mm = 1.0;              // mm per unit of files that carry none (STL, OBJ); 3MF states its own
+  bool drop_bad = false;             // drop facets with coordinates that are not finite instead of refusing the file
+  bool repair = true;                // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
+  bool blocks = false;               // closed meshes may come as Mesh::blocks, which are read in one pass, not as lists
+  bool shown_only = false;           // blocks are shown instead of being kept: a mesh that would come so has no triangles
+  bool order = false;                // blocks know the order of the file, 2 bytes a triangle
+  Isa isa = Isa::kAuto;              // widest instructions of the loops that make blocks; no mesh depends on it
+  std::shared_ptr<Scratch> scratch;  // none: each file takes its own
+  bool turn_shells = true;           // shells that are inside out and overlap others are turned over (shells.h), with a note
+  bool winding = false;              // close such a mesh by its winding number instead of caps: approximate
+  std::int64_t weld_nm = kWeldByItself;       // repair joins open edges that are at most this far apart
   std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
   std::uint64_t expanded_limit = 8ull << 30;  // bytes a compressed file may expand to
 };
 
-/// Is shown the triangles of a file in pieces, each in the order of the file, by any thread. first  the number of the first
-using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Triangle>)>;
+/// Is shown the triangles of a file in pieces, each in the order of the file, by any thread.
+/// first    the number of the first
+/// returns  false: the mesh is needed as a list
+using SeeTriangles = std::function<bool(std::uint32_t first, std::span<const Triangle>)>;
 
 /// Reads a part file; the format follows from its content first, then from its name: STL (binary, ASCII), OBJ, 3MF,
 /// and gzip of STL or OBJ.
@@ -67,7 +70,8 @@ using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Tri
 /// cost     two passes over the triangles, parallel; 36 bytes a triangle, 150 more while a mesh is repaired, and the
 ///          inflated bytes while a compressed file is read. A binary STL with options.blocks: one pass, 13 to 38 bytes a
 ///          triangle, if it is sound; else it is read a second time for its list
-/// see      is shown all triangles of a mesh that comes as blocks, while they are in a core's cache
+/// see      is shown all triangles of a mesh that comes as blocks, while they are in a core's cache; with options.shown_only it
+///          is `see` that says whether the mesh is sound
 Result<Part> load(const std::string& path, const LoadOptions& options, const SeeTriangles& see = {});
 
 /// What load() would take the file for, in words: "binary STL", "ASCII STL, gzip", "OBJ", "3MF".

@@ -217,17 +217,18 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
   return held;
 }
 
-/// Reads one block. false  it cannot be read or snapped
+/// Reads one block. prisms  null: it is shown only. false  it cannot be read or snapped, or is refused
 bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, const SeeTriangles& see,
-                Scratch::Worker& worker, MeshBlocks& blocks, Prisms& prisms) {
+                Scratch::Worker& worker, MeshBlocks& blocks, Prisms* prisms) {
   const std::uint64_t first = blocks.first_triangle(block), count = blocks.triangles_in(block);
   if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
   if (!snap_facets(worker.bytes.data(), count, snapper, worker.kernels.isa, worker.facets.data(), worker.box)) return false;
-  if (see) see(static_cast<std::uint32_t>(first), {worker.facets.data(), count});
+  if (see && !see(static_cast<std::uint32_t>(first), {worker.facets.data(), count})) return false;
+  if (prisms == nullptr) return true;
   SortedBlock& sorted = worker.maker.sort({worker.facets.data(), count}, blocks, block);
   worker.kernels.census(sorted, share, worker.sums);
-  prisms = worker.kernels.prisms(sorted, worker.facets.front().a.z);
-  worker.maker.store(blocks, block);
+  *prisms = worker.kernels.prisms(sorted, worker.facets.front().a.z);
+  worker.maker.store({worker.facets.data(), count}, blocks, block);
   return true;
 }
 
@@ -266,19 +267,12 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
     worker->box = {};
   }
   std::atomic<bool> failed{false};
-  std::atomic<std::uint32_t> visited{0}, listed{0};
-  // Whether too many blocks are in disorder to inspect edges: such a file is better read as a list.
-  const auto in_disorder = [&](std::uint32_t block) {
-    constexpr std::uint32_t kFew = 8;
-    const std::uint32_t so_far = ++visited;
-    return blocks->indexed(block * MeshBlocks::kClusters).cluster == nullptr && ++listed > kFew + so_far / 4;
-  };
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
                       Scratch::Worker& worker = *workers.local();
                       for (std::uint32_t b = range.begin(); b != range.end() && !failed; ++b) {
-                        if (!read_block(source, snapper, b, share, see, worker, *blocks, pieces[b])) failed = true;
-                        if (see && !failed && in_disorder(b)) failed = true;
+                        Prisms* const prisms = options.shown_only ? nullptr : &pieces[b];
+                        if (!read_block(source, snapper, b, share, see, worker, *blocks, prisms)) failed = true;
                       }
                     });
   if (failed) return std::nullopt;
@@ -291,7 +285,10 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
     box.add(worker->box);
   }
   Mesh mesh;
+  mesh.name = source.path();
   mesh.bounds = box.nm(snapper);
+  notes.insert(notes.end(), header.notes.begin(), header.notes.end());
+  if (options.shown_only) return mesh;
   mesh.fingerprint = sums.fingerprint;
   double sixfold_volume = 0;  // nm3; the sum is taken in the order of blocks, whichever thread read them
   for (const Prisms& piece : pieces) sixfold_volume += piece.sixfold_volume_above(mesh.bounds.middle().z);
@@ -299,10 +296,8 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   const double of_box = mm(mesh.bounds.width()) * mm(mesh.bounds.depth()) * mm(mesh.bounds.height());
   const bool sound = sums.boundary == 0 && mesh.volume_mm3 > kHardlyAny * of_box && !any_reversed(sums.sampled);
   if (!sound) return std::nullopt;
-  mesh.name = source.path();
   mesh.repaired_from = triangles;
   mesh.blocks = blocks;
-  notes.insert(notes.end(), header.notes.begin(), header.notes.end());
   if (options.repair && options.turn_shells) turn_shells(mesh, "", notes);
   return mesh;
 }

@@ -29,8 +29,7 @@ Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, con
 
 /// The same in one pass, where the mesh is sound: closed, as long as its header says, and enclosing something. As blocks, with
 /// what load() has to say of it. returns  nothing where the list of triangles is needed to judge, to repair or to refuse
-/// see  may be empty; is shown triangles, all of them where a mesh is returned. With it, nothing is returned either where
-///      neighbours are far apart in the file
+/// see  may be empty; is shown triangles, all of them where a mesh is returned. Nothing is returned where it refuses any
 std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
                                    const SeeTriangles& see, std::vector<Note>& notes);
 

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
+#include <utility>
 
 namespace lamina::slice {
 namespace {
@@ -24,12 +26,17 @@ Heights heights_in(const Cluster& cluster) {
   return heights;
 }
 
-/// Of planes [first, last) that facet `id` crosses, its rank in a PlaneIndex: by level, bucket and number.
-std::uint64_t rank_of(std::uint32_t first, std::uint32_t last, std::uint32_t id) {
-  constexpr std::uint32_t kLevel = 58;  // buckets: 26 bits, more planes than fit into memory with their contours
-  const auto level = static_cast<std::uint64_t>(std::bit_width(last - first - 1));
-  return level << kLevel | std::uint64_t{first >> level} << 32 | id;
+std::uint32_t level_of(std::uint32_t first, std::uint32_t last) { return std::bit_width(last - first - 1); }
+
+/// Of planes [first, last) that a facet crosses, its rank in a PlaneIndex but for its number: by level, then by the bucket of
+/// the first plane, which is that of `plane` or the one before.
+std::uint8_t rank_of(std::uint32_t first, std::uint32_t last, std::uint32_t plane) {
+  const std::uint32_t level = level_of(first, last), own_bucket = first >> level == plane >> level ? 1 : 0;
+  return static_cast<std::uint8_t>(2 * level + own_bucket);
 }
+constexpr std::size_t kRanks = 66;
+
+std::uint32_t groups_of(const MeshBlocks& blocks) { return (blocks.cluster_count() + kIndexedTogether - 1) / kIndexedTogether; }
 
 }  // namespace
 
@@ -51,12 +58,18 @@ BlockPlanes::BlockPlanes(const MeshBlocks& blocks, std::span<const std::int64_t>
       first_at_or_above_(planes_),
       table_(0, static_cast<std::int64_t>(planes.size()) - 1, 0,
              [&](auto use) {
-               for (std::uint32_t c = 0; c < blocks.cluster_count(); ++c) {
-                 const auto [first, last] = first_at_or_above_.crossed(blocks.bounds()[c].lo.z, blocks.bounds()[c].hi.z);
-                 if (first < last) use({first, last, c});
+               for (std::uint32_t g = 0; g < groups_of(blocks); ++g) {
+                 const std::uint32_t from = g * kIndexedTogether,
+                                     end = std::min(from + kIndexedTogether, blocks.cluster_count());
+                 Nm low = INT32_MAX, high = INT32_MIN;
+                 for (const Box& box : blocks.bounds().subspan(from, end - from))
+                   low = std::min(low, box.lo.z), high = std::max(high, box.hi.z);
+                 const auto [first, last] = first_at_or_above_.crossed(low, high);
+                 if (first < last) use({first, last, g});
                }
              }),
       counts_(planes.size(), 0u) {
+  assert(blocks.keeps_order() && blocks.first_cap() == blocks.cluster_count());
   using Changes = Buffer<std::uint32_t>;  // of the count from plane to plane, modulo 2^32
   tbb::enumerable_thread_specific<Changes> changes([&] { return Changes(planes_.size() + 1, 0u); });
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks.cluster_count(), 256), [&](const auto& range) {
@@ -76,29 +89,76 @@ BlockPlanes::BlockPlanes(const MeshBlocks& blocks, std::span<const std::int64_t>
   }
 }
 
-void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch) const {
-  scratch.clusters.clear();
-  table_.append(plane, scratch.clusters);
-  scratch.order.clear();
-  scratch.found.clear();
-  scratch.order.reserve(counts_[plane]);
-  scratch.found.reserve(counts_[plane]);
+/// Appends the facets of a cluster that a plane crosses, and their ranks.
+void BlockPlanes::find_in(std::uint32_t cluster, std::uint32_t plane, BlockScratch& scratch) const {
   const std::int64_t z = planes_[plane];
-  Cluster unpacked;
-  for (const std::uint32_t c : scratch.clusters) {
-    const Cluster& cluster = blocks_.cluster(c, unpacked);
-    const Heights heights = heights_in(cluster);
-    for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-      if (is_above_plane(heights.low[i], z) || !is_above_plane(heights.high[i], z)) continue;
-      const auto [first, last] = first_at_or_above_.crossed(heights.low[i], heights.high[i]);
-      scratch.order.push_back(
-          {rank_of(first, last, blocks_.listed_number(c, i)), static_cast<std::uint32_t>(scratch.found.size())});
-      scratch.found.push_back(cluster.triangle(i));
-    }
+  const Box& box = blocks_.bounds()[cluster];
+  if (is_above_plane(box.lo.z, z) || !is_above_plane(box.hi.z, z)) return;
+  std::uint32_t near = (1u << kClusterSize) - 1;
+  if (const MeshBlocks::Indexed indexed = blocks_.indexed(cluster); indexed.cluster != nullptr) {
+    const FacetSteps& steps = indexed.cluster->steps;
+    const std::uint8_t step = indexed.step_of(z + kPlaneReach);
+    std::uint8_t met[kClusterSize];
+    for (std::uint32_t i = 0; i < kClusterSize; ++i)
+      met[i] = static_cast<std::uint8_t>(step - steps.low[i]) <= steps.span[i] ? 1 : 0;
+    near = 0;
+    for (std::uint32_t i = 0; i < kClusterSize; ++i) near |= std::uint32_t{met[i]} << i;
   }
-  std::ranges::sort(scratch.order);
-  scratch.facets.resize(scratch.found.size());
-  std::ranges::transform(scratch.order, scratch.facets.begin(), [&](const auto& entry) { return scratch.found[entry.second]; });
+  for (; near != 0; near &= near - 1) {
+    const auto lane = static_cast<std::uint32_t>(std::countr_zero(near));
+    const Triangle t = blocks_.triangle(cluster, lane);
+    const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
+    if (is_above_plane(low, z) || !is_above_plane(high, z)) continue;
+    const auto [first, last] = first_at_or_above_.crossed(low, high);
+    scratch.facets.push_back(cluster * kClusterSize + lane);
+    scratch.key.push_back(rank_of(first, last, plane));
+  }
+}
+
+/// Puts what was found of one block from `begin` on in the order of the file. first  cluster of the block
+void BlockPlanes::sort_listed(std::uint32_t first, std::size_t begin, BlockScratch& scratch) const {
+  constexpr std::uint32_t kBits = 12, kRankBits = 7;
+  static_assert(1u << kBits == kBlockSize && 2 * kBits + kRankBits <= 32);
+  const std::uint32_t base = first * kClusterSize, block = blocks_.listed_number(first, 0) / kBlockSize * kBlockSize;
+  scratch.listed.clear();
+  for (std::size_t i = begin; i < scratch.facets.size(); ++i) {
+    const std::uint32_t facet = scratch.facets[i];
+    const std::uint32_t number = blocks_.listed_number(facet / kClusterSize, facet % kClusterSize) - block;
+    scratch.listed.push_back(number << (kBits + kRankBits) | (facet - base) << kRankBits | scratch.key[i]);
+  }
+  std::ranges::sort(scratch.listed);
+  for (std::size_t i = 0; i < scratch.listed.size(); ++i) {
+    scratch.facets[begin + i] = base + (scratch.listed[i] >> kRankBits & (kBlockSize - 1));
+    scratch.key[begin + i] = static_cast<std::uint8_t>(scratch.listed[i] & ((1u << kRankBits) - 1));
+  }
+}
+
+void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets) const {
+  scratch.groups.clear();
+  table_.append(plane, scratch.groups);
+  std::ranges::sort(scratch.groups);
+  scratch.facets.clear();
+  scratch.key.clear();
+  ensure_capacity(scratch.facets, counts_[plane]);
+  ensure_capacity(scratch.key, counts_[plane]);
+  for (std::size_t g = 0, end = 0; g < scratch.groups.size(); g = end) {
+    constexpr std::uint32_t kInBlock = MeshBlocks::kClusters / kIndexedTogether;
+    const std::uint32_t block = scratch.groups[g] / kInBlock;
+    const std::size_t before = scratch.facets.size();
+    for (; end < scratch.groups.size() && scratch.groups[end] / kInBlock == block; ++end) {
+      const std::uint32_t from = scratch.groups[end] * kIndexedTogether;
+      for (std::uint32_t c = from; c < std::min(from + kIndexedTogether, blocks_.cluster_count()); ++c)
+        find_in(c, plane, scratch);
+    }
+    const std::uint32_t first = block * MeshBlocks::kClusters;
+    if (blocks_.indexed(first).cluster == nullptr) sort_listed(first, before, scratch);
+  }
+  std::array<std::uint32_t, kRanks> position{};
+  for (const std::uint8_t rank : scratch.key) ++position[rank];
+  std::uint32_t total = 0;
+  for (std::uint32_t& of : position) total += std::exchange(of, total);
+  facets.resize(total);
+  for (std::size_t i = 0; i < total; ++i) facets[position[scratch.key[i]]++] = scratch.facets[i];
 }
 
 }  // namespace lamina::slice

@@ -38,33 +38,46 @@ class PlaneFinder {
   Buffer<std::uint32_t> position_;
 };
 
+/// Clusters that are indexed together: neighbours in the file.
+inline constexpr std::uint32_t kIndexedTogether = 4;
+
 /// Buffers of a layer, reused.
 struct BlockScratch {
-  Buffer<std::uint32_t> clusters;
-  Buffer<std::pair<std::uint64_t, std::uint32_t>> order;  // of the facets that were found
-  Buffer<Triangle> found, facets;
+  Buffer<std::uint32_t> groups;  // of kIndexedTogether clusters
+  Buffer<std::uint32_t> facets;  // as they are found, and
+  Buffer<std::uint8_t> key;      // what they are sorted by
+  Buffer<std::uint32_t> listed;  // of a block that is not in the order of its file
 
-  std::uint64_t bytes() const { return bytes_held(clusters) + bytes_held(order) + bytes_held(found) + bytes_held(facets); }
+  std::uint64_t bytes() const { return bytes_held(groups) + bytes_held(facets) + bytes_held(key) + bytes_held(listed); }
 };
 
-/// An index of clusters: 12 bytes for each, where one of facets takes as many for each facet.
+/// A facet of blocks by one number.
+inline Triangle facet_of(const MeshBlocks& blocks, std::uint32_t number) {
+  return blocks.triangle(number / kClusterSize, number % kClusterSize);
+}
+
+/// An index of groups of clusters: 12 bytes for each, where one of facets takes as many for each facet.
 class BlockPlanes {
  public:
-  /// blocks  with the order of their file; they outlive this
+  /// blocks  with the order of their file, and nothing that repair added; they outlive this
   /// planes  nm, in the frame of the blocks, strictly increasing
   /// cost    O(T), parallel
   BlockPlanes(const MeshBlocks& blocks, std::span<const std::int64_t> planes);
   BlockPlanes(const BlockPlanes&) = delete;
   BlockPlanes& operator=(const BlockPlanes&) = delete;
 
-  /// scratch.facets become those that the plane crosses, in the order in which a PlaneIndex of the file's list finds them: all
-  /// that is made of facets depends on it. cost  O(F log F)
-  void find(std::uint32_t plane, BlockScratch& scratch) const;
+  /// facets  become those that the plane crosses, for facet_of(), in the order in which a PlaneIndex of the file's list finds
+  ///         them: all that is made of facets depends on it
+  /// cost    O(F) where vertices are shared
+  void find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets) const;
 
   std::uint64_t count(std::uint32_t plane) const { return counts_[plane]; }  // of facets that it crosses
   std::uint64_t bytes() const { return table_.bytes() + bytes_held(counts_) + planes_.size() * sizeof(std::int64_t); }
 
  private:
+  void find_in(std::uint32_t cluster, std::uint32_t plane, BlockScratch& scratch) const;
+  void sort_listed(std::uint32_t first, std::size_t begin, BlockScratch& scratch) const;
+
   const MeshBlocks& blocks_;
   std::vector<std::int64_t> planes_;
   PlaneFinder first_at_or_above_;

@@ -20,9 +20,9 @@ std::uint64_t hash_of(const Point3& p) {
   return (h + word(p.z)) * 0xBF58476D1CE4E5B9ull;
 }
 
-std::uint64_t hash_of(std::uint64_t low, std::uint64_t high) {
+std::uint32_t hash_of(std::uint64_t low, std::uint64_t high) {
   const std::uint64_t h = (low ^ (high >> 31) ^ (high << 33)) * 0x94D049BB133111EBull;
-  return h ^ (h >> 32);
+  return static_cast<std::uint32_t>(h ^ (h >> 32));
 }
 
 /// from + the share num / den of the way to `to`, rounded; 0 <= num < den.
@@ -43,6 +43,30 @@ Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
   return static_cast<Nm>(from + whole - static_cast<std::int64_t>(kPositive));
 }
 
+/// Calls use(get), get(i) being facet i.
+template <class Use>
+void with_facets(const CrossedFacets& facets, const Cuts& cuts, Use&& use) {
+  if (!cuts.facets.empty()) return use([&](std::size_t i) -> const Triangle& { return cuts.facets[i]; });
+  if (facets.blocks != nullptr) return use([&](std::size_t i) { return facet_of(*facets.blocks, facets.at[i]); });
+  use([&](std::size_t i) -> const Triangle& { return facets.list[facets.at[i]]; });
+}
+
+/// The corners of a facet, the first alone on its side of the plane; the plane cuts the two edges that start there.
+struct Tip {
+  Point3 own, next, previous;
+  bool above;
+
+  Tip(const Triangle& t, std::int64_t z) {
+    const Point3* corner = &t.a;
+    const bool a = is_above_plane(t.a.z, z), b = is_above_plane(t.b.z, z), c = is_above_plane(t.c.z, z);
+    const std::uint32_t tip = a == b ? 2 : a == c ? 1 : 0;
+    own = corner[tip], next = corner[tip == 2 ? 0 : tip + 1], previous = corner[tip == 0 ? 2 : tip - 1];
+    above = is_above_plane(own.z, z);
+  }
+  Edge from() const { return above ? Edge{next, own} : Edge{own, previous}; }
+  Edge to() const { return above ? Edge{previous, own} : Edge{own, next}; }
+};
+
 [[gnu::cold]] void add_level(const Point3* corner, LevelFace& level) {
   const std::int64_t ux = std::int64_t{corner[1].x} - corner[0].x, uy = std::int64_t{corner[1].y} - corner[0].y;
   const std::int64_t vx = std::int64_t{corner[2].x} - corner[0].x, vy = std::int64_t{corner[2].y} - corner[0].y;
@@ -58,44 +82,37 @@ Point2 crossing(const Edge& edge, std::int64_t z) {
   return {between(edge.low.x, edge.high.x, share, num, den), between(edge.low.y, edge.high.y, share, num, den)};
 }
 
-void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> facets, std::int64_t z, Cuts& cuts) {
-  constexpr std::size_t kAhead = 16;  // facets are anywhere in memory: prefetched before they are needed
-  const std::size_t count = facets.size();
-  cuts.from.resize(count);
-  cuts.to.resize(count);
+void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts) {
+  const std::size_t count = facets.at.size();
+  ensure_capacity(cuts.from_hash, count);
+  ensure_capacity(cuts.to_hash, count);
+  ensure_capacity(cuts.at, count);
   cuts.from_hash.resize(count);
   cuts.to_hash.resize(count);
   cuts.at.resize(count);
   cuts.level = {};
-  for (std::size_t i = 0; i < count; ++i) {
-    if (i + kAhead < count) {
-      const auto* next = reinterpret_cast<const char*>(&triangles[facets[i + kAhead]]);
-      __builtin_prefetch(next);
-      __builtin_prefetch(next + sizeof(Triangle) - 1);
+  cuts.facets.clear();
+  const bool copies = facets.blocks != nullptr && count <= kManyCuts;
+  with_facets(facets, cuts, [&](auto&& facet) {
+    if (copies) cuts.facets.resize(count);
+    constexpr std::size_t kAhead = 16;  // facets of a list are anywhere in memory: prefetched before they are needed
+    for (std::size_t i = 0; i < count; ++i) {
+      if (facets.blocks == nullptr && i + kAhead < count) {
+        const auto* next = reinterpret_cast<const char*>(&facets.list[facets.at[i + kAhead]]);
+        __builtin_prefetch(next);
+        __builtin_prefetch(next + sizeof(Triangle) - 1);
+      }
+      const Triangle& t = facet(i);
+      if (copies) cuts.facets[i] = t;
+      const Tip tip(t, z);
+      const std::uint64_t own = hash_of(tip.own), next = hash_of(tip.next), previous = hash_of(tip.previous);
+      cuts.from_hash[i] = tip.above ? hash_of(next, own) : hash_of(own, previous);
+      cuts.to_hash[i] = tip.above ? hash_of(previous, own) : hash_of(own, next);
+      cuts.at[i] = crossing(tip.from(), z);
+      if (LevelFace::is_level(t.a.z - z, t.b.z - z, t.c.z - z)) [[unlikely]]
+        add_level(&t.a, cuts.level);
     }
-    const Point3* corner = &triangles[facets[i]].a;
-    const bool a = is_above_plane(corner[0].z, z), b = is_above_plane(corner[1].z, z), c = is_above_plane(corner[2].z, z);
-    // The tip is alone on its side; the plane cuts the two edges that start there.
-    const std::uint32_t tip = a == b ? 2 : a == c ? 1 : 0;
-    const Point3& own = corner[tip];
-    const Point3& next = corner[tip == 2 ? 0 : tip + 1];
-    const Point3& previous = corner[tip == 0 ? 2 : tip - 1];
-    const std::uint64_t own_hash = hash_of(own), next_hash = hash_of(next), previous_hash = hash_of(previous);
-    if (is_above_plane(own.z, z)) {
-      cuts.from[i] = {next, own};
-      cuts.to[i] = {previous, own};
-      cuts.from_hash[i] = hash_of(next_hash, own_hash);
-      cuts.to_hash[i] = hash_of(previous_hash, own_hash);
-    } else {
-      cuts.from[i] = {own, previous};
-      cuts.to[i] = {own, next};
-      cuts.from_hash[i] = hash_of(own_hash, previous_hash);
-      cuts.to_hash[i] = hash_of(own_hash, next_hash);
-    }
-    cuts.at[i] = crossing(cuts.from[i], z);
-    if (LevelFace::is_level(corner[0].z - z, corner[1].z - z, corner[2].z - z)) [[unlikely]]
-      add_level(corner, cuts.level);
-  }
+  });
 }
 
 PlaneIndex index_crossings(std::span<const Triangle> triangles, std::span<const std::int64_t> planes) {
@@ -118,25 +135,28 @@ constexpr std::uint8_t kHasPrevious = 1, kVisited = 2;
 
 /// For each cut the one that starts at the edge where it ends. Where several start there, at an edge of four or more
 /// facets, the first that is free.
-void find_successors(const Cuts& cuts, ChainScratch& scratch) {
-  const std::size_t count = cuts.size();
-  const std::size_t slots = std::bit_ceil(2 * count + 2);
-  const std::size_t mask = slots - 1;
+template <class Facet>
+void find_successors(const Facet& facet, const Cuts& cuts, std::int64_t z, ChainScratch& scratch) {
+  const std::size_t count = cuts.size(), slots = count + count / 2 + 2;
+  ensure_capacity(scratch.slot, slots);
+  ensure_capacity(scratch.next, count);
   scratch.slot.assign(slots, 0);
   scratch.next.resize(count);
   scratch.state.assign(count, 0);
+  const auto first_slot = [&](std::uint32_t hash) { return static_cast<std::size_t>(hash * std::uint64_t{slots} >> 32); };
+  const auto behind = [&](std::size_t position) { return position + 1 == slots ? 0 : position + 1; };
   for (std::size_t i = 0; i < count; ++i) {
-    std::size_t position = cuts.from_hash[i] & mask;
-    while (scratch.slot[position] != 0) position = (position + 1) & mask;
+    std::size_t position = first_slot(cuts.from_hash[i]);
+    while (scratch.slot[position] != 0) position = behind(position);
     scratch.slot[position] = static_cast<std::uint32_t>(i + 1);
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t hash = cuts.to_hash[i];
+    const std::uint32_t hash = cuts.to_hash[i];
     std::uint32_t found = kNone;
-    for (std::size_t position = hash & mask; scratch.slot[position] != 0; position = (position + 1) & mask) {
+    for (std::size_t position = first_slot(hash); scratch.slot[position] != 0; position = behind(position)) {
       if (scratch.slot[position] == kTaken) continue;
       const std::uint32_t other = scratch.slot[position] - 1;
-      if (cuts.from_hash[other] != hash || !(cuts.from[other] == cuts.to[i])) continue;
+      if (cuts.from_hash[other] != hash || !(Tip(facet(other), z).from() == Tip(facet(i), z).to())) continue;
       scratch.slot[position] = kTaken;
       scratch.state[other] |= kHasPrevious;
       found = other;
@@ -148,8 +168,10 @@ void find_successors(const Cuts& cuts, ChainScratch& scratch) {
 
 }  // namespace
 
-void chain(const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed, Contours& open) {
-  find_successors(cuts, scratch);
+void chain(const CrossedFacets& facets, const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed,
+           Contours& open) {
+  with_facets(facets, cuts, [&](auto&& facet) { find_successors(facet, cuts, z, scratch); });
+  reserve_more(closed.point, cuts.size());
   const auto count = static_cast<std::uint32_t>(cuts.size());
   for (std::uint32_t first = 0; first < count; ++first) {
     if ((scratch.state[first] & kHasPrevious) != 0) continue;
@@ -159,7 +181,7 @@ void chain(const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& cl
       scratch.state[i] |= kVisited;
       last = i;
     }
-    open.point.push_back(crossing(cuts.to[last], z));
+    with_facets(facets, cuts, [&](auto&& facet) { open.point.push_back(crossing(Tip(facet(last), z).to(), z)); });
     open.close();
   }
   for (std::uint32_t first = 0; first < count; ++first) {

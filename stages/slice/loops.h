@@ -1,9 +1,9 @@
 // stages/slice/loops.h: one plane cuts the facets that it crosses, cuts are joined to chains, and gaps between chains are
 // closed.
 //
-// A corner with z <= Z, or some nanometres above (height_for_plane()), is below the plane, as for the bitmaps; so a facet is cut
-// through exactly two edges or not at all. A crossing belongs to the mesh edge that carries it and is computed from that edge's lower end, in the same bits
-// for both facets that share it.
+// A corner with z <= Z, or some nanometres above (height_for_plane()), is below the plane, as for the bitmaps; so a facet is
+// cut through exactly two edges or not at all. A crossing belongs to the mesh edge that carries it and is computed from that
+// edge's lower end, in the same bits for both facets that share it.
 //
 // Edges are found by their names, the two ends; points are never compared, so there is no tolerance and two crossings
 // that round to the same nanometre stay apart. On a closed mesh every cut has a successor and every chain is a loop.
@@ -30,27 +30,35 @@ struct Edge {
   friend bool operator==(const Edge&, const Edge&) = default;
 };
 
-/// The cuts of one layer, in the order of the facets. Cut i is walked from edge from[i] to edge to[i] with the solid on
-/// its left.
+/// Facets of a mesh that a plane crosses.
+struct CrossedFacets {
+  std::span<const Triangle> list;     // of the mesh, or
+  const MeshBlocks* blocks;           // where this is not null, its blocks
+  std::span<const std::uint32_t> at;  // numbers in the list, or those of facet_of()
+};
+
+/// More cuts than this get by with less memory, for some more time.
+inline constexpr std::size_t kManyCuts = 1 << 17;
+
+/// The cuts of one layer, in the order of the facets. Cut i is walked from an edge of facet i to another one with the solid on
+/// its left. Edges are read from the facets again where hashes of their names are equal: 16 bytes a cut instead of 72.
 struct Cuts {
-  Buffer<Edge> from, to;
-  Buffer<std::uint64_t> from_hash, to_hash;  // of the edges' names
-  Buffer<Point2> at;                         // nm, where from[i] meets the plane
+  Buffer<Triangle> facets;                   // of blocks, unless they are many
+  Buffer<std::uint32_t> from_hash, to_hash;  // of the edges' names
+  Buffer<Point2> at;                         // nm, where the edge that cut i comes from meets the plane
   LevelFace level;                           // horizontal faces among the facets
 
   std::size_t size() const { return at.size(); }
-  std::uint64_t bytes() const {
-    return bytes_held(from) + bytes_held(to) + bytes_held(from_hash) + bytes_held(to_hash) + bytes_held(at);
-  }
+  std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(from_hash) + bytes_held(to_hash) + bytes_held(at); }
 };
 
-/// Where an edge meets height z, low.z being below the plane and high.z above it. Rounded to the nearest nm, halves towards +infinity on the way
-/// from the lower end; decided in integers.
+/// Where an edge meets height z, low.z being below the plane and high.z above it. Rounded to the nearest nm, halves towards
+/// +infinity on the way from the lower end; decided in integers.
 Point2 crossing(const Edge& edge, std::int64_t z);
 
-/// Cuts `facets` of `triangles`, all of which the plane crosses. `cuts` is overwritten.
+/// Cuts facets at height z. `cuts` is overwritten.
 /// cost  one division for a facet
-void cut(std::span<const Triangle> triangles, std::span<const std::uint32_t> facets, std::int64_t z, Cuts& cuts);
+void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts);
 
 // --- which facets a plane crosses, for planes known beforehand.
 
@@ -73,14 +81,15 @@ struct ChainScratch {
   std::uint64_t bytes() const { return bytes_held(slot) + bytes_held(next) + bytes_held(state); }
 };
 
-/// Joins the cuts at height z. Appends closed chains to `closed`, in the order of their first cut; chains that end at
-/// an edge without a neighbour, of open meshes only, go to `open`, from their first to their last point. Both may hold
+/// Joins the cuts of `facets` at height z. Appends closed chains to `closed`, in the order of their first cut; chains that end
+/// at an edge without a neighbour, of open meshes only, go to `open`, from their first to their last point. Both may hold
 /// repeated and collinear points, and chains of fewer than three.
 /// cost  O(C) for C cuts; the table of edges is that of one layer and stays in the cache
 /// source  R. Minetto, N. Volpato, J. Stolfi et al., "An optimal algorithm for 3D triangle mesh slicing", Computer-Aided Design
 /// 92 (2017), for
 ///         loop closure by a table; naming crossings by their edges in place of hashing points is ours
-void chain(const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed, Contours& open);
+void chain(const CrossedFacets& facets, const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed,
+           Contours& open);
 
 // --- open chains of a mesh that is not closed, joined over short gaps.
 

@@ -5,7 +5,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "stages/data/growth.h"
@@ -15,25 +14,34 @@
 namespace lamina::slice {
 namespace {
 
-/// The cuts of a source at a plane become chains: `closed`, and scratch.open.
-void find_loops(std::span<const Triangle> triangles, const SourceMesh& source, std::span<const Nm> planes, std::uint32_t plane,
-                SectionScratch& scratch, Contours& closed) {
+/// The cuts of a source at a plane become chains: `closed`, and scratch.open. returns  how many there are
+std::size_t find_loops(const Mesh& mesh, const SourceMesh& source, std::span<const Nm> planes, std::uint32_t plane,
+                       SectionScratch& scratch, Contours& closed) {
   const std::int64_t z = std::int64_t{planes[plane]} - source.z;
   scratch.facets.clear();
-  if (source.blocks) {
-    source.blocks->find(plane, scratch.blocks);
-    triangles = scratch.blocks.facets;
-    scratch.facets.resize(triangles.size());
-    std::iota(scratch.facets.begin(), scratch.facets.end(), 0u);
-  } else {
-    source.list->append(plane, scratch.facets);
-  }
-  cut(triangles, scratch.facets, z, scratch.cuts);
+  source.blocks ? source.blocks->find(plane, scratch.blocks, scratch.facets) : source.list->append(plane, scratch.facets);
+  const CrossedFacets facets{mesh.triangles, mesh.blocks.get(), scratch.facets};
+  cut(facets, z, scratch.cuts);
   scratch.open.clear();
-  chain(scratch.cuts, z, scratch.chain, closed, scratch.open);
+  chain(facets, scratch.cuts, z, scratch.chain, closed, scratch.open);
+  const std::size_t count = facets.at.size();
+  if (count > kManyCuts) {  // what searches contacts takes their memory
+    const LevelFace level = scratch.cuts.level;
+    scratch.facets = {}, scratch.blocks = {}, scratch.cuts = {}, scratch.chain = {};
+    scratch.cuts.level = level;
+  }
+  return count;
 }
 
 }  // namespace
+
+std::uint64_t SectionScratch::bytes() const {
+  const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
+  std::uint64_t total = bytes_held(facets) + blocks.bytes() + cuts.bytes() + chain.bytes() + contact.bytes() +
+                        bytes_held(group) + simplify.bytes() + of(closed) + of(open);
+  for (const Contours& contours : of_source) total += of(contours);
+  return total;
+}
 
 ContoursView LayerContours::of(std::uint32_t b, Buffer<std::uint32_t>& rebased) const {
   const std::uint32_t first = body[b], last = body[b + 1], base = contours.offset[first];
@@ -88,8 +96,8 @@ void Slicer::group(std::span<const std::uint32_t> body_of) {
 
 void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
                       SectionReport& report) const {
-  find_loops(meshes_[source.mesh].triangles, source, planes_, plane, scratch, closed);
-  report.cuts += scratch.cuts.size();
+  const std::size_t count = find_loops(meshes_[source.mesh], source, planes_, plane, scratch, closed);
+  report.cuts += count;
   report.level.keep_larger(scratch.cuts.level);
   if (scratch.open.size() == 0) return;
   report.gaps.add(close_gaps(scratch.open, options_.gap, closed));
@@ -159,26 +167,30 @@ std::uint64_t Slicer::index_bytes() const {
   return total;
 }
 
-std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
-  // Of a cut: its two edges, hashes and point; slots, links and states; its edge in the grid; its points before and after,
-  // and once more while points are left out.
-  const std::uint64_t of_cut = 48 + 16 + 8 + 16 + 5 + 24 + 24 + (options_.tolerance > 0 ? 48 : 0);
-  constexpr std::uint64_t kOfBlocks = 2 * sizeof(Triangle) + 16 + 4;  // facets as found and in order, their places, clusters
-  std::uint64_t maximum = 0;
+Slicer::CutBound Slicer::cut_bound(std::uint32_t plane) const {
+  CutBound bound{0, 0};
   std::vector<std::uint8_t> visited(sources_->size(), 0);
-  for (const Placed& placed : placed_) visited[placed.source] = 1;
-  for (std::size_t s = 0; s < visited.size(); ++s)
-    if (visited[s] != 0) maximum += (*sources_)[s].max_found(plane) * (of_cut + ((*sources_)[s].blocks ? kOfBlocks : 0));
-  std::uint64_t points = 0;
-  for (const Placed& placed : placed_) points += (*sources_)[placed.source].max_found(plane);
-  return maximum + points * sizeof(Point2);
+  for (const Placed& placed : placed_) {
+    const std::uint64_t found = (*sources_)[placed.source].max_found(plane);
+    bound.points += found;
+    if (std::exchange(visited[placed.source], 1) == 0) bound.cuts += found;
+  }
+  return bound;
+}
+
+std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
+  // Of a cut: its facet, which is found first and sorted then; hashes and point; slots, links and states; its edge in the grid;
+  // its points before and after, and once more while points are left out.
+  const std::uint64_t of_cut = 9 + 16 + 6 + 5 + 24 + 24 + (options_.tolerance > 0 ? 48 : 0);
+  const CutBound bound = cut_bound(plane);
+  return bound.cuts * of_cut + bound.points * sizeof(Point2);
 }
 
 namespace {
 
 /// A mesh at a height, and where its copies stand.
 struct SharedMesh {
-  std::span<const Triangle> triangles;
+  const Mesh& mesh;
   const SourceMesh& source;
   std::vector<Point2> by;
 };
@@ -186,9 +198,9 @@ struct SharedMesh {
 Result<double> surplus_area(std::span<const SharedMesh> shared, std::span<const Nm> planes, std::uint32_t plane,
                             SectionScratch& scratch, Contours& all) {
   all.clear();
-  for (const auto& [triangles, source, offsets] : shared) {
+  for (const auto& [mesh, source, offsets] : shared) {
     scratch.closed.clear();
-    find_loops(triangles, source, planes, plane, scratch, scratch.closed);
+    find_loops(mesh, source, planes, plane, scratch, scratch.closed);
     reserve_more(all.point, offsets.size() * scratch.closed.point.size());
     for (const Point2 by : offsets) append_moved(scratch.closed, by, all);
   }
@@ -206,7 +218,7 @@ Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::spa
   std::vector<std::uint32_t> source_of;
   const std::vector<SourceMesh> sources = find_sources(meshes, instances, planes, source_of);
   std::vector<SharedMesh> shared;
-  for (const SourceMesh& source : sources) shared.push_back({meshes[source.mesh].triangles, source, {}});
+  for (const SourceMesh& source : sources) shared.push_back({meshes[source.mesh], source, {}});
   for (std::size_t i = 0; i < instances.size(); ++i)
     shared[source_of[i]].by.push_back({instances[i].offset.x, instances[i].offset.y});
   std::vector<double> areas(planes.size());

@@ -60,6 +60,8 @@ struct SectionScratch {
   Contours closed, open;
   std::vector<Contours> of_source;  // clean contours of what copies share
   std::vector<std::uint8_t> source_done;
+
+  std::uint64_t bytes() const;
 };
 
 /// Bodies: instances that may overlap and are merged; those of different bodies must not.
@@ -85,6 +87,11 @@ class Slicer {
   std::uint32_t planes() const { return static_cast<std::uint32_t>(planes_.size()); }
   std::uint32_t bodies() const { return bodies_; }
   std::uint64_t index_bytes() const;
+  /// Facets that a plane crosses at most, of each mesh once, and points of all contours.
+  struct CutBound {
+    std::uint64_t cuts, points;
+  };
+  CutBound cut_bound(std::uint32_t plane) const;
   /// Bytes that layer() may need at most for scratch and result where no union is made; unions take a multiple of
   /// their contours more.
   std::uint64_t layer_bytes_bound(std::uint32_t plane) const;

@@ -246,7 +246,7 @@ TEST(Blocks, AreRightRegardlessOfEqualHashes) {
       SortedBlock& sorted = maker->sort(list, blocks, 0);
       sorted.hash_corners();
       for (std::uint16_t& hash : sorted.hash) hash = static_cast<std::uint16_t>(hash & mask);
-      maker->store(blocks, 0);
+      maker->store(list, blocks, 0);
       EXPECT_EQ(in_order(triangles_in(blocks, 0, blocks.cluster_count(), 900)), in_order(list));
       EXPECT_LT(blocks.bytes(), 900 * 16u) << "each vertex is stored once";
     }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "stages/formats/rp3/rp3.h"
+#include "stages/geometry/blocks/block_maker.h"
 #include "stages/heights/candidate_heights.h"
 #include "stages/heights/heights.h"
 #include "tests/heights/surfaces.h"
@@ -226,6 +227,38 @@ TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetRequests) {
   const Buffer<double> found = projected_below(index, index.parts, *candidate_heights, Sign::kBoth);
   for (std::uint32_t i = 0; i < candidate_heights->candidates(); ++i)
     EXPECT_NEAR(found[i], below[i], 1e-9 * (1 + below[i])) << i;
+}
+
+/// Sums too: facets are read in the order of the file.
+TEST(HeightSurface, BlocksAreAsTheListThatTheyAreMadeOf) {
+  const Mesh list = random_mesh(3, 50'000);
+  Mesh blocks;
+  blocks.bounds = list.bounds;
+  blocks.blocks = std::make_shared<MeshBlocks>(static_cast<std::uint32_t>(list.triangles.size()), 0, true);
+  BlockMaker maker;
+  for (std::uint32_t b = 0; b < blocks.blocks->block_count(); ++b) {
+    const auto facets = std::span(list.triangles).subspan(blocks.blocks->first_triangle(b), blocks.blocks->triangles_in(b));
+    maker.make(facets, *blocks.blocks, b);
+  }
+  const Instance instance{0, {0, 0, 0}};
+  const std::uint32_t part = 0;
+  const Result<CandidateHeights> heights = CandidateHeights::reachable(set_of({0.05, 0.06}), list.bounds.hi.z);
+  for (const ScaleFactors& scale : {ScaleFactors{1, 1, 1}, ScaleFactors{1.01, 1.02, 1.05}}) {
+    SurfaceOptions options;
+    options.nominal_cusps = true;
+    const auto index_of = [&](const Mesh& mesh) {
+      return index_surface(std::span(&mesh, 1), std::span(&instance, 1), std::span(&part, 1), 1, options, std::span(&scale, 1));
+    };
+    const SurfaceIndex one = index_of(list), other = index_of(blocks);
+    ASSERT_TRUE(other.meshes[0].steepness.empty());
+    EXPECT_EQ(one.area_mm2, other.area_mm2);
+    EXPECT_EQ(one.meshes[0].flats.size(), other.meshes[0].flats.size());
+    for (const Slope slope : {Slope::kSteps, Slope::kAngles})
+      EXPECT_EQ(steepest_in_cells(one, one.parts, *heights, slope), steepest_in_cells(other, other.parts, *heights, slope));
+    EXPECT_EQ(projected_below(one, one.parts, *heights, Sign::kBoth),
+              projected_below(other, other.parts, *heights, Sign::kBoth));
+    EXPECT_EQ(section_at_candidates(one, *heights, 1000), section_at_candidates(other, *heights, 1000));
+  }
 }
 
 }  // namespace

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 #include <tuple>
 
-#include "stages/geometry/blocks/block_maker.h"
+#include "stages/load/diagnosis/sound_survey.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
 
@@ -209,8 +210,8 @@ void expect_positions(const load::Diagnosis& found, const std::vector<Triangle>&
   EXPECT_EQ(positions_of(found.duplicate_facets), expected.duplicate.first(50));
 }
 
-/// Facets of a list in no order are processed in a spatial one; blocks bring vertices of their own.
-TEST(Diagnose, ListsInAnyOrderAndBlocksFindTheSame) {
+/// Facets of a list in no order are processed in a spatial one.
+TEST(Diagnose, ListsInAnyOrderFindTheSame) {
   std::mt19937 random(8);
   for (int faults = 0; faults < 3; ++faults) {
     std::vector<Triangle> triangles = torus_in_order(250, 40);
@@ -232,11 +233,94 @@ TEST(Diagnose, ListsInAnyOrderAndBlocksFindTheSame) {
     expect_same_counts(in_order, diagnosis_of(shuffled));
     expect_positions(in_order, triangles);
     expect_positions(diagnosis_of(shuffled), shuffled);
-    for (const std::vector<Triangle>& list : {triangles, shuffled}) {
-      Mesh mesh;
-      mesh.triangles.assign(list.begin(), list.end());
-      expect_same_counts(in_order, load::diagnose_blocks(take_blocks({&mesh, 1}).front()));
+  }
+}
+
+constexpr std::size_t kChunk = 4096;
+
+std::optional<load::Diagnosis> survey_of(std::span<const Triangle> list) {
+  load::SoundSurvey survey;
+  for (std::size_t first = 0; first < list.size(); first += kChunk)
+    if (!survey.inspect(list.subspan(first, std::min(kChunk, list.size() - first)))) return std::nullopt;
+  return survey.finish();
+}
+
+std::vector<Triangle> moved(std::vector<Triangle> list, Point3 by) {
+  for (Triangle& t : list)
+    for (Point3* p : {&t.a, &t.b, &t.c}) *p = {p->x + by.x, p->y + by.y, p->z + by.z};
+  return list;
+}
+
+std::vector<Triangle> joined(std::vector<Triangle> list, const std::vector<Triangle>& more) {
+  list.insert(list.end(), more.begin(), more.end());
+  return list;
+}
+
+TEST(SoundSurvey, SaysOfSoundMeshesWhatDiagnosisSays) {
+  std::mt19937 random(9);
+  std::vector<Triangle> list = torus_in_order(250, 40);
+  const load::Diagnosis alone = diagnosis_of(list);
+  ASSERT_GT(alone.volume_mm3, 0);
+  const auto wide = static_cast<Nm>(alone.bounds.width() + 1000);
+  list = joined(list, moved(torus_in_order(100, 20), {wide, 0, 0}));
+  list.push_back({list[7].a, list[7].b, list[7].a});  // without area, in no shell
+  std::vector<Triangle> shuffled = list;
+  std::shuffle(shuffled.begin(), shuffled.end(), random);
+  const load::Diagnosis expected = diagnosis_of(list);
+  EXPECT_EQ(expected.shells, 2u);
+  for (const std::vector<Triangle>& one : {list, shuffled}) {
+    const std::optional<load::Diagnosis> found = survey_of(one);
+    ASSERT_TRUE(found);
+    expect_same_counts(expected, *found);
+    EXPECT_EQ(found->volume_mm3, expected.volume_mm3);
+    EXPECT_EQ(found->outward_mm3, expected.outward_mm3);
+    EXPECT_EQ(found->shells_apart, expected.shells_apart);
+    EXPECT_EQ(found->shell_ends, expected.shell_ends);
+  }
+}
+
+TEST(SoundSurvey, TakesNoMeshWithAFaultForSound) {
+  std::mt19937 random(10);
+  const std::vector<Triangle> torus = torus_in_order(250, 40);
+  for (int run = 0; run < 60; ++run) {
+    std::vector<Triangle> list = torus;
+    const std::size_t at = random() % list.size();
+    switch (run % 5) {
+      case 0: std::swap(list[at].b, list[at].c); break;
+      case 1: list.erase(list.begin() + static_cast<std::ptrdiff_t>(at)); break;
+      case 2: list.push_back(list[at]); break;
+      case 3: list.push_back({list[at].a, list[at].c, list[at].b}); break;
+      default: list.insert(list.end(), 2, {list[at].a, list[at].b, list[at].a}); break;
     }
+    if (run % 2 == 1) std::shuffle(list.begin(), list.end(), random);
+    EXPECT_FALSE(survey_of(list)) << run;
+  }
+  std::vector<Triangle> inside_out = torus;
+  for (Triangle& t : inside_out) std::swap(t.b, t.c);
+  EXPECT_FALSE(survey_of(inside_out));
+  EXPECT_FALSE(survey_of(joined(torus, moved(inside_out, {400'000'000, 0, 0}))));
+  EXPECT_FALSE(survey_of(std::vector<Triangle>{{{0, 0, 0}, {5, 0, 0}, {0, 5, 5}}, {{0, 0, 0}, {0, 5, 5}, {5, 0, 0}}}));
+}
+
+/// Each of two tetrahedra is sound; together an edge has four sides, of which each chunk has two that fit.
+TEST(SoundSurvey, DetectsAnEdgeOfFourSidesThatIsClosedInTwoChunks) {
+  const Point3 p{0, 0, 0}, q{0, 0, 9000};
+  const auto tetrahedron = [&](Point3 r, Point3 s) {
+    return std::vector<Triangle>{{p, r, q}, {p, q, s}, {q, r, s}, {p, s, r}};
+  };
+  const std::vector<Triangle> one = tetrahedron({9000, 0, 0}, {0, 9000, 0}), other = tetrahedron({-9000, 0, 0}, {0, -9000, 0});
+  const std::vector<Triangle> torus = moved(torus_in_order(250, 40), {400'000'000, 0, 0});
+  ASSERT_TRUE(survey_of(torus));
+  for (const auto& each : {one, other}) ASSERT_TRUE(survey_of(joined(each, torus)));
+  EXPECT_FALSE(survey_of(joined(one, other)));
+  EXPECT_FALSE(survey_of(joined(joined(one, torus), other)));
+  // The first two facets of each meet at the edge, whose ends are on the rim of their chunk.
+  for (const Nm apart : {0, 50'000}) {
+    const std::vector<Triangle> far = moved(other, {-apart, 0, 0});
+    load::SoundSurvey survey;
+    for (const std::vector<Triangle>& each : {one, far})
+      for (const std::size_t first : {0, 2}) ASSERT_TRUE(survey.inspect(std::span(each).subspan(first, 2)));
+    EXPECT_EQ(survey.finish().has_value(), apart > 0);
   }
 }
 

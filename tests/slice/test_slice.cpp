@@ -207,7 +207,7 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
     for (std::int64_t z = -6000; z < 6000; z += 1 + static_cast<std::int64_t>(random() % static_cast<unsigned>(spread)))
       planes.push_back(z);
     const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
-    Buffer<std::uint32_t> found;
+    Buffer<std::uint32_t> found, facets;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 200)) {
       found.clear();
       index.append(p, found);
@@ -248,14 +248,15 @@ TEST(PlaneIndex, OfBlocksFindsTheSameFacetsInTheSameOrderAsThatOfTheList) {
     const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
     const slice::BlockPlanes of_blocks(blocks, planes);
     slice::BlockScratch scratch;
-    Buffer<std::uint32_t> found;
+    Buffer<std::uint32_t> found, facets;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 50)) {
       found.clear();
       index.append(p, found);
-      of_blocks.find(p, scratch);
+      of_blocks.find(p, scratch, facets);
       ASSERT_EQ(of_blocks.count(p), found.size());
-      ASSERT_EQ(scratch.facets.size(), found.size());
-      for (std::size_t i = 0; i < found.size(); ++i) ASSERT_EQ(scratch.facets[i], triangles[found[i]]) << p << " " << i;
+      ASSERT_EQ(facets.size(), found.size());
+      for (std::size_t i = 0; i < found.size(); ++i)
+        ASSERT_EQ(slice::facet_of(blocks, facets[i]), triangles[found[i]]) << p << " " << i;
     }
   }
   Buffer<Triangle> list(kBlockSize);

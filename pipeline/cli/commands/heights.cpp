@@ -154,7 +154,7 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   }
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  const Result<Scene> scene = load_scene(*job, kLargestBed);
+  const Result<Scene> scene = load_scene(*job, kLargestBed, MeshForm::kOrderedBlocks);
   const std::chrono::duration<double> load = Clock::now() - start;
   if (!scene) return scene.error();
 

@@ -72,14 +72,14 @@ Result<StlCounts> write_stl(File& file, std::span<const Mesh> meshes, std::span<
     }
     return {};
   };
-  Buffer<Triangle> list(kBlockSize);
+  Buffer<Triangle> scratch;
   for (const Instance& instance : instances) {
     const Mesh& mesh = meshes[instance.mesh];
-    if (Status status = put(mesh.triangles, instance.offset); !status) return status.error();
-    for (std::uint32_t b = 0; mesh.blocks && b < mesh.blocks->block_count(); ++b) {
-      mesh.blocks->list_block(b, list);
-      if (Status status = put({list.data(), mesh.blocks->triangles_in(b)}, instance.offset); !status) return status.error();
-    }
+    Status status;
+    each_listed(mesh, 0, triangle_count(mesh), scratch, [&](std::span<const Triangle> facets) {
+      if (status) status = put(facets, instance.offset);
+    });
+    if (!status) return status.error();
   }
   if (Status status = file.append(piece); !status) return status.error();
   return counts;

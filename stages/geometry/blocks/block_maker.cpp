@@ -113,11 +113,22 @@ SortedBlock& BlockMaker::sort(std::span<const Triangle> triangles, const MeshBlo
   return sorted_;
 }
 
-void BlockMaker::store(MeshBlocks& mesh, std::uint32_t number) {
+/// Numbers the vertices. returns  whether they are few; then, where the order is kept, triangles are in it
+bool BlockMaker::number(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block) {
+  if (!mesh.keeps_order()) return vertices_.number(sorted_, kernels_);
+  std::array<std::uint16_t, kBlockSize> listed;
+  std::iota(listed.data(), listed.data() + triangles.size(), std::uint16_t{0});
+  sorted_.take(triangles, {listed.data(), triangles.size()});
+  sorted_.hash_corners();
+  if (vertices_.number(sorted_, kernels_)) return true;
+  sorted_.take(triangles, {order_.data(), triangles.size()});
+  std::copy_n(order_.data(), triangles.size(), mesh.order_.data() + mesh.first_triangle(block));
+  return false;
+}
+
+void BlockMaker::store(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t number) {
   MeshBlocks::Block& block = mesh.blocks_[number];
-  const bool few = vertices_.number(sorted_, kernels_);
-  if (mesh.keeps_order())
-    std::copy_n(order_.begin(), mesh.triangles_in(number), mesh.order_.begin() + mesh.first_triangle(number));
+  const bool few = this->number(triangles, mesh, number);
   block.clusters = sorted_.clusters();
   block.vertices = few ? vertices_.count() : 0;
   const std::span<const Cluster> clusters(sorted_.cluster.data(), block.clusters);
@@ -136,7 +147,7 @@ void BlockMaker::store(MeshBlocks& mesh, std::uint32_t number) {
 
 void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block) {
   sort(triangles, mesh, block).hash_corners();
-  store(mesh, block);
+  store(triangles, mesh, block);
 }
 
 std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes, Isa isa) {

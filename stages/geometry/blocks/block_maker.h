@@ -49,12 +49,15 @@ class BlockMaker {
   /// where they are not.
   /// triangles  at least one, in the order of the file; those that repair added stay in it
   SortedBlock& sort(std::span<const Triangle> triangles, const MeshBlocks& mesh, std::uint32_t block);
-  /// Stores them and the boxes of their clusters. Other threads may make other blocks meanwhile.
-  void store(MeshBlocks& mesh, std::uint32_t block);
+  /// Stores them, the same `triangles`, and the boxes of their clusters. Other threads may make other blocks meanwhile. Where
+  /// `mesh` keeps the order of the file, and vertices are shared, they are stored in that order.
+  void store(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block);
   /// Both, with hashes of its own.
   void make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block);
 
  private:
+  bool number(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block);
+
   const BlockKernels& kernels_;
   SortedBlock sorted_;
   VertexNumbers vertices_;

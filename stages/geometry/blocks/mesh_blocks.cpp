@@ -96,6 +96,7 @@ MeshBlocks::MeshBlocks(std::uint32_t own, std::uint32_t added, bool keeps_order)
       added_(added),
       first_cap_(clusters_for(own)),
       first_cap_block_(blocks_for(own)),
+      keeps_order_(keeps_order),
       order_(keeps_order ? std::size_t{own} + added : 0),
       pages_(max_bytes(own) + max_bytes(added) + bytes_of_bounds(clusters_for(own) + clusters_for(added))) {
   blocks_.resize(std::size_t{first_cap_block_} + blocks_for(added));
@@ -111,7 +112,24 @@ std::uint32_t MeshBlocks::triangles_in(std::uint32_t block) const {
 
 void MeshBlocks::list_block(std::uint32_t block, std::span<Triangle> list) const {
   const std::uint32_t count = triangles_in(block), cluster = first_cluster(block), first = first_triangle(block);
-  for (std::uint32_t i = 0; i < count; ++i) list[order_[first + i]] = triangle(cluster + i / kClusterSize, i % kClusterSize);
+  if (blocks_[block].vertices == 0) {
+    for (std::uint32_t i = 0; i < count; ++i) list[order_[first + i]] = triangle(cluster + i / kClusterSize, i % kClusterSize);
+    return;
+  }
+  const Point3* const vertex = blocks_[block].vertex();
+  const IndexedCluster* const indexed = blocks_[block].indexed();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto& corner = indexed[i / kClusterSize].corner;
+    const std::uint32_t lane = i % kClusterSize;
+    list[i] = {vertex[corner[0][lane]], vertex[corner[1][lane]], vertex[corner[2][lane]]};
+  }
+}
+
+std::uint64_t MeshBlocks::order_bytes() const {
+  std::uint64_t bytes = 0;
+  for (std::uint32_t b = 0; keeps_order_ && b < blocks_.size(); ++b)
+    bytes += blocks_[b].vertices > 0 ? 0 : triangles_in(b) * sizeof(std::uint16_t);
+  return bytes;
 }
 
 void MeshBlocks::shift(const Point3& by) {

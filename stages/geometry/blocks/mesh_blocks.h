@@ -2,6 +2,7 @@
 // neighbouring ones: the shape that every kernel reads.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -76,7 +77,8 @@ class MeshBlocks {
   static constexpr std::uint32_t kClusters = kBlockSize / kClusterSize;  // a block
 
   /// own, added   triangles of the file, and of those the ones that repair added: they begin a cluster and a block
-  /// keeps_order  2 bytes a triangle more say where each is in the file
+  /// keeps_order  blocks with numbered vertices are in the order of the file; in others, 2 bytes a triangle more say where each
+  ///              is
   MeshBlocks(std::uint32_t own, std::uint32_t added, bool keeps_order = false);
 
   std::uint32_t triangle_count() const { return own_ + added_; }
@@ -123,13 +125,13 @@ class MeshBlocks {
     return {vertex[corner[0][lane]], vertex[corner[1][lane]], vertex[corner[2][lane]]};
   }
 
-  bool keeps_order() const { return !order_.empty(); }
+  bool keeps_order() const { return keeps_order_; }
   /// Where the order is kept: the number of a triangle in the file's list.
   std::uint32_t listed_number(std::uint32_t cluster, std::uint32_t lane) const {
     const std::uint32_t block =
         cluster < first_cap_ ? cluster / kClusters : first_cap_block_ + (cluster - first_cap_) / kClusters;
-    const std::uint32_t first = first_triangle(block);
-    return first + order_[first + (cluster - first_cluster(block)) * kClusterSize + lane];
+    const std::uint32_t first = first_triangle(block), at = (cluster - first_cluster(block)) * kClusterSize + lane;
+    return first + (blocks_[block].vertices > 0 ? at : order_[first + at]);
   }
   /// Where the order is kept: the triangles of a block as the file lists them. list  of at least triangles_in(block)
   void list_block(std::uint32_t block, std::span<Triangle> list) const;
@@ -160,7 +162,7 @@ class MeshBlocks {
   void shift(const Point3& by);
 
   std::uint64_t bytes() const {  // of triangles
-    return pages_.bytes() - bounds_taken_ + bytes_held(blocks_) + bytes_held(order_);
+    return pages_.bytes() - bounds_taken_ + bytes_held(blocks_) + order_bytes();
   }
   std::uint64_t bounds_bytes() const { return bounds_taken_; }
 
@@ -203,10 +205,14 @@ class MeshBlocks {
     return block < first_cap_block_ ? block * kClusters : first_cap_ + (block - first_cap_block_) * kClusters;
   }
 
+  std::uint64_t order_bytes() const;
+
   std::uint32_t own_, added_, first_cap_, first_cap_block_;
+  bool keeps_order_;
   Buffer<Block> blocks_;
-  Buffer<std::uint16_t>
-      order_;  // of each place in the clusters of a block, the triangle of the block's list; empty if not kept
+  // Where the order is kept, of each place in the clusters of a block, the triangle of the block's list. Unset, and without
+  // memory as a rule, in blocks that are in the order of the file.
+  Buffer<std::uint16_t> order_;
   Pages pages_;
   std::uint64_t bounds_taken_;
   std::span<Box> bounds_;  // in pages_: written first where blocks are made, by all threads
@@ -215,6 +221,24 @@ class MeshBlocks {
 /// Of a list or of blocks.
 inline std::uint64_t triangle_count(const Mesh& mesh) {
   return mesh.blocks ? mesh.blocks->triangle_count() : mesh.triangles.size();
+}
+
+/// Calls visit(triangles) for triangles [first, end) of a mesh in the order of its file, piece by piece.
+/// mesh     a list, or blocks that keep the order
+/// scratch  what blocks are listed into
+template <class Visit>
+void each_listed(const Mesh& mesh, std::uint64_t first, std::uint64_t end, Buffer<Triangle>& scratch, Visit&& visit) {
+  if (!mesh.blocks) return visit(std::span(mesh.triangles).subspan(first, end - first));
+  const MeshBlocks& blocks = *mesh.blocks;
+  scratch.resize(kBlockSize);
+  for (auto b = static_cast<std::uint32_t>(first / kBlockSize); first < end; ++b) {
+    const std::uint64_t begin = blocks.first_triangle(b), behind = begin + blocks.triangles_in(b);
+    if (behind <= first) continue;
+    blocks.list_block(b, scratch);
+    const std::uint64_t last = std::min(behind, end);
+    visit(std::span<const Triangle>(scratch).subspan(first - begin, last - first));
+    first = last;
+  }
 }
 
 /// Calls `see` for each vertex at least once: in the order of a list, in no order of blocks.

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "stages/load/diagnosis/chunk_edges.h"
+#include "stages/load/diagnosis/diagnosed_shells.h"
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/topology.h"
@@ -21,20 +22,10 @@
 namespace lamina::load {
 namespace {
 
-struct Shell {
-  Int128 volume = 0;  // sixfold
-  Box box;
-  bool closed = true;
-
-  void add(const Shell& other) {
-    volume += other.volume;
-    box.add(other.box);
-    closed = closed && other.closed;
-  }
-};
-
 /// More ends than this say little.
 constexpr std::size_t kMaxEnds = 64;
+
+}  // namespace
 
 void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
   result.shells = static_cast<std::uint32_t>(shells.size());
@@ -58,6 +49,8 @@ void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
   std::ranges::sort(result.shell_ends);
   result.shell_ends.erase(std::unique(result.shell_ends.begin(), result.shell_ends.end()), result.shell_ends.end());
 }
+
+namespace {
 
 constexpr std::size_t kGrain = std::size_t{1} << 13;  // facets or vertices a task
 
@@ -287,16 +280,6 @@ void diagnose_edges(const Numbered& mesh, std::size_t positions, Diagnosis& resu
 Diagnosis diagnose(const Mesh& mesh, std::size_t positions) {
   Diagnosis result = diagnose_facets(mesh.triangles, positions);
   diagnose_edges(Numbered(mesh.triangles, mesh.bounds), positions, result);
-  return result;
-}
-
-Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks) {
-  Diagnosis result;
-  result.triangles = blocks->triangle_count();
-  constexpr std::uint32_t kLarge = 16;  // blocks: of few there is little to give back
-  const Numbered numbered(*blocks, blocks.use_count() == 1 && blocks->block_count() > kLarge);
-  blocks.reset();
-  diagnose_edges(numbered, 0, result);
   return result;
 }
 

@@ -47,10 +47,6 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t positions = 3);
 /// cost: as above; no more memory than the list and a quarter of it, half of it where the list is in disorder
 Diagnosis diagnose_alone(Mesh& mesh, std::size_t positions = 3);
 
-/// The same of blocks without caps. Degenerate facets are not searched for, and no positions are given: the order of the file
-/// is not known. blocks: given up as soon as their vertices are numbered
-Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks);
-
 /// What every job pays for, in one pass.
 struct Census {
   /// Every edge is walked as often one way as the other, up to a chance of 2^-57 that is the same on every machine: the

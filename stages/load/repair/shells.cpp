@@ -240,8 +240,12 @@ bool turn_shells(Mesh& mesh, const std::string& prefix, std::vector<Note>& notes
   if (!mesh.closed) return false;
   if (mesh.blocks) {
     const bool is_large = mesh.blocks->triangle_count() > kBlockSize;
-    if (is_large ? !may_have_negative_surface(*mesh.blocks) : is_plain(diagnose_blocks(mesh.blocks))) return false;
+    if (is_large && !may_have_negative_surface(*mesh.blocks)) return false;
     mesh.triangles = list_of(*mesh.blocks);
+    if (!is_large && is_plain(diagnose(mesh, 0))) {
+      mesh.triangles = {};
+      return false;
+    }
   } else if (is_plain(diagnose(mesh, 0))) {
     return false;
   }

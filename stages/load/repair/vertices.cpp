@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "stages/geometry/blocks/pages.h"
+#include "stages/load/diagnosis/chunk_numbers.h"
 
 namespace lamina::load {
 namespace {
@@ -25,72 +26,9 @@ constexpr std::uint32_t kFree = UINT32_MAX;
 constexpr std::size_t kChunk = Numbered::kChunk;  // 144 KiB
 constexpr std::size_t kTogether = 16;             // chunks a task, 2.25 MiB of the list
 constexpr std::uint32_t kNameBits = 14;           // of a point's name, within its chunk
-static_assert(kChunk == kBlockSize);
 static_assert(3 * kChunk <= std::size_t{1} << kNameBits);
 
 using Local = Numbered::Local;
-
-/// The upper bits depend on all of the point.
-std::uint64_t hash_of(const Point3& p) {
-  const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
-  const std::uint64_t mixed = (xy ^ xy >> 29) * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(p.z) * 0x2d358dccaa6c78a5u;
-  return (mixed ^ mixed >> 32) * 0x8bb84b93962eacc9;
-}
-
-/// Numbers the corners of one chunk after the other, in memory that stays in a core's cache. Corners find the first corner that
-/// is the same point through a table in which the first corner of each hash stands: it is written from the last corner to the
-/// first, so no branch depends on what it held. Points whose slot another one has are few, and are found by probing.
-class ChunkNumbers {
- public:
-  /// point  where to write the points, at most as many as corners; may be where the triangles begin, or before
-  /// returns  how many there are
-  std::uint32_t number(std::span<const Triangle> triangles, Numbered::Local* facets, Point3* point) {
-    const auto corners = static_cast<std::uint32_t>(3 * triangles.size());
-    const Point3* const corner = &triangles.front().a;
-    match({corner, corners});
-    std::uint32_t count = 0;
-    std::uint16_t* const number = facets->data();
-    for (std::uint32_t i = 0; i < corners; ++i) {
-      number_[i] = static_cast<std::uint16_t>(count);  // of a first corner
-      number[i] = number_[first_[i]];
-      const Point3 at = corner[i];  // not behind point[count], which is read no more
-      point[count] = at;
-      count += first_[i] == i;
-    }
-    return count;
-  }
-
- private:
-  static constexpr std::uint16_t kNone = UINT16_MAX;
-  static constexpr int kSlotBits = 15;
-  static constexpr std::size_t kSlots = std::size_t{1} << kSlotBits;
-
-  static bool same(const Point3& p, const Point3& q) { return ((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z)) == 0; }
-
-  void match(std::span<const Point3> corner) {
-    const auto corners = static_cast<std::uint32_t>(corner.size());
-    for (std::uint32_t i = 0; i < corners; ++i) hash_[i] = static_cast<std::uint16_t>(hash_of(corner[i]) >> (64 - kSlotBits));
-    for (std::uint32_t i = corners; i-- > 0;) slot_[hash_[i]] = static_cast<std::uint16_t>(i);
-    std::uint32_t unmatched = 0;
-    for (std::uint32_t i = 0; i < corners; ++i) {
-      first_[i] = slot_[hash_[i]];
-      rest_[unmatched] = static_cast<std::uint16_t>(i);
-      unmatched += !same(corner[i], corner[first_[i]]);
-    }
-    if (unmatched == 0) return;
-    slot_.fill(kNone);
-    for (std::uint32_t r = 0; r < unmatched; ++r) {
-      const std::uint16_t i = rest_[r];
-      std::size_t at = hash_[i];
-      while (slot_[at] != kNone && !same(corner[i], corner[slot_[at]])) at = (at + 1) % kSlots;
-      if (slot_[at] == kNone) slot_[at] = i;
-      first_[i] = slot_[at];
-    }
-  }
-
-  std::array<std::uint16_t, kSlots> slot_;
-  std::array<std::uint16_t, 3 * Numbered::kChunk> hash_, first_, number_, rest_;
-};
 
 /// The points of a chunk, each once, in the order in which its facets name them.
 struct Chunk {
@@ -114,7 +52,7 @@ void for_each_hash(const Chunk& chunk, const Prefetch& prefetch, const Visit& vi
   std::array<std::uint64_t, kAhead> hashes;
   for (std::uint32_t i = 0; i < chunk.count + kAhead; ++i) {
     if (i >= kAhead) visit(i - kAhead, hashes[i % kAhead]);
-    if (i < chunk.count) prefetch(hashes[i % kAhead] = hash_of(chunk.point[i]));
+    if (i < chunk.count) prefetch(hashes[i % kAhead] = point_hash(chunk.point[i]));
   }
 }
 
@@ -185,7 +123,7 @@ class PointTable {
     for (std::uint32_t i = 0; i < count + 2 * kAhead; ++i) {
       if (i < count) {
         std::uint64_t& hashed = hashes[i % hashes.size()];
-        hashed = hash_of(chunk.point[shared[i]]);
+        hashed = point_hash(chunk.point[shared[i]]);
         __builtin_prefetch(&slots_[hashed >> shift_], 1);
       }
       if (i >= kAhead && i - kAhead < count) {
@@ -264,39 +202,7 @@ class Numbering {
     });
   }
 
-  /// The chunks are blocks. Points of blocks that hold clusters as they are read go to `listed`.
-  /// forget  clusters' memory goes back to the system
-  void read(const MeshBlocks& blocks, std::vector<Buffer<Point3>>& listed, bool forget) {
-    Gatherers gatherers([] { return std::make_unique<ChunkGatherer>(); });
-    for_each_chunk([&](std::uint32_t c) {
-      const std::uint32_t cluster = c * MeshBlocks::kClusters, count = blocks.triangles_in(c);
-      Local* const facets = facets_.data() + c * kChunk;
-      const MeshBlocks::Indexed first = blocks.indexed(cluster);
-      if (first.cluster == nullptr) {
-        ChunkGatherer& gatherer = *gatherers.local();
-        for (std::uint32_t i = 0; i < count; ++i)
-          gatherer.list[i] = blocks.listed(cluster + i / kClusterSize).triangle(i % kClusterSize);
-        return number_gathered(c, count, gatherer, listed);
-      }
-      std::uint16_t last = 0;  // vertices count in the order in which corners name them
-      for (std::uint32_t i = 0; i < count; ++i) {
-        const auto& corner = first.cluster[i / kClusterSize].corner;
-        const std::uint32_t lane = i % kClusterSize;
-        facets[i] = {corner[0][lane], corner[1][lane], corner[2][lane]};
-        last = std::max({last, facets[i][0], facets[i][1], facets[i][2]});
-      }
-      chunks_[c].point = first.vertex;
-      chunks_[c].count = last + 1u;
-      if (forget) {
-        const char* const begin = blocks.stored(cluster).data();
-        forget_pages(const_cast<char*>(begin), const_cast<Point3*>(first.vertex));
-      }
-    });
-  }
-
-  /// Numbers the points of all chunks, and gives all to `to`.
-  /// forget  the memory of points goes back to the system when they are numbered
-  void join(Numbered& to, bool forget = false) {
+  void join(Numbered& to) {
     std::size_t points = 0, slots = 64;
     for (Chunk& chunk : chunks_) chunk.before = std::exchange(points, points + chunk.count);
     slot_.resize(points);
@@ -312,11 +218,7 @@ class Numbering {
     for (Chunk& chunk : chunks_) chunk.numbers_from = std::exchange(count, count + chunk.numbers_from);
     Buffer<Point3> vertices(count);
     prefer_large_pages(vertices);
-    for_each_chunk([&](std::uint32_t c) {
-      number(chunks_[c], table, vertices);
-      auto* const point = const_cast<Point3*>(chunks_[c].point);
-      if (forget) forget_pages(point, point + chunks_[c].count);
-    });
+    for_each_chunk([&](std::uint32_t c) { number(chunks_[c], table, vertices); });
     in_several_.assign(count, std::uint8_t{0});
     for_each_chunk([&](std::uint32_t c) {
       for (std::size_t i = chunks_[c].before, end = i + chunks_[c].count; i < end; ++i) {
@@ -514,13 +416,6 @@ Numbered::Numbered(std::span<const Triangle> triangles, const Box& bounds) {
     numbering.read(triangles, points.data(), [](Point3*, std::size_t) {});
     numbering.join(*this);
   }
-}
-
-Numbered::Numbered(const MeshBlocks& blocks, bool forget) {
-  Numbering numbering(blocks.triangle_count());
-  std::vector<Buffer<Point3>> listed(blocks.block_count());
-  numbering.read(blocks, listed, forget);
-  numbering.join(*this, forget);
 }
 
 // Points of a list in order lie where their triangles were until vertices are known.

@@ -8,7 +8,6 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
-#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/repair/topology.h"
 
 namespace lamina::load {
@@ -28,9 +27,6 @@ class Numbered {
   Numbered(std::span<const Triangle> triangles, const Box& bounds);
   /// The same in the memory of the list, which goes back to the system as it is read.
   Numbered(Buffer<Triangle>&& triangles, const Box& bounds);
-  /// Of blocks that hold no caps, each of which knows its own vertices already: facets count in the order of their clusters.
-  /// forget  their memory goes back to the system as they are read; nothing but their destructor may be called afterwards
-  explicit Numbered(const MeshBlocks& blocks, bool forget = false);
   Numbered(const Numbered&) = delete;
   Numbered& operator=(const Numbered&) = delete;
 
@@ -40,7 +36,7 @@ class Numbered {
     const std::uint32_t* const number = numbers_.data() + begin_[f / kChunk];
     return {number[local_[f][0]], number[local_[f][1]], number[local_[f][2]]};
   }
-  /// Its number in the list, or among the clusters of the blocks.
+  /// Its number in the list.
   std::uint32_t listed(std::uint32_t f) const { return order_.empty() ? f : order_[f]; }
   /// It uses a vertex twice.
   bool collapsed(std::uint32_t f) const {
