@@ -106,6 +106,22 @@ std::uint32_t adler_of(std::span<const std::byte> bytes, std::span<const RowSpan
 
 }  // namespace
 
+std::size_t DitherDeflate::compress_rows(RowBits& image, std::uint32_t begin, std::uint32_t end, std::size_t stride,
+                                         std::byte* out) {
+  const std::size_t size = stride * (end - begin);
+  if (strip_.size() < size) strip_.assign(size, std::byte{0});
+  set_.clear();
+  for (std::uint32_t row = begin; row < end; ++row) {
+    const std::size_t at = stride * (row - begin), before = set_.size();
+    image.put_set(row, std::span(strip_).subspan(at, stride), set_);
+    for (RowSpan& set : std::span(set_).subspan(before)) set.begin += at, set.end += at;
+  }
+  const auto strip = std::span(strip_).first(size);
+  const std::size_t length = compress(strip, stride, set_, out);
+  for (const RowSpan& set : set_) std::memset(strip.data() + set.begin, 0, set.end - set.begin);
+  return length;
+}
+
 /// Parts of the bytes outside of which all are 0 and repeat; whole lanes where they do not end with the bytes.
 void DitherDeflate::find_parts(std::size_t size, std::span<const RowSpan> set) {
   parts_.clear();

@@ -12,12 +12,18 @@
 
 #include "stages/data/bit_rows.h"
 #include "stages/formats/tiff/strip_code.h"
+#include "stages/geometry/bits.h"
 
 namespace lamina::formats::tiff {
 
 /// One compressor per thread; keeps its scratch.
 class DitherDeflate {
  public:
+  /// Before the rows of an image.
+  void start() { strip_.clear(); }
+  /// As compress(), of the rows [begin, end), which are no more than those of the image's first strip.
+  std::size_t compress_rows(RowBits& image, std::uint32_t begin, std::uint32_t end, std::size_t stride, std::byte* out);
+
   /// Writes the zlib stream of `bytes` to `out`, which has StripCode::bound() bytes. returns  those written
   /// stride  bytes of a row
   /// set     spans in order and apart; all bytes outside of them are 0
@@ -40,6 +46,8 @@ class DitherDeflate {
   void find_pieces(std::span<const std::byte> bytes);
   void put_pieces(std::span<const std::byte> bytes, png::BitWriter& writer) const;
 
+  Buffer<std::byte> strip_;
+  Buffer<RowSpan> set_;  // of the strip, where it is not 0
   Buffer<RowSpan> parts_;
   std::vector<Piece> pieces_;
   StripWeights weights_{};

@@ -422,26 +422,12 @@ class DeflateEncoder : public ImageEncoder {
 
  private:
   Status encode_rows(RowBits image, double dpi_x, double dpi_y, Bytes& file) {
-    strip_.clear();
+    deflate_.start();
     return encode_strips(image.columns, image.rows, {dpi_x, dpi_y}, kStripBytes, file,
                          [&](std::uint32_t begin, std::uint32_t end, std::size_t stride) {
-                           const std::size_t size = stride * (end - begin);
-                           if (strip_.size() < size) strip_.assign(size, std::byte{0});  // by the first strip
-                           set_.clear();
-                           for (std::uint32_t row = begin; row < end; ++row) put_row(image, row, stride * (row - begin), stride);
-                           const auto strip = std::span(strip_).first(size);
-                           const std::size_t length = deflate_.compress(strip, stride, set_, packed_.data());
-                           for (const RowSpan& set : set_) std::memset(strip.data() + set.begin, 0, set.end - set.begin);
-                           return length;
+                           return deflate_.compress_rows(image, begin, end, stride, packed_.data());
                          });
   }
-  /// at  offset of the row in the strip
-  void put_row(RowBits& image, std::uint32_t row, std::size_t at, std::size_t stride) {
-    const std::size_t before = set_.size();
-    image.put_set(row, std::span(strip_).subspan(at, stride), set_);
-    for (RowSpan& set : std::span(set_).subspan(before)) set.begin += at, set.end += at;
-  }
-
   /// put_strip(first row, end, bytes of a row)  writes a strip to packed_ and returns its length
   template <class PutStrip>
   Status encode_strips(std::uint32_t columns, std::uint32_t rows, std::array<double, 2> dpi, std::size_t strip_bytes,
@@ -462,8 +448,7 @@ class DeflateEncoder : public ImageEncoder {
   DitherDeflate deflate_;
   EdgeDeflate edges_;
   WordSpans spans_;
-  Bytes strip_, packed_;
-  Buffer<RowSpan> set_;  // of the strip, where it is not 0
+  Bytes packed_;
 };
 
 }  // namespace
