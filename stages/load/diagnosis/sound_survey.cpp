@@ -70,7 +70,7 @@ struct ChunkPiece {
 /// Facets that use a vertex twice, by their corners in order.
 using Collapsed = std::array<Point3, 3>;
 
-bool before(const Point3& p, const Point3& q) { return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z); }
+bool precedes(const Point3& p, const Point3& q) { return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z); }
 
 std::uint64_t edge_hash(const Point3& low, const Point3& high) {
   return (point_hash(low) ^ std::rotl(point_hash(high), 23)) * 0x9e3779b97f4a7c15u;
@@ -247,7 +247,7 @@ void Worker::list_collapsed(std::uint32_t count) {
       continue;
     Collapsed corners;
     for (std::size_t k = 0; k < 3; ++k) corners[k] = points[facets[f][k]];
-    std::ranges::sort(corners, before);
+    std::ranges::sort(corners, precedes);
     collapsed.push_back(corners);
   }
   if (collapsed.size() == before_these) return;
@@ -300,7 +300,7 @@ void Worker::list_points(std::uint32_t points_count) {
 
 void Worker::add_side(std::uint32_t side, std::uint32_t kind) {
   Point3 low = points[sides.low(side)], high = points[sides.high(side)];
-  if (before(high, low)) std::swap(low, high), kind = kind == kBoth ? kBoth : kind ^ 1;
+  if (precedes(high, low)) std::swap(low, high), kind = kind == kBoth ? kBoth : kind ^ 1;
   const std::uint32_t piece = pieces.back().first + piece_of[parent[side / 3]];
   rim_sides[share_of(edge_hash(low, high))].push({low, high, piece << 2 | kind});
 }
@@ -484,7 +484,7 @@ bool SoundSurvey::State::repeats_collapsed() {
   std::vector<Collapsed> all;
   for (auto& worker : workers) all.insert(all.end(), worker->collapsed.begin(), worker->collapsed.end());
   std::ranges::sort(all, [](const Collapsed& one, const Collapsed& other) {
-    return std::ranges::lexicographical_compare(one, other, before);
+    return std::ranges::lexicographical_compare(one, other, precedes);
   });
   return std::ranges::adjacent_find(all) != all.end();
 }
