@@ -12,7 +12,6 @@
 
 #include "pipeline/manifest/manifest.h"
 #include "stages/data/bit_rows.h"
-#include "stages/data/levels.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -33,8 +32,6 @@ class LayerDrops {
   std::uint64_t drops = 0;    // of all pixels
   std::uint32_t maximum = 0;  // of any pixel
   std::uint64_t requested = 0;  // by the target, as LayerRecord has it; of drops that are made again
-  /// Of drops that are made again, those of each pixel.
-  void levels(Levels& result) const { levels_of(work_.drops.front(), result); }
 
  private:
   friend class ExpectedDrops;

@@ -99,7 +99,11 @@ std::uint64_t bytes_to_read(const ManifestHead& head, const LayerRecord& record,
   const std::uint64_t changes = std::min({2 * set, 2 * (all - set) + 2 * std::uint64_t{rows}, by_file});
   const std::uint64_t drops = std::max(1u, head.max_drops), runs = 8 * changes * (drops > 1 || head.full_level() > 0 ? 3 : 1);
   const std::uint64_t pixels = keep == Keep::kSmaller ? std::min(runs, 2 * bytes_of_bits(columns, rows)) : runs;
-  return kRows + std::min(record.bytes, kMaxStrip) + pixels + 2 * record.program.bytes;
+  return kRows + std::min(record.bytes, kMaxStrip) + pixels;
+}
+
+std::uint64_t bytes_to_make(const ManifestHead& head, const LayerRecord& record) {
+  return 4 * bytes_to_read(head, record);  // with the zones of drops, and what the shell of a core takes to be found
 }
 
 Result<formats::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops,

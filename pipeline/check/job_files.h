@@ -39,9 +39,12 @@ using LayerPicture = std::vector<Runs>;
 
 /// Whether a layer is one image of 1 bit.
 bool is_one_bit(const ManifestHead& head);
-/// Memory that reading a layer takes at most: its image and its program, as files and decoded.
+/// Memory that reading the image of a layer takes at most, as file and decoded.
 /// keep  of the image of a job that is_one_bit()
 std::uint64_t bytes_to_read(const ManifestHead& head, const LayerRecord& record, Keep keep = Keep::kRuns);
+
+/// The same with the drops that are made of it again, row by row.
+std::uint64_t bytes_to_make(const ManifestHead& head, const LayerRecord& record);
 
 /// Reads an image of a layer; its runs are the pixels with any drop.
 /// keep    of images of 1 bit

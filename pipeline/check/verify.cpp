@@ -265,7 +265,10 @@ void inspect_layers(const Verification& inspection, std::span<const LayerRecord>
   const replay::VirtualMachine* machine = quick || !inspection.machine ? nullptr : &*inspection.machine;
   const std::uint32_t planes = std::max(1u, head.max_drops);
   const auto inspect = [&](std::size_t i, std::uint64_t replay_bytes) {
-    const auto pass = gate.enter(quick ? 0 : bytes_to_read(head, records[i], inspection.keep()) + replay_bytes);
+    const std::uint64_t images = inspection.expected.remakes() ? bytes_to_make(head, records[i])
+                                                               : bytes_to_read(head, records[i], inspection.keep());
+    const std::uint64_t text = machine != nullptr ? 2 * records[i].program.bytes : 0;  // while it grows
+    const auto pass = gate.enter(quick ? 0 : images + text + replay_bytes);
     found[i].count.reset();
     // Isolated: a thread that waits within has a pass, and must not begin another layer.
     auto scratch = pool.take();

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -9,6 +10,7 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/plan/plan.h"
 #include "stages/formats/gcode/read_gcode.h"
+#include "stages/geometry/run_rows.h"
 #include "stages/raster/beads.h"
 #include "stages/support/hash/hash.h"
 
@@ -58,14 +60,43 @@ Result<ReportLayer> read_bits(const std::string& directory, const ManifestHead& 
 
 /// Machine time of a layer, from replaying its program as lamina verify does.
 Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
-                                const LayerRecord& record, const LayerPicture& picture) {
+                                const LayerRecord& record, std::span<const BitRows* const> planes) {
   const auto program = program_of_layer(directory, head, record);
   if (!program) return program.error();
-  const std::vector<RunsView> planes(picture.begin(), picture.end());
   const auto replay = machine.replay(*program, record.layer, planes, record.program.moved, record.program.lost);
   if (replay) return replay->seconds();
   return wrong(directory + "/" + program_file_name(record.layer.index, head.program_extension),
                replay.error().message + "; run lamina verify for details");
+}
+
+Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
+                                const LayerRecord& record, const LayerPicture& picture) {
+  const std::vector<RunRows> rows(picture.begin(), picture.end());
+  std::vector<const BitRows*> planes;
+  for (const RunRows& one : rows) planes.push_back(&one);
+  return seconds_of_layer(directory, head, machine, record, planes);
+}
+
+/// A layer whose image is the geometry: its drops are made row by row, and only the pixels with any are kept, as bits.
+/// machine  null: without the time
+Result<ReportLayer> read_dosed(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
+                               const ExpectedDrops& expected, const replay::VirtualMachine* machine) {
+  const auto geometry = read_layer(directory, head, record, ExpectedDrops());
+  if (!geometry) return geometry.error();
+  LayerDrops drops;
+  if (Status status = expected.make(record.layer, *geometry, drops); !status)
+    return wrong(directory, status.error().message + "; run lamina verify for details");
+  ReportLayer layer;
+  if (machine != nullptr) {
+    const auto seconds = seconds_of_layer(directory, head, *machine, record, drops.planes());
+    if (!seconds) return seconds.error();
+    layer.seconds = *seconds;
+  }
+  const BitRows& any = *drops.planes().front();
+  const auto bits = std::make_shared<BitImage>(any.columns(), any.rows());
+  for (std::uint32_t r = 0; r < any.rows(); ++r) any.row(r, bits->row(r));
+  layer.bits = bits;
+  return layer;
 }
 
 Result<ReportSource> source_of_images(const std::string& directory, ReportSource source) {
@@ -90,8 +121,9 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
   const auto manifest = std::make_shared<const Manifest>(source.manifest);
   source.layer = [directory, manifest, machine, expected](std::uint32_t position, bool timed) -> Result<ReportLayer> {
     const LayerRecord& record = manifest->layers[position];
-    if (is_one_bit(manifest->head) && !manifest->head.geometry && (!machine || !timed))
-      return read_bits(directory, manifest->head, record);
+    if (expected->remakes())
+      return read_dosed(directory, manifest->head, record, *expected, timed ? &*machine : nullptr);
+    if (is_one_bit(manifest->head) && (!machine || !timed)) return read_bits(directory, manifest->head, record);
     auto runs = read_layer(directory, manifest->head, record, *expected);
     if (!runs) return runs.error();
     if (!machine || !timed) return ReportLayer{std::move(runs->front())};
@@ -99,9 +131,14 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
     if (!seconds) return seconds.error();
     return ReportLayer{std::move(runs->front()), *seconds};
   };
-  source.bytes = [manifest, replays = machine.has_value()](std::uint32_t position, bool timed) {
-    const Keep keep = is_one_bit(manifest->head) && !(replays && timed) ? Keep::kSmaller : Keep::kRuns;
-    return bytes_to_read(manifest->head, manifest->layers[position], keep);
+  const std::uint32_t planes = std::max(1u, head.max_drops);
+  source.bytes = [manifest, expected, replay = machine ? machine->bytes_of_replay(planes) : 0](std::uint32_t position,
+                                                                                              bool timed) {
+    const ManifestHead& of = manifest->head;
+    const LayerRecord& record = manifest->layers[position];
+    const std::uint64_t more = replay > 0 && timed ? replay + 2 * record.program.bytes : 0;
+    if (expected->remakes()) return bytes_to_make(of, record) + bytes_of_bits(of.grid.columns(), of.grid.rows()) + more;
+    return bytes_to_read(of, record, is_one_bit(of) && more == 0 ? Keep::kSmaller : Keep::kRuns) + more;
   };
   return source;
 }

@@ -162,28 +162,17 @@ Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& req
   return Preview{std::move(*picture), said};
 }
 
-/// The drops of an image of the geometry, made again; those of one drop a pixel as bits.
-Result<view::picture::SheetImage> made_again(const ExpectedDrops& expected, const Layer& layer, const Runs& geometry,
-                                             bool several) {
-  LayerDrops drops;
-  if (Status status = expected.make(layer, {&geometry, 1}, drops); !status) return status.error();
-  view::picture::SheetImage made;
-  if (several) {
-    drops.levels(made.levels);
-    return made;
-  }
-  const BitRows& plane = *drops.planes().front();
-  const auto bits = std::make_shared<BitImage>(plane.columns(), plane.rows());
-  for (std::uint32_t r = 0; r < plane.rows(); ++r) plane.row(r, bits->row(r));
-  made.bits = bits;
-  return made;
-}
-
-/// Memory of what made_again() returns, at most.
-std::uint64_t bytes_made(const ManifestHead& head, const LayerRecord& record) {
-  const std::uint64_t levels = 18 * record.geometry_pixels + 4 * std::uint64_t{head.grid.rows()};
-  const std::uint64_t bits = bytes_of_bits(head.grid.columns(), head.grid.rows());
-  return head.max_of_pixel() > 1 ? levels : bits;
+/// The drops of an image of the geometry, made again row by row.
+Result<view::picture::SheetImage> made_again(const ExpectedDrops& expected, const Layer& layer, Runs&& geometry) {
+  struct Made {
+    Runs geometry;
+    LayerDrops drops;
+  };
+  const auto made = std::make_shared<Made>(Made{std::move(geometry), {}});
+  if (Status status = expected.make(layer, {&made->geometry, 1}, made->drops); !status) return status.error();
+  view::picture::SheetImage image;
+  for (const BitRows* const plane : made->drops.planes()) image.planes.emplace_back(made, plane);
+  return image;
 }
 
 /// The image of a file; of the geometry, its drops where `expected` makes them.
@@ -197,8 +186,8 @@ Result<view::picture::SheetImage> read_sheet_image(const ManifestHead& head, con
   auto image = formats::image(path, 0, expected.remakes() ? Keep::kRuns : Keep::kSmaller);
   if (!image) return image.error();
   const bool fits = image->columns == head.grid.columns() && image->rows == head.grid.rows();  // else the sheet refuses it
-  if (expected.remakes() && fits) return made_again(expected, layer, image->runs, head.max_of_pixel() > 1);
-  if (image->bits) return view::picture::SheetImage{{}, std::move(image->bits)};
+  if (expected.remakes() && fits) return made_again(expected, layer, std::move(image->runs));
+  if (image->bits) return view::picture::SheetImage{{}, {std::move(image->bits)}};
   view::picture::SheetImage made;
   levels_of(image->runs, 1, made.levels);
   return made;
@@ -228,8 +217,8 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
     const auto images = layer_images(head, record);
     for (std::size_t first = 0; first < images.size(); first += head.drop_images()) {  // of each material
       view::picture::SheetLayer cell;
-      cell.bytes = bytes_to_read(head, record, is_one_bit(head) && !expected.remakes() ? Keep::kSmaller : Keep::kRuns);
-      if (expected.remakes()) cell.bytes += bytes_made(head, record);
+      cell.bytes = expected.remakes() ? bytes_to_make(head, record)
+                                      : bytes_to_read(head, record, is_one_bit(head) ? Keep::kSmaller : Keep::kRuns);
       for (std::size_t drop = 0; drop < head.drop_images(); ++drop)
         cell.paths.push_back((folder / images[first + drop].name).string());
       cell.warns = images[first].record.unfed_pixels > 0;

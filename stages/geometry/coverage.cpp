@@ -124,6 +124,15 @@ void box_coverage(RowRuns image, const PixelWindow& window, std::uint32_t column
   });
 }
 
+void box_coverage(std::span<const BitRows* const> planes, std::uint32_t full, const PixelWindow& window, std::uint32_t columns,
+                  std::span<std::uint8_t> result) {
+  std::vector<RowRuns> images;
+  for (const BitRows* const plane : planes) images.emplace_back(*plane);
+  fill_parts(window, columns, full, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
+    for (RowRuns& image : images) part_row.add(image.row(r), weight, [](std::size_t) { return std::uint64_t{1}; });
+  });
+}
+
 void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
                   std::span<std::uint8_t> result) {
   fill_parts(window, columns, full, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {

@@ -34,6 +34,10 @@ PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
 /// cost     a few operations a run and result row that it touches, and one a result value
 void box_coverage(RowRuns image, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
 
+/// The same of drops, the planes of which are added up: 255 where all pixels get `full` drops. cost  that of each plane
+void box_coverage(std::span<const BitRows* const> planes, std::uint32_t full, const PixelWindow& window, std::uint32_t columns,
+                  std::span<std::uint8_t> result);
+
 /// The same of levels, each pixel set by its share: 255 where all have the level `full` (no pixel has more), and the mean of
 /// shares where they differ. Of one level it is what the runs are.
 void box_coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,

@@ -4,6 +4,7 @@
 
 #include "stages/data/levels.h"
 #include "stages/geometry/combine.h"
+#include "stages/geometry/run_rows.h"
 #include "tests/formats/images.h"
 
 namespace lamina::formats {
@@ -69,7 +70,8 @@ TEST(Coverage, OfLevelsIsTheMeanOfTheirShares) {
     const std::uint32_t to_columns = 1 + testing::below(random, 30), to_rows = 1 + testing::below(random, 30);
     // Levels as a sum of planes, each of which counts for one part of the full level.
     Levels levels;
-    levels_of(testing::random_image(seed, columns, rows), 1, levels);
+    std::vector<Runs> images{testing::random_image(seed, columns, rows)};
+    levels_of(images.front(), 1, levels);
     std::vector<double> expected = shares_by_pixels(testing::random_image(seed, columns, rows), window, to_columns, to_rows);
     for (std::uint32_t plane = 1; plane < std::min<std::uint32_t>(full, 20); ++plane) {
       const Runs more = testing::random_image(1000 * plane + seed, columns, rows);
@@ -79,10 +81,18 @@ TEST(Coverage, OfLevelsIsTheMeanOfTheirShares) {
       add_levels(before, one, levels);
       const std::vector<double> shares = shares_by_pixels(more, window, to_columns, to_rows);
       for (std::size_t i = 0; i < shares.size(); ++i) expected[i] += shares[i];
+      images.push_back(more);
     }
     std::vector<std::uint8_t> result(std::size_t{to_columns} * to_rows);
     box_coverage(levels, full, window, to_columns, result);
     for (std::size_t i = 0; i < result.size(); ++i) ASSERT_NEAR(result[i], expected[i] / full * 255, 0.5 + 1e-6) << seed;
+    // The planes themselves, as rows of bits.
+    const std::vector<RunRows> bits(images.begin(), images.end());
+    std::vector<const BitRows*> planes;
+    for (const RunRows& one : bits) planes.push_back(&one);
+    std::vector<std::uint8_t> of_planes(result.size());
+    box_coverage(planes, full, window, to_columns, of_planes);
+    ASSERT_EQ(of_planes, result) << seed;
   }
 }
 

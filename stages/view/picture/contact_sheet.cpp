@@ -122,7 +122,7 @@ Result<PixelWindow> shown_window(const SheetRequest& request, const ReadImage& r
   std::mutex mutex;
   PixelWindow all;
   const Status status = for_each_image(request, read, [&](std::size_t, const SheetImage& image) {
-    const PixelWindow window = image.bits ? window_of(*image.bits) : window_of(image.levels.view());
+    const PixelWindow window = image.planes.empty() ? window_of(image.levels.view()) : window_of(*image.planes.front());
     const std::lock_guard lock(mutex);
     all = joined(all, window);
   });
@@ -191,10 +191,12 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
   const Status status = for_each_image(request, read, [&](std::size_t index, const SheetImage& image) {
     Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
     const auto width = static_cast<std::uint32_t>(layout.picture_width);
-    if (image.bits) {
-      box_coverage(*image.bits, *window, width, shares);
-    } else {
+    if (image.planes.empty()) {
       box_coverage(image.levels.view(), request.maximum, *window, width, shares);
+    } else {
+      std::vector<const BitRows*> planes;
+      for (const auto& plane : image.planes) planes.push_back(plane.get());
+      box_coverage(planes, request.maximum, *window, width, shares);
     }
     const int cell = static_cast<int>(index);
     const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;

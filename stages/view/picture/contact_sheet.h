@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/data/bit_image.h"
+#include "stages/data/bit_rows.h"
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
@@ -51,13 +51,13 @@ struct SheetRequest {
   std::uint32_t width = 2400;      // pixels of the sheet; a single layer is never made larger than its pixels
 };
 
-/// An image as levels, or of a layer of one image whose levels are 0 and 1, as bits.
+/// An image as levels, or of a layer of one image, as rows of bits that are added up: each within the one before.
 struct SheetImage {
   Levels levels;
-  std::shared_ptr<const BitImage> bits = {};
+  std::vector<std::shared_ptr<const BitRows>> planes = {};
 
-  std::uint32_t columns() const { return bits ? bits->columns() : levels.columns; }
-  std::uint32_t rows() const { return bits ? bits->rows() : levels.view().rows(); }
+  std::uint32_t columns() const { return planes.empty() ? levels.columns : planes.front()->columns(); }
+  std::uint32_t rows() const { return planes.empty() ? levels.view().rows() : planes.front()->rows(); }
 };
 
 /// A PNG of the layers. All cells show the same part of the bed at the same scale; each of its pixels is as dark as
