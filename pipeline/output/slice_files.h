@@ -46,6 +46,8 @@ class SliceFiles {
   Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
 
   // --- from one thread at a time, in layer order
+  /// Whether record() reads the layer; else its text alone.
+  bool records_contours() const { return package_.has_value(); }
   Status record(const formats::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
   /// returns  the bytes of all files
   Result<std::uint64_t> finish();

@@ -211,7 +211,9 @@ class ContourMaker : public Maker {
                facts.bead_mm = length_mm(work.paths);
                facts.area_mm2 = checks_.add_contours(made_[ticket.work].layer, work.contours);
                made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
-               return files_.encode(view_of(made_[ticket.work].layer, work), work.text);
+               Status encoded = files_.encode(view_of(made_[ticket.work].layer, work), work.text);
+               if (!files_.records_contours()) work.contours.contours = Contours();
+               return encoded;
              }},
             {"store", [&](std::uint32_t layer, const Ticket& ticket) {
                return files_.store(layer, work_[ticket.work].text, made_[ticket.work]);

@@ -38,7 +38,7 @@ struct CrossedFacets {
 };
 
 /// More cuts than this get by with less memory, for some more time.
-inline constexpr std::size_t kManyCuts = 1 << 17;
+inline constexpr std::size_t kManyCuts = 1 << 16;
 
 /// The cuts of one layer, in the order of the facets. Cut i is walked from an edge of facet i to another one with the solid on
 /// its left. Edges are read from the facets again where hashes of their names are equal: 16 bytes a cut instead of 72.
