@@ -57,7 +57,6 @@ class ShortSpans {
   void follow(const Layer& next, const PixelBox& window);
 
   std::int64_t height_nm_;
-  bool all_ = true;           // below_ has all layers so far
   std::vector<Below> below_;  // the last layers, the lowest first
   std::vector<Below> unused_;
   std::optional<Followed> young_;

@@ -20,6 +20,13 @@ namespace {
 
 constexpr std::size_t kBlock = 2048;
 
+// Before a loop whose reads are of elements that later turns write.
+#if defined(__clang__)
+#define LAMINA_READS_AHEAD _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define LAMINA_READS_AHEAD _Pragma("GCC ivdep")
+#endif
+
 LAMINA_BODY void slide_body(const std::int32_t* values, std::size_t count, std::int32_t sign, const Windows& windows,
                             std::int32_t* held, std::int32_t* result) {
   for (std::size_t base = 0; base < count; base += kBlock) {
@@ -30,7 +37,7 @@ LAMINA_BODY void slide_body(const std::int32_t* values, std::size_t count, std::
       const auto [further, more] = windows.step[s];
       left -= further;
       const std::int32_t* const next = held + further;
-#pragma GCC ivdep
+LAMINA_READS_AHEAD
       for (std::size_t i = 0; i < left; ++i) held[i] = std::min(held[i], next[i] + more);
     }
     std::copy(held, held + size, result + base);
