@@ -174,11 +174,11 @@ void DitherDeflate::add_distance(std::size_t bytes) {
 
 /// The longest of the matches that begin at `at`; of one that is long enough no other distance is compared.
 /// part  the first that ends after `at`, as far as the caller knows; moves on
-DitherDeflate::Match DitherDeflate::longest_match(std::span<const std::byte> bytes, const std::byte* at,
+DitherDeflate::DitherMatch DitherDeflate::longest_match(std::span<const std::byte> bytes, const std::byte* at,
                                                   std::size_t& part) const {
   constexpr std::ptrdiff_t kLongEnough = 64;
   const std::byte *const data = bytes.data(), *const end = data + bytes.size();
-  Match longest{at, 0};
+  DitherMatch longest{at, 0};
   for (const std::byte* stop = at;;) {
     while (part < parts_.size() && data + parts_[part].end <= stop) ++part;
     if (part == parts_.size()) return {end, 0};
@@ -213,7 +213,7 @@ void DitherDeflate::find_pieces(std::span<const std::byte> bytes) {
   while (true) {
     while (end - at >= 8 && is_new(bytes, at)) at += 8;
     if (end - at < 8) at = end;
-    const Match match = longest_match(bytes, at, part);
+    const DitherMatch match = longest_match(bytes, at, part);
     const auto distance = static_cast<std::ptrdiff_t>(distance_[match.distance].bytes);
     const std::byte* begin = at;
     if (match.end > at) {

@@ -40,14 +40,14 @@ class DitherDeflate {
     std::uint32_t literals, match;  // so many bytes, and then a match of so many
     std::uint32_t distance;         // number of its distance
   };
-  struct Match {
+  struct DitherMatch {
     const std::byte* end;
     std::uint32_t distance;
   };
   void find_parts(std::size_t size, std::span<const RowSpan> set);
   void choose_distances(std::span<const std::byte> bytes, std::size_t stride);
   void add_distance(std::size_t bytes);
-  Match longest_match(std::span<const std::byte> bytes, const std::byte* at, std::size_t& part) const;
+  DitherMatch longest_match(std::span<const std::byte> bytes, const std::byte* at, std::size_t& part) const;
   bool is_new(std::span<const std::byte> bytes, const std::byte* at) const;
   void find_pieces(std::span<const std::byte> bytes);
   void make_code();
