@@ -1,4 +1,4 @@
-// stages/dose/edges.h: edges of a layer on runs: erosion, dilation, holes, and binder that spreads beyond what is jetted.
+// stages/dose/edges.h: edges of a layer on runs: dilation, holes, and binder that spreads beyond what is jetted.
 #pragma once
 
 #include <array>
@@ -10,25 +10,14 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
+#include "stages/dose/erode.h"
 
 namespace lamina::dose {
-
-/// The pixels around a pixel that have to be set for it to stay: an ellipse of whole pixels.
-struct Reach {
-  /// Columns on either side in the rows 0, 1, 2, ... above and below; empty if nothing is taken away.
-  std::vector<std::uint32_t> half_width;
-  bool operator==(const Reach&) const = default;
-};
 
 /// All offsets (i columns, j rows) with (i px / x)^2 + (j py / y)^2 <= 1, decided in integers; px and py are the pitches in
 /// whole picometres, x and y the half axes in whole nanometres. With an axis of 0 only offsets along the other one count.
 /// x_nm, y_nm  0 .. 10^7, or equal and up to 10^9
 Reach reach_of(const PixelGrid& grid, std::int64_t x_nm, std::int64_t y_nm);
-
-/// A pixel stays if and only if every pixel within reach of it is set; beyond the image nothing is set. So with a circle
-/// it stays if its centre is farther than the radius from the centre of the nearest pixel that is not set.
-/// cost  O(changes x log(rows of the reach)), and some operations for 8 rows of the reach at a time; nothing is expanded
-void erode(const RunsView& image, const Reach& reach, Runs& result);
 
 /// A pixel is set if and only if a pixel within reach of it is: the complement of what erode() leaves of the complement,
 /// with pixels beyond the image that are not set. What would grow beyond the image is cut off.

@@ -1,4 +1,5 @@
-// Erosion of runs (edges.h).
+#include "stages/dose/erode.h"
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -6,8 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <span>
 
-#include "stages/dose/edges.h"
 #include "stages/geometry/isa.h"
 #include "stages/geometry/targets.h"
 

