@@ -78,12 +78,13 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
     for (std::uint32_t p = 0; p < stack.own.size(); ++p) {
       facets.clear();
       index.append(p, facets);
-      slice::cut(triangles, facets, stack.own[p], cuts);
+      const slice::CrossedFacets crossed{triangles, nullptr, facets};
+      slice::cut(crossed, stack.own[p], cuts);
       benchmark::DoNotOptimize(cuts.at.data());
       if (until == Until::kCut) continue;
       closed.clear();
       open.clear();
-      slice::chain(cuts, stack.own[p], scratch, closed, open);
+      slice::chain(crossed, cuts, stack.own[p], scratch, closed, open);
       benchmark::DoNotOptimize(closed.point.data());
       if (until == Until::kChain) continue;
       tidy(closed);

@@ -1,3 +1,4 @@
+#include "stages/geometry/drop_rows.h"
 #include "stages/program/compile.h"
 
 #include <gtest/gtest.h>
@@ -329,7 +330,10 @@ struct RandomDrops {
       patterns.zone.push_back({static_cast<std::uint8_t>(random() % (max_base + 1)), DropZone::Extra::kTile, tile});
       patterns.zone.push_back({static_cast<std::uint8_t>(random() % (max_base + 1))});
     }
-    patterns.core = {random(), random(), random(), random() % 3 == 0 ? 1u << 22 : random()};
+    CorePattern& core = patterns.core;
+    for (std::uint32_t* value : {&core.column_step, &core.row_step, &core.first, &core.threshold}) *value = random();
+    if (random() % 3 == 0) core.threshold = 1u << 22;
+    tabulate(core);
     patterns.zone.push_back({0, DropZone::Extra::kCore});
     zones.start(columns);
     const std::uint32_t longest = 1u << (random() % 9);
