@@ -1,4 +1,3 @@
-#include "stages/geometry/drop_rows.h"
 #include "stages/program/compile.h"
 
 #include <gtest/gtest.h>
@@ -9,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "stages/geometry/drop_rows.h"
 #include "tests/program/machines.h"
 
 namespace lamina::program {
