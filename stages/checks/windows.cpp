@@ -20,9 +20,9 @@ namespace {
 
 constexpr std::size_t kBlock = 2048;
 
-// Before a loop whose reads are of elements that later turns write.
+// Before a loop whose reads are of elements that later turns write. clang fails where it does not vectorise what it is to.
 #if defined(__clang__)
-#define LAMINA_READS_AHEAD _Pragma("clang loop vectorize(assume_safety)")
+#define LAMINA_READS_AHEAD
 #else
 #define LAMINA_READS_AHEAD _Pragma("GCC ivdep")
 #endif
