@@ -408,6 +408,7 @@ struct SoundSurvey::State {
   std::atomic<bool> failed{false}, scatters{false};
   std::mutex mutex;
   SurveyCells cells;  // set before `scatters` is
+  std::vector<Worker*> scattered;  // those with cells; while these are inspected, workers may be added
 
   bool is_in_disorder(const Worker& worker, std::uint32_t points, std::size_t facets);
   void sort_finely(std::vector<Triangle>& list) const;
@@ -421,14 +422,14 @@ SoundSurvey::SoundSurvey() : state_(std::make_unique<State>()) {}
 SoundSurvey::~SoundSurvey() = default;
 
 /// Too many chunks are: facets are put into cells from here on.
-bool SoundSurvey::State::is_in_disorder(const Worker& worker, std::uint32_t points, std::size_t facets) {
-  constexpr std::uint32_t kFew = 3;
+bool SoundSurvey::State::is_in_disorder(const Worker& worker, std::uint32_t point_count, std::size_t facets) {
+  constexpr std::uint32_t kFewChunks = 3;
   const std::uint32_t so_far = ++visited;
-  if (2 * points <= 3 * facets || ++disordered <= kFew + so_far / 4) return false;
+  if (2 * point_count <= 3 * facets || ++disordered <= kFewChunks + so_far / 4) return false;
   const std::lock_guard lock(mutex);
   if (scatters) return true;
   Box box;
-  for (std::uint32_t p = 0; p < points; ++p) box.add(worker.points[p]);
+  for (std::uint32_t p = 0; p < point_count; ++p) box.add(worker.points[p]);
   cells = SurveyCells(box);
   scatters = true;
   return true;
@@ -465,10 +466,9 @@ void SoundSurvey::State::sort_finely(std::vector<Triangle>& list) const {
 void SoundSurvey::State::inspect_cell(std::uint32_t cell) {
   std::vector<Triangle> list;
   std::size_t count = 0;
-  for (auto& worker : workers) count += worker->cells.empty() ? 0 : worker->cells[cell].size();
+  for (const Worker* of : scattered) count += of->cells[cell].size();
   list.reserve(count);
-  for (auto& worker : workers)
-    if (!worker->cells.empty()) worker->cells[cell].move_to(list);
+  for (Worker* of : scattered) of->cells[cell].move_to(list);
   if (list.size() > kChunk) sort_finely(list);
   Worker& worker = *workers.local();
   for (std::size_t first = 0; first < list.size() && !failed; first += kChunk) {
@@ -512,7 +512,11 @@ std::vector<Shell> SoundSurvey::State::shells(DisjointSets& sets) {
 }
 
 std::optional<Diagnosis> SoundSurvey::State::finish() {
-  if (scatters) tbb::parallel_for(std::uint32_t{0}, SurveyCells::kCount, [&](std::uint32_t cell) { inspect_cell(cell); });
+  if (scatters) {
+    for (auto& worker : workers)
+      if (!worker->cells.empty()) scattered.push_back(worker.get());
+    tbb::parallel_for(std::uint32_t{0}, SurveyCells::kCount, [&](std::uint32_t cell) { inspect_cell(cell); });
+  }
   if (failed || repeats_collapsed()) return std::nullopt;
   DisjointSets sets(pieces);
   std::atomic<std::uint64_t> vertices{0}, edges{0};

@@ -383,7 +383,7 @@ TEST_F(ImageLevels, WithoutDropsAreNoPores) {
   test::write_box(folder_ / "box.stl", {0, 0, 0}, {2, 2, 2});
   test::write_text(folder_.path() / "printer.toml", kPrinter);
   const std::string rest = " --layer 0.1 --at 1,1 ";
-  done("jet box.stl --machine printer.toml --saturation 10 -o few" + rest);
+  done("jet box.stl --machine printer.toml --saturation 10 --images drops -o few" + rest);
   done("jet box.stl --machine printer.toml --levels 16 -o dithered" + rest);
   done("jet box.stl --machine printer.toml --saturation 10 --format tiff-4 -o few-grey" + rest);
   done("jet box.stl --machine printer.toml --levels 16 --format png-8 -o dithered-grey" + rest);
