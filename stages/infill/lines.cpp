@@ -43,6 +43,7 @@ class Scan {
         previous_[next_[i]] = i;
       }
     }
+    find_lines(region);
     find_crossings();
     find_intervals();
   }
@@ -83,20 +84,27 @@ class Scan {
   }
 
  private:
-  std::uint32_t first_line_at_or_above(std::int64_t v) const {
-    return static_cast<std::uint32_t>(std::lower_bound(at_.begin(), at_.end(), v) - at_.begin());
+  /// Of each point, the first line at or above it. Between neighbours of a contour are the lines that their edge crosses.
+  void find_lines(const ContoursView& region) {
+    above_.resize(point_.size());
+    for (std::uint32_t c = 0; c < region.size(); ++c) {
+      const std::uint32_t begin = region.offset[c], end = region.offset[c + 1];
+      auto line = static_cast<std::uint32_t>(std::ranges::lower_bound(at_, std::int64_t{point_[begin].y}) - at_.begin());
+      for (std::uint32_t i = begin; i < end; ++i) {
+        while (line < at_.size() && at_[line] < point_[i].y) ++line;
+        while (line > 0 && at_[line - 1] >= point_[i].y) --line;
+        above_[i] = line;
+      }
+    }
   }
 
   /// count, scan, fill
   void find_crossings() {
     const auto for_each = [&](auto&& act) {
       for (std::uint32_t e = 0; e < point_.size(); ++e) {
-        const Point2 a = point_[e], b = point_[next_[e]];
-        if (a.y == b.y) continue;
         // A line at v is crossed if low <= v < high: an end on the line is below it.
-        const std::uint32_t first = first_line_at_or_above(std::min(a.y, b.y));
-        const std::uint32_t last = first_line_at_or_above(std::max(a.y, b.y));
-        for (std::uint32_t line = first; line < last; ++line) act(line, e, a, b);
+        const auto [first, last] = std::minmax(above_[e], above_[next_[e]]);
+        for (std::uint32_t line = first; line < last; ++line) act(line, e, point_[e], point_[next_[e]]);
       }
     };
     crossing_offset_.assign(at_.size() + 1, 0);
@@ -173,7 +181,7 @@ class Scan {
 
   std::span<const Point2> point_;
   const Buffer<std::int64_t>& at_;
-  Buffer<std::uint32_t> next_, previous_;
+  Buffer<std::uint32_t> next_, previous_, above_;
   Buffer<std::uint32_t> crossing_offset_;
   Buffer<Crossing> crossing_;
   Buffer<std::uint32_t> offset_;  // lines + 1, into intervals_
