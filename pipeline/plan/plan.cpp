@@ -100,10 +100,10 @@ class Planner {
 
   /// Contours, and images of layers of one thickness, need no list of triangles.
   MeshForm form() {
-    if (plan_.product == Product::kContours) return MeshForm::kOrderedBlocks;
+    if (plan_.product == Product::kContours || beads_) return MeshForm::kOrderedBlocks;
     const auto options = heights_options(job());
     if (!options || options->mode != heights::Mode::kUniform || job().heights.per_part) return MeshForm::kLists;
-    return images() && !beads_ ? MeshForm::kBlocks : MeshForm::kLists;
+    return images() ? MeshForm::kBlocks : MeshForm::kLists;
   }
 
   Status load() { return read_parts_as(form()); }

@@ -320,8 +320,7 @@ void report_image_plan(const Plan& plan, Summary& summary) {
   summary.mesh_bytes = plan.images->solids.mesh_bytes();
   summary.index_bytes = plan.images->solids.index_bytes();
   if (plan.sections) {
-    for (const Mesh& mesh : plan.scene->meshes)
-      summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle) + (mesh.blocks ? mesh.blocks->bytes() : 0);
+    for (const Mesh& mesh : plan.scene->meshes) summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle);
     summary.index_bytes += plan.sections->slicer().index_bytes();
   }
   summary.head.emplace_back(

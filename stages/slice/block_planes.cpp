@@ -89,29 +89,42 @@ BlockPlanes::BlockPlanes(const MeshBlocks& blocks, std::span<const std::int64_t>
   }
 }
 
-/// Appends the facets of a cluster that a plane crosses, and their ranks.
-void BlockPlanes::find_in(std::uint32_t cluster, std::uint32_t plane, BlockScratch& scratch) const {
-  const std::int64_t z = planes_[plane];
+/// Appends the facets of a cluster that a plane may cross, whose vertices are fetched early.
+std::uint32_t* BlockPlanes::near_in(std::uint32_t cluster, std::int64_t z, std::uint32_t* to) const {
   const Box& box = blocks_.bounds()[cluster];
-  if (is_above_plane(box.lo.z, z) || !is_above_plane(box.hi.z, z)) return;
-  std::uint32_t near = (1u << kClusterSize) - 1;
-  if (const MeshBlocks::Indexed indexed = blocks_.indexed(cluster); indexed.cluster != nullptr) {
-    const FacetSteps& steps = indexed.cluster->steps;
-    const std::uint8_t step = indexed.step_of(z + kPlaneReach);
-    std::uint8_t met[kClusterSize];
-    for (std::uint32_t i = 0; i < kClusterSize; ++i)
-      met[i] = static_cast<std::uint8_t>(step - steps.low[i]) <= steps.span[i] ? 1 : 0;
-    near = 0;
-    for (std::uint32_t i = 0; i < kClusterSize; ++i) near |= std::uint32_t{met[i]} << i;
+  if (is_above_plane(box.lo.z, z) || !is_above_plane(box.hi.z, z)) return to;
+  const MeshBlocks::Indexed indexed = blocks_.indexed(cluster);
+  if (indexed.cluster == nullptr) {
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) *to++ = cluster * kClusterSize + lane;
+    return to;
   }
+  const FacetSteps& steps = indexed.cluster->steps;
+  const std::uint8_t step = indexed.step_of(z + kPlaneReach);
+  std::uint8_t met[kClusterSize];
+  for (std::uint32_t i = 0; i < kClusterSize; ++i)
+    met[i] = static_cast<std::uint8_t>(step - steps.low[i]) <= steps.span[i] ? 1 : 0;
+  std::uint32_t near = 0;
+  for (std::uint32_t i = 0; i < kClusterSize; ++i) near |= std::uint32_t{met[i]} << i;
   for (; near != 0; near &= near - 1) {
     const auto lane = static_cast<std::uint32_t>(std::countr_zero(near));
-    const Triangle t = blocks_.triangle(cluster, lane);
+    for (const auto& corner : indexed.cluster->corner) __builtin_prefetch(indexed.vertex + corner[lane]);
+    *to++ = cluster * kClusterSize + lane;
+  }
+  return to;
+}
+
+/// Appends those facets that a plane crosses, and their ranks.
+void BlockPlanes::keep_crossed(std::span<const std::uint32_t> near, std::uint32_t plane, BlockScratch& scratch) const {
+  const std::int64_t z = planes_[plane];
+  const bool copies = counts_[plane] <= kManyCuts;
+  for (const std::uint32_t facet : near) {
+    const Triangle t = facet_of(blocks_, facet);
     const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
     if (is_above_plane(low, z) || !is_above_plane(high, z)) continue;
     const auto [first, last] = first_at_or_above_.crossed(low, high);
-    scratch.facets.push_back(cluster * kClusterSize + lane);
+    scratch.facets.push_back(facet);
     scratch.key.push_back(rank_of(first, last, plane));
+    if (copies) scratch.copies.push_back(t);
   }
 }
 
@@ -130,26 +143,33 @@ void BlockPlanes::sort_listed(std::uint32_t first, std::size_t begin, BlockScrat
   for (std::size_t i = 0; i < scratch.listed.size(); ++i) {
     scratch.facets[begin + i] = base + (scratch.listed[i] >> kRankBits & (kBlockSize - 1));
     scratch.key[begin + i] = static_cast<std::uint8_t>(scratch.listed[i] & ((1u << kRankBits) - 1));
+    if (!scratch.copies.empty()) scratch.copies[begin + i] = facet_of(blocks_, scratch.facets[begin + i]);
   }
 }
 
-void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets) const {
+void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets,
+                       Buffer<Triangle>& copies) const {
   scratch.groups.clear();
   table_.append(plane, scratch.groups);
   std::ranges::sort(scratch.groups);
   scratch.facets.clear();
   scratch.key.clear();
+  scratch.copies.clear();
+  if (counts_[plane] <= kManyCuts) ensure_capacity(scratch.copies, counts_[plane]);
   ensure_capacity(scratch.facets, counts_[plane]);
   ensure_capacity(scratch.key, counts_[plane]);
   for (std::size_t g = 0, end = 0; g < scratch.groups.size(); g = end) {
     constexpr std::uint32_t kInBlock = MeshBlocks::kClusters / kIndexedTogether;
     const std::uint32_t block = scratch.groups[g] / kInBlock;
     const std::size_t before = scratch.facets.size();
+    std::array<std::uint32_t, kBlockSize> near;
+    std::uint32_t* behind = near.data();
     for (; end < scratch.groups.size() && scratch.groups[end] / kInBlock == block; ++end) {
       const std::uint32_t from = scratch.groups[end] * kIndexedTogether;
       for (std::uint32_t c = from; c < std::min(from + kIndexedTogether, blocks_.cluster_count()); ++c)
-        find_in(c, plane, scratch);
+        behind = near_in(c, planes_[plane], behind);
     }
+    keep_crossed({near.data(), behind}, plane, scratch);
     const std::uint32_t first = block * MeshBlocks::kClusters;
     if (blocks_.indexed(first).cluster == nullptr) sort_listed(first, before, scratch);
   }
@@ -158,7 +178,12 @@ void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::u
   std::uint32_t total = 0;
   for (std::uint32_t& of : position) total += std::exchange(of, total);
   facets.resize(total);
-  for (std::size_t i = 0; i < total; ++i) facets[position[scratch.key[i]]++] = scratch.facets[i];
+  copies.resize(scratch.copies.size());
+  for (std::size_t i = 0; i < total; ++i) {
+    const std::uint32_t at = position[scratch.key[i]]++;
+    facets[at] = scratch.facets[i];
+    if (!copies.empty()) copies[at] = scratch.copies[i];
+  }
 }
 
 }  // namespace lamina::slice

@@ -41,14 +41,20 @@ class PlaneFinder {
 /// Clusters that are indexed together: neighbours in the file.
 inline constexpr std::uint32_t kIndexedTogether = 4;
 
+/// More cuts than this get by with less memory, for some more time.
+inline constexpr std::size_t kManyCuts = 1 << 16;
+
 /// Buffers of a layer, reused.
 struct BlockScratch {
   Buffer<std::uint32_t> groups;  // of kIndexedTogether clusters
   Buffer<std::uint32_t> facets;  // as they are found, and
   Buffer<std::uint8_t> key;      // what they are sorted by
+  Buffer<Triangle> copies;       // of these, unless they are many
   Buffer<std::uint32_t> listed;  // of a block that is not in the order of its file
 
-  std::uint64_t bytes() const { return bytes_held(groups) + bytes_held(facets) + bytes_held(key) + bytes_held(listed); }
+  std::uint64_t bytes() const {
+    return bytes_held(groups) + bytes_held(facets) + bytes_held(key) + bytes_held(copies) + bytes_held(listed);
+  }
 };
 
 /// A facet of blocks by one number.
@@ -68,14 +74,16 @@ class BlockPlanes {
 
   /// facets  become those that the plane crosses, for facet_of(), in the order in which a PlaneIndex of the file's list finds
   ///         them: all that is made of facets depends on it
+  /// copies  become these facets, or nothing where they are more than kManyCuts
   /// cost    O(F) where vertices are shared
-  void find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets) const;
+  void find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets, Buffer<Triangle>& copies) const;
 
   std::uint64_t count(std::uint32_t plane) const { return counts_[plane]; }  // of facets that it crosses
   std::uint64_t bytes() const { return table_.bytes() + bytes_held(counts_) + planes_.size() * sizeof(std::int64_t); }
 
  private:
-  void find_in(std::uint32_t cluster, std::uint32_t plane, BlockScratch& scratch) const;
+  std::uint32_t* near_in(std::uint32_t cluster, std::int64_t z, std::uint32_t* to) const;
+  void keep_crossed(std::span<const std::uint32_t> near, std::uint32_t plane, BlockScratch& scratch) const;
   void sort_listed(std::uint32_t first, std::size_t begin, BlockScratch& scratch) const;
 
   const MeshBlocks& blocks_;

@@ -91,10 +91,7 @@ void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts) {
   cuts.to_hash.resize(count);
   cuts.at.resize(count);
   cuts.level = {};
-  cuts.facets.clear();
-  const bool copies = facets.blocks != nullptr && count <= kManyCuts;
   with_facets(facets, cuts, [&](auto&& facet) {
-    if (copies) cuts.facets.resize(count);
     constexpr std::size_t kAhead = 16;  // facets of a list are anywhere in memory: prefetched before they are needed
     for (std::size_t i = 0; i < count; ++i) {
       if (facets.blocks == nullptr && i + kAhead < count) {
@@ -103,7 +100,6 @@ void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts) {
         __builtin_prefetch(next + sizeof(Triangle) - 1);
       }
       const Triangle& t = facet(i);
-      if (copies) cuts.facets[i] = t;
       const Tip tip(t, z);
       const std::uint64_t own = hash_of(tip.own), next = hash_of(tip.next), previous = hash_of(tip.previous);
       cuts.from_hash[i] = tip.above ? hash_of(next, own) : hash_of(own, previous);

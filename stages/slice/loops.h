@@ -37,9 +37,6 @@ struct CrossedFacets {
   std::span<const std::uint32_t> at;  // numbers in the list, or those of facet_of()
 };
 
-/// More cuts than this get by with less memory, for some more time.
-inline constexpr std::size_t kManyCuts = 1 << 16;
-
 /// The cuts of one layer, in the order of the facets. Cut i is walked from an edge of facet i to another one with the solid on
 /// its left. Edges are read from the facets again where hashes of their names are equal: 16 bytes a cut instead of 72.
 struct Cuts {
@@ -56,7 +53,7 @@ struct Cuts {
 /// +infinity on the way from the lower end; decided in integers.
 Point2 crossing(const Edge& edge, std::int64_t z);
 
-/// Cuts facets at height z. `cuts` is overwritten.
+/// Cuts facets at height z. `cuts` is overwritten but for its facets: copies of these, or none.
 /// cost  one division for a facet
 void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts);
 

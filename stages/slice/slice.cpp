@@ -19,7 +19,9 @@ std::size_t find_loops(const Mesh& mesh, const SourceMesh& source, std::span<con
                        SectionScratch& scratch, Contours& closed) {
   const std::int64_t z = std::int64_t{planes[plane]} - source.z;
   scratch.facets.clear();
-  source.blocks ? source.blocks->find(plane, scratch.blocks, scratch.facets) : source.list->append(plane, scratch.facets);
+  scratch.cuts.facets.clear();
+  source.blocks ? source.blocks->find(plane, scratch.blocks, scratch.facets, scratch.cuts.facets)
+                : source.list->append(plane, scratch.facets);
   const CrossedFacets facets{mesh.triangles, mesh.blocks.get(), scratch.facets};
   cut(facets, z, scratch.cuts);
   scratch.open.clear();

@@ -208,6 +208,7 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
       planes.push_back(z);
     const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
     Buffer<std::uint32_t> found, facets;
+    Buffer<Triangle> copies;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 200)) {
       found.clear();
       index.append(p, found);
@@ -249,14 +250,18 @@ TEST(PlaneIndex, OfBlocksFindsTheSameFacetsInTheSameOrderAsThatOfTheList) {
     const slice::BlockPlanes of_blocks(blocks, planes);
     slice::BlockScratch scratch;
     Buffer<std::uint32_t> found, facets;
+    Buffer<Triangle> copies;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 50)) {
       found.clear();
       index.append(p, found);
-      of_blocks.find(p, scratch, facets);
+      of_blocks.find(p, scratch, facets, copies);
       ASSERT_EQ(of_blocks.count(p), found.size());
       ASSERT_EQ(facets.size(), found.size());
-      for (std::size_t i = 0; i < found.size(); ++i)
+      ASSERT_EQ(copies.size(), found.size());
+      for (std::size_t i = 0; i < found.size(); ++i) {
         ASSERT_EQ(slice::facet_of(blocks, facets[i]), triangles[found[i]]) << p << " " << i;
+        ASSERT_EQ(copies[i], triangles[found[i]]) << p << " " << i;
+      }
     }
   }
   Buffer<Triangle> list(kBlockSize);
