@@ -80,13 +80,17 @@ TEST(CoverageBands, FlatTopsWithinALayerAreOneShareButForWhatLiesBelowAndAboveTh
   }
 }
 
-TEST(CoverageBands, AHollowOfThreeNanometresBreaksATie) {
-  Triangles all = box({100'000, 200'000, 0}, {100'100'000, 1'600'000, 50'000});
-  add(all, reversed(pin({50'000'010, 800'010, 20'000}, 3)));
-  const BandLayer made = band_layer(all, 2);
-  EXPECT_EQ(level_of(made.image, 499, 8), 1);
-  EXPECT_EQ(level_of(made.image, 500, 8), 0);
-  EXPECT_EQ(level_of(made.image, 501, 8), 1);
+TEST(CoverageBands, AHollowOfThirtyNanometresBreaksATie) {
+  for (const Nm rise : {0, 1, 10}) {  // of the hollow's floor: only where it is 0 the band has faces at two heights
+    Triangles all = box({100'000, 200'000, 0}, {100'100'000, 1'600'000, 50'000}), hollow;
+    const Point3 at{50'000'010, 800'010, 20'000};
+    add_tetrahedron(hollow, at, {at.x + 30, at.y, at.z + rise}, {at.x, at.y + 30, at.z + 2 * rise}, {at.x, at.y, at.z + 30});
+    add(all, reversed(hollow));
+    const BandLayer made = band_layer(all, 2);
+    EXPECT_EQ(level_of(made.image, 499, 8), 1);
+    EXPECT_EQ(level_of(made.image, 500, 8), 0) << "a floor that rises by " << rise << " nm";
+    EXPECT_EQ(level_of(made.image, 501, 8), 1);
+  }
 }
 
 TEST(CoverageBands, AnyInstructionsGiveTheSame) {

@@ -68,7 +68,6 @@ LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const E
   cells.held().mark(first, last);
   if (!piece.edgewise) cells.summed().mark(first, last);
   if (piece.suspect) cells.suspect().mark(first, last);
-  if (!piece.level) cells.sloped().mark(first, last);
   const Eight one = in_lanes(begin, end, all(1), all(0));
   add_to(sums.size.data(), times(one, all(piece.size)));
   add_to(sums.columns.data(), times(one, all(last - first + 2)));
@@ -109,6 +108,22 @@ LAMINA_LANES std::uint64_t levels_at(const SweepState& state, Eight share, std::
   return bytes_of(maximum(minimum(pick(below(position, near), less(near, all(1)), near), state.top), all(0)));
 }
 
+/// Puts levels of rows whose share can only be of one level of the horizontal facets. rows  a bit each; returns  those decided
+LAMINA_LANES std::uint32_t put_faces(const BandTask& band, Eight share, std::uint32_t rows, std::uint64_t& levels) {
+  Eight lowest = all(255), highest = all(-1);
+  for (std::size_t i = 0; i < band.faces.share.size(); ++i) {
+    const Mask misses = below(load(band.face_off.data()), magnitude(less(all(band.faces.share[i]), share)));
+    const Eight level = all(band.faces.level[i]);
+    lowest = pick(misses, lowest, minimum(lowest, level));
+    highest = pick(misses, highest, maximum(highest, level));
+  }
+  rows &= ~(bits(below(lowest, highest)) | bits(below(highest, lowest)));
+  constexpr std::uint64_t kOnes = 0x0101010101010101;
+  const std::uint64_t bytes = (((rows * kOnes & 0x8040201008040201) + 0x7f * kOnes) >> 7 & kOnes) * 255;
+  levels = (levels & ~bytes) | (bytes_of(lowest) & bytes);
+  return rows;
+}
+
 /// Columns of one share, with numbers if they are a single one.
 LAMINA_LANES void sweep_columns(const BandTask& band, SweepState& state, const LevelSegment& columns, bool suspect,
                                 SweptBand& swept) {
@@ -120,6 +135,13 @@ LAMINA_LANES void sweep_columns(const BandTask& band, SweepState& state, const L
   swept.level[columns.first] = levels_at(state, share, undecided, outside);
   if ((undecided | outside) == 0 && !suspect) [[likely]]
     return;
+  if (band.has_ties && outside == 0 && !suspect) {
+    const std::uint32_t rows = undecided & ~band.cells->sloped_rows(columns.first);
+    const std::uint32_t decided = put_faces(band, share, rows, swept.level[columns.first]);
+    swept.face_voxels += static_cast<std::uint32_t>(std::popcount(decided));
+    undecided &= ~decided;
+    if (undecided == 0) return;
+  }
   OpenColumns open{columns.first,
                    columns.end,
                    static_cast<std::uint32_t>(swept.span.size() - 1),

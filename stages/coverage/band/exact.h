@@ -5,7 +5,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -32,7 +31,6 @@ struct NearShare {
 ///              else some ten microseconds a facet
 std::uint32_t exact_level(const Voxel& voxel, std::span<const SlabFacet* const> near_facets, const NearShare& near_share);
 
-
 /// The shares that a voxel can have which one plane splits, if any, and their levels.
 struct PlaneLevels {
   std::array<double, 4> share;
@@ -47,29 +45,6 @@ struct PlaneLevels {
       found = level[i];
     }
     return found;
-  }
-
-  /// The same of eight rows, a byte of `levels` each. rows  a bit each, of those to decide; returns  those that are decided
-  std::uint32_t put(const std::array<double, 8>& near_share, const std::array<double, 8>& off, std::uint32_t rows,
-                    std::uint64_t& levels) const {
-    std::array<std::uint32_t, 4> hit{};
-    for (std::size_t i = 0; i < hit.size(); ++i) {
-      for (std::uint32_t row = 0; row < 8; ++row)
-        hit[i] |= (std::abs(share[i] - near_share[row]) > off[row] + 0x1p-50 ? 0u : 1u) << row;
-    }
-    std::uint32_t some = 0, several = 0;
-    for (std::size_t i = 0; i < hit.size(); ++i) {
-      some |= hit[i];
-      for (std::size_t k = 0; k < i; ++k) several |= level[i] != level[k] ? hit[i] & hit[k] : 0;
-    }
-    rows &= some & ~several;
-    for (std::size_t i = 0; i < hit.size(); ++i) {
-      for (std::uint32_t left = hit[i] & rows; left != 0; left &= left - 1) {
-        const int shift = 8 * std::countr_zero(left);
-        levels = (levels & ~(std::uint64_t{255} << shift)) | std::uint64_t{level[i]} << shift;
-      }
-    }
-    return rows;
   }
 };
 

@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstdint>
 
+#include "stages/coverage/band/exact.h"
 #include "stages/coverage/slab_facet.h"
 #include "stages/data/choices.h"
 
@@ -88,21 +89,36 @@ class BandCells {
   /// First nm^3 that facets add within the column, then nm^2 of facets that end before it: they add this times the width to it
   /// and all behind.
   double* column(std::uint32_t column) { return first_ + std::size_t{column} * 2 * kLanes; }
-  /// Columns that hold facets, in any row; those that have numbers; those with facets that meet others; those with facets that
-  /// are not horizontal.
+  /// Columns that hold facets, in any row; those that have numbers; those with facets that meet others.
   ColumnMarks held() { return marks(0); }
   ColumnMarks summed() { return marks(1); }
   ColumnMarks suspect() { return marks(2); }
-  ColumnMarks sloped() { return marks(3); }
+  /// Rows of a column, a bit each, that facets reach which are not horizontal; after mark_sloped() for each of them.
+  std::uint32_t sloped_rows(std::uint32_t column) const {
+    const std::uint64_t* words = &sloped_[std::size_t{column} / 64 * kLanes];
+    std::uint32_t rows = 0;
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane)
+      rows |= static_cast<std::uint32_t>(words[lane] >> column % 64 & 1) << lane;
+    return rows;
+  }
+  void clear_sloped() { sloped_.assign(std::size_t{words_} * kLanes, 0); }
+  void mark_sloped(std::uint32_t lane, std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t w = first / 64; w <= last / 64; ++w) {
+      const std::uint64_t from = w == first / 64 ? ~std::uint64_t{0} << first % 64 : ~std::uint64_t{0};
+      const std::uint64_t to = w == last / 64 ? ~std::uint64_t{0} >> (63 - last % 64) : ~std::uint64_t{0};
+      sloped_[std::size_t{w} * kLanes + lane] |= from & to;
+    }
+  }
   static std::uint64_t bytes_of(std::uint32_t columns) {
     BandCells cells;
     cells.size(columns);
-    return (cells.values_ + kLanes) * sizeof(double) + kMarks * (cells.words_ + cells.groups_) * sizeof(std::uint64_t);
+    return (cells.values_ + kLanes) * sizeof(double) +
+           (kMarks * (cells.words_ + cells.groups_) + kLanes * cells.words_) * sizeof(std::uint64_t);
   }
-  std::uint64_t bytes() const { return bytes_held(value_) + bytes_held(word_) + bytes_held(group_); }
+  std::uint64_t bytes() const { return bytes_held(value_) + bytes_held(word_) + bytes_held(group_) + bytes_held(sloped_); }
 
  private:
-  static constexpr std::uint32_t kMarks = 4;
+  static constexpr std::uint32_t kMarks = 3;
   ColumnMarks marks(std::uint32_t kind) {
     return {word_.data() + std::size_t{kind} * words_, group_.data() + std::size_t{kind} * groups_, words_};
   }
@@ -118,6 +134,7 @@ class BandCells {
   double* first_ = nullptr;
   Buffer<double> value_;
   Buffer<std::uint64_t> word_, group_;
+  Buffer<std::uint64_t> sloped_;  // bits of 64 columns of each row
 };
 
 // ---
@@ -164,11 +181,12 @@ struct SweptBand {
   Buffer<LevelSegment> segment;
   Buffer<ColumnSpan> span;
   Buffer<OpenColumns> open;
-  bool winds = false;  // a winding number is neither 0 nor 1
+  bool winds = false;             // a winding number is neither 0 nor 1
+  std::uint64_t face_voxels = 0;  // that BandTask::faces decided; an interval of one share counts once
   void start(std::uint32_t columns) {
     level.resize(std::size_t{columns} + 1 + kLanes);
     segment.clear(), span.clear(), open.clear();
-    winds = false;
+    winds = false, face_voxels = 0;
   }
   std::uint64_t bytes() const { return bytes_held(level) + bytes_held(segment) + bytes_held(span) + bytes_held(open); }
 };
@@ -182,6 +200,11 @@ struct BandTask {
   alignas(64) std::array<double, kLanes> off;             // bound of errors of levels
   double top;                                             // the highest level
   BandCells* cells;
+  /// Of the horizontal facets, where they are at one height and doubles may not decide one of the shares; cells have
+  /// sloped_rows().
+  bool has_ties = false;
+  PlaneLevels faces{};
+  alignas(64) std::array<double, kLanes> face_off{};  // bound of errors of shares
 };
 
 /// Where the level of each row changes, and what it is from there on; before the first it is 0. Capacity for one more than

@@ -1,7 +1,6 @@
 #include "stages/coverage/band/maker.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -282,7 +281,7 @@ std::uint64_t BandMaker::bytes_of(std::uint64_t facets, std::uint32_t columns) {
   const std::uint64_t of_columns = std::uint64_t{columns} + 1 + kLanes;
   const std::uint64_t swept = sizeof(std::uint64_t) + sizeof(LevelSegment) + sizeof(ColumnSpan) / 2 + sizeof(OpenColumns);
   return slack * (sizeof(Trapezoid) + sizeof(ColumnReach)) + 2 * pieces * sizeof(RowFacet) + BandCells::bytes_of(columns) +
-         of_columns * (kBandRows * (sizeof(std::uint32_t) + sizeof(std::uint8_t)) + swept + sizeof(std::uint8_t));
+         of_columns * (kBandRows * (sizeof(std::uint32_t) + sizeof(std::uint8_t)) + swept);
 }
 
 void BandMaker::start(const BandSlab& slab, Isa isa, bool counts_held) {
@@ -368,47 +367,31 @@ BandTask BandMaker::task(const BandSlab& slab, const BandSums& sums) {
   return band;
 }
 
-/// Marks what facets that are not horizontal reach: rows as bits of each column.
-void BandMaker::mark_sloped(std::uint32_t columns) {
-  sloped_.assign(columns, 0);
+/// Whether doubles may not decide what horizontal facets of one height split: cells then get rows of other facets.
+void BandMaker::find_ties(const BandSlab& slab, BandTask& task) {
+  if (faces_.heights != 1) return;
+  task.faces = levels_of_height(faces_.z, slab.bottom, slab.top, slab.rule.top_level);
+  const double off = std::ranges::max(task.off) + 16 * kEpsilon * task.top;
+  task.has_ties = std::ranges::any_of(task.faces.share, [&](double share) {
+    const double position = share * task.top + 0.5;
+    return std::abs(position - std::round(position)) <= off;
+  });
+  if (!task.has_ties) return;
+  std::ranges::transform(task.off, task.face_off.begin(), [&](double of_level) { return of_level / task.top + 0x1p-50; });
+  cells_.clear_sloped();
   const std::uint32_t first = rows_.first, last = first + rows_.count - 1;
   for (std::size_t i = 0; i < active_.size(); ++i) {
     const Trapezoid& piece = active_[i];
     if (piece.level || piece.first_row > last || piece.last_row < first) continue;
     const std::uint32_t end = std::min(piece.last_row, last) - first;
-    for (std::uint32_t lane = std::max(piece.first_row, first) - first; lane <= end; ++lane) {
-      for (std::uint32_t c = reach_[i].first[lane]; c <= reach_[i].last[lane]; ++c)
-        sloped_[c] = static_cast<std::uint8_t>(sloped_[c] | 1u << lane);
-    }
+    for (std::uint32_t lane = std::max(piece.first_row, first) - first; lane <= end; ++lane)
+      cells_.mark_sloped(lane, reach_[i].first[lane], reach_[i].last[lane]);
   }
-}
-
-/// Columns whose facets are all horizontal, at one height, in a row: four comparisons decide them.
-void BandMaker::resolve_faces(const BandSlab& slab, const BandTask& task, CoverageReport& report) {
-  if (faces_.heights != 1) return;
-  const ColumnMarks sloped = cells_.sloped();
-  const PlaneLevels faces = levels_of_height(faces_.z, slab.bottom, slab.top, slab.rule.top_level);
-  std::array<double, kLanes> off;
-  for (std::uint32_t lane = 0; lane < kLanes; ++lane) off[lane] = task.off[lane] / task.top;
-  bool marked = false;
-  for (OpenColumns& open : swept_.open) {
-    if (open.suspect || open.outside != 0) continue;
-    std::uint32_t rows = open.undecided;
-    if (sloped.next(open.first) < open.end) {
-      if (!std::exchange(marked, true)) mark_sloped(task.columns);
-      for (std::uint32_t c = open.first; c < open.end; ++c) rows &= ~std::uint32_t{sloped_[c]};
-    }
-    std::uint64_t& levels = swept_.level[open.first];
-    rows = faces.put(open.share, off, rows, levels);
-    report.exact_voxels += static_cast<std::uint64_t>(std::popcount(rows));
-    open.undecided = static_cast<std::uint8_t>(open.undecided & ~rows);
-  }
-  std::erase_if(swept_.open, [](const OpenColumns& open) { return !open.suspect && open.outside == 0 && open.undecided == 0; });
 }
 
 /// What doubles do not decide, row by row.
-void BandMaker::resolve(const BandSlab& slab, const BandTask& task, CoverageReport& report) {
-  if (!swept_.open.empty()) resolve_faces(slab, task, report);
+void BandMaker::resolve(const BandSlab& slab, CoverageReport& report) {
+  report.exact_voxels += swept_.face_voxels;
   if (swept_.open.empty() && !swept_.winds && !counts_held_) return;
   for (std::uint32_t lane = rows_.count; lane-- > 0;) {
     resolver_.start(slab, {active_, reach_}, rows_.first + lane, rows_.first, report);
@@ -428,10 +411,11 @@ void BandMaker::make(const BandSlab& slab, std::uint32_t first, std::uint32_t ro
   deposit(slab, sums);
   const std::uint32_t columns = slab.edges.count();
   swept_.start(columns);
-  const BandTask band = task(slab, sums);
+  BandTask band = task(slab, sums);
+  find_ties(slab, band);
   kernels_->sweep(band, swept_);
-  resolve(slab, band, report);
-  for (const ColumnMarks& marks : {cells_.held(), cells_.summed(), cells_.suspect(), cells_.sloped()}) marks.clear();
+  resolve(slab, report);
+  for (const ColumnMarks& marks : {cells_.held(), cells_.summed(), cells_.suspect()}) marks.clear();
   std::array<Changes, kBandRows> changes;
   for (std::uint32_t lane = 0; lane < kBandRows; ++lane) {
     const std::size_t at = std::size_t{lane} * (columns + 1 + kLanes);

@@ -158,7 +158,7 @@ class BandMaker {
 
   std::uint64_t bytes() const {
     return cells_.bytes() + swept_.bytes() + resolver_.bytes() + bytes_held(active_) + bytes_held(reach_) +
-           bytes_held(column_) + bytes_held(level_) + bytes_held(sloped_);
+           bytes_held(column_) + bytes_held(level_);
   }
   /// Bound of bytes(), for a layer of so many facets on a grid of so many columns.
   static std::uint64_t bytes_of(std::uint64_t facets, std::uint32_t columns);
@@ -166,9 +166,8 @@ class BandMaker {
  private:
   void deposit(const BandSlab& slab, BandSums& sums);
   BandTask task(const BandSlab& slab, const BandSums& sums);
-  void resolve(const BandSlab& slab, const BandTask& task, CoverageReport& report);
-  void mark_sloped(std::uint32_t columns);
-  void resolve_faces(const BandSlab& slab, const BandTask& task, CoverageReport& report);
+  void find_ties(const BandSlab& slab, BandTask& task);
+  void resolve(const BandSlab& slab, CoverageReport& report);
   void append(const Changes& changes, std::uint32_t columns, Levels& out) const;
 
   const BandKernels* kernels_ = nullptr;
@@ -181,7 +180,6 @@ class BandMaker {
   Buffer<ColumnReach> reach_;     // of each active one
   Buffer<std::uint32_t> column_;  // changes of each row
   Buffer<std::uint8_t> level_;
-  Buffer<std::uint8_t> sloped_;  // rows of each column that facets reach which are not horizontal, as bits
   RowResolver resolver_;
 };
 
