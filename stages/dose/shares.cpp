@@ -12,23 +12,37 @@ struct AlikePixels {
   std::int64_t stop;  // the first pixel that is not so, or that may be so
 };
 
-AlikePixels alike_pixels(std::span<const std::uint32_t> row, std::int64_t column, bool value) {
-  constexpr std::int64_t kNone = INT64_MAX;
-  const auto after = std::ranges::upper_bound(row, column, {}, [](std::uint32_t at) { return std::int64_t{at}; });
-  const std::int64_t end = after == row.end() ? kNone : std::int64_t{*after};
-  if (((after - row.begin()) & 1) != (value ? 1 : 0)) return {false, end == kNone ? kNone : end + 1};
-  if ((after != row.begin() && *(after - 1) == column) || end == column + 1) return {false, column + 1};
-  return {true, end == kNone ? kNone : end - 1};
+/// A row of changes that is read from left to right.
+struct RowReader {
+  std::span<const std::uint32_t> row;
+  std::size_t next = 0;  // the first change behind the column at work
+
+  AlikePixels alike_pixels(std::int64_t column, bool value) {
+    constexpr std::int64_t kNone = INT64_MAX;
+    while (next < row.size() && row[next] <= column) ++next;
+    const std::int64_t end = next == row.size() ? kNone : std::int64_t{row[next]};
+    if ((next & 1) != (value ? 1 : 0)) return {false, end == kNone ? kNone : end + 1};
+    if ((next > 0 && row[next - 1] == column) || end == column + 1) return {false, column + 1};
+    return {true, end == kNone ? kNone : end - 1};
+  }
+};
+
+/// A row of an image and those around it; rows outside are empty.
+std::array<RowReader, 3> rows_around(const RunsView& image, std::uint32_t row) {
+  std::array<RowReader, 3> rows;
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    if (row + i > 0 && row + i <= image.rows()) rows[i].row = image.row(row + i - 1);
+  }
+  return rows;
 }
 
 /// Pixels of [begin, end) whose eight neighbours have their value, which is one for all of them.
-std::uint64_t pixels_away_from_edges(const RunsView& image, std::uint32_t row, std::int64_t begin, std::int64_t end, bool value) {
+std::uint64_t pixels_away_from_edges(std::array<RowReader, 3>& rows, std::int64_t begin, std::int64_t end, bool value) {
   std::uint64_t found = 0;
   for (std::int64_t at = begin; at < end;) {
     std::int64_t stop = end, candidate = at;
-    for (std::int64_t r = std::int64_t{row} - 1; r <= std::int64_t{row} + 1; ++r) {
-      const bool outside = r < 0 || r >= image.rows();
-      const auto near = alike_pixels(outside ? std::span<const std::uint32_t>() : image.row(static_cast<std::uint32_t>(r)), at, value);
+    for (RowReader& row : rows) {
+      const AlikePixels near = row.alike_pixels(at, value);
       if (near.alike) {
         stop = std::min(stop, near.stop);
       } else {
@@ -234,6 +248,7 @@ Difference difference(const RunsView& a, const RunsView& b) {
   Difference found;
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     const auto one = a.row(r), other = b.row(r);
+    std::array<RowReader, 3> around = rows_around(a, r);
     // Where the changes of both are merged, pixels differ from every odd one to the next.
     std::size_t i = same_changes(one, other), k = i;
     bool differs = false;
@@ -244,7 +259,7 @@ Difference difference(const RunsView& a, const RunsView& b) {
       const std::uint32_t at = first ? one[i++] : other[k++];
       if (differs && from < at) {
         found.pixels += at - from;
-        found.far += pixels_away_from_edges(a, r, from, at, (changes_before & 1) != 0);
+        found.far += pixels_away_from_edges(around, from, at, (changes_before & 1) != 0);
       }
       differs = !differs;
       from = at;

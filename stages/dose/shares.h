@@ -58,7 +58,7 @@ struct Difference {
   std::uint64_t pixels = 0;
   std::uint64_t far = 0;  // where all nine pixels around are equal in the first image: no boundary of it is near
 };
-/// a, b  of the same size. cost  O(changes + differing intervals x log(changes of a row))
+/// a, b  of the same size. cost  O(changes)
 Difference difference(const RunsView& a, const RunsView& b);
 
 struct ShareCount {
