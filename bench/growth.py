@@ -2,7 +2,8 @@
 
     scripts/bench growth                writes bench/growth.md and the slopes in bench/README.md; about fifteen minutes on two cores
     scripts/bench growth --only NAME    this series only (can be repeated); no page is written. Names: triangles, layers, pixels, copies,
-                                        meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs
+                                        meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs; pages-info,
+                                        pages-convert, pages-jet: of a multi-page TIFF
     --program FILE                      a lamina; else build/release/lamina, built first
     --runs N                            runs of a job; the minimum counts (default 3)
     --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
@@ -75,6 +76,8 @@ class Jobs:
         """Pairs of a size and the words of its job."""
         if name == "batch-jobs":
             yield from self.batch()
+        elif name.startswith("pages-"):
+            yield from self.pages(name.split("-")[1])
         elif "-" not in name:
             for x, words in getattr(self, name)():
                 yield x, ["jet", *words]
@@ -132,6 +135,13 @@ class Jobs:
         for count in sorted({1, 2, *(c for c in (4, 8, 16, 32, 64) if c < cores), cores}):
             yield count, [path, *BED, "--dpi", "1200", "--layer", "0.05", "--threads", str(count)]
 
+    def pages(self, command):
+        """Pages of one TIFF, 512 x 512 pixels each."""
+        path, options = self.path("pages.tif"), {"jet": ["--layer", "0.1"]}
+        for count in (500, 1000, 2000, 4000):
+            shapes.write_pages(path, count)
+            yield count, [command, path, *options.get(command, [])]
+
     def batch(self):
         """Dry runs of a small part, in one list."""
         cube, jobs = self.path("cube.stl"), self.path("jobs.txt")
@@ -148,7 +158,8 @@ def without(words, *options):
 
 
 SERIES = ["triangles", "layers", "pixels", "copies", "meshes", "threads",
-          *(f"{product}-{size}" for product, (_, _, sizes) in PRODUCTS.items() for size in sizes), "batch-jobs"]
+          *(f"{product}-{size}" for product, (_, _, sizes) in PRODUCTS.items() for size in sizes), "batch-jobs",
+          "pages-info", "pages-convert", "pages-jet"]
 MEASURES = ["wall", "processor", "peak"]
 
 
@@ -162,7 +173,8 @@ def run_job(options, words, work):
         for name in os.listdir(work):
             if name.startswith("out."):
                 os.remove(os.path.join(work, name))
-        return started([options.program, *words, "--quiet", "-o", out + ".gcode" if words[0] == "extrude" else out])
+        output = [] if words[0] == "info" else ["--quiet", "-o", out + ".gcode" if words[0] == "extrude" else out]
+        return started([options.program, *words, *output])
 
     first = once()
     runs = [first] if first[0] > 2 else []

@@ -19,6 +19,8 @@ def about(name):
         return "jobs", "of a batch, dry runs of a cube"
     if "-" not in name:
         return ABOUT[name]
+    if name.startswith("pages-"):
+        return "pages", f"`{name[6:]}` of one TIFF, 512 x 512 pixels a page"
     product, size = name.split("-")
     return ABOUT[size][0], f"{PRODUCTS[product]}, {ABOUT[size][1]}"
 

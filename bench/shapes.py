@@ -136,3 +136,24 @@ def write_waves(path, across, deep, width, depth, height):
         yield b"".join(ZERO + a + b + c + END for a, b, c in fan(first))
 
     return write_facets(path, 2 * (across + 3) * deep + 2 * (across + 1), blocks())
+
+
+def write_pages(path, count, side=512, dpi=600):
+    """A TIFF of `count` uncompressed 1-bit pages, a square that moves from page to page in each."""
+    with open(path, "wb") as file:
+        file.write(struct.pack("<2sHI", b"II", 42, 8))
+        for page in range(count):
+            at, stride = file.tell(), side // 8
+            tags = [(256, 3, side), (257, 3, side), (258, 3, 1), (259, 3, 1), (262, 3, 0), (273, 4, 0), (277, 3, 1), (278, 3, side),
+                    (279, 4, stride * side), (282, 5, 0), (283, 5, 0)]
+            fraction = at + 2 + 12 * len(tags) + 4
+            values = {273: fraction + 8, 282: fraction, 283: fraction}
+            file.write(struct.pack("<H", len(tags)))
+            for tag, kind, value in tags:
+                file.write(struct.pack("<HHII", tag, kind, 1, values.get(tag, value)))
+            end = fraction + 8 + stride * side
+            file.write(struct.pack("<III", end if page + 1 < count else 0, dpi, 1))
+            for row in range(side):
+                solid = side // 4 <= row < side // 2
+                left = (page % (stride // 2)) * solid
+                file.write(bytes(left) + b"\xff" * (stride // 2 * solid) + bytes(stride - left - stride // 2 * solid))

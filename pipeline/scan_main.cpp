@@ -83,7 +83,7 @@ int main(int count, char** words) {
   try {
     return pipeline::end(pipeline::run(count == 2 ? words[1] : ""));
   } catch (const std::exception& error) {
-    return pipeline::end(is_shortage(error) ? out_of_memory()
+    return pipeline::end(is_shortage(error) ? shortage(error)
                                             : Error{Fault::kInternal, std::string("internal error: ") + error.what()});
   }
 }

@@ -24,7 +24,7 @@ const Kind kKinds[] = {
     {Fault::kInput, "InputError", &PyExc_ValueError, "a part file that cannot be planned"},
     {Fault::kOutput, "OutputError", &PyExc_OSError, "a result that could not be written"},
     {Fault::kVerification, "VerificationError", &PyExc_ValueError, "files that are not what they should be"},
-    {Fault::kMemory, "OutOfMemoryError", &PyExc_MemoryError, "the system gives no more memory or threads"},
+    {Fault::kMemory, "OutOfMemoryError", &PyExc_MemoryError, "the system gives no more memory, threads or open files"},
 };
 PyObject* general_error = nullptr;
 PyObject* errors[std::size(kKinds)] = {};

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <map>
 
@@ -108,7 +109,7 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
     if (Status status = check_outputs(command.name, arguments); !status) return status;
     return command.run(arguments, context);
   } catch (const std::exception& error) {
-    if (is_shortage(error)) return out_of_memory();
+    if (is_shortage(error)) return shortage(error);
     return failure(Fault::kInternal, "internal error: {}", error.what());
   } catch (...) {
     return failure(Fault::kInternal, "internal error");
@@ -155,8 +156,12 @@ namespace {
     if (const auto current = std::current_exception()) std::rethrow_exception(current);
   } catch (const std::exception& error) {
     if (!is_shortage(error)) std::abort();
-    constexpr std::string_view kLine = "lamina: out of memory; give a smaller --memory or fewer --threads\n";
-    lamina::write_all(2, std::as_bytes(std::span(kLine)));
+    std::array<char, 160> line;
+    const auto end = fmt::format_to_n(line.data(), line.size(),
+                                      "lamina: out of memory: needs more than {} MiB of address space; give a smaller --memory "
+                                      "or fewer --threads\n",
+                                      needed_address_space() >> 20);
+    lamina::write_all(2, std::as_bytes(std::span(line.data(), end.size)));
     std::_Exit(static_cast<int>(Fault::kMemory));
   } catch (...) {
   }
@@ -174,7 +179,7 @@ int run_program(int argument_count, char** arguments, Program program) {
     for (const std::string& left : take_left_behind()) console.say("lamina: note: " + left);
     return outcome.error ? console.complain(*outcome.error) : outcome.code;
   } catch (const std::exception& error) {
-    if (is_shortage(error)) return console.complain(out_of_memory());
+    if (is_shortage(error)) return console.complain(shortage(error));
     return console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())});
   }
 }

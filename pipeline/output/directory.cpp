@@ -13,6 +13,7 @@
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/file.h"
 #include "pipeline/output/print_program.h"
+#include "stages/data/shortage.h"
 #include "stages/support/hash/hash.h"
 #include "stages/support/io/compressed.h"
 #include "stages/support/text/version.h"
@@ -25,6 +26,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kPartial = ".part";
 
 Error cannot(const fs::path& path, int reason) {
+  if (is_shortage(reason)) return shortage(reason, path.string());
   return {Fault::kOutput, fmt::format("{}: {}", path.string(), std::strerror(reason))};
 }
 

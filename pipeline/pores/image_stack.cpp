@@ -11,6 +11,7 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/job/file.h"
 #include "stages/data/levels.h"
+#include "stages/data/shortage.h"
 #include "stages/formats/images/image.h"
 #include "stages/pores/rows.h"
 #include "stages/pores/surface.h"
@@ -90,7 +91,7 @@ Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head,
 
 Result<ImageStack> stack_of_job(const std::string& folder) {
   auto manifest = read_manifest(folder + "/manifest.json");
-  if (!manifest) return Error{Fault::kInput, manifest.error().message};
+  if (!manifest) return of_input(manifest.error());
   const auto job = std::make_shared<const Manifest>(std::move(*manifest));
   const ManifestHead& head = job->head;
   if (head.product != Product::kImages || head.extension.empty() || job->layers.empty())

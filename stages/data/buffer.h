@@ -4,11 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace lamina {
+
+/// Notes the size of a block that was refused, for out_of_memory().
+void note_refused_block(std::uint64_t bytes);
 
 /// Leaves new elements of trivial types unset, so that a buffer of a gigabyte can be filled by many threads
 /// without one of them zeroing it first.
@@ -18,6 +22,12 @@ struct UnsetAllocator : std::allocator<T> {
   struct rebind {
     using other = UnsetAllocator<U>;
   };
+  T* allocate(std::size_t count) try {
+    return std::allocator<T>::allocate(count);
+  } catch (const std::bad_alloc&) {
+    note_refused_block(count * sizeof(T));
+    throw;
+  }
   template <class U>
   void construct(U* position) noexcept(std::is_nothrow_default_constructible_v<U>) {
     ::new (static_cast<void*>(position)) U;

@@ -17,7 +17,7 @@ enum class Fault : int {
   kInput = 3,         // a part file that cannot be planned
   kOutput = 4,        // a result that could not be written
   kVerification = 5,  // outputs that are not what the manifest says, or engines that disagree
-  kMemory = 6,        // the system gives no more memory or threads
+  kMemory = 6,        // the system gives no more memory, threads or open files
   kInterrupted = 130  // stopped by the user; finished layers are kept
 };
 
@@ -27,12 +27,8 @@ struct Error {
   std::string message;
 };
 
-/// The answer to std::bad_alloc.
-inline Error out_of_memory() {
-  return {Fault::kMemory,
-          "out of memory; give a smaller --memory, fewer --threads or --jobs, or --engine contours, or run it where more "
-          "memory is free"};
-}
+/// The answer to std::bad_alloc, with the address space that is needed at least (stages/data/shortage.h).
+Error out_of_memory();
 
 /// A value or the error that kept it from being made.
 template <class T>

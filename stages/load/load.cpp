@@ -400,9 +400,8 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options,
 template <class Work>
 auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
   try {
-    return work();
+    return report_shortages(path, work);
   } catch (const std::exception& problem) {
-    if (is_shortage(problem)) return Error{Fault::kMemory, path + ": " + out_of_memory().message};
     return Error{Fault::kInternal, path + ": " + problem.what()};
   }
 }

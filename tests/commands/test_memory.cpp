@@ -48,7 +48,7 @@ TEST_F(Memory, RunningOutOfItIsOneLineWithItsOwnCode) {
       ++(outcome.code == 0 ? done : short_of_memory);
       if (outcome.code != 0) {
         EXPECT_EQ(outcome.code, 6) << what;
-        EXPECT_NE(outcome.err.find("out of memory; give a smaller --memory"), std::string::npos) << what;
+        EXPECT_NE(outcome.err.find("MiB of address space; give a smaller --memory"), std::string::npos) << what;
         EXPECT_EQ(outcome.error_lines(), 1u) << what;
         EXPECT_FALSE(fs::exists(directory_ / "out/manifest.json")) << what;
       } else if (writes) {

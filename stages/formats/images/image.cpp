@@ -8,9 +8,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <new>
 
 #include "stages/data/bit_image.h"
+#include "stages/data/shortage.h"
 #include "stages/data/units.h"
 #include "stages/formats/images/image_formats.h"
 #include "stages/support/io/file_reader.h"
@@ -41,11 +41,7 @@ Result<Image> read_image(const std::string& path, int threshold, std::uint64_t p
                          Keep keep = Keep::kRuns) {
   const auto file = FileReader::open(path, {});
   if (!file) return file.error();
-  try {
-    return read_by_magic(*file, threshold, page, sink, keep);
-  } catch (const std::bad_alloc&) {
-    return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
-  }
+  return report_shortages(path, [&] { return read_by_magic(*file, threshold, page, sink, keep); });
 }
 
 }  // namespace
@@ -85,8 +81,10 @@ Result<Levels> image_levels(const std::string& path, std::uint8_t full) {
 namespace {
 
 /// Of images of others: what is wrong is with the input.
-Error of_others(std::string message) {
+Error of_others(Error error) {
+  if (error.fault == Fault::kMemory) return error;
   constexpr std::string_view kAgain = "; plan the layer again";
+  std::string& message = error.message;
   if (message.ends_with(kAgain)) message.resize(message.size() - kAgain.size());
   return Error{Fault::kInput, message + "; take grey or 1-bit PNG, TIFF, BMP or PBM"};
 }
@@ -97,7 +95,7 @@ Result<Image> nearest_levels(const std::string& path, const LevelsRequest& reque
   LevelSink sink{request.full, levels, true, request.invert};
   levels.row_offset.clear();
   auto image = read_image(path, 128, request.page, &sink, keep);
-  if (!image) return of_others(image.error().message);
+  if (!image) return of_others(image.error());
   if (image->bits) {
     if (request.invert) invert(*image->bits);
     return image;
@@ -115,14 +113,14 @@ Result<GreyCounts> grey_counts(const std::string& path, std::uint64_t page) {
   Levels unused;
   LevelSink sink{255, unused, true, false, &counts};
   const auto image = read_image(path, 128, page, &sink, Keep::kCounts);
-  if (!image) return of_others(image.error().message);
+  if (!image) return of_others(image.error());
   if (unused.row_offset.empty()) counts.darkness = 255 * image->counts.set;  // of 1 bit
   return counts;
 }
 
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page, Keep keep) {
   auto image = read_image(path, threshold, page, nullptr, keep);
-  return image ? std::move(image) : of_others(image.error().message);
+  return image ? std::move(image) : of_others(image.error());
 }
 
 Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
@@ -132,7 +130,7 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
   if (!file->read_at(0, magic)) return Error{Fault::kInput, path + ": is empty; use a complete image"};
   const bool is_tiff = (magic[0] == 'I' || magic[0] == 'M') && magic[1] == magic[0];
   if (!is_tiff) return std::vector<std::uint64_t>{0};
-  return tiff_pages(file->descriptor(), path);
+  return report_shortages(path, [&] { return tiff_pages(file->descriptor(), path); });
 }
 
 namespace {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "stages/data/shortage.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/images/image_order.h"
 #include "stages/support/hash/hash.h"
@@ -58,6 +59,7 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
                                one_line(path.string()))};
     images.push_back({std::stoull(digits), path.string()});
   }
+  if (is_shortage(wrong.value())) return shortage(wrong.value(), one_line(folder));
   if (wrong) return Error{Fault::kInput, fmt::format("{}: the folder cannot be read: {}", one_line(folder), wrong.message())};
   if (images.empty() && !nested.empty())
     return Error{Fault::kInput, fmt::format("{}: contains no images, only folders; give one of them, as {}", one_line(folder),
@@ -98,7 +100,7 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
   for (Numbered& file : files) {
     stack.stamps_.push_back(stamp_of(file.path));
     const auto digest = digest_file(file.path);
-    if (!digest) return Error{Fault::kInput, digest.error().message};
+    if (!digest) return of_input(digest.error());
     const auto positions = pages_of(file.path);
     if (!positions) return positions.error();
     if (folder && positions->size() > 1)

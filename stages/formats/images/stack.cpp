@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "stages/data/shortage.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/images/layer_images.h"
 #include "stages/support/text/readable.h"
@@ -70,7 +71,7 @@ Result<VoxelStack> cut_box(const ImageStack& stack, const std::array<std::uint32
     const std::uint32_t layer = stack.layer_of[z];
     if (z == low[2] || layer != stack.layer_of[z - 1]) {
       const Result<Runs> image = stack.read(layer);
-      if (!image) return Error{Fault::kInput, image.error().message};
+      if (!image) return of_input(image.error());
       if (image->columns != stack.size[0] || image->view().rows() != stack.size[1])
         return Error{Fault::kInput, fmt::format("{}: layer {} is {} x {} pixels, others are {} x {}", one_line(stack.path),
                                                 layer, image->columns, image->view().rows(), stack.size[0], stack.size[1])};

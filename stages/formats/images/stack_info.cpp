@@ -3,17 +3,17 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include <unistd.h>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 
+#include "stages/data/shortage.h"
 #include "stages/formats/images/image.h"
 #include "stages/formats/images/image_formats.h"
 #include "stages/formats/images/layer_images.h"
+#include "stages/formats/tiff/input.h"
 #include "stages/support/io/file_reader.h"
-#include "stages/support/late/tiff.h"
 #include "stages/support/memory_gate.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/number_text.h"
@@ -37,6 +37,7 @@ struct ImageFile {
 /// One image.
 struct ImageInspection {
   std::string wrong;  // why it cannot be read
+  Fault fault = Fault::kInput;
   ImageKind kind;
   std::uint32_t columns = 0, rows = 0;
   double dpi_x = 0, dpi_y = 0;
@@ -45,7 +46,11 @@ struct ImageInspection {
 
 ImageInspection inspect_image(const ImageFile& position, int threshold) {
   ImageInspection inspection;
-  const auto refuse = [&](const Error& error) { return inspection.wrong = one_line(error.message), inspection; };
+  const auto refuse = [&](const Error& error) {
+    inspection.wrong = one_line(error.message);
+    inspection.fault = error.fault;
+    return inspection;
+  };
   auto kind = kind_of(*position.path, position.page);
   if (!kind) return refuse(kind.error());
   const auto image = dark_pixels(*position.path, threshold, position.page, Keep::kCounts);
@@ -136,7 +141,7 @@ Result<StackInfo> inspect_stack(const std::string& path, int threshold, std::uin
   std::vector<ImageFile> positions;
   for (const Numbered& file : files) {
     const auto pages = pages_of(file.path);
-    if (!pages && info.files == 1) return pages.error();
+    if (!pages && (info.files == 1 || pages.error().fault == Fault::kMemory)) return pages.error();
     if (!pages) {
       positions.push_back({&file.path, 0});  // says what is wrong when it is read
       continue;
@@ -155,6 +160,8 @@ Result<StackInfo> inspect_stack(const std::string& path, int threshold, std::uin
     const auto pass = gate.enter(kRowsBytes + (unknown ? 0 : std::min<std::uint64_t>(bytes, kMaxStripBytes)));
     inspections[i] = inspect_image(positions[i], threshold);
   });
+  const auto stopped = std::ranges::find(inspections, Fault::kMemory, &ImageInspection::fault);
+  if (stopped != inspections.end()) return Error{Fault::kMemory, stopped->wrong};
   const auto first =
       std::ranges::find_if(inspections, [](const ImageInspection& inspection) { return inspection.wrong.empty(); });
   if (first == inspections.end()) return Error{Fault::kInput, inspections.front().wrong};
@@ -238,18 +245,13 @@ std::string tiff_coding(std::uint16_t compression) {
 }
 
 Result<ImageKind> tiff_kind(int file, const std::string& path, std::uint64_t page) {
-  std::string message;
-  const auto options = strict_tiff_options(message);
-  const int own_file = ::dup(file);
-  const TiffHandle handle(options != nullptr && own_file >= 0 ? TIFFFdOpenExt(own_file, path.c_str(), "rCm", options.get())
-                                                              : nullptr);
-  if (handle == nullptr && own_file >= 0) ::close(own_file);
-  if (handle == nullptr || (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0))
-    return Error{Fault::kInput, fmt::format("{}: not a complete TIFF: {}", path, message)};
+  const tiff::Input input(file, path, page);
+  TIFF* const handle = input.handle();
+  if (handle == nullptr) return Error{Fault::kInput, fmt::format("{}: not a complete TIFF: {}", path, input.message)};
   std::uint16_t bits = 1, photometric = PHOTOMETRIC_MINISWHITE, compression = COMPRESSION_NONE;
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_BITSPERSAMPLE, &bits);
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
-  TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric);
+  TIFFGetFieldDefaulted(handle, TIFFTAG_BITSPERSAMPLE, &bits);
+  TIFFGetFieldDefaulted(handle, TIFFTAG_COMPRESSION, &compression);
+  TIFFGetField(handle, TIFFTAG_PHOTOMETRIC, &photometric);
   const bool white = photometric == PHOTOMETRIC_MINISWHITE, black = photometric == PHOTOMETRIC_MINISBLACK;
   return ImageKind{"TIFF", bits,
                    white   ? "0 is white"
@@ -267,7 +269,8 @@ Result<ImageKind> kind_of(const std::string& path, std::uint64_t page) {
   if (!file->read_at(0, std::span(reinterpret_cast<char*>(head), std::min<std::uint64_t>(sizeof head, file->size()))))
     return Error{Fault::kInput, path + ": cannot be read; use a complete image"};
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(head, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return tiff_kind(file->descriptor(), path, page);
+  if (begins("II", 2) || begins("MM", 2)) 
+    return report_shortages(path, [&] { return tiff_kind(file->descriptor(), path, page); });
   if (begins("\x89PNG", 4)) return ImageKind{"PNG", head[24], head[25] == 3 ? "by its palette" : "0 is black", "deflate"};
   if (begins("BM", 2)) return ImageKind{"BMP", head[28], "by its palette", "none"};
   if (begins("P4", 2)) return ImageKind{"PBM", 1, "0 is white", "none"};

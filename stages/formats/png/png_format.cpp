@@ -336,6 +336,7 @@ const char* add_row(ReadState& source) {
     bits_of_grey(source.row, columns, wide ? 2 : 1, false, source.threshold);
     return source.builder->add_row(std::span(source.row).first(row_bytes(columns)), false) ? nullptr : kTooMany;
   } catch (...) {
+    errno = ENOMEM;
     return "out of memory";
   }
 }
@@ -347,6 +348,7 @@ bool prepare(ReadState& source, std::size_t stride, std::uint32_t rows) {
     if (source.sink != nullptr && !source.as_bits) source.sink->levels.start(source.columns);
     return true;
   } catch (...) {
+    errno = ENOMEM;
     return false;
   }
 }
@@ -416,7 +418,7 @@ Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, i
   if (!whole) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole {}PNG: {}; plan the layer again", path,
                                                    threshold > 0 || sink != nullptr ? "" : "1-bit ",
-                                                   source->message[0] != 0 ? source->message : "out of memory")};
+                                                   source->message)};
   }
   return image_of(*source->builder, source->columns, source->dpi_x, source->dpi_y);
 }

@@ -26,6 +26,7 @@
 #include "stages/formats/row_encoder.h"
 #include "stages/formats/tiff/dither_deflate.h"
 #include "stages/formats/tiff/edge_deflate.h"
+#include "stages/formats/tiff/input.h"
 #include "stages/formats/tiff/packbits.h"
 #include "stages/geometry/bits.h"
 #include "stages/support/late/tiff.h"
@@ -516,7 +517,7 @@ std::unique_ptr<LevelEncoder> make_8_bit_encoder() { return std::make_unique<Gre
 namespace lamina::formats {
 namespace {
 
-constexpr std::uint32_t kLargestAllocation = 64 << 20;  // bytes; no strip that anybody writes is larger
+constexpr std::uint64_t kLargestStrip = 64 << 20;  // bytes; nobody writes a larger one
 
 /// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
 std::uint64_t max_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
@@ -561,7 +562,7 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
   Buffer<std::byte> coded;
   for (std::uint32_t row = 0, strip = 0; row < rows; row += rows_per_strip, ++strip) {
     const std::uint64_t size = TIFFGetStrileByteCount(tiff, strip);
-    if (size > kLargestAllocation) return false;
+    if (size > kLargestStrip) return false;
     coded.resize(size);
     const auto position = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
     if (::pread(file, coded.data(), coded.size(), position) != static_cast<ssize_t>(coded.size())) return false;
@@ -617,25 +618,6 @@ void read_resolution(TIFF* tiff, int file, Image& image) {
   const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
   image.dpi_x = resolution[0] * to_inch;
   image.dpi_y = resolution[1] * to_inch;
-}
-
-/// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
-/// message  outlives the handle; if that is nullptr and libtiff gives no reason, `no_file` or `no_directory`
-TiffHandle open_for_reading(int file, const std::string& path, std::string& message, std::string_view no_file = {},
-                            std::string_view no_directory = {}) {
-  const auto options = strict_tiff_options(message);
-  const int own_file = options != nullptr ? ::dup(file) : -1;
-  if (own_file < 0) {
-    if (message.empty()) message = no_file;
-    return nullptr;
-  }
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
-  TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), "rCm", options.get()));
-  if (handle == nullptr) {
-    ::close(own_file);
-    if (message.empty()) message = no_directory;
-  }
-  return handle;
 }
 
 /// What no writer of layers says is longer.
@@ -734,26 +716,28 @@ std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, in
 
 Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
                         LevelSink* sink, Keep keep) {
-  std::string message;  // of libtiff, outlives the handle
+  tiff::Input input(file, path, page);
+  std::string& message = input.message;
+  TIFF* const handle = input.handle();
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path,
                                                    threshold > 0 || sink != nullptr ? "" : "1-bit ", why)};
   };
-  const TiffHandle handle = open_for_reading(file, path, message, "out of memory or files", "no directory");
-  if (handle == nullptr) return failure(message);
-  if (page == 0 && !select_only_image(handle.get(), message, page) && threshold > 0)
+  if (handle == nullptr) return failure(message.empty() ? "no directory" : message);
+  if (page == 0 && !select_only_image(handle, message, page) && threshold > 0)
     return failure("several images in one file; write one a layer");
-  if (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0) return failure(message.empty() ? "no such page" : message);
+  if (page != 0 && page != TIFFCurrentDirOffset(handle) && TIFFSetSubDirectory(handle, page) == 0)
+    return failure(message.empty() ? "no such page" : message);
   if (!message.empty()) return failure(message);
   TiffHead head;
-  const std::string wrong = read_tiff_head(handle.get(), bytes, threshold, sink, head);
+  const std::string wrong = read_tiff_head(handle, bytes, threshold, sink, head);
   if (!wrong.empty()) return failure(wrong);
 
   const bool to_sink = head.grey() && sink != nullptr;
   if (to_sink) sink->levels.start(head.columns);
   Image image;
-  read_resolution(handle.get(), file, image);
-  image.description = description_of(handle.get());
+  read_resolution(handle, file, image);
+  image.description = description_of(handle);
   RunsBuilder builder(head.columns, head.rows, keep);
   const auto finish = [&] {
     Image whole = image_of(builder, head.columns, image.dpi_x, image.dpi_y);
@@ -761,12 +745,12 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
     return whole;
   };
   if (head.compression == COMPRESSION_CCITTFAX4 && !head.grey()) {
-    if (read_g4(handle.get(), file, head.columns, head.rows, !head.bright_is_low(), builder)) return finish();
+    if (read_g4(handle, file, head.columns, head.rows, !head.bright_is_low(), builder)) return finish();
     builder = RunsBuilder(head.columns, head.rows, keep);
   }
   Buffer<std::byte> row(head.bits == 2 ? head.columns : head.stride());
   for (std::uint32_t r = 0; r < head.rows; ++r) {
-    if (TIFFReadScanline(handle.get(), row.data(), r, 0) < 0 || !message.empty()) {
+    if (TIFFReadScanline(handle, row.data(), r, 0) < 0 || !message.empty()) {
       return failure(fmt::format("row {}: {}", r, message.empty() ? "cannot be decoded" : message));
     }
     if (const std::string_view why = add_tiff_row(row, head, threshold, sink, builder); !why.empty())
@@ -777,17 +761,20 @@ Result<Image> read_tiff(int file, std::uint64_t bytes, const std::string& path, 
 
 Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path) {
   constexpr std::size_t kMaxPages = 1 << 20;
-  std::string message;
-  const TiffHandle handle = open_for_reading(file, path, message);
-  if (handle == nullptr) return Error{Fault::kInput, fmt::format("{}: not a TIFF: {}; take a whole file", path, message)};
+  tiff::Input input(file, path, 0);
+  std::string& message = input.message;
+  TIFF* const handle = input.handle();
+  const auto failure = [&](const std::string& why) {
+    return Error{Fault::kInput, fmt::format("{}: {}; take a whole file", path, why)};
+  };
+  if (handle == nullptr) return failure("not a TIFF: " + message);
   std::vector<std::uint64_t> pages;
-  const bool alone = TIFFLastDirectory(handle.get()) != 0;
+  const bool alone = TIFFLastDirectory(handle) != 0;
   do {
-    if (!is_no_layer(handle.get(), message)) pages.push_back(TIFFCurrentDirOffset(handle.get()));
-  } while (pages.size() <= kMaxPages && TIFFReadDirectory(handle.get()) != 0);
+    if (!is_no_layer(handle, message)) pages.push_back(TIFFCurrentDirOffset(handle));
+  } while (pages.size() <= kMaxPages && TIFFReadDirectory(handle) != 0);
   if (!message.empty() || pages.size() > kMaxPages) {
-    return Error{Fault::kInput, fmt::format("{}: page {}: {}; take a whole file", path, pages.size(),
-                                            message.empty() ? "too many of them" : message)};
+    return failure(fmt::format("page {}: {}", pages.size(), message.empty() ? "too many of them" : message));
   }
   if (pages.empty() || alone) pages.assign(1, 0);
   return pages;

@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "stages/data/shortage.h"
 #include "stages/support/io/file_reader.h"
 #include "stages/support/io/sync.h"
 #include "stages/support/io/temporary.h"
@@ -302,6 +303,7 @@ Status write_file(const std::string& path, std::string_view text, const FileOpti
 }
 
 Error write_failure(const std::string& path, int code) {
+  if (is_shortage(code)) return shortage(code, path);
   switch (code) {
     case ENOSPC:
     case EDQUOT: return {Fault::kOutput, fmt::format("{}: disk full ({}); free some space", path, std::strerror(code))};

@@ -11,6 +11,8 @@
 #include <cstring>
 #include <utility>
 
+#include "stages/data/shortage.h"
+
 namespace lamina {
 namespace {
 
@@ -128,6 +130,7 @@ Result<FileReader> FileReader::open(const std::string& path, const ReadRules& ru
   }
   struct stat status {};
   if (state->file < 0 || ::fstat(state->file, &status) != 0) {
+    if (is_shortage(errno)) return shortage(errno, path);
     const bool absent = errno == ENOENT || errno == ENOTDIR;
     return state->error(absent ? std::string(rules.missing) : fmt::format("cannot be opened: {}", std::strerror(errno)));
   }

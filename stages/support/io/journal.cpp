@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
 #include "stages/support/io/file_reader.h"
 
@@ -20,6 +21,7 @@ namespace {
 constexpr std::size_t kLongestLine = 64 << 20;  // bytes
 
 Error reason_of(const std::string& path, int code) {
+  if (is_shortage(code)) return shortage(code, path);
   return {Fault::kOutput, fmt::format("{}: {}", path, std::strerror(code))};
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,13 +15,25 @@
 #include <filesystem>
 #include <memory>
 
+#include "stages/data/shortage.h"
 #include "stages/support/io/file.h"
 
 namespace lamina {
 namespace {
 
 Error not_started(const std::string& program, int reason) {
+  if (is_shortage(reason)) return shortage(reason, program);
   return {Fault::kInternal, fmt::format("{}: {}; install it next to lamina or in PATH", program, std::strerror(reason))};
+}
+
+/// OpenImageIO and OpenCV name some hundred libraries, whose constructors end the program if memory runs out.
+/// errors  kMemory: the limit on address space is below what they take in Debian 12
+Status check_address_space(const std::string& program) {
+  constexpr rlim_t kNeeded = 512;  // MiB
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur >= kNeeded << 20) return {};
+  return Error{Fault::kMemory, fmt::format("{}: out of memory: needs more than {} MiB of address space; raise the limit (ulimit -v)",
+                                           program, kNeeded)};
 }
 
 /// The program in this one's folder, or its name for PATH.
@@ -40,6 +53,7 @@ std::unique_ptr<std::FILE, int (*)(std::FILE*)> memory_file(const std::string& n
 }  // namespace
 
 Error hand_over(const std::string& program, const std::vector<std::string>& arguments) {
+  if (const Status enough = check_address_space(program); !enough) return enough.error();
   std::vector<std::string> copies = arguments;
   std::vector<char*> texts = {const_cast<char*>(program.c_str())};
   for (std::string& argument : copies) texts.push_back(argument.data());
@@ -53,6 +67,7 @@ Error hand_over(const std::string& program, const std::vector<std::string>& argu
 
 // Files in memory rather than pipes: neither side waits for the other, and nothing lies on the disk if one is killed.
 Result<std::string> filter(const std::string& program, const std::string& argument, std::string_view input) {
+  if (const Status enough = check_address_space(program); !enough) return enough.error();
   const auto in = memory_file(program), out = memory_file(program);
   if (!in || !out) return not_started(program, errno);
   if (std::fwrite(input.data(), 1, input.size(), in.get()) != input.size() || std::fflush(in.get()) != 0)

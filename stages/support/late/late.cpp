@@ -3,10 +3,12 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
 
+#include "stages/data/shortage.h"
 #include "stages/support/late/embree.h"
 #include "stages/support/late/tiff.h"
 #include "stages/support/late/zip.h"
@@ -36,7 +38,8 @@ Status load_library(const char* file, std::span<const LateFunction> functions) {
   void* const library = ::dlopen(file, RTLD_LAZY | RTLD_LOCAL);
   if (library == nullptr) {
     const char* const reason = ::dlerror();
-    // The loader reports lack of memory in words alone.
+    // The loader reports shortages in words alone.
+    if (std::strstr(reason, "Too many open files") != nullptr) return shortage(EMFILE);
     for (const char* words : {"failed to map", "cannot map", "annot allocate", "cannot create"}) {
       if (std::strstr(reason, words) != nullptr) return out_of_memory();
     }
@@ -59,7 +62,8 @@ LAMINA_LATE_LIBRARY(LAMINA_TIFF, LAMINA_TIFF_FILE, load_tiff)
 
 TiffOptions strict_tiff_options(std::string& message) {
   if (const Status loaded = load_tiff(); !loaded) {
-    if (loaded.error().fault != Fault::kMemory) message = loaded.error().message;
+    message = loaded.error().message;
+    if (loaded.error().fault == Fault::kMemory) errno = message.starts_with("out of memory") ? ENOMEM : EMFILE;
     return nullptr;
   }
   TiffOptions options(TIFFOpenOptionsAlloc());

@@ -34,7 +34,8 @@ using TiffOptions = std::unique_ptr<TIFFOpenOptions, FreeTiffOptions>;
 
 /// For TIFFOpen and its kin: the first error goes into `message` instead of to the terminal. So does the first warning,
 /// because libtiff only warns of a tag cut off and of G4 rows of wrong length; tags that it does not know are fine.
-/// Loads libtiff; nothing of it is called before. nullptr if memory ran out, or, with a message, if there is no libtiff.
+/// Loads libtiff; nothing of it is called before. nullptr if memory ran out or libtiff cannot
+/// be loaded; errno has a shortage.
 TiffOptions strict_tiff_options(std::string& message);
 
 }  // namespace lamina

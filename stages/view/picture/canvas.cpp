@@ -6,8 +6,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <system_error>
 #include <utility>
+
+#include "stages/data/shortage.h"
 
 namespace lamina::view::picture {
 namespace {
@@ -23,6 +27,11 @@ std::string ascii(const std::string& line) {
     plain += byte >= 0x20 && byte < 0x7F ? c : '?';
   }
   return plain;
+}
+
+/// Of memory or open files in OpenImageIO, if errno states one.
+void throw_shortage() {
+  if (is_shortage(errno)) throw std::system_error(errno, std::generic_category());
 }
 
 constexpr int kSubrows = 8;
@@ -45,7 +54,10 @@ void add_span(double from, double to, double weight, std::vector<double>& share)
 }  // namespace
 
 Canvas::Canvas(int width, int height, Colour ground)
-    : width_(width), height_(height), pixels_(OIIO::ImageSpec(width, height, 3, OIIO::TypeDesc::UINT8)) {
+    : width_(width),
+      height_(height),
+      bytes_(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
+      pixels_(OIIO::ImageSpec(width, height, 3, OIIO::TypeDesc::UINT8), bytes_.data()) {
   pixels_.specmod().attribute("Software", "lamina");
   fill_box(0, 0, width, height, ground);
 }
@@ -83,11 +95,14 @@ void Canvas::text(int left, int baseline, int size, const std::string& line, Col
   if (!have_font()) return;
   const float channels[3] = {static_cast<float>(colour.red) / 255, static_cast<float>(colour.green) / 255,
                              static_cast<float>(colour.blue) / 255};
-  OIIO::ImageBufAlgo::render_text(pixels_, left, baseline, ascii(line), size, kFont, channels);
+  errno = 0;
+  if (!OIIO::ImageBufAlgo::render_text(pixels_, left, baseline, ascii(line), size, kFont, channels)) throw_shortage();
 }
 
 Result<Buffer<std::byte>> Canvas::png() const {
+  errno = 0;
   const auto failure = [](const std::string& why) {
+    if (is_shortage(errno)) return shortage(errno);
     return Error{Fault::kInternal, fmt::format("the picture cannot be encoded: {}", why)};
   };
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("sheet.png");
@@ -106,7 +121,9 @@ Result<Buffer<std::byte>> Canvas::png() const {
 
 bool have_font() {
   static const bool found = [] {
+    errno = 0;
     const bool measured = OIIO::ImageBufAlgo::text_size("0", 16, kFont).defined();
+    if (!measured) throw_shortage();
     if (!measured) OIIO::geterror();  // taken, so that it is not printed at the end of the program
     return measured;
   }();

@@ -21,7 +21,9 @@ struct Colour {
 /// Pixels count from the top left. Shapes are clipped at the canvas.
 class Canvas {
  public:
+  /// throws  std::bad_alloc
   Canvas(int width, int height, Colour ground);
+  Canvas(const Canvas&) = delete;
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -35,15 +37,17 @@ class Canvas {
   /// not ASCII is drawn as "?" (OpenImageIO 2.4 draws other characters for it).
   void text(int left, int baseline, int size, const std::string& line, Colour colour);
 
-  /// The whole canvas as PNG. errors  kInternal
+  /// The whole canvas as PNG. errors  kInternal; kMemory
   Result<Buffer<std::byte>> png() const;
 
  private:
   int width_, height_;
+  Buffer<std::uint8_t> bytes_;  // of the pixels: OpenImageIO prints what it cannot allocate
   OIIO::ImageBuf pixels_;
 };
 
 /// Whether text can be drawn: DejaVu Sans (Debian's fonts-dejavu-core) is installed.
+/// throws  std::system_error: the font cannot be opened for want of memory or open files
 bool have_font();
 
 /// Pixels from the start to the end of a line; 0 without a font.
