@@ -137,7 +137,7 @@ class Jobs:
 
     def pages(self, command):
         """Pages of one TIFF, 512 x 512 pixels each."""
-        path, options = self.path("pages.tif"), {"jet": ["--layer", "0.1"]}
+        path, options = self.path("pages.tif"), {"jet": ["--dpi", "600", "--layer", "0.1"]}
         for count in (500, 1000, 2000, 4000):
             shapes.write_pages(path, count)
             yield count, [command, path, *options.get(command, [])]
