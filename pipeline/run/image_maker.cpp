@@ -6,72 +6,17 @@
 #include <optional>
 #include <vector>
 
-#include "pipeline/manifest/inspection_file.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/report/image_observers.h"
-#include "pipeline/report/image_text.h"
 #include "pipeline/report/job_cost.h"
+#include "pipeline/run/inspector.h"
 #include "pipeline/run/layer_imager.h"
 #include "pipeline/run/powders.h"
-#include "stages/checks/inspect.h"
 #include "stages/cost/part_pixels.h"
 #include "stages/slice/bodies.h"
-#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
-
-/// That of the powder, or 0.3 mm; at least two pixels, because thinner walls are not resolved.
-double narrowest_mm(const ImagePlan& images) {
-  constexpr double kUnstated = 0.3;
-  const double stated = images.machine ? images.machine->machine.powder.min_wall_mm : 0;
-  return std::max(2 * 25.4 / std::min(images.grid.x.dpi(), images.grid.y.dpi()), stated > 0 ? stated : kUnstated);
-}
-
-/// Ten grains of 80 um. Grains form arches over openings below about five of their diameters: I. Zuriguel, "Clogging of
-/// granular materials in bottlenecks", Papers in Physics 6, 060014, 2014.
-constexpr double kMinDrainMm = 0.8;
-
-class Inspector : public ImageObserver {
- public:
-  /// Idle unless the job requests it. The plan must outlive this object.
-  explicit Inspector(const Plan& plan);
-  bool on() const { return inspection_.has_value(); }
-
-  /// Those of layers in flight, from any thread, are its const functions. Of an idle one there is none.
-  const checks::Inspection& inspection() const { return *inspection_; }
-  /// In layer order.
-  void record(const Layer& layer, const checks::LayerInspection& layer_inspection) {
-    inspection_->add(layer, layer_inspection);
-  }
-  /// In addition to the inspection of layers.
-  std::uint64_t bytes() const { return on() ? inspection_->bytes() + inspection_->scratch_bytes() : 0; }
-
-  // --- observer
-  /// The image of a layer of an earlier run is not available: bodies cannot be followed.
-  void layer(const LayerRecord&, const ImageNotes* made) override {
-    if (made != nullptr) return;
-    kept_ = true;
-    if (on()) inspection_->leave();
-  }
-  void warn(const Summary& summary, std::vector<Warning>& warnings) override;
-  void report(Summary& summary) const override;
-
-  // --- DIR/inspection.json, for reports: of whole jobs that were inspected from the first layer to the last
-  /// Before the first layer. errors  kUsage: a file of somebody else has that name
-  Status check_file() const;
-  /// After warn(). Without findings of this run the file stays if it is of the same job, and is removed if it is of another.
-  Status write(const ManifestHead& head) const;
-
- private:
-  bool whole() const;
-
-  const Plan& plan_;
-  std::optional<checks::Inspection> inspection_;
-  std::vector<Warning> reports_;
-  double min_mm_ = 0, drain_mm_ = 0;
-  bool kept_ = false;
-};
 
 /// Counts nothing unless costs of parts are reported one by one (reported_parts). Usable from many threads at once.
 class PartCounter {
@@ -93,56 +38,6 @@ class PartCounter {
   bool saturates_ = false;  // drops are decided
   std::uint8_t full_ = 0;   // level of a full voxel; 0: pixels are set or not
 };
-
-Inspector::Inspector(const Plan& plan) : plan_(plan) {
-  if (!plan.job.inspect) return;
-  std::vector<checks::Solid> placed_parts;
-  for (std::size_t i = 0; i < plan.scene->instances.size(); ++i) {
-    placed_parts.push_back({box_of(*plan.scene, plan.scene->instances[i]), plan.scene->part_of_instance[i]});
-  }
-  for (const PlacedImages& images : plan.scene->images) {
-    placed_parts.push_back({plan.scene->parts[images.part].bounds, images.part});
-    Box& box = placed_parts.back().box;
-    const PixelGrid& grid = plan.images->grid;
-    const auto nm = [](std::int64_t pixel, const PixelAxis& axis) { return static_cast<Nm>(pixel * axis.span / axis.dots); };
-    const std::int64_t back = std::int64_t{grid.rows()} - images.position.first_row;
-    box.lo = {nm(images.position.column.front(), grid.x), nm(back - std::ssize(images.position.row), grid.y), images.bottom};
-    box.hi = {nm(images.position.column.back(), grid.x), nm(back, grid.y),
-              static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
-  }
-  min_mm_ = plan.job.min_wall_mm.value_or(narrowest_mm(*plan.images));
-  drain_mm_ = plan.job.min_drain_mm.value_or(kMinDrainMm);
-  inspection_.emplace(plan.images->grid, std::move(placed_parts), nm_of(min_mm_), nm_of(drain_mm_), plan.job.memory_bytes / 2);
-}
-
-void Inspector::warn(const Summary&, std::vector<Warning>& warnings) {
-  if (!on()) return;
-  if (kept_) {
-    warnings.push_back({"not-inspected",
-                        "layers of an earlier run were kept and are not inspected; run the job "
-                        "again, or as a dry run, with --inspect"});
-    return;
-  }
-  std::vector<std::string> names;
-  for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  checks::report(inspection_->finish(), names, min_mm_, drain_mm_, reports_);
-  warnings.insert(warnings.end(), reports_.begin(), reports_.end());
-}
-
-void Inspector::report(Summary& summary) const {
-  if (on() && !kept_) summary.facts["inspection"] = json_of(inspection_->findings(), min_mm_, drain_mm_);
-}
-
-Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
-
-Status Inspector::write(const ManifestHead& head) const {
-  if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
-  return write_inspection(
-      plan_.job.output, head,
-      {{"inspection", json_of(inspection_->findings(), min_mm_, drain_mm_)}, {"warnings", warnings_json(reports_)}});
-}
-
-bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }
 
 PartCounter::PartCounter(const Plan& plan) : plan_(plan) {
   const std::size_t parts = reported_parts(plan);
@@ -247,22 +142,26 @@ class ImageMaker : public Maker {
     auto refills = plan_refills(plan_, imager_);
     if (!refills) return refills.error();
     files_.pause_before(refills_ = std::move(*refills));
-    if (plan_.job.dry_run) {
-      std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
-      std::iota(all.begin(), all.end(), plan_.range[0]);
-      return all;
-    }
+    std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
+    std::iota(all.begin(), all.end(), plan_.range[0]);
+    if (plan_.job.dry_run) return all;
     if (Status status = inspector_->check_file(); !status) return status.error();
     if (Status status = files_.open(); !status) return status.error();
-    return files_.take_todo();
+    if (Status status = inspector_->open(files_.head()); !status) return status.error();
+    if (!inspector_->on()) return files_.take_todo();
+    // An inspection needs all layers: the sections of kept ones are made again, without their files.
+    is_kept_.assign(all.size(), 0);
+    for (const LayerRecord& record : files_.kept()) is_kept_[record.layer.index - plan_.range[0]] = 1;
+    return all;
   }
   Status start() override { return files_.start(); }
   std::vector<LayerRecord> kept() const override { return files_.kept(); }
 
   std::vector<MakerStep> steps() override {
     std::vector<MakerStep> steps;
-    const auto add = [&](std::string_view name, auto step) {
-      steps.push_back({name, [this, step](std::uint32_t layer, const Ticket& ticket) {
+    const auto add = [&](std::string_view name, auto step, bool of_kept = true) {
+      steps.push_back({name, [this, step, of_kept](std::uint32_t layer, const Ticket& ticket) {
+                         if (!of_kept && is_kept(layer)) return Status();
                          return step(plan_.layer(layer), work_[ticket.work], made_[ticket.record]);
                        }});
     };
@@ -293,51 +192,61 @@ class ImageMaker : public Maker {
     }
     if (inspector_->on()) {
       add("inspect", [this, samples = imager_.samples()](const Layer& layer, Work& work, Made&) {
-        inspector_->inspection().prepare(work.images.runs, work.layer_inspection);
+        inspector_->prepare(work.images.runs, work.inspected);
         for (std::uint32_t i = 0; samples && i < LayerImager::kSamples; ++i) {
           imager_.sample(layer, i, work.images);
-          inspector_->inspection().add_sample(work.images.second, work.layer_inspection);
+          inspector_->add_sample(work.images.second, work.inspected);
         }
+        inspector_->end(work.inspected);
         return Status();
       });
       steps.back().needs = [this](std::uint32_t, const Ticket& ticket) -> Result<std::uint64_t> {
-        return inspector_->inspection().bytes_needed(work_[ticket.work].images.runs);
+        return inspector_->bytes_needed(work_[ticket.work].images.runs);
       };
     }
     const auto dose_needs = [this](std::uint32_t layer, const Ticket& ticket) -> Result<std::uint64_t> {
       const ImageWork& work = work_[ticket.work].images;
       const Layer of = plan_.layer(layer);
       return bytes_of(of, plan_.images->dose.parted_pixels(work.runs, work.drops)) - bytes_of(of, 0) +
-             work_[ticket.work].layer_inspection.bytes();
+             work_[ticket.work].inspected.bytes();
     };
-    add("dose", [this](const Layer& layer, Work& work, Made& made) {
-      if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
-      // What walls and fillings left out is no bleed.
-      if (plan_.images->dose.bleeds() && !plan_.images->beads) checks_.add_left(layer, work.images.runs);
-      if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
-      if (parts_) parts_->count(work.images, made.notes, made.record);
-      return Status();
-    });
+    add(
+        "dose",
+        [this](const Layer& layer, Work& work, Made& made) {
+          if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
+          // What walls and fillings left out is no bleed.
+          if (plan_.images->dose.bleeds() && !plan_.images->beads) checks_.add_left(layer, work.images.runs);
+          if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
+          if (parts_) parts_->count(work.images, made.notes, made.record);
+          return Status();
+        },
+        false);
     if (plan_.images->dose.parts_pixels()) steps.back().needs = dose_needs;
     if (plan_.job.dry_run) {
       add("program",
           [this](const Layer&, Work& work, Made& made) { return files_.program(images_of(work), work.files, made.record); });
       return steps;
     }
-    add("encode",
-        [this](const Layer&, Work& work, Made& made) { return files_.encode(images_of(work), work.files, made.record); });
-    add("store",
-        [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); });
+    add(
+        "encode",
+        [this](const Layer&, Work& work, Made& made) { return files_.encode(images_of(work), work.files, made.record); },
+        false);
+    add(
+        "store",
+        [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); }, false);
     return steps;
   }
   bool records_from_work() const override { return inspector_->on(); }
 
-  Status record(std::uint32_t, const Ticket& ticket) override {
+  Status record(std::uint32_t layer, const Ticket& ticket) override {
     const Made& made = made_[ticket.record];
+    if (inspector_->on()) {
+      if (Status status = inspector_->record(made.record.layer, work_[ticket.work].inspected); !status) return status;
+    }
+    if (is_kept(layer)) return {};
     if (!plan_.job.dry_run) {
       if (Status status = files_.record(made.record); !status) return status;
     }
-    if (inspector_->on()) inspector_->record(made.record.layer, work_[ticket.work].layer_inspection);
     observers_.layer(made.record, &made.notes);
     checks_.record(made.record.layer.index, made.record.set_pixels > 0);
     crossings_ += made.notes.report.crossings;
@@ -350,7 +259,7 @@ class ImageMaker : public Maker {
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override {
-    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].layer_inspection.bytes();
+    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].inspected.bytes();
   }
   std::uint64_t extra_bytes() const override { return inspector_->bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
@@ -360,6 +269,7 @@ class ImageMaker : public Maker {
   bool keeps() const override { return files_.started(); }
   Status finish() override {
     if (plan_.job.dry_run) return {};
+    if (Status status = inspector_->finish(); !status) return status;
     const Status status = files_.finish();
     return status ? inspector_->write(files_.head()) : status;
   }
@@ -383,13 +293,14 @@ class ImageMaker : public Maker {
   struct Work {
     ImageWork images;
     ImageFiles::FileWork files;
-    checks::LayerInspection layer_inspection;
+    Inspector::SectionWork inspected;
   };
   struct Made {
     LayerRecord record;
     ImageNotes notes;
   };
 
+  bool is_kept(std::uint32_t layer) const { return !is_kept_.empty() && is_kept_[layer - plan_.range[0]] != 0; }
   std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const {
     return imager_.bytes_of(layer, pixels) + files_.bytes_bound(imager_.drops_bound(layer, pixels), imager_.edges_bound(layer));
   }
@@ -405,6 +316,7 @@ class ImageMaker : public Maker {
   ImageFiles files_;
   std::vector<Work> work_;
   std::vector<Made> made_;
+  std::vector<std::uint8_t> is_kept_;   // by layer of the range
   std::optional<PartCounter> parts_;    // of a job with a machine
   std::vector<std::uint32_t> refills_;  // layers before which vats are filled
   Observers<ImageNotes> observers_;

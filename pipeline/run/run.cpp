@@ -158,10 +158,7 @@ Status make_layers(Plan& plan, Maker& maker, JobChecks& checks, const FlowLimits
   std::uint32_t done = layers - static_cast<std::uint32_t>(todo->size());
   progress({ProgressEvent::Stage::kLayers, done, layers});
   const Stopwatch moving;
-  const std::function<void()> recorded = [&] {
-    ++summary.layers_planned;
-    progress({ProgressEvent::Stage::kLayers, ++done, layers});
-  };
+  const std::function<void()> recorded = [&] { progress({ProgressEvent::Stage::kLayers, ++done, layers}); };
   const std::function<std::uint32_t(std::uint32_t)> layer_at = [&](std::uint32_t position) {
     return plan.undecided ? position : (*todo)[position];
   };
@@ -179,6 +176,7 @@ Status make_layers(Plan& plan, Maker& maker, JobChecks& checks, const FlowLimits
   const std::uint32_t count = plan.undecided ? plan.undecided->max_layers() : static_cast<std::uint32_t>(todo->size());
   const Status moved = flow_layers(count, steps, limits, cancel, report);
   if (!moved) return ended_early(maker, moved.error(), done > 0, shared);
+  summary.layers_planned = done - summary.layers_kept;
   if (Status status = check_job(plan, maker, checks, shared, summary); !status) {
     return cut_short(status) ? ended_early(maker, status.error(), done > 0, shared) : status;
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pipeline/manifest/inspection_file.h"
+#include "pipeline/manifest/kept_sections.h"
 #include "stages/support/text/escape.h"
 #include "stages/support/text/json_value.h"
 
@@ -96,9 +97,14 @@ void add(const Json& json, const Shown& shown, ReportLayers& detected) {
     if (warning.contains("layer")) reported.layer = shown.layer(warning.at("layer"));
   }
   const Json& found = json.at("inspection");
-  constexpr std::array<std::pair<const char*, const char*>, 8> kKinds = {
-      {{"islands", "mm2"}, {"loose", "mm3"}, {"hollows", "mm3"}, {"drains", "mm3"},
-       {"thin", "mm2"}, {"roofs", "mm2"}, {"gaps", "mm2"}, {"contacts", "mm2"}}};
+  constexpr std::array<std::pair<const char*, const char*>, 8> kKinds = {{{"islands", "mm2"},
+                                                                          {"loose", "mm3"},
+                                                                          {"hollows", "mm3"},
+                                                                          {"drains", "mm3"},
+                                                                          {"thin", "mm2"},
+                                                                          {"roofs", "mm2"},
+                                                                          {"gaps", "mm2"},
+                                                                          {"contacts", "mm2"}}};
   for (const auto& [code, unit] : kKinds) {
     if (!found.at(code).contains("locations")) continue;
     for (const Json& position : found.at(code).at("locations"))
@@ -167,6 +173,8 @@ void add_inspection(const std::string& directory, const ManifestHead& head, bool
                     ReportLayers& detected) {
   if (head.product != Product::kImages) return;
   const auto json = read_inspection(directory, head);
+  if (!json && is_file(sections_path(directory + "/manifest.json")))
+    detected.warnings.push_back({"not-inspected", "layers are inspected by lamina merge, once it has all of them"});
   if (!json) return;
   ReportLayers with = {};
   const Shown shown{head.grid, mirrored_x, mirrored_y, head.layer_count};

@@ -182,5 +182,113 @@ TEST_F(InspectedReports, AThinWallIsOnePosition) {
   EXPECT_NEAR(locations[0]["mm"][0].get<double>(), 25, 0.5);
 }
 
+/// Jobs whose images lack what their inspection needs: bleed and mirrors, levels, no files at all.
+const Words kMore[] = {{}, {"--mirror", "xy", "--bleed", "150"}, {"--levels", "4"}, {"--format", "null"}, {"--threads", "1"}};
+
+TEST_F(InspectedReports, OfAResumedRunIsThatOfAnUninterruptedOne) {
+  planted();
+  for (const Words& more : kMore) {
+    Words words = job(more);
+    words.insert(words.end(), {"--inspect", "--overwrite"});
+    ASSERT_EQ(lamina(words).code, 0);
+    const std::string whole = tree_text(directory_ / "out"), manifest = read_text(directory_ / "out/manifest.json");
+    ASSERT_NE(whole.find("\"hollows\":{\"count\":1"), std::string::npos);
+    words.back() = "--resume";
+    for (const int kept : {30, 29, 12, 1, 0}) {
+      fs::remove(directory_ / "out/inspection.json");
+      if (kept < 30) {
+        std::size_t end = manifest.find("\"layers\": [") + 11;
+        for (int i = 0; i < kept; ++i) end = manifest.find('\n', end + 1);
+        write_text(directory_ / "out/manifest.json.part", manifest.substr(0, end));
+        fs::remove(directory_ / "out/manifest.json");
+      }
+      words.push_back("--json");
+      const Outcome outcome = lamina(words);
+      words.pop_back();
+      ASSERT_EQ(outcome.code, 0) << outcome.err;
+      EXPECT_EQ(Json::parse(outcome.out)["layers_kept"], kept);
+      EXPECT_EQ(Json::parse(outcome.out)["layers_planned"], 30 - kept);
+      EXPECT_TRUE(tree_text(directory_ / "out") == whole) << kept << " kept, " << (more.empty() ? "" : more[0]);
+    }
+  }
+}
+
+TEST_F(InspectedReports, OfMergedShardsAndRangesIsThatOfAWholeRun) {
+  planted();
+  for (const Words& more : kMore) {
+    Words words = job(more);
+    words.insert(words.end(), {"--inspect", "--overwrite"});
+    ASSERT_EQ(lamina(words).code, 0);
+    const std::string whole = tree_text(directory_ / "out");
+    const auto part = [&](const std::string& flag, const std::string& value, const std::string& output) {
+      Words one = words;
+      *(std::find(one.begin(), one.end(), "-o") + 1) = output;
+      one.insert(one.end(), {flag, value, "--json"});
+      const Outcome outcome = lamina(one);
+      EXPECT_EQ(outcome.code, 0) << outcome.err;
+      EXPECT_EQ(Json::parse(outcome.out)["inspection"]["layers"], 0) << "not yet";
+      EXPECT_FALSE(fs::exists(directory_ / (output + "/inspection.json")));
+    };
+    for (const char* shard : {"3/3", "1/3", "2/3"}) part("--shard", shard, "shards");
+    for (const char* shard : {"1/2", "2/2"}) part("--shard", shard, std::string("s") + shard[0]);
+    part("--layers", "0:13", "low");
+    part("--layers", "13:30", "high");
+    for (const Words& merge : {Words{"merge", "shards", "-o", "shards"}, Words{"merge", "s2", "s1", "-o", "joined"},
+                               Words{"merge", "low", "high", "-o", "ranges"}, Words{"merge", "low", "high", "-o", "low"}}) {
+      const Outcome outcome = lamina(merge);
+      EXPECT_EQ(outcome.code, 0) << outcome.err;
+      EXPECT_NE(outcome.err.find("one closed hollow"), std::string::npos) << outcome.err;
+      EXPECT_TRUE(tree_text(directory_ / merge.back()) == whole) << merge.back() << (more.empty() ? "" : more[0]);
+    }
+    for (const char* done : {"shards", "s1", "s2", "joined", "ranges", "low", "high"}) fs::remove_all(directory_ / done);
+  }
+}
+
+TEST_F(InspectedReports, ThatCannotBeMadeAreReportedByTheMerge) {
+  planted();
+  ASSERT_EQ(lamina(job({"--inspect"})).code, 0);
+  const std::string whole = tree_text(directory_ / "out");
+  const auto shard = [&](const char* number, Words more) {
+    more.insert(more.end(), {"--shard", std::string(number) + "/2", "-o", std::string("s") + number});
+    Words words = job(more);
+    words.erase(std::find(words.begin(), words.end(), "-o"), std::find(words.begin(), words.end(), "-o") + 2);
+    EXPECT_EQ(lamina(words).code, 0);
+  };
+  const auto merged = [&](const Words& more) {
+    Words words{"merge", "s1", "s2", "-o", "m"};
+    words.insert(words.end(), more.begin(), more.end());
+    return lamina(words);
+  };
+  const auto not_inspected = [&](const std::string& why) {
+    const Outcome strict = merged({"--strict"});
+    EXPECT_EQ(strict.code, 5) << why;
+    EXPECT_FALSE(fs::exists(directory_ / "m")) << why;
+    const Outcome outcome = merged({});
+    EXPECT_EQ(outcome.code, 0);
+    EXPECT_NE(outcome.err.find("the layers were not inspected: s2/inspection-2-of-2.zst: " + why), std::string::npos)
+        << outcome.err;
+    EXPECT_FALSE(fs::exists(directory_ / "m/inspection.json"));
+    fs::remove_all(directory_ / "m");
+  };
+  shard("1", {"--inspect"});
+  shard("2", {});
+  not_inspected("No such file");
+  shard("2", {"--resume", "--inspect", "--min-wall", "1"});
+  not_inspected("--min-wall differs");
+  shard("2", {"--resume", "--inspect"});
+  const std::string sections = read_text(directory_ / "s2/inspection-2-of-2.zst");
+  for (std::size_t at = 20; at < sections.size(); at += sections.size() / 7) {
+    std::string torn = sections;
+    torn[at] = static_cast<char>(torn[at] ^ 4);
+    write_text(directory_ / "s2/inspection-2-of-2.zst", torn);
+    not_inspected("");
+  }
+  write_text(directory_ / "s2/inspection-2-of-2.zst", sections.substr(0, sections.size() / 2));
+  not_inspected("");
+  write_text(directory_ / "s2/inspection-2-of-2.zst", sections);
+  EXPECT_EQ(merged({}).code, 0);
+  EXPECT_TRUE(tree_text(directory_ / "m") == whole);
+}
+
 }  // namespace
 }  // namespace lamina::test

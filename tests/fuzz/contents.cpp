@@ -1,8 +1,8 @@
-// Files of one Zstandard frame, as print programs are stored.
-#include "stages/support/io/compressed.h"
-
+// Files of one Zstandard frame, as print programs are stored, and the sections that an inspection keeps in one.
 #include <zstd.h>
 
+#include "pipeline/manifest/kept_sections.h"
+#include "stages/support/io/compressed.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -41,6 +41,41 @@ std::vector<std::string> content_seeds() {
 }
 
 const Registered kContents({"contents", read_content_of, content_seeds, "stages/support/io/compressed", ""});
+
+bool equal(const Runs& one, const Runs& other) {
+  return one.columns == other.columns && one.row_offset == other.row_offset && one.change == other.change;
+}
+
+bool read_section(std::string_view bytes) {
+  const PixelGrid grid{PixelAxis(254, kNmPerMm), PixelAxis(254, 2 * kNmPerMm)};
+  const auto section = section_of(std::as_bytes(std::span(bytes)), grid);
+  if (!section) return false;
+  Buffer<std::byte> block;
+  for (const Runs* image : {&section->image, &section->sampled}) {
+    if (image == &section->sampled && !section->has_samples) continue;
+    const RunsView runs = *image;
+    law(runs.columns == grid.columns() && runs.rows() == grid.rows(), "an image of another size");
+    law(runs.row_offset.back() == runs.change.size(), "changes beyond the last row");
+    for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+      const auto row = runs.row(r);
+      law(row.size() % 2 == 0 && (row.empty() || row.back() <= runs.columns), "a run beyond the image");
+      for (std::size_t i = 1; i < row.size(); ++i) law(row[i - 1] < row[i], "runs out of order");
+    }
+    add_image(runs, block);
+  }
+  const auto again = section_of(block, grid);
+  law(again && again->has_samples == section->has_samples, "what was written is not read");
+  law(equal(again->image, section->image) && equal(again->sampled, section->sampled), "it comes back as another section");
+  return true;
+}
+
+std::vector<std::string> section_seeds() {
+  // No pixels; rows 2 and 20 with runs of 2 to 5, 7 to 10, and of all columns; the same as image and samples.
+  const std::string image("\x02\x02\x02\x03\x02\x03\x12\x01\x00\x0a\x00", 11);
+  return {std::string(1, '\0'), image, image + image};
+}
+
+const Registered kSections({"sections", read_section, section_seeds, "pipeline/manifest/kept_sections", ""});
 
 }  // namespace
 }  // namespace lamina::fuzz

@@ -3,8 +3,8 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/job/errors.h"
-#include "pipeline/output/merge.h"
 #include "pipeline/report/summary.h"
+#include "pipeline/run/merge.h"
 #include "stages/support/text/json_value.h"
 #include "stages/support/text/readable.h"
 

@@ -12,7 +12,7 @@
 #include "pipeline/check/verify.h"
 #include "pipeline/job/job.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/output/merge.h"
+#include "pipeline/run/merge.h"
 #include "pipeline/run/run.h"
 #include "stages/data/status.h"
 #include "tests/commands/program.h"

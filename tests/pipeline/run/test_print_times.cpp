@@ -5,7 +5,7 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/output/merge.h"
+#include "pipeline/run/merge.h"
 #include "pipeline/run/run.h"
 #include "tests/commands/program.h"
 

@@ -17,7 +17,7 @@
 #include "pipeline/job/profiles/printer.h"
 #include "pipeline/machine/materials.h"
 #include "pipeline/manifest/manifest.h"
-#include "pipeline/output/merge.h"
+#include "pipeline/run/merge.h"
 #include "pipeline/run/run.h"
 #include "stages/formats/images/image.h"
 #include "stages/raster/images.h"

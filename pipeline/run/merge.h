@@ -1,4 +1,4 @@
-// pipeline/output/merge.h: merges the shards of a job.
+// pipeline/run/merge.h: merges the shards of a job.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "pipeline/output/merge.h"
+#include "pipeline/run/merge.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,12 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/manifest/compare.h"
+#include "pipeline/manifest/inspection_file.h"
+#include "pipeline/manifest/kept_sections.h"
 #include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
+#include "pipeline/run/inspector.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/support/io/compressed.h"
 #include "stages/support/io/file.h"
@@ -158,6 +161,7 @@ Status remove_shard_manifests(const std::string& output) {
   for (const ManifestFile& file : find_manifests(output)) {
     const fs::path path = fs::path(output) / file.name;
     std::error_code error;
+    remove_sections(path.string());
     if (file.shard) fs::remove(path, error);
     if (error)
       return Error{Fault::kOutput, fmt::format("{}: merged, and not needed any more, but cannot be removed: {}", path.string(),
@@ -188,7 +192,7 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
 }
 
 /// shards  that cover all layers, in their order
-Status check(std::span<const Shard> shards, bool strict, bool allow_empty, MergeReport& report) {
+Status check(std::span<const Shard> shards, bool allow_empty, MergeReport& report) {
   const ManifestHead& head = shards.front().manifest.head;
   Job job;
   if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
@@ -203,8 +207,16 @@ Status check(std::span<const Shard> shards, bool strict, bool allow_empty, Merge
     }
   }
   for (const UnfedPowder& powder : unfed) checks::warn_of_unfed(powder, report.warnings);
-  const Status status = records.check(head.parts, thins(job), allow_empty, report.warnings);
-  return status && strict ? checks::refuse_warnings(report.warnings) : status;
+  return records.check(head.parts, thins(job), allow_empty, report.warnings);
+}
+
+/// The findings of the shards' layers, if the shards were to inspect them.
+std::optional<Json> inspect(std::span<const Shard> shards, std::vector<Warning>& warnings) {
+  std::vector<KeptLayers> kept;
+  for (const Shard& shard : shards) kept.push_back({shard.path, shard.manifest.layers});
+  WholeInspection found = inspect_kept(shards.front().manifest.head, kept);
+  warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
+  return std::move(found.facts);
 }
 
 }  // namespace
@@ -216,7 +228,8 @@ Result<MergeReport> merge(const MergeRequest& request) {
   MergeReport report;
   report.output = output;
   if (const auto whole = whole_job(request.directories, *shards, output)) {
-    if (Status status = check({&*whole, 1}, request.strict, true, report); !status) return status.error();
+    if (Status status = check({&*whole, 1}, true, report); !status) return status.error();
+    if (Status status = checks::refuse_warnings(report.warnings); request.strict && !status) return status.error();
     if (Status status = bring_files(*whole, output, report); !status) return status.error();
     if (Status status = end_earlier_merge(output); !status) return status.error();
     report.layers = whole->manifest.layers.size();
@@ -224,8 +237,10 @@ Result<MergeReport> merge(const MergeRequest& request) {
   }
   if (shards->empty()) return unmatched(fmt::format("{}: contains no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
-  const Status sane = check(*shards, request.strict, request.allow_empty, report);
-  if (!sane) return sane.error();
+  if (Status status = check(*shards, request.allow_empty, report); !status) return status.error();
+  const std::optional<Json> inspection = inspect(*shards, report.warnings);
+  if (Status status = checks::refuse_warnings(report.warnings); request.strict && !status) return status.error();
+  if (Status status = inspection ? check_inspection_file(output) : Status(); !status) return status.error();
 
   std::error_code error;
   fs::create_directories(output, error);
@@ -263,6 +278,9 @@ Result<MergeReport> merge(const MergeRequest& request) {
     }
     report.layers += shard.manifest.layers.size();
   }
+  // Before the manifest, after which shards are not read again.
+  if (Status status = inspection ? write_inspection(output, head, *inspection) : keep_inspection_of(output, head); !status)
+    return status.error();
   if (Status status = writer->finish({}, [&sync] { return sync.sync(); }); !status) return status.error();
   if (Status status = remove_shard_manifests(output); !status) return status.error();
   return report;
