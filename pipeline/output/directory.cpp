@@ -12,6 +12,7 @@
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/file.h"
+#include "pipeline/manifest/kept_sections.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/shortage.h"
 #include "stages/support/hash/hash.h"
@@ -154,12 +155,14 @@ Result<Claim> prepare_output(const Job& job, MadeFolders& made) {
   for (const fs::path& position : {directory, layers}) {
     if (::access(position.c_str(), W_OK | X_OK) != 0) return cannot(position, errno);
   }
+  remove_leftovers(job.output, [](std::string_view name) { return name.starts_with("inspection"); });
   if (!job.overwrite) {
     if (!job.shard) sweep_partial_files(job.output);
     return claim;
   }
   for (const ManifestFile& file : find_manifests(job.output)) {
     if (joins(job, file) || file.name == part_of(manifest_name(job))) continue;  // the claim is in that name
+    remove_sections(directory / file.name);
     fs::remove(directory / file.name, error);
     if (error) return cannot(directory / file.name, error.value());
   }

@@ -1,22 +1,63 @@
 #include "pipeline/output/temporary_folder.h"
 
+#include <fcntl.h>
 #include <stdlib.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <filesystem>
+#include <utility>
 
 namespace lamina::pipeline {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+std::string lock_of(const std::string& folder) { return folder + "/lock"; }
+
+/// Removes folders of killed runs: those without a locked file.
+void remove_abandoned(const fs::path& position, const std::string& stem) {
+  std::error_code error;
+  for (fs::directory_iterator entry(position, error), end; !error && entry != end; entry.increment(error)) {
+    const fs::path path = entry->path();
+    std::error_code ignored;
+    if (!path.filename().string().starts_with(stem) || !fs::is_directory(entry->symlink_status(ignored))) continue;
+    const int lock = ::open(lock_of(path.string()).c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
+    if (lock < 0) {
+      fs::remove(path, ignored);  // fails if it has files
+    } else if (::flock(lock, LOCK_EX | LOCK_NB) == 0) {
+      fs::remove_all(path, ignored);
+    }
+    if (lock >= 0) ::close(lock);
+  }
+}
+
+}  // namespace
+
 TemporaryFolder::TemporaryFolder(const std::string& purpose) {
+  const std::string stem = "lamina_" + purpose + "_";
   std::error_code none;
-  std::string name = (fs::temp_directory_path(none) / ("lamina_" + purpose + "_XXXXXX")).string();
-  if (!none && mkdtemp(name.data()) != nullptr) path_ = name;
+  const fs::path position = fs::temp_directory_path(none);
+  if (none) return;
+  remove_abandoned(position, stem);
+  for (int tries = 0; tries < 16 && path_.empty(); ++tries) {
+    std::string name = (position / (stem + "XXXXXX")).string();
+    if (mkdtemp(name.data()) == nullptr) return;
+    lock_ = ::open(lock_of(name).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    // Another run may have removed it before it had its lock.
+    if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) == 0 && ::access(lock_of(name).c_str(), F_OK) == 0) {
+      path_ = name;
+    } else if (lock_ >= 0) {
+      ::close(std::exchange(lock_, -1));
+    }
+  }
 }
 
 TemporaryFolder::~TemporaryFolder() {
   std::error_code ignored;
   if (!path_.empty()) fs::remove_all(path_, ignored);
+  if (lock_ >= 0) ::close(lock_);
 }
 
 Status TemporaryFolder::status() const {

@@ -7,7 +7,7 @@
 
 namespace lamina::pipeline {
 
-/// In TMPDIR; gone with all that is in it when it is left.
+/// In TMPDIR; gone with all that is in it when it is left. One of a killed run is removed by the next run of the same purpose.
 class TemporaryFolder {
  public:
   /// purpose  a word of its name, as in "design"
@@ -22,6 +22,7 @@ class TemporaryFolder {
 
  private:
   std::string path_;
+  int lock_ = -1;  // of a file in it
 };
 
 }  // namespace lamina::pipeline

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <thread>
 
 #include "pipeline/cli/command.h"
@@ -24,66 +25,37 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A call that writes under the name in place of @.
+/// A row of outputs.tsv.
 struct Row {
-  std::string_view command, flag, call;
-  const char* read;        // an input of the call
-  const char* lock = "";   // of a directory: the file in it whose writer holds it
-  bool directory = false;  // of files; else a file
-  bool stream = false;     // may be a device or a pipe
-  bool product = false;    // replaces nothing by itself, not even its own kind
+  std::string call, flag, read, lock;
+  bool directory, stream, product;
+  std::string command = call.substr(0, call.find(' '));
 };
 
-const Row kRows[] = {
-    {"jet", "-o,--output", "jet part.stl --layer 1 --dpi 60 --quiet -o @", "part.stl", "/manifest.json", true, false, true},
-    {"jet", "-o,--output", "jet part.stl --layer 1 --machine hp45 --quiet -o @", "part.stl", "/manifest.json", true, false,
-     true},
-    {"jet", "--save-job", "jet part.stl --layer 1 --dry-run --quiet --save-job @", "part.stl"},
-    {"jet", "--quote", "jet part.stl --layer 1 --machine hp45 --dry-run --quiet --quote @", "part.stl"},
-    {"slice", "-o,--output", "slice part.stl --layer 1 --quiet -o @", "part.stl", "/manifest.json", true, false, true},
-    {"slice", "-o,--output", "slice part.stl --layer 1 --file-a-layer --quiet -o @", "part.stl", "/manifest.json", true, false,
-     true},
-    {"slice", "-o,--output", "slice part.stl --layer 1 --format 3mf --quiet -o @", "part.stl", "/manifest.json", true, false,
-     true},
-    {"slice", "--save-job", "slice part.stl --layer 1 --dry-run --quiet --save-job @", "part.stl"},
-    {"extrude", "-o,--output", "extrude part.stl --machine anet-a8 --layer 0.3 --quiet -o @", "part.stl", "", false, true,
-     true},
-    {"extrude", "-o,--output", "extrude part.stl --machine fdm-2000 --layer 0.254 --quiet -o @.sml", "part.stl", "", false,
-     false, true},
-    {"extrude", "--save-job", "extrude part.stl --layer 0.3 --dry-run --quiet --save-job @", "part.stl"},
-    {"export", "-o,--output", "export part.stl --quiet -o @", "part.stl", "", false, true, true},
-    {"export", "-o,--output", "export part.stl --quiet -o @.3mf", "part.stl", "", false, false, true},
-    {"export", "--save-job", "export part.stl --quiet -o - --save-job @", "part.stl"},
-    {"heights", "-o,--output", "heights part.stl --layer 1 --quiet -o @", "part.stl", "", false, true},
-    {"heights", "--plot", "heights part.stl --layer 1 --quiet --plot @.svg", "part.stl"},
-    {"heights", "--plot", "heights part.stl --layer 1 --quiet --plot @.png", "part.stl"},
-    {"heights", "--save-job", "heights part.stl --layer 1 --quiet --save-job @", "part.stl"},
-    {"calibrate", "-o,--output", "calibrate --machine anet-a8 --quiet -o @", "printer.toml", "/widths.csv", true, false, true},
-    {"calibrate", "-o,--output", "calibrate --machine printer.toml --measured widths.csv --quiet -o @", "widths.csv"},
-    {"calibrate", "-o,--output", "calibrate --machine hp45 --quiet -o @", nullptr, "/chart.json", true, false, true},
-    {"calibrate", "-o,--output", "calibrate --machine hp45 --drops 1000 --quiet -o @", nullptr, "/drops.json", true, false,
-     true},
-    {"calibrate", "-o,--output", "calibrate --machine hp45 --drops 1000 --weighed-mg 0.04 --quiet -o @", nullptr},
-    {"calibrate", "--overlay", "calibrate --machine nuferbj --chart sheet --scan photo.png --quiet -o y.toml --overlay @.png",
-     "photo.png"},
-    {"design", "-o,--output", "design --pore 0.12x0.9 --machine printer.toml --voxel 40 --quiet -o @", "printer.toml"},
-    {"permeability", "--plot", "permeability drops.csv --convention dinisio2022 --plot @.svg", "drops.csv"},
-    {"permeability", "--plot", "permeability made.gcode --window 5,3.9,0.6 --voxel 100 --plot @.svg", "made.gcode"},
-    {"permeability", "--plot", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --plot @.png", "made.gcode"},
-    {"permeability", "--solid", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --solid @.mha", "made.gcode"},
-    {"permeability", "--void", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --void @.stl", "made.gcode"},
-    {"convert", "-o,--output", "convert made/layers --format bmp --quiet -o @", "made/layers/000000.tif", "/manifest.json",
-     true, false, true},
-    {"merge", "-o,--output", "merge shards --quiet -o @", "part.stl", "/manifest.json", true},
-    {"machines", "--target", "machines --target @", nullptr},
-    {"preview", "-o,--output", "preview made.gcode --quiet -o @.svg", "made.gcode"},
-    {"preview", "-o,--output", "preview made.gcode --quiet -o @.png", "made.gcode"},
-    {"verify", "--quote", "verify powder --quiet --quote @", nullptr},
-    {"stream", "-o,--output", "stream powder --quiet -o @", nullptr, "", false, true, true},
-    {"report", "-o,--output", "report made --quiet -o @.html", nullptr},
-    {"batch", "-o,--output", "batch list.txt --quiet -o @", "list.txt", "/summary.json", true, false, true},
-    {"manual", "-o,--output", "manual --markdown -o @", nullptr, "/jet.md", true},
-};
+std::vector<Row> read_rows() {
+  std::istringstream table(read_text(fs::path(LAMINA_TEST_DIR) / "commands/outputs.tsv"));
+  std::vector<Row> rows;
+  for (std::string line; std::getline(table, line);) {
+    if (line.starts_with("#") || line.starts_with("call\t")) continue;
+    std::vector<std::string> cells(1);
+    for (const char one : line) one == '\t' ? cells.emplace_back() : cells.back() += one;
+    cells.resize(5);
+    const auto is = [&](const char* kind) { return cells[4].find(kind) != std::string::npos; };
+    rows.push_back({cells[0], cells[1], cells[2], cells[3], is("directory"), is("stream"), is("product")});
+  }
+  return rows;
+}
+
+/// Rows of outputs, and calls that make their inputs.
+std::vector<Row> rows_of(bool outputs) {
+  std::vector<Row> rows = read_rows();
+  std::erase_if(rows, [&](const Row& row) { return row.flag.empty() == outputs; });
+  return rows;
+}
+const std::vector<Row>& output_rows() {
+  static const std::vector<Row> rows = rows_of(true);
+  return rows;
+}
 
 /// Values of options that name no file, in addition to lists of words to choose from.
 const std::set<std::string_view> kNoFiles = {"A:B",
@@ -140,7 +112,7 @@ const std::set<std::string_view> kNoFiles = {"A:B",
                                              "X,Y",
                                              "X,Y,Z"};
 
-std::string all_messages(const Outcome& outcome, const Row& row) { return std::string(row.call) + "\n" + outcome.err; }
+std::string all_messages(const Outcome& outcome, const Row& row) { return row.call + "\n" + outcome.err; }
 
 class EveryOutput : public ::testing::Test {
  protected:
@@ -151,13 +123,8 @@ class EveryOutput : public ::testing::Test {
     fs::copy(tests / ".." / "pipeline/machine/shipped/extruders/anet-a8.toml", directory_ / "printer.toml");
     write_text(directory_ / "widths.csv", kWidths);
     write_text(directory_ / "list.txt", "info part.stl\n");
-    for (const char* line :
-         {"jet part.stl --layer 1 --dpi 60 --quiet -o made",
-          "jet part.stl --layer 1 --dpi 60 --quiet -o shards "
-          "--shard 1/1",
-          "jet part.stl --layer 1 --machine hp45 --quiet -o powder", "calibrate --machine nuferbj --quiet -o sheet",
-          "preview sheet/print --layer 0 --quiet -o photo.png",
-          "extrude part.stl --machine anet-a8 --layer 0.3 --quiet -o made.gcode"}) {
+    for (const Row& row : rows_of(false)) {
+      const std::string& line = row.call;
       const Outcome outcome = run(line);
       EXPECT_EQ(outcome.code, 0) << line << outcome.err;
     }
@@ -165,7 +132,7 @@ class EveryOutput : public ::testing::Test {
 
   Outcome run(const std::string& line) { return run_lamina(words_of(line), directory_.path()); }
   static std::string line_of(const Row& row, const std::string& name) {
-    std::string line(row.call);
+    std::string line = row.call;
     return line.replace(line.find('@'), 1, name);
   }
   /// The name of the output, with the ending that the row's call gives it.
@@ -206,8 +173,8 @@ TEST(EveryOutputOption, HasARowHere) {
   for (const pipeline::Command* command : pipeline::commands()) {
     for (const pipeline::OptionSpec& option : pipeline::spec_of(*command).options) {
       if (!pipeline::is_output_option(option.flag)) continue;
-      EXPECT_TRUE(
-          std::ranges::any_of(kRows, [&](const Row& row) { return row.command == command->name && row.flag == option.flag; }))
+      EXPECT_TRUE(std::ranges::any_of(output_rows(),
+                                      [&](const Row& row) { return row.command == command->name && row.flag == option.flag; }))
           << command->name << " " << option.flag;
     }
   }
@@ -225,7 +192,7 @@ TEST(EveryOutputOption, ANewKindOfValueIsSaidToBeAFileOrNot) {
 }
 
 TEST_F(EveryOutput, AppearsWholeAndAloneAndIsWrittenAgainOnlyByItsOwnKind) {
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     const Outcome first = run(line_of(row, "x"));
     EXPECT_EQ(first.code, 0) << all_messages(first, row);
     EXPECT_TRUE(fs::exists(directory_ / target_of(row, "x"))) << row.call;
@@ -242,7 +209,7 @@ TEST_F(EveryOutput, AppearsWholeAndAloneAndIsWrittenAgainOnlyByItsOwnKind) {
 
 TEST_F(EveryOutput, SomebodysFileIsNotReplacedUnderAnyNameOrLink) {
   fs::create_directory(directory_ / "far");
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     const std::string target = target_of(row, "x");
     for (const bool link : {false, true}) {
       const std::string file = link ? "far/mine" : target;
@@ -259,7 +226,7 @@ TEST_F(EveryOutput, SomebodysFileIsNotReplacedUnderAnyNameOrLink) {
 }
 
 TEST_F(EveryOutput, LinksThatLeadNowhereOrRoundStayLinks) {
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     const std::string target = target_of(row, "x");
     for (const std::string& to : {std::string("far"), target}) {
       fs::create_symlink(to, directory_ / target);
@@ -275,7 +242,7 @@ TEST_F(EveryOutput, LinksThatLeadNowhereOrRoundStayLinks) {
 }
 
 TEST_F(EveryOutput, NeitherAPipeNorADirectoryThereInsteadIsReplaced) {
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     const std::string target = target_of(row, "x");
     if (!row.directory) {
       fs::create_directory(directory_ / target);
@@ -296,8 +263,8 @@ TEST_F(EveryOutput, NeitherAPipeNorADirectoryThereInsteadIsReplaced) {
 }
 
 TEST_F(EveryOutput, WhatIsReadSurvivesOverwrite) {
-  for (const Row& row : kRows) {
-    if (row.read == nullptr) continue;
+  for (const Row& row : output_rows()) {
+    if (row.read.empty()) continue;
     const std::string target = target_of(row, "x"), before = read_text(directory_ / row.read);
     fs::create_hard_link(directory_ / row.read, directory_ / target);
     refused(row, run(forced(row, "x")));
@@ -313,7 +280,7 @@ TEST_F(EveryOutput, WhatIsReadSurvivesOverwrite) {
 
 TEST_F(EveryOutput, SomebodysPartAndWhatItLeadsToStay) {
   write_text(directory_ / "victim", kMine);
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     const std::string target = target_of(row, "x"), part = directory_ / (target + row.lock + ".part");
     for (const bool link : {false, true}) {
       if (row.directory) fs::create_directory(directory_ / target);
@@ -333,13 +300,13 @@ TEST_F(EveryOutput, SomebodysPartAndWhatItLeadsToStay) {
 }
 
 TEST_F(EveryOutput, WhileAnotherRunWritesTheCallIsRefused) {
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     const std::string target = target_of(row, "x");
     if (row.directory) fs::create_directory(directory_ / target);
     std::optional<Claim> claim;
     std::optional<File> file;
     const std::string locked = directory_ / (target + row.lock);
-    if (std::string_view(row.lock) == "/manifest.json") {
+    if (row.lock == "/manifest.json") {
       auto taken = Claim::take(locked, locked);
       ASSERT_TRUE(taken.ok());
       claim.emplace(std::move(*taken));
@@ -362,7 +329,7 @@ TEST_F(EveryOutput, WhileAnotherRunWritesTheCallIsRefused) {
 }
 
 TEST_F(EveryOutput, OfTwoThatBeginAtOnceWhatStaysIsWhole) {
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     if (row.flag == "--save-job" && row.command != "jet") continue;  // one function writes them all
     const std::string target = target_of(row, "x");
     std::string alone;
@@ -397,7 +364,7 @@ TEST_F(EveryOutput, AFullDiskIsOneLineAndNothingUnderAFinalName) {
   const bool mounted = ::mount("none", disk.c_str(), "tmpfs", 0, "size=64k") == 0;
   rlimit before{};
   ::getrlimit(RLIMIT_FSIZE, &before);
-  for (const Row& row : kRows) {
+  for (const Row& row : output_rows()) {
     if (row.flag == "--save-job" && row.command != "jet") continue;
     const std::string target = target_of(row, "disk/x");
     if (mounted) {

@@ -45,6 +45,7 @@ def check(ran, words, tally, name, ends):
 def full(program, job, ref, folder, size_kb, tally):
     """The job on a disk of this size, then on one that is large enough."""
     mount(folder, 1 << 18)
+    jobs.add_inputs(folder, job)
     for words in (*job.before, *job.cut_short):
         program.run(words, folder)
     used = os.statvfs(folder)
@@ -73,7 +74,7 @@ def full(program, job, ref, folder, size_kb, tally):
 
 def limited(program, job, ref, folder, size_kb, tally):
     """No file may grow beyond this size."""
-    jobs.fresh(folder)
+    jobs.fresh(folder, job)
     for words in (*job.before, *job.cut_short):
         program.run(words, folder)
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import shutil
+import struct
 import subprocess
 import time
 
@@ -26,9 +27,11 @@ class Job:
     unlike: tuple = ()         # names of files that hold times, so that two runs differ in them
     over: bool = False         # an older job of another kind stands there at first
     counts_layers: bool = False  # its --json names the layers that a second run keeps
+    inputs: dict = dataclasses.field(default_factory=dict)  # files that the folder has from the beginning: name to bytes
     ends: int = 0              # exit code of a whole run
     when_done: int = None      # exit code of resuming finished work, if it is another one
     cut_short: list = dataclasses.field(default_factory=list)  # commands of `before` that are killed too
+    whole: list = None         # a command that leaves the same files without the others
 
 
 def jet(name, arguments, other_part=NUT):
@@ -56,17 +59,83 @@ def resumed(name, arguments, other_part=NUT, out="out"):
                other=[arguments[0], other_part, *arguments[2:], *common], counts_layers=out == "out")
 
 
-def merged():
-    shards = [["jet", NIST, "--dpi", "300", "--layer", "0.1", "--shard", f"{i}/4", "-o", f"s{i}", "--quiet"] for i in (1, 2, 3, 4)]
+def merged(more=()):
+    job = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "--quiet", *more]
+    shards = [[*job, "--shard", f"{i}/4", "-o", f"s{i}"] for i in (1, 2, 3, 4)]
     merge = ["merge", "s1", "s2", "s3", "s4", "-o", "out", "--quiet"]
-    return Job("merge of 4 shards", merge, merge, before=shards)
+    return Job(" ".join(["merge of 4 shards", *more]), merge, merge, before=shards, whole=[*job, "-o", "out"])
 
 
-def sharded():
-    """Shards in one directory, each cut short and begun again, then merged there."""
-    shards = [["jet", NIST, "--dpi", "300", "--layer", "0.1", "--shard", f"{i}/3", "-o", "out", "--quiet"] for i in (1, 2, 3)]
+def sharded(more=()):
+    """Shards in one directory, each cut short and begun again, then merged there: the files of a whole run."""
+    whole = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "-o", "out", "--quiet", *more]
+    shards = [[*whole, "--shard", f"{i}/3", "--resume"] for i in (1, 2, 3)]
     merge = ["merge", "out", "-o", "out", "--quiet"]
-    return Job("shards in one directory", merge, merge, cut_short=[[*shard, "--resume"] for shard in shards])
+    return Job(" ".join(["shards in one directory", *more]), merge, merge, cut_short=shards, whole=whole)
+
+
+def converted():
+    """A stack of images to another format, and to grey."""
+    images = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "-o", "job", "--quiet"]
+    begin = ["convert", "job/layers", "--format", "png-8", "-o", "out", "--quiet"]
+    return Job("convert", begin, [*begin, "--overwrite"], before=[images],
+               other=["convert", "job/layers", "--format", "bmp", "-o", "out", "--quiet"])
+
+
+def image_part():
+    """A part that is a stack of images."""
+    images = ["jet", NUT, "--dpi", "200", "--layer", "0.2", "-o", "job", "--quiet"]
+    begin = ["jet", "job/layers", "--layer", "0.2", "--dpi", "200", "-o", "out", "--json"]
+    return Job("jet, image part", begin, [*begin, "--resume"], before=[images], counts_layers=True)
+
+
+def exported(name, out):
+    begin = ["export", NIST, "--copies", "2", "--bed", "400x400", "-o", out, "--quiet"]
+    return Job(name, begin, [*begin, "--overwrite"], other=["export", NUT, "-o", out, "--quiet"])
+
+
+def box(size):
+    """A closed box in mm, from 0, as a binary STL."""
+    corner = [[size[axis] if number >> axis & 1 else 0.0 for axis in range(3)] for number in range(8)]
+    faces = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)]
+    facets = [struct.pack("<12fH", 0, 0, 0, *corner[a], *corner[b], *corner[c], 0) for a, b, c in faces]
+    return bytes(80) + struct.pack("<I", len(facets)) + b"".join(facets)
+
+
+def read(*names):
+    with open(os.path.join(ROOT, *names), "rb") as file:
+        return file.read()
+
+
+def table_rows():
+    """The calls of tests/commands/outputs.tsv with their columns; those without a flag make inputs of the others."""
+    lines = [line for line in read("tests", "commands", "outputs.tsv").decode().splitlines() if not line.startswith("#")]
+    return [dict(zip(lines[0].split("\t"), line.split("\t"))) for line in lines[1:]]
+
+
+def table_jobs():
+    """Each call that names an output: none is without a kill test."""
+    inputs = {"part.stl": box([6.0, 4.0, 3.0]), "drops.csv": read("tests", "reference", "dinisio2022", "table_18.tsv"),
+              "printer.toml": read("pipeline", "machine", "shipped", "extruders", "anet-a8.toml"), "list.txt": b"info part.stl\n",
+              "widths.csv": b"test,percent,thin_mm\nextrusion,90,0.3\nextrusion,80,0.25\nextrusion,70,0.2\n"}
+    makers = [row["call"].split() for row in table_rows() if not row["flag"]]
+    made = {words[words.index("-o") + 1]: words for words in makers}
+    jobs = []
+    for row in (row for row in table_rows() if row["flag"]):
+        words = row["call"].replace("@", "out").split()
+        before, wanted = [], list(words)
+        while wanted:
+            maker = made.get(wanted.pop().split("/")[0])
+            if maker and maker not in before:
+                before.insert(0, maker)
+                wanted += maker[:maker.index("-o")]
+        # Tables of measurements may be filled in by now, and are not replaced.
+        fills_in = words[0] == "calibrate" and "directory" in row["kind"]
+        resumes = "product" in row["kind"] and words[0] in ("jet", "slice", "extrude", "batch") and "3mf" not in words
+        again = ["--resume"] if resumes else [] if words[0] == "merge" else ["--overwrite"]
+        jobs.append(Job(row["call"], words, [*words, *again], before=before, inputs=inputs,
+                        unlike=("summary.json", "summary.tsv", "batch.jsonl"), when_done=2 if fills_in else None))
+    return jobs
 
 
 def reported():
@@ -105,6 +174,10 @@ def all_jobs():
     lines = ["--layer", "0.3", "--pattern", "raster", "--bead", "0.4"]
     return [
         jet("jet, tiff", [NIST, "--dpi", "300", "--layer", "0.05"]),
+        jet("jet, png with a saturation", [NUT, *nuferbj, "--saturation", "60", "--format", "png"], CROWN),
+        jet("jet, levels", [NIST, "--dpi", "300", "--layer", "0.2", "--levels", "16", "--format", "png-8"]),
+        jet("jet, inspection", [NIST, "--dpi", "300", "--layer", "0.1", "--inspect"]),
+        jet("jet, inspection of drops", [NUT, *nuferbj, "--saturation", "60", "--inspect", "--mirror", "x"], CROWN),
         jet("jet, print program", [NUT, *nuferbj], CROWN),
         jet("jet, two materials", [NUT, CROWN, "--material", "steel,bronze", "--bed", "60x40", "--dpi", "600", "--layer", "0.05"], CROWN),
         jet("jet, segmented with shell", [NUT, *filled, "--bed", "60x60"], CROWN),
@@ -122,7 +195,9 @@ def all_jobs():
         again("slice, 3mf", ["slice", NIST, "--layer", "0.1", "--format", "3mf"]),
         resumed("extrude, segmented", ["extrude", NUT, "--machine", "anet-a8", "--layer", "0.3", "--fill", "segmented",
                                        "--scale", "2"], CROWN, "out.gcode"),
-        batch(), merged(), sharded(), reported(), calibrated(), plotted(), previewed(),
+        batch(), merged(), sharded(), merged(["--inspect"]), sharded(["--inspect"]), image_part(), converted(),
+        exported("export, stl", "out.stl"), exported("export, 3mf", "out.3mf"), reported(), calibrated(), plotted(), previewed(),
+        *table_jobs(),
     ]
 
 
@@ -148,7 +223,7 @@ def tree(folder):
 
 def outputs(folder, job):
     """What the job wrote: `out`, `out.*` and all other files that none of its predecessors wrote."""
-    made = {word for words in (*job.before, *job.cut_short) for word in words} - {"out", "out.gcode"}
+    made = {word for words in (*job.before, *job.cut_short) for word in words} - {"out", "out.gcode"} | set(job.inputs)
     return {name: value for name, value in tree(folder).items()
             if name.split(os.sep)[0] not in made and os.path.basename(name) not in job.unlike}
 
@@ -174,8 +249,13 @@ class Ran:
 class Program:
     def __init__(self, path):
         self.path = os.path.abspath(path)
+        self.keeps_temporary = False  # TMPDIR is in the folder of the run, whose files are compared
 
     def start(self, words, folder, **options):
+        if self.keeps_temporary:
+            temporary = os.path.join(folder, "tmp")
+            os.makedirs(temporary, exist_ok=True)
+            options["env"] = {**os.environ, "TMPDIR": temporary}
         return subprocess.Popen([self.path, *words], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE, text=True, errors="replace", **options)
 
@@ -218,9 +298,18 @@ def remove(path):
             os.remove(whole)
 
 
-def fresh(folder):
+def add_inputs(folder, job):
+    for name, content in job.inputs.items():
+        with open(os.path.join(folder, name), "wb") as file:
+            file.write(content)
+
+
+def fresh(folder, job=None):
+    """An empty folder, or one with the job's inputs."""
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
+    if job:
+        add_inputs(folder, job)
     return folder
 
 
@@ -235,7 +324,7 @@ def reference(program, job, folder):
     """The uninterrupted run, three times: their bytes have to agree."""
     files, seconds, in_flight = None, [], 0
     for _ in range(3):
-        fresh(folder)
+        fresh(folder, job)
         for words in (*job.before, *job.cut_short):
             ran = program.run(words, folder)
             assert ran.code == 0, f"{job.name}: {' '.join(words)}: {ran.code} {ran.error}"
@@ -244,6 +333,9 @@ def reference(program, job, folder):
         now = outputs(folder, job)
         assert files in (None, now), f"{job.name}: two whole runs differ"
         files = now
+        if job.whole:
+            program.run(job.whole, fresh(folder, job))
+            assert outputs(folder, job) == files, f"{job.name}: not as {' '.join(job.whole)}"
         seconds.append(ran.seconds)
         in_flight = max(in_flight, ran.summary().get("max_layers_in_flight", 0))
     return Reference(files, sorted(seconds)[1], in_flight)

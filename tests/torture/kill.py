@@ -25,7 +25,7 @@ def check_whole(files, ref, tally, name):
 
 
 def one_trial(program, job, ref, folder, tally, draw):
-    jobs.fresh(folder)
+    jobs.fresh(folder, job)
     for words in job.before:
         program.run(words, folder)
     kills = 0
@@ -74,8 +74,13 @@ def compare(files, ref, tally, name):
 
 def main(program, settings, draw):
     tally = Tally("kill -9")
+    program.keeps_temporary = True
     for job in settings.jobs:
-        ref = jobs.reference(program, job, os.path.join(settings.work, "whole"))
+        try:
+            ref = jobs.reference(program, job, os.path.join(settings.work, "whole"))
+        except AssertionError as why:
+            tally.fault(job.name, "wrong", str(why))
+            continue
         for _ in range(settings.trials):
             one_trial(program, job, ref, os.path.join(settings.work, "trial"), tally, draw)
     return tally

@@ -25,7 +25,7 @@ def reading_jobs():
 
 def limited(program, job, ref, folder, size_mb, tally):
     """A run within this much address space, then one without a limit. returns  the exit code of the first"""
-    jobs.fresh(folder)
+    jobs.fresh(folder, job)
     for words in (*job.before, *job.cut_short):
         program.run(words, folder)
     size = int(size_mb * (1 << 20))

@@ -17,7 +17,7 @@ def may_stay(name, job):
 
 
 def one_trial(program, job, ref, number, folder, tally, draw):
-    jobs.fresh(folder)
+    jobs.fresh(folder, job)
     for words in (*job.before, *job.cut_short):
         program.run(words, folder)
     ran = program.run_and_signal(job.begin, folder, draw.uniform(0.01, ref.seconds), number)

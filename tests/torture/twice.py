@@ -20,7 +20,7 @@ def pairs(job):
 
 
 def whole(program, job, words, folder):
-    jobs.fresh(folder)
+    jobs.fresh(folder, job)
     for earlier in (*job.before, *job.cut_short):
         program.run(earlier, folder)
     ran = program.run(words, folder)
@@ -29,7 +29,7 @@ def whole(program, job, words, folder):
 
 
 def one_trial(program, job, words, results, folder, seconds, tally, draw):
-    jobs.fresh(folder)
+    jobs.fresh(folder, job)
     for earlier in (*job.before, *job.cut_short):
         program.run(earlier, folder)
     started = time.monotonic()

@@ -8,6 +8,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/job/errors.h"
+#include "pipeline/manifest/layer_files.h"
 #include "pipeline/manifest/manifest.h"
 #include "stages/data/bit_image.h"
 #include "stages/dose/shares.h"
@@ -149,6 +150,28 @@ Status check_output(const Conversion& all, const std::string& stack) {
   return {};
 }
 
+/// Holds the output directory and removes what a killed conversion left in it. errors  kOutput: another run writes here
+Result<Claim> claim_folder(const std::string& output) {
+  auto claim = Claim::take(output + "/manifest.json", output);
+  if (!claim) return claim;
+  // The files of a running job have no locks of their own.
+  std::error_code ignored;
+  const fs::path folder = fs::weakly_canonical(output, ignored);
+  if (folder.filename() == "layers") {
+    for (const ManifestFile& file : find_manifests(folder.parent_path().string())) {
+      std::string name = (folder.parent_path() / file.name).string();
+      if (file.partial) name.resize(name.size() - part_of("").size());
+      if (Status status = check_not_being_written(name); !status) return status.error();
+    }
+  }
+  remove_leftovers(output, [](std::string_view name) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    return read_layer_file_name(name, index, partial);
+  });
+  return claim;
+}
+
 /// errors  of the lowest image that fails
 Status convert_all(const Conversion& all, const std::atomic<bool>& cancel, Converted& sum) {
   std::mutex mutex;
@@ -234,7 +257,7 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   all.first_number = images->first_number();
   all.images = std::move(*images);
   if (Status status = check_output(all, stack); !status) return status;
-  const auto claim = Claim::take(output + "/manifest.json", output);
+  const auto claim = claim_folder(output);
   if (!claim) return claim.error();
   Converted sum;
   context.progress({ProgressEvent::Stage::kLayers, 0, all.images.layers()});

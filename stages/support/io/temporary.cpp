@@ -286,6 +286,15 @@ Status check_not_being_written(const std::string& path) {
   return another_writes(turn.folder(), path, {}, false) ? Status(busy(path)) : Status();
 }
 
+void remove_leftovers(const std::string& folder, const std::function<bool(std::string_view)>& is_of) {
+  const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const std::unique_ptr<DIR, int (*)(DIR*)> entries(opened < 0 ? nullptr : ::fdopendir(opened), &::closedir);
+  while (const dirent* entry = entries ? ::readdir(entries.get()) : nullptr) {
+    const std::string_view named = named_by_temporary(entry->d_name);
+    if (!named.empty() && is_of(named)) is_written(opened, entry->d_name, folder + "/" + entry->d_name, true);
+  }
+}
+
 std::error_code MadeFolders::make(const std::string& folder) {
   namespace fs = std::filesystem;
   std::error_code error;

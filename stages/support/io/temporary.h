@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -72,6 +73,10 @@ class Claim {
 
 /// Changes nothing. errors  kOutput if another run writes this file
 Status check_not_being_written(const std::string& path);
+
+/// Removes what killed runs left of files in a folder: temporary files without a lock.
+/// is_of  says which, by the name of the file that they were to become; no run writes such files without locks
+void remove_leftovers(const std::string& folder, const std::function<bool(std::string_view)>& is_of);
 
 // --- what must not stay behind: temporary files at a signal, folders of a job that is
 // refused, and what could not be removed.
