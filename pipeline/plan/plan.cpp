@@ -9,6 +9,7 @@
 
 #include "pipeline/job/errors.h"
 #include "pipeline/plan/layers.h"
+#include "pipeline/plan/repeated.h"
 #include "pipeline/plan/scene.h"
 #include "stages/checks/layer_warnings.h"
 #include "stages/formats/extrusion_format.h"
@@ -114,6 +115,7 @@ class Planner {
     if (images() && job().engine != Engine::kContours) neighbour = std::async(raster::BeamIndex::prepare);
     auto scene = load_scene(job(), plan_.bed, form, images() ? &printer_.grid : nullptr);
     if (!scene) return scene.error();
+    drop_repeated(job().fill_rule, *scene);
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
     for (const PlacedImages& images : plan_.scene->images) {
       // Their manifest may put them higher than the job.

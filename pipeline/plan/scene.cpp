@@ -6,6 +6,8 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <numeric>
+#include <set>
 #include <tuple>
 
 #include "pipeline/job/errors.h"
@@ -120,26 +122,45 @@ Result<Loaded> load_images(const Job& job, const PartRequest& request, const Pix
   return loaded;
 }
 
+/// Of a part, no more overlaps than this are listed.
+constexpr std::size_t kOverlapsNoted = 3;
+
 // Only parts with explicit positions can overlap: arranged boxes are disjoint.
 void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std::uint32_t, Box>>& boxes) {
-  std::vector<std::uint32_t> order(boxes.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto count = static_cast<std::uint32_t>(boxes.size());
+  std::vector<std::uint32_t> order(count), found(count, 0), next(count + 1);
+  for (std::uint32_t i = 0; i < count; ++i) order[i] = i;
+  std::iota(next.begin(), next.end(), 0u);
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return std::tie(boxes[a].second.lo.x, a) < std::tie(boxes[b].second.lo.x, b);
   });
+  // A box for which enough others are known is left out: boxes at one position are compared a few times each.
+  const auto open_from = [&](std::uint32_t j) {
+    while (next[j] != j) j = next[j] = next[next[j]];
+    return j;
+  };
   std::map<std::pair<std::uint32_t, std::uint32_t>, bool> noted;
-  for (std::size_t i = 0; i < order.size(); ++i) {
+  std::set<std::uint32_t> more;  // parts with overlaps that are not listed
+  for (std::uint32_t i = 0; i < count; ++i) {
     const auto& [part, box] = boxes[order[i]];
-    for (std::size_t j = i + 1; j < order.size(); ++j) {
+    for (std::uint32_t j = open_from(i + 1); j < count; j = open_from(j + 1)) {
       const auto& [other_part, other] = boxes[order[j]];
       if (other.lo.x >= box.hi.x) break;
-      if (part == other_part || (!job.parts[part].at_mm && !job.parts[other_part].at_mm)) continue;
       const bool apart = other.lo.y >= box.hi.y || other.hi.y <= box.lo.y || other.lo.z >= box.hi.z || other.hi.z <= box.lo.z;
-      if (!apart) noted[{std::min(part, other_part), std::max(part, other_part)}] = true;
+      const bool counts = part != other_part && (job.parts[part].at_mm || job.parts[other_part].at_mm) && !apart;
+      if (counts && noted.try_emplace(std::minmax({part, other_part}), true).second) ++found[j];
+      if (found[j] <= kOverlapsNoted) continue;
+      more.insert(other_part);
+      next[j] = j + 1;
     }
   }
+  std::vector<std::size_t> listed(scene.parts.size(), 0);
   for (const auto& [pair, unused] : noted) {
     const auto& [first, second] = pair;
+    if (listed[second]++ >= kOverlapsNoted) {
+      more.insert(second);
+      continue;
+    }
     const auto is_images = [&](std::uint32_t part) { return std::ranges::count(scene.images, part, &PlacedImages::part) > 0; };
     scene.parts[second].notes.push_back(
         {false, fmt::format("its box overlaps that of part {} ({}); where solids overlap {}", first + 1,
@@ -148,6 +169,7 @@ void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std
                             : is_images(first) && !is_images(second)                ? "that one's material counts"
                                                                                     : "this one's material counts")});
   }
+  for (const std::uint32_t part : more) scene.parts[part].notes.push_back({false, "its box overlaps those of more parts"});
 }
 
 /// nm above the bed.

@@ -10,6 +10,7 @@
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/keys.h"
+#include "stages/geometry/boxes.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
 #include "stages/slice/bodies.h"
@@ -107,7 +108,7 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   if (job.slice.offset_mm > 0) made.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
   std::vector<Box> reach;  // offset boxes: parts may touch only after the offset
   for (const Box& box : boxes) reach.push_back(slice::grown(box, made.grow_));
-  made.body_ = slice::group_bodies(reach);
+  made.body_ = group_touching(reach);
   const std::vector<std::uint32_t>& body = made.body_;
   const std::vector<std::uint32_t> part_area = made.make_areas(job, boxes, body);
   made.find_copies(body);
@@ -307,7 +308,7 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
       const ContoursView surface = work.parts.of(area.shared, work.rebased);
       Contours earlier;
       for (std::size_t other = body_area_[area.body]; other < a; ++other) {
-        if (!slice::touch(slice::grown(areas_[other].box, grow_), slice::grown(area.box, grow_))) continue;
+        if (!touch(slice::grown(areas_[other].box, grow_), slice::grown(area.box, grow_))) continue;
         earlier.append(work.surface[areas_[other].shared]);
       }
       auto rest = subtract_contours(surface, earlier);

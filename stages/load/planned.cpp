@@ -5,8 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "stages/load/repair/enclosed.h"
-#include "stages/load/repair/topology.h"
+#include "stages/geometry/boxes.h"
 
 namespace lamina::load {
 namespace {
@@ -110,6 +109,7 @@ Result<PlannedVolume> merged(std::span<const Mesh> meshes, std::span<const Insta
   bool exact = false;
   if (!find_rule(meshes, instances, ends, effort, rule, exact)) return PlannedVolume{std::fabs(signed_mm3), Known::kSummed};
   const Result<std::vector<double>> areas = surplus(meshes, instances, rule.planes);
+  if (!areas && areas.error().fault == Fault::kInput) return PlannedVolume{std::fabs(signed_mm3), Known::kSummed};
   if (!areas) return areas.error();
   double more = 0;
   for (std::size_t p = 0; p < areas->size(); ++p) more += (*areas)[p] * rule.weight_mm[p];
@@ -117,27 +117,23 @@ Result<PlannedVolume> merged(std::span<const Mesh> meshes, std::span<const Insta
   return PlannedVolume{signed_mm3 + more, Known::kAbout};
 }
 
-/// Instances whose boxes overlap, directly or through others, one list after the other; false: too many to decide.
-bool find_bodies(std::span<const Mesh> meshes, std::span<const Instance> instances,
-                 std::vector<std::vector<std::uint32_t>>& bodies) {
+/// Instances whose boxes overlap, directly or through others, one list after the other.
+std::vector<std::vector<std::uint32_t>> find_bodies(std::span<const Mesh> meshes, std::span<const Instance> instances) {
   std::vector<Box> boxes;
   for (const Instance& instance : instances) {
     Box box = meshes[instance.mesh].bounds;
     if (!box.empty()) {
       for (Point3* corner : {&box.lo, &box.hi})
         corner->x += instance.offset.x, corner->y += instance.offset.y, corner->z += instance.offset.z;
+      box.hi = {box.hi.x - 1, box.hi.y - 1, box.hi.z - 1};  // boxes that merely touch do not overlap
     }
     boxes.push_back(box);
   }
-  DisjointSets sets(boxes.size());
-  const bool all = for_each_overlap(boxes, [&](std::uint32_t i, std::uint32_t j) {
-    sets.join(i, j);
-    return true;
-  });
-  bodies.resize(boxes.size());
-  for (std::uint32_t i = 0; i < boxes.size(); ++i) bodies[sets.find(i)].push_back(i);
+  const std::vector<std::uint32_t> group = group_touching(boxes);
+  std::vector<std::vector<std::uint32_t>> bodies(boxes.size());
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) bodies[group[i]].push_back(i);
   std::erase_if(bodies, [](const auto& members) { return members.size() < 2; });
-  return all;
+  return bodies;
 }
 
 /// Of a mesh alone.
@@ -183,13 +179,11 @@ Result<PlannedVolumes> planned_volumes(std::span<const Mesh> meshes, std::span<c
     if (!volume) return volume.error();
     volumes.of_mesh[instance.mesh] = *volume;
   }
-  std::vector<std::vector<std::uint32_t>> bodies;
-  if (!find_bodies(meshes, instances, bodies)) volumes.all.known = Known::kSummed;
   const auto add = [&](const PlannedVolume& volume) {
     volumes.all.mm3 += volume.mm3;
     volumes.all.known = std::max(volumes.all.known, volume.known);
   };
-  for (const std::vector<std::uint32_t>& members : bodies) {
+  for (const std::vector<std::uint32_t>& members : find_bodies(meshes, instances)) {
     std::vector<Instance> together;
     for (const std::uint32_t i : members) {
       together.push_back(instances[i]);

@@ -10,6 +10,7 @@
 #include "stages/data/growth.h"
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/nest.h"
+#include "stages/slice/deep.h"
 
 namespace lamina::slice {
 namespace {
@@ -33,6 +34,37 @@ std::size_t find_loops(const Mesh& mesh, const SourceMesh& source, std::span<con
     scratch.cuts.level = level;
   }
   return count;
+}
+
+/// returns  merged groups
+Result<std::uint32_t> nest_apart(Contours& contours, FillRule rule, SectionScratch& scratch) {
+  tidy(contours);
+  if (!find_contacts(contours, scratch.contact, scratch.group)) scratch.group.clear();
+  return nest(contours, rule, scratch.group);
+}
+
+/// Contours of an instance become clean, so that they can be combined with those of others.
+/// errors  kInput: they wind backwards about something, so what is solid depends on how often others wind about it
+Status clean_alone(Contours& contours, FillRule rule, SectionScratch& scratch) {
+  Contours forwards = contours;
+  if (const auto merged = nest_apart(contours, rule, scratch); !merged) return merged.error();
+  if (rule == FillRule::kEvenOdd) return {};
+  const FillRule other = rule == FillRule::kNonzero ? FillRule::kPositive : FillRule::kNonzero;
+  if (const auto merged = nest_apart(forwards, other, scratch); !merged) return merged.error();
+  if (contours.point == forwards.point && contours.offset == forwards.offset) return {};
+  return Error{Fault::kInput, fmt::format("more than {} instances overlap at once and the mesh of one is inside out; repair "
+                                          "the mesh, or remove copies",
+                                          kDeep)};
+}
+
+bool overlap_deeply(std::span<const Mesh> meshes, std::span<const Instance> instances) {
+  std::vector<Box> boxes;
+  for (const auto& [mesh, by] : instances) {
+    const Box& own = meshes[mesh].bounds;
+    const auto moved = [&](const Point3& p) { return Point3{p.x + by.x, p.y + by.y, p.z + by.z}; };
+    boxes.push_back(own.empty() ? own : Box{moved(own.lo), moved(own.hi)});
+  }
+  return overlaps_deeply(boxes);
 }
 
 }  // namespace
@@ -92,8 +124,15 @@ void Slicer::group(std::span<const std::uint32_t> body_of) {
   for (std::size_t i = 0; i < body_of.size(); ++i)
     if (body_of[i] != kLeftOut) placed_[position[body_of[i]]++] = instances_[i];
   alone_.assign(sources_->size(), 0);
-  for (std::uint32_t b = 0; b < bodies_; ++b)
-    if (body_offset_[b + 1] - body_offset_[b] == 1) ++alone_[placed_[body_offset_[b]].source];
+  deep_.assign(bodies_, 0);
+  for (std::uint32_t b = 0; b < bodies_; ++b) {
+    const std::span<const Placed> members = std::span(placed_).subspan(body_offset_[b], body_offset_[b + 1] - body_offset_[b]);
+    if (members.size() == 1) ++alone_[members.front().source];
+    if (members.size() <= kDeep) continue;
+    std::vector<Instance> together;
+    for (const auto& [source, by] : members) together.push_back({(*sources_)[source].mesh, {by.x, by.y, (*sources_)[source].z}});
+    deep_[b] = overlap_deeply(meshes_, together);
+  }
 }
 
 void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
@@ -106,11 +145,13 @@ void Slicer::loops_of(const SourceMesh& source, std::uint32_t plane, SectionScra
 }
 
 Status Slicer::clean(Contours& contours, SectionScratch& scratch, SectionReport& report) const {
-  tidy(contours);
-  if (!find_contacts(contours, scratch.contact, scratch.group)) scratch.group.clear();
-  const auto merged = nest(contours, options_.fill_rule, scratch.group);
+  const auto merged = nest_apart(contours, options_.fill_rule, scratch);
   if (!merged) return merged.error();
   report.merged += *merged;
+  return finish(contours, scratch);
+}
+
+Status Slicer::finish(Contours& contours, SectionScratch& scratch) const {
   order_by_outer(contours);
   if (options_.offset != 0) {
     auto moved = offset_contours(contours, options_.offset);
@@ -119,6 +160,26 @@ Status Slicer::clean(Contours& contours, SectionScratch& scratch, SectionReport&
   }
   simplify(contours, options_.tolerance, scratch.simplify);
   return {};
+}
+
+Status Slicer::combine_members(std::span<const Placed> members, std::uint32_t plane, SectionScratch& scratch,
+                               SectionReport& report, Contours& all) const {
+  std::vector<Contours> clean_source(sources_->size()), sets(members.size());
+  std::vector<std::uint8_t> done(sources_->size(), 0);
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const auto& [source, by] = members[i];
+    Contours& own = clean_source[source];
+    if (std::exchange(done[source], 1) == 0) {
+      loops_of((*sources_)[source], plane, scratch, own, report);
+      if (Status status = clean_alone(own, options_.fill_rule, scratch); !status) return status;
+    }
+    append_moved(own, by, sets[i]);
+  }
+  auto combined = combine_pairwise(std::move(sets), options_.fill_rule);
+  if (!combined) return combined.error();
+  all = std::move(*combined);
+  report.merged += 1;
+  return finish(all, scratch);
 }
 
 Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch, LayerContours& out) const {
@@ -147,12 +208,13 @@ Result<SectionReport> Slicer::layer(std::uint32_t plane, SectionScratch& scratch
     } else {
       Contours& all = scratch.closed;
       all.clear();
-      for (const Placed& member : members) {
+      for (const Placed& member : deep_[b] ? std::span<const Placed>() : members) {
         Contours own;
         loops_of((*sources_)[member.source], plane, scratch, own, report);
         append_moved(own, member.by, all);
       }
-      if (auto status = clean(all, scratch, report); !status) return failed(status);
+      Status status = deep_[b] ? combine_members(members, plane, scratch, report, all) : clean(all, scratch, report);
+      if (!status) return failed(status);
       append_moved(all, {0, 0}, out.contours);
     }
     out.body.push_back(out.contours.size());
@@ -197,19 +259,29 @@ struct SharedMesh {
   std::vector<Point2> by;
 };
 
-Result<double> surplus_area(std::span<const SharedMesh> shared, std::span<const Nm> planes, std::uint32_t plane,
+Result<double> surplus_area(std::span<const SharedMesh> shared, bool deep, std::span<const Nm> planes, std::uint32_t plane,
                             SectionScratch& scratch, Contours& all) {
   all.clear();
+  __int128 wound = 0;
+  std::vector<Contours> sets;
   for (const auto& [mesh, source, offsets] : shared) {
     scratch.closed.clear();
     find_loops(mesh, source, planes, plane, scratch, scratch.closed);
+    wound += doubled_area(scratch.closed) * static_cast<std::int64_t>(offsets.size());
+    if (deep) {
+      if (Status status = clean_alone(scratch.closed, FillRule::kNonzero, scratch); !status) return status.error();
+      for (const Point2 by : offsets) append_moved(scratch.closed, by, sets.emplace_back());
+      continue;
+    }
     reserve_more(all.point, offsets.size() * scratch.closed.point.size());
     for (const Point2 by : offsets) append_moved(scratch.closed, by, all);
   }
-  const __int128 wound = doubled_area(all);
-  tidy(all);
-  if (!find_contacts(all, scratch.contact, scratch.group)) scratch.group.clear();
-  if (const auto merged = nest(all, FillRule::kNonzero, scratch.group); !merged) return merged.error();
+  if (deep) {
+    auto combined = combine_pairwise(std::move(sets), FillRule::kNonzero);
+    if (!combined) return combined.error();
+    return square_mm(doubled_area(*combined) - wound);
+  }
+  if (const auto merged = nest_apart(all, FillRule::kNonzero, scratch); !merged) return merged.error();
   return square_mm(doubled_area(all) - wound);
 }
 
@@ -223,6 +295,7 @@ Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::spa
   for (const SourceMesh& source : sources) shared.push_back({meshes[source.mesh], source, {}});
   for (std::size_t i = 0; i < instances.size(); ++i)
     shared[source_of[i]].by.push_back({instances[i].offset.x, instances[i].offset.y});
+  const bool deep = overlap_deeply(meshes, instances);
   std::vector<double> areas(planes.size());
   std::vector<Status> status(planes.size());
   struct Scratch {
@@ -232,7 +305,7 @@ Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::spa
   tbb::enumerable_thread_specific<Scratch> scratches;
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(planes.size()), [&](std::uint32_t plane) {
     Scratch& own = scratches.local();
-    const Result<double> area = surplus_area(shared, planes, plane, own.section, own.all);
+    const Result<double> area = surplus_area(shared, deep, planes, plane, own.section, own.all);
     area ? void(areas[plane] = *area) : void(status[plane] = area.error());
   });
   for (const Status& each : status)

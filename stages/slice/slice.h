@@ -82,6 +82,7 @@ class Slicer {
   Slicer regrouped(std::span<const std::uint32_t> body_of) const;
 
   /// The contours of plane p. Pure: the same for any thread and order.
+  /// errors  kInternal of the clipping library; kInput: instances overlap deeply and one winds backwards somewhere
   Result<SectionReport> layer(std::uint32_t plane, SectionScratch& scratch, LayerContours& out) const;
 
   std::uint32_t planes() const { return static_cast<std::uint32_t>(planes_.size()); }
@@ -105,6 +106,9 @@ class Slicer {
   void loops_of(const SourceMesh& source, std::uint32_t plane, SectionScratch& scratch, Contours& closed,
                 SectionReport& report) const;
   Status clean(Contours& contours, SectionScratch& scratch, SectionReport& report) const;
+  Status finish(Contours& contours, SectionScratch& scratch) const;
+  Status combine_members(std::span<const Placed> members, std::uint32_t plane, SectionScratch& scratch, SectionReport& report,
+                         Contours& all) const;
 
   std::span<const Mesh> meshes_;
   std::vector<Nm> planes_;
@@ -116,6 +120,7 @@ class Slicer {
   std::vector<Placed> placed_;              // body by body
   std::vector<std::uint32_t> body_offset_;  // bodies + 1, into placed_
   std::vector<std::uint32_t> alone_;        // of each source, how many bodies are one instance of it
+  std::vector<std::uint8_t> deep_;          // of each body, whether its instances overlap deeply (deep.h)
   std::uint32_t bodies_ = 0;
 };
 
@@ -128,7 +133,7 @@ class Slicer {
 /// meshes     closed
 /// instances  all of them stand together
 /// planes     nm, strictly increasing
-/// errors     kInternal of the clipping library
+/// errors     kInternal of the clipping library; kInput: instances overlap deeply and one winds backwards somewhere
 /// cost       that of slicing the planes, in parallel; the same for any number of threads
 Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::span<const Instance> instances,
                                           std::span<const Nm> planes);

@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "stages/geometry/boxes.h"
 #include "stages/slice/bodies.h"
 
 namespace lamina::slice {
@@ -17,12 +18,12 @@ Box box(Nm x, Nm y, Nm z, Nm side) {
 }
 
 TEST(Bodies, TouchingFacesAreOneBodyAndANanometreApartAreTwo) {
-  EXPECT_EQ(group_bodies(std::vector{box(0, 0, 0, 10), box(10, 0, 0, 10)}), (std::vector<std::uint32_t>{0, 0}));
-  EXPECT_EQ(group_bodies(std::vector{box(0, 0, 0, 10), box(11, 0, 0, 10)}), (std::vector<std::uint32_t>{0, 1}));
-  EXPECT_EQ(group_bodies(std::vector{box(0, 0, 0, 10), box(0, 0, 11, 10)}), (std::vector<std::uint32_t>{0, 1}));
-  EXPECT_EQ(group_bodies(std::vector{grown(box(0, 0, 0, 10), 1), box(11, 0, 0, 10)}), (std::vector<std::uint32_t>{0, 0}));
-  EXPECT_EQ(group_bodies(std::vector{grown(box(0, 0, 0, 10), 1), box(0, 0, 11, 10)}), (std::vector<std::uint32_t>{0, 1}));
-  EXPECT_EQ(group_bodies(std::vector{Box(), Box()}), (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_EQ(group_touching(std::vector{box(0, 0, 0, 10), box(10, 0, 0, 10)}), (std::vector<std::uint32_t>{0, 0}));
+  EXPECT_EQ(group_touching(std::vector{box(0, 0, 0, 10), box(11, 0, 0, 10)}), (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_EQ(group_touching(std::vector{box(0, 0, 0, 10), box(0, 0, 11, 10)}), (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_EQ(group_touching(std::vector{grown(box(0, 0, 0, 10), 1), box(11, 0, 0, 10)}), (std::vector<std::uint32_t>{0, 0}));
+  EXPECT_EQ(group_touching(std::vector{grown(box(0, 0, 0, 10), 1), box(0, 0, 11, 10)}), (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_EQ(group_touching(std::vector{Box(), Box()}), (std::vector<std::uint32_t>{0, 1}));
 }
 
 TEST(Bodies, AreTheClosureOfTouchingAndNumberedByTheirFirstBox) {
@@ -52,7 +53,7 @@ TEST(Bodies, AreTheClosureOfTouchingAndNumberedByTheirFirstBox) {
       }
       ++bodies;
     }
-    EXPECT_EQ(group_bodies(boxes), wanted) << "run " << run;
+    EXPECT_EQ(group_touching(boxes), wanted) << "run " << run;
   }
 }
 

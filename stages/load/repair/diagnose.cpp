@@ -12,9 +12,9 @@
 #include <memory>
 #include <utility>
 
+#include "stages/geometry/boxes.h"
 #include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/diagnosis/diagnosed_shells.h"
-#include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/vertices.h"

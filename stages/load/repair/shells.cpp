@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/geometry/boxes.h"
 #include "stages/load/repair/census.h"
 #include "stages/load/repair/diagnose.h"
-#include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/surfaces.h"
 #include "stages/load/repair/topology.h"
