@@ -52,8 +52,9 @@ Beads::Beads(const Job& job, const PixelGrid& grid, const Sections& sections, co
 }
 
 Status Beads::deposit(const Layer& layer, BeadWork& work) const {
-  work.beads.clear();
   const ToolpathsView all = work.sections.paths;
+  work.beads.clear();
+  work.beads.reserve(all.point.size());
   const std::span<const std::uint32_t> path_area = work.sections.path_area;
   for (std::uint32_t a = 0; a + 1 < path_area.size(); ++a) {
     const Sections::Area& area = sections_->areas()[a];
@@ -119,7 +120,7 @@ std::uint64_t Beads::bytes_expected(std::uint32_t layer) const {
   const auto [beads, spans] = expected(layer);
   const std::uint64_t of_beads = 64 * beads + 4 * rows;  // a bead and its place take 44 bytes
   const std::uint64_t at_once = 2 * (spans + raster::kBeadBandRows * beads) / std::max<std::uint64_t>(rows, 1);  // in a band
-  const std::uint64_t of_band = raster::BeadRaster::band_bytes(grid_, at_once) + at_once * sizeof(raster::BeadShape);
+  const std::uint64_t of_band = raster::BeadRaster::band_bytes(grid_, at_once);
   const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);  // second, inner
   const std::uint64_t of_paths = 34 * beads;                   // a point of a toolpath is 17 bytes, and begins a bead or more
   return sections_->bytes_bound(layer) + of_beads + of_band + of_images + of_paths;

@@ -16,7 +16,7 @@ namespace {
 
 using Row = std::span<const std::uint32_t>;
 
-std::uint32_t* put(std::uint32_t begin, std::uint32_t end, std::uint32_t* to) {
+inline std::uint32_t* put(std::uint32_t begin, std::uint32_t end, std::uint32_t* to) {
   to[0] = begin;
   to[1] = end;
   return to + 2;
@@ -44,8 +44,10 @@ std::uint32_t* intersect(Row a, Row b, std::uint32_t* to) {
   }
   for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
     const std::uint32_t begin = std::max(a[i], b[j]), end_a = a[i + 1], end_b = b[j + 1], end = std::min(end_a, end_b);
-    if (begin < end) to = put(begin, end, to);
-    (end_a < end_b ? i : j) += 2;
+    put(begin, end, to);  // no branch depends on how runs lie: what is empty is overwritten
+    to += begin < end ? 2 : 0;
+    i += end_a < end_b ? 2 : 0;
+    j += end_a < end_b ? 0 : 2;
   }
   return to;
 }

@@ -48,14 +48,15 @@ Bead bead_of(Point2 a, Point2 b, Nm width, BeadEnds ends) {
 
 /// Of doubles: a root is off by less than 2 nm, as its argument is by less than 4 nm2, and centres of pixels are rounded down
 /// by less than 1; what slopes multiply is off by its last bits.
-BeadShape shape_of(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis& axis) {
+void set_shape(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis& axis, BeadShape& shape) {
   if (b.y < a.y || (b.y == a.y && b.x < a.x)) std::swap(a, b);
   constexpr double kOfRoot = 3, kOfSlope = 1.0 / (1ull << 49);
-  BeadShape shape{};
+  shape = {};
   const double radius = static_cast<double>(width) / 2;
   shape.y0 = a.y;
   shape.dx = static_cast<double>(std::int64_t{b.x} - a.x);
   shape.dy = static_cast<double>(std::int64_t{b.y} - a.y);
+  shape.radius = radius;
   shape.radius2 = radius * radius;
   shape.square = ends == BeadEnds::kSquare;
   double tolerance = kOfRoot + std::abs(shape.dx) * kOfSlope;
@@ -85,7 +86,6 @@ BeadShape shape_of(Point2 a, Point2 b, Nm width, BeadEnds ends, const PixelAxis&
   shape.tolerance = 2 * (tolerance * shape.columns_per_nm + 1e-7);
   shape.first_column = a.x * shape.columns_per_nm + 0.5 + shape.tolerance / 2;
   shape.columns = static_cast<std::int32_t>(axis.count);
-  return shape;
 }
 
 }  // namespace
@@ -103,67 +103,95 @@ void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
   beads_.push_back({a, b, static_cast<std::uint32_t>(rows - last), static_cast<std::uint32_t>(rows - first), width, ends});
 }
 
-/// Sets the bits of a bead in the band that begins with first_row, into which it reaches.
-void BeadRaster::cover(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row,
-                       std::uint32_t band_rows) {
-  const std::uint32_t first = std::max(first_row, deposited.first_row) - first_row;
-  const std::uint32_t last = std::min(first_row + band_rows, deposited.last_row) - first_row;
-  std::array<std::uint32_t, 2> line{first, last};
-  std::uint64_t undecided = 0;
-  if (!cover_line(shape, line, undecided)) return cover_rows(deposited, shape, first_row, first, last);
-  if (first < line[0]) cover_rows(deposited, shape, first_row, first, line[0]);
-  if (line[1] < last) cover_rows(deposited, shape, first_row, line[1], last);
-  for (; undecided != 0; undecided &= undecided - 1) {
-    const auto r = static_cast<std::uint32_t>(std::countr_zero(undecided));
-    cover_rows(deposited, shape, first_row, r, r + 1);
-  }
+/// Rows that are between the discs, if they are many and no flat line.
+void BeadRaster::set_straight(Reaching& bead) const {
+  const DepositedParts& deposited = bead.deposited;
+  const BeadShape& shape = bead.shape;
+  bead.straight.first = bead.straight.last = 0;
+  constexpr double kOne = 1 << kBeadLineBits, kFar = 1 << 30;
+  if (kernels_->line == nullptr || shape.square || !(shape.dy * rows_per_nm_ > kMinLineRows)) return;
+  const auto centre = [&](std::uint32_t row) {
+    return static_cast<double>(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - deposited.first_row - row)) - shape.y0;
+  };
+  const double top = centre(0), high = std::min(shape.left[1], shape.right[1]), low = std::max(shape.left[0], shape.right[0]);
+  const double rows = deposited.last_row - deposited.first_row;
+  // Rows are cut off from doubles: std::ceil and std::floor are calls, and a row more or less is the other loop's.
+  const auto first = static_cast<std::uint32_t>(std::clamp<double>((top - high) * rows_per_nm_ + 1, 0, rows));
+  const auto last = static_cast<std::uint32_t>(std::clamp<double>((top - low) * rows_per_nm_ + 1, 0, rows));
+  if (last < first + kMinLineRows) return;
+  // Centres of rows are rounded down by less than 1 nm, and steps by their last bits: of a band's rows, and of all.
+  const double step = -shape.slope / rows_per_nm_ * shape.columns_per_nm, way = step * rows;
+  const double off = (1 + std::abs(shape.slope)) * shape.columns_per_nm + (kBeadBandRows / 2 + 1 + rows * 0x1p-11) / kOne;
+  const double at = shape.first_column - shape.tolerance / 2 + off, line = centre(first) * shape.slope;
+  const double from = (line - shape.aside) * shape.columns_per_nm + at, to = (line + shape.aside) * shape.columns_per_nm + at;
+  if (!(off < 0.25 && std::abs(from) < kFar && std::abs(to) < kFar && std::abs(way) < kFar)) return;
+  const auto fixed = [](double columns) { return static_cast<std::int64_t>(columns * 0x1p32); };
+  bead.straight.first = deposited.first_row + first;
+  bead.straight.last = deposited.first_row + last;
+  bead.straight.from = fixed(from);
+  bead.straight.to = fixed(to);
+  bead.straight.step = fixed(step);
+  bead.straight.tolerance = (static_cast<std::uint32_t>(2 * off * kOne) + 1) << (32 - kBeadLineBits);
 }
 
-/// Sets the bits of those rows that are between the discs, if they are many and no flat line.
-/// rows      of the bead in the band; become those that are done
+/// Sets the bits of a bead in the band that begins with first_row, into which it reaches.
+void BeadRaster::cover(const Reaching& bead, std::uint32_t first_row, std::uint32_t band_rows) {
+  const std::uint32_t first = std::max(first_row, bead.deposited.first_row) - first_row;
+  const std::uint32_t last = std::min(first_row + band_rows, bead.deposited.last_row) - first_row;
+  const std::uint32_t from = std::max(first_row, bead.straight.first), to = std::min(first_row + band_rows, bead.straight.last);
+  std::uint64_t undecided = 0;
+  if (to < from + kMinLineRows || !cover_line(bead.straight, first_row, from - first_row, to - first_row, undecided))
+    return cover_rows(bead, first_row, first, last);
+  if (first < from - first_row) cover_rows(bead, first_row, first, from - first_row);
+  if (to - first_row < last) cover_rows(bead, first_row, to - first_row, last);
+  decide(bead, first_row, undecided);
+}
+
+/// Sets the bits of rows [first, last) of the band, which are between the discs.
 /// undecided  becomes a bit for each of these whose bits are not set
-bool BeadRaster::cover_line(const BeadShape& shape, std::array<std::uint32_t, 2>& rows, std::uint64_t& undecided) {
-  constexpr std::uint32_t kMinRows = 12;
-  constexpr double kMaxColumns = 1 << (32 - kBeadLineBits), kOne = 1 << kBeadLineBits;
-  if (kernels_->line == nullptr || shape.square || !(shape.dy * rows_per_nm_ > kMinRows)) return false;
-  const auto row_at = [&](double y) { return (rows_.y[0] - y) * rows_per_nm_; };  // of the band
-  const double high = shape.y0 + std::min(shape.left[1], shape.right[1]),
-               low = shape.y0 + std::max(shape.left[0], shape.right[0]);
-  // Rows are cut off from doubles: std::ceil and std::floor are calls, and a row more or less is the other loop's.
-  const double above = std::clamp<double>(row_at(high) + 1, rows[0], rows[1]),
-               below = std::clamp<double>(row_at(low) + 1, 0, rows[1]);
-  rows = {static_cast<std::uint32_t>(above), static_cast<std::uint32_t>(below)};
-  if (rows[1] < rows[0] + kMinRows) return false;
-  // Centres of rows are rounded down by less than 1 nm, and the step by half of its last bit.
-  const double off = (1 + std::abs(shape.slope)) * shape.columns_per_nm + (kBeadBandRows / 2 + 1) / kOne;
-  const double step = -shape.slope / rows_per_nm_ * shape.columns_per_nm;
-  const double at = shape.first_column - shape.tolerance / 2 + off;
-  const double line = (rows_.y[rows[0]] - shape.y0) * shape.slope;
-  const double from = (line - shape.aside) * shape.columns_per_nm + at, to = (line + shape.aside) * shape.columns_per_nm + at;
-  const double way = step * (rows[1] - 1 - rows[0]), left = from + std::min(way, 0.0), right = to + std::max(way, 0.0);
-  if (!(left >= 1 && right < shape.columns && right - left < kMaxColumns - 2 * kBeadWordBits && off < 0.25)) return false;
-  const std::uint32_t word = static_cast<std::uint32_t>(left) / kBeadWordBits;
-  const auto fixed = [&](double column) { return static_cast<std::uint32_t>((column - word * kBeadWordBits) * kOne + 0.5); };
-  const BeadLine bits{word, fixed(from), fixed(to),
-                      static_cast<std::uint32_t>(static_cast<std::int32_t>(step * kOne + std::copysign(0.5, step))),
-                      (static_cast<std::uint32_t>(2 * off * kOne) + 1) << (32 - kBeadLineBits)};
-  undecided = kernels_->line(bits, rows[0], rows[1], words_.data(), touched_.data());
+/// returns    false: they are too wide, or beyond the image
+bool BeadRaster::cover_line(const Straight& line, std::uint32_t first_row, std::uint32_t first, std::uint32_t last,
+                            std::uint64_t& undecided) {
+  constexpr std::int64_t kOne = std::int64_t{1} << 32, kMaxColumns = (1 << (32 - kBeadLineBits)) - 2 * kBeadWordBits;
+  const std::int64_t down = line.step * (first_row + first - line.first), way = line.step * (last - 1 - first);
+  const std::int64_t from = line.from + down, to = line.to + down;
+  const std::int64_t left = from + std::min<std::int64_t>(way, 0), right = to + std::max<std::int64_t>(way, 0);
+  if (left < kOne || right >= grid_.columns() * kOne || right - left >= kMaxColumns * kOne) return false;
+  const std::int64_t word = left / (kBeadWordBits * kOne);
+  const auto rounded = [](std::int64_t columns) {
+    return static_cast<std::uint32_t>((columns + (1 << (31 - kBeadLineBits))) >> (32 - kBeadLineBits));
+  };
+  const std::int64_t before = word * kBeadWordBits * kOne;
+  const BeadLine bits{static_cast<std::uint32_t>(word), rounded(from - before), rounded(to - before), rounded(line.step),
+                      line.tolerance};
+  undecided = kernels_->line(bits, first, last, words_.data(), touched_.data());
   return true;
 }
 
 /// Sets the bits of rows [first, last) of the band.
-void BeadRaster::cover_rows(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row,
-                            std::uint32_t first, std::uint32_t last) {
-  if (kernels_->columns(shape, first, last, rows_)) {
-    for (std::uint32_t r = first; r < last; ++r) {
-      if (rows_.near[r] < shape.tolerance) decide(deposited, shape, first_row + r, r);
-    }
+void BeadRaster::cover_rows(const Reaching& bead, std::uint32_t first_row, std::uint32_t first, std::uint32_t last) {
+  if (kernels_->rows != nullptr && !bead.shape.square)
+    return decide(bead, first_row, kernels_->rows(bead.shape, rows_, first, last, words_.data(), touched_.data()));
+  if (kernels_->columns(bead.shape, first, last, rows_)) {
+    for (std::uint32_t r = first; r < last; ++r)
+      if (rows_.near[r] < bead.shape.tolerance) decide_row(bead, first_row + r, r);
   }
   kernels_->set(rows_, first, last, words_.data(), touched_.data());
 }
 
+/// Sets the bits of rows of the band, exactly. undecided  a bit for each of these
+void BeadRaster::decide(const Reaching& bead, std::uint32_t first_row, std::uint64_t undecided) {
+  for (; undecided != 0; undecided &= undecided - 1) {
+    const auto r = static_cast<std::uint32_t>(std::countr_zero(undecided));
+    kernels_->columns(bead.shape, r, r + 1, rows_);
+    decide_row(bead, first_row + r, r);
+    kernels_->set(rows_, r, r + 1, words_.data(), touched_.data());
+  }
+}
+
 /// The columns of an undecided row, exactly.
-void BeadRaster::decide(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t row, std::uint32_t in_band) {
+void BeadRaster::decide_row(const Reaching& reaching, std::uint32_t row, std::uint32_t in_band) {
+  const auto& [deposited, shape, straight] = reaching;
   const Bead bead = bead_of(deposited.a, deposited.b, deposited.width, deposited.ends);
   const std::int64_t y = grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row);
   const auto margin = static_cast<std::int32_t>(std::min(shape.tolerance, 1e9)) + 1;
@@ -213,6 +241,20 @@ void BeadRaster::collect(std::uint32_t band_rows) {
   }
 }
 
+/// A bead reaches into the band at work.
+void BeadRaster::begin(const DepositedParts& bead) {
+  if (free_.empty()) {
+    free_.push_back(static_cast<std::uint32_t>(slots_.size()));
+    slots_.emplace_back();
+  }
+  reaching_.push_back(free_.back());
+  Reaching& slot = slots_[free_.back()];
+  free_.pop_back();
+  slot.deposited = bead;
+  set_shape(bead.a, bead.b, bead.width, bead.ends, grid_.x, slot.shape);
+  set_straight(slot);
+}
+
 void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const RunsView&)>& take) {
   const std::uint32_t rows = grid_.rows(), bands = (rows + kBeadBandRows - 1) / kBeadBandRows;
   // Beads by the band of their first row.
@@ -223,29 +265,26 @@ void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const Run
   for (std::uint32_t i = 0; i < beads_.size(); ++i) by_band_[band_begin_[beads_[i].first_row / kBeadBandRows]++] = i;
   band_.columns = grid_.columns();
   reaching_.clear();
-  shapes_.clear();
+  slots_.clear();
+  free_.clear();
   // A column of words more, in which runs that end with the image do.
   touched_.assign(grid_.columns() / kBeadWordBits + 2, 0);
   words_.assign(touched_.size() * kBeadBandRows, 0);
   for (std::uint32_t b = 0, next = 0; b < bands; ++b) {
     const std::uint32_t first = b * kBeadBandRows, last = std::min(rows, first + kBeadBandRows);
     for (; next < band_begin_[b]; ++next) {
-      const DepositedParts& bead = beads_[by_band_[next]];
-      reaching_.push_back(by_band_[next]);
-      shapes_.push_back(shape_of(bead.a, bead.b, bead.width, bead.ends, grid_.x));
+      constexpr std::uint32_t kAhead = 8;  // beads of a band are anywhere in memory
+      if (next + kAhead < by_band_.size()) __builtin_prefetch(&beads_[by_band_[next + kAhead]]);
+      begin(beads_[by_band_[next]]);
     }
     for (std::uint32_t r = 0; r < kBeadBandRows; ++r)
       rows_.y[r] = static_cast<double>(grid_.y.centre(std::int64_t{rows} - 1 - first - r));
     std::size_t stay = 0;
-    for (std::size_t k = 0; k < reaching_.size(); ++k) {
-      const DepositedParts& bead = beads_[reaching_[k]];
-      cover(bead, shapes_[k], first, last - first);
-      if (bead.last_row <= last) continue;
-      reaching_[stay] = reaching_[k];
-      shapes_[stay++] = shapes_[k];
+    for (const std::uint32_t slot : reaching_) {
+      cover(slots_[slot], first, last - first);
+      (slots_[slot].deposited.last_row > last ? reaching_[stay++] : free_.emplace_back()) = slot;
     }
     reaching_.resize(stay);
-    shapes_.resize(stay);
     collect(last - first);
     take(first, band_);
   }
@@ -306,6 +345,11 @@ void keep_beads(Runs& image, BeadRaster& beads, const Runs* inner, Runs& scratch
                       whole.change};
     };
     const RunsView part = band_of(image);
+    // As many changes for each of the image's as in the bands before: reserved once, as a rule.
+    const std::size_t before = part.row_offset.front(), kept_changes = scratch.change.size();
+    const std::size_t more = part.row_offset.back() - before + deposited.change.size();
+    if (kept_changes + more > scratch.change.capacity())
+      scratch.change.reserve(kept_changes + more + (image.change.size() - before) * (1 + kept_changes / (before + 1)));
     if (inner == nullptr) return append_combined(part, deposited, SetOperation::kIntersection, scratch);
     combine(part, deposited, SetOperation::kIntersection, kept);
     combine(part, band_of(*inner), SetOperation::kDifference, shell);

@@ -5,7 +5,6 @@
 // says so, unless a whole number is so near that rounding might pass it: then integers decide.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -29,6 +28,8 @@ class BeadRaster {
   explicit BeadRaster(const PixelGrid& grid, Isa isa = Isa::kAuto);
 
   void clear() { beads_.clear(); }
+  /// Capacity for so many beads after clear().
+  void reserve(std::size_t beads) { ensure_capacity(beads_, beads); }
   /// a, b   nm on the bed; equal for a dot (round ends only, square ends leave nothing)
   /// width  nm, > 0 and below 2^27 (134 mm)
   void add(Point2 a, Point2 b, Nm width, BeadEnds ends);
@@ -43,13 +44,13 @@ class BeadRaster {
 
   std::uint64_t bytes() const {
     return bytes_held(beads_) + bytes_held(by_band_) + bytes_held(reaching_) + bytes_held(band_begin_) + bytes_held(words_) +
-           bytes_held(touched_) + bytes_held(row_change_) + bytes_held(shapes_) + bytes_held(band_.row_offset) +
-           bytes_held(band_.change);
+           bytes_held(touched_) + bytes_held(row_change_) + bytes_held(slots_) + bytes_held(free_) +
+           bytes_held(band_.row_offset) + bytes_held(band_.change);
   }
-  /// Bytes of a band: its bits, and runs of rows with so many changes.
+  /// Bytes of a band: its bits, and runs of rows with so many changes, or beads.
   static std::uint64_t band_bytes(const PixelGrid& grid, std::uint64_t changes_of_row) {
     return (std::uint64_t{grid.columns()} / kBeadWordBits + 2) * (4 * kBeadBandRows + 1) +
-           8 * kBeadBandRows * (changes_of_row + 256);
+           8 * kBeadBandRows * (changes_of_row + 256) + sizeof(Reaching) * changes_of_row;
   }
 
  private:
@@ -59,11 +60,27 @@ class BeadRaster {
     Nm width;
     BeadEnds ends;
   };
-  void cover(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row, std::uint32_t band_rows);
-  bool cover_line(const BeadShape& shape, std::array<std::uint32_t, 2>& rows, std::uint64_t& undecided);
-  void cover_rows(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t first_row, std::uint32_t first,
-                  std::uint32_t last);
-  void decide(const DepositedParts& deposited, const BeadShape& shape, std::uint32_t row, std::uint32_t in_band);
+  /// Image rows [first, last) between the discs, and columns of the first one with 32 bits after the point.
+  struct Straight {
+    std::uint32_t first = 0, last = 0;
+    std::int64_t from = 0, to = 0, step = 0;  // step  from row to row
+    std::uint32_t tolerance = 0;              // of BeadLine
+  };
+  struct Reaching {
+    DepositedParts deposited;
+    BeadShape shape;
+    Straight straight;
+  };
+  static constexpr std::uint32_t kMinLineRows = 12;  // fewer are covered as the discs are
+
+  void begin(const DepositedParts& bead);
+  void set_straight(Reaching& bead) const;
+  void cover(const Reaching& bead, std::uint32_t first_row, std::uint32_t band_rows);
+  bool cover_line(const Straight& line, std::uint32_t first_row, std::uint32_t first, std::uint32_t last,
+                  std::uint64_t& undecided);
+  void cover_rows(const Reaching& bead, std::uint32_t first_row, std::uint32_t first, std::uint32_t last);
+  void decide(const Reaching& bead, std::uint32_t first_row, std::uint64_t undecided);
+  void decide_row(const Reaching& reaching, std::uint32_t row, std::uint32_t in_band);
   void collect(std::uint32_t band_rows);
   void widen_rows();
 
@@ -72,8 +89,8 @@ class BeadRaster {
   const BeadKernels* kernels_;
   Buffer<DepositedParts> beads_;
   Buffer<std::uint32_t> by_band_, band_begin_;  // beads by the band of their first row; where each band's end
-  Buffer<std::uint32_t> reaching_;              // into the band at work
-  Buffer<BeadShape> shapes_;                    // of these
+  Buffer<Reaching> slots_;                      // of beads that reach into the band at work
+  Buffer<std::uint32_t> reaching_, free_;       // slots that are in use, and others
   BeadRows rows_;                               // of the band, and of the bead at work
   Buffer<std::uint32_t> words_;                 // of the band; all 0 between bands
   Buffer<std::uint8_t> touched_;                // by column of words

@@ -89,12 +89,13 @@ TEST(BeadRaster, LongLinesBeginAndEndWhereIntegersDecideOnEveryInstructionSet) {
   };
   for (int round = 0; round < 40; ++round) {
     const std::int64_t dpi = round % 2 == 0 ? 1200 : 254;
-    const PixelGrid grid{PixelAxis(dpi, 40'000'000), PixelAxis(round % 3 == 0 ? 600 : dpi, 40'000'000)};
+    const std::int64_t depth = round % 8 == 6 ? 400'000'000 : 40'000'000;  // a line may be on 18,900 rows
+    const PixelGrid grid{PixelAxis(dpi, 40'000'000), PixelAxis(round % 3 == 0 ? 600 : dpi, depth)};
     std::vector<std::tuple<Point2, Point2, Nm, BeadEnds>> list;
     for (int i = 0; i < 12; ++i) {
-      const Point2 a{static_cast<Nm>(any(-1'000'000, 41'000'000)), static_cast<Nm>(any(-1'000'000, 41'000'000))};
-      const std::int64_t far = i % 3 == 0 ? 500'000 : 40'000'000;
-      Point2 b{static_cast<Nm>(a.x + any(-far, far)), static_cast<Nm>(a.y + any(-far, far))};
+      const Point2 a{static_cast<Nm>(any(-1'000'000, 41'000'000)), static_cast<Nm>(any(-1'000'000, depth + 1'000'000))};
+      const std::int64_t far = i % 3 == 0 ? 500'000 : 40'000'000, far_y = i % 3 == 0 ? far : depth;
+      Point2 b{static_cast<Nm>(a.x + any(-far, far)), static_cast<Nm>(a.y + any(-far_y, far_y))};
       if (i % 4 == 1) b.x = static_cast<Nm>(a.x + any(-2, 2));
       if (i % 4 == 2) b.y = static_cast<Nm>(a.y + any(-2, 2));
       list.emplace_back(a, b, static_cast<Nm>(any(20'000, 1'500'000)), round % 5 == 0 ? BeadEnds::kSquare : BeadEnds::kRound);

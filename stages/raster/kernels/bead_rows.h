@@ -24,7 +24,7 @@ struct alignas(64) BeadRows {
 struct BeadShape {
   double y0;                 // of the lower end
   double dx, dy;             // to the other end; dy >= 0, and dx > 0 where dy is 0
-  double radius2;            // of both discs
+  double radius, radius2;    // of both discs
   double slope, aside;       // edges along the bead: x = y slope -+ aside
   double left[2], right[2];  // y where these are its boundary; beyond are the discs
   bool square;               // no discs; left and right ends are x = y turned + end[.]
@@ -49,6 +49,10 @@ struct BeadKernels {
   bool (*columns)(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows);
   /// Sets the bits of [begin, end) in those rows. touched  of each column of words: becomes 1
   void (*set)(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words, std::uint8_t* touched);
+  /// Both, of a bead with round ends. nullptr: there is no faster way than one after the other
+  /// returns  a bit for each undecided row, of which no bit is set
+  std::uint64_t (*rows)(const BeadShape& bead, const BeadRows& rows, std::uint32_t first, std::uint32_t last,
+                        std::uint32_t* words, std::uint8_t* touched);
   /// Columns of rows [first, last) of a line, and their bits. nullptr: there is no faster way than both of the above
   /// returns  a bit for each undecided row, of which no bit is set
   std::uint64_t (*line)(const BeadLine& line, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
