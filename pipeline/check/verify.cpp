@@ -20,6 +20,7 @@
 #include "pipeline/output/print_program.h"
 #include "pipeline/report/job_cost.h"
 #include "stages/data/levels.h"
+#include "stages/data/shortage.h"
 #include "stages/formats/images/image.h"
 #include "stages/replay/frame.h"
 #include "stages/replay/totals.h"
@@ -370,9 +371,7 @@ Result<VerifyReport> verify_file(const std::string& path) {
   return verify_paths(path, folder.empty() ? "." : folder.string(), *manifest);
 }
 
-}  // namespace
-
-Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options) {
+Result<VerifyReport> verify_any(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
   if (fs::is_regular_file(directory, error)) return verify_file(directory);
   if (!fs::is_directory(directory, error)) {
@@ -422,6 +421,16 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
   // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
   if (!whole_job && !manifests.empty()) check_shards(shards, manifests[0].head.layer_count, report);
+  return report;
+}
+
+}  // namespace
+
+Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options) {
+  take_shortage();
+  auto report = verify_any(directory, options);
+  const int reason = take_shortage();
+  if (reason != 0 && (!report || !report->ok())) return shortage(reason, directory);
   return report;
 }
 

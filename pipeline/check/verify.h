@@ -38,7 +38,7 @@ struct VerifyReport : Faults {
 /// without an entry in a manifest are faults, and so are an interrupted job and shards that are missing.
 ///
 /// directory  or a file of toolpaths; toolpaths and contours are compared by the bytes of file and layers (compare_paths)
-/// errors  kVerification: manifest missing or unreadable; kUsage: no such directory or file
+/// errors  kVerification: manifest missing or unreadable; kUsage: no such directory or file; kMemory
 /// cost    reads every file once, and again to decode it; parallel over layers; memory of a few layers' runs
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options);
 

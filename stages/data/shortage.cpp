@@ -21,6 +21,7 @@ namespace lamina {
 namespace {
 
 std::atomic<std::uint64_t> refused{0}, refused_block{0};
+std::atomic<int> last_reason{0};
 std::new_handler handler_before = nullptr;
 
 void count_refusal() {
@@ -77,6 +78,7 @@ bool is_shortage(const std::exception& problem) {
 }
 
 Error out_of_memory() {
+  last_reason = ENOMEM;
   const std::uint64_t needed = needed_address_space() >> 20;
   return {Fault::kMemory,
           fmt::format("out of memory{}; give a smaller --memory, fewer --threads or --jobs, or --engine contours, or run it "
@@ -86,12 +88,15 @@ Error out_of_memory() {
 
 Error shortage(int reason, const std::string& path) {
   Error error = out_of_memory();
+  last_reason = reason;
   if (reason == ENFILE) error.message = "too many open files in the system: needs one more; close other programs";
   if (reason == EMFILE)
     error.message = fmt::format("too many open files: needs more than {}; raise the limit (ulimit -n)", limit_of(RLIMIT_NOFILE));
   if (!path.empty()) error.message.insert(0, path + ": ");
   return error;
 }
+
+int take_shortage() { return last_reason.exchange(0); }
 
 Error shortage(const std::exception& problem, const std::string& path) { return shortage(reason_of(problem), path); }
 

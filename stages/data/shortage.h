@@ -29,6 +29,9 @@ bool is_shortage(int reason);
 Error shortage(int reason, const std::string& path = {});
 Error shortage(const std::exception& problem, const std::string& path = {});
 
+/// The reason of the last shortage() of this process, 0: none since the last call. For what reports files as damaged.
+int take_shortage();
+
 /// The result of work that reads a file. A shortage is kMemory, whether the work throws it, or a library calls it damage.
 template <class Work>
 auto report_shortages(const std::string& path, const Work& work) -> decltype(work()) {

@@ -1,7 +1,12 @@
 // Address space of many sizes: a command is done, or says in one line that memory ran out, and nothing it leaves is torn.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 
+#include <algorithm>
+#include <cstdlib>
+#include <regex>
 #include <sstream>
 
 #include "tests/commands/program.h"
@@ -60,6 +65,39 @@ TEST_F(Memory, RunningOutOfItIsOneLineWithItsOwnCode) {
     EXPECT_TRUE(!writes || short_of_memory > 0) << command;
     fs::remove_all(directory_ / "whole");
   }
+}
+
+// tests/torture/readers.py does this for every reader and with more limits.
+TEST(Limits, ReadersThatLackMemoryOrOpenFilesNameWhatTheyNeed) {
+  const Directory folder;
+  int complete = 0, lacks_memory = 0, lacks_files = 0;
+  for (const char* input : {"images3/I02_gray8_trns_bg/layer_0000.png", "images3/I12_thumb_second/layer_0000.tif",
+                            "images3/I25b_pbm_trailing", "images3/J02_bmp_white_white", "quad_knot.obj",
+                            "nist_part_feature_open.stl", "arrow_scaled_mirrored.3mf"}) {
+    std::string whole;
+    for (const std::string limit : {"-n 64", "-v 16000", "-v 19000", "-v 22000", "-v 26000", "-v 36000", "-n 4", "-n 5", "-n 8"}) {
+      const std::string out = folder / "out", err = folder / "err";
+      const int state = std::system(fmt::format("exec >{} 2>{} </dev/null; ulimit {}; exec {} info {}", out, err, limit,
+                                                LAMINA_PROGRAM, corpus_file(input))
+                                        .c_str());
+      const int code = WIFEXITED(state) ? WEXITSTATUS(state) : -1;
+      const std::string what = std::string(input) + ", ulimit " + limit + ": " + read_text(err), answer = read_text(out);
+      if (code == 127 || read_text(err).starts_with("\nlibgomp: ")) continue;  // nothing is left for the program's libraries
+      if (whole.empty()) whole = answer;
+      if (code == 0) {
+        EXPECT_EQ(answer, whole) << what;
+        ++complete;
+        continue;
+      }
+      ASSERT_EQ(code, 6) << what;
+      EXPECT_TRUE(std::regex_search(what, std::regex(": needs more than [0-9]+( MiB of address space;|; raise the limit)"))) << what;
+      EXPECT_EQ(std::ranges::count(read_text(err), '\n'), 1) << what;
+      ++(limit[1] == 'v' ? lacks_memory : lacks_files);
+    }
+  }
+  EXPECT_GE(complete, 21);
+  EXPECT_GT(lacks_memory, 0);
+  EXPECT_GT(lacks_files, 0);
 }
 
 }  // namespace

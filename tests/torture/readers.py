@@ -88,13 +88,15 @@ def reading_jobs(program, folder):
         path, dpi = os.path.join(at, path), "2400" if path == "large.png" else "600"
         found.append((f"info, {name}", ["info", path], []))
         found.append((f"convert, {name}", ["convert", path, "-o", "out", "--dpi", dpi, "--quiet"], []))
-        found.append((f"jet, {name}", ["jet", path, "--layer", "0.1", "--dpi", dpi, "-o", "out", "--quiet"], []))
+        if not path.endswith("pgm"):  # states no resolution
+            found.append((f"jet, {name}", ["jet", path, "--layer", "0.1", "--dpi", dpi, "-o", "out", "--quiet"], []))
     for name, path in meshes.items():
         path = os.path.join(at, path)
         found.append((f"info, {name}", ["info", path], []))
         found.append((f"jet, {name}", ["jet", path, "--dpi", "150", "--layer", "0.5", "-o", "out", "--quiet"], []))
     for form in ("tiff-g4", "png", "bmp", "pbm"):
         job = ["jet", jobs.NUT, "--dpi", "300", "--layer", "0.5", "--format", form, "-o", "job", "--quiet"]
+        found.append((f"verify, {form}", ["verify", "job"], [job]))
         found.append((f"preview, {form}", ["preview", "job", "--layer", "3", "-o", "out.png", "--quiet"], [job]))
     return found
 

@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
 
+#include "stages/data/shortage.h"
 #include "stages/support/text/readable.h"
 
 namespace lamina::calibration {
@@ -82,7 +84,9 @@ Photo photo_of(cv::Mat grey) {
 }
 
 Result<Photo> read_photo(const std::string& path, int minimum) {
+  errno = 0;
   const auto refused = [&](const std::string& why) {
+    if (is_shortage(errno)) return shortage(errno, one_line(path));
     return Error{Fault::kInput, fmt::format("{}: {}", one_line(path), one_line(why))};
   };
   const auto file = OIIO::ImageInput::open(path);

@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +20,7 @@
 #include <vector>
 
 #include "stages/data/grid.h"
+#include "stages/data/shortage.h"
 #include "stages/data/units.h"
 #include "stages/formats/g4/decode.h"
 #include "stages/formats/g4/encode.h"
@@ -196,8 +198,9 @@ template <class PutStrips>
 Status write_file(Bytes& file, const TagFrame& frame, const LayerText& text, const PutStrips& put_strips) {
   MemoryFile memory{file};
   std::string message;
+  errno = 0;
   TiffHandle tiff = open_for_writing(memory, message);
-  if (tiff == nullptr) return refused(frame, message);
+  if (tiff == nullptr) return is_shortage(errno) ? shortage(errno) : refused(frame, message);
   set_tags(tiff.get(), frame);
   text.put(tiff.get());
   const bool written = put_strips(tiff.get()) && TIFFFlush(tiff.get()) != 0;
@@ -206,7 +209,7 @@ Status write_file(Bytes& file, const TagFrame& frame, const LayerText& text, con
     if (memory.position > kMaxClassicBytes - kStripBytes - kDirectoryBytes) {
       return refused(frame, "the file would exceed 4 GiB; use --format tiff-g4");
     }
-    return refused(frame, message.empty() ? "out of memory" : message);
+    return is_shortage(errno) ? shortage(errno) : refused(frame, message);
   }
   file.resize(memory.size);
   put_exact_resolution(frame, file);
