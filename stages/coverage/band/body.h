@@ -6,6 +6,9 @@ struct Tent {
   Eight x0, x1, x2, area, mean, rise, fall;
 };
 
+/// nm of x that change no volume: area x this is far below roundings.
+constexpr double kThinnest = 0x1p-64;
+
 /// Corners in any order.
 LAMINA_LANES Tent tent_of(Eight a, Eight b, Eight c, Eight area) {
   const Eight low = minimum(a, b), high = maximum(a, b), inner = minimum(high, c);
@@ -15,10 +18,13 @@ LAMINA_LANES Tent tent_of(Eight a, Eight b, Eight c, Eight area) {
   t.x1 = maximum(low, inner);
   t.area = area;
   t.mean = times(plus(plus(t.x0, t.x1), t.x2), all(1.0 / 3));
-  const Eight span = less(t.x2, t.x0), third = times(area, all(1.0 / 3));
-  const Eight of_rise = times(less(t.x1, t.x0), span), of_fall = times(less(t.x2, t.x1), span);
-  t.rise = keep(below(all(0), of_rise), over(third, of_rise));
-  t.fall = keep(below(all(0), of_fall), over(third, of_fall));
+  // One division for both: area / 3 (x1 - x0) (x2 - x0) and area / 3 (x2 - x1) (x2 - x0).
+  const Eight rise = less(t.x1, t.x0), fall = less(t.x2, t.x1), one = all(1);
+  const Mask rises = below(all(kThinnest), rise), falls = below(all(kThinnest), fall);
+  const Eight of_rise = pick(rises, rise, one), of_fall = pick(falls, fall, one);
+  const Eight per_both = over(times(area, all(1.0 / 3)), times(times(of_rise, of_fall), less(t.x2, t.x0)));
+  t.rise = keep(rises, times(per_both, of_fall));
+  t.fall = keep(falls, times(per_both, of_rise));
   return t;
 }
 
@@ -80,18 +86,19 @@ LAMINA_LANES void add_body(const Trapezoid& piece, const BandRows& rows, const E
   const Eight upper = times(height(on_high, back_high), half), lower = times(height(on_low, back_low), half);
   const Tent a = tent_of(x_back_high, x_on_high, x_back_low, upper), b = tent_of(x_back_low, x_on_low, x_on_high, lower);
   double* cell = cells.column(first);
-  const double* edges = columns.data() + first;
-  const auto behind_both = [&](double x) LAMINA_TARGET {
-    const Eight from_piece = all(x - piece.from_x);
-    return plus(behind(a, from_piece), behind(b, from_piece));
-  };
-  Eight before = behind_both(*edges);
-  for (std::uint32_t column = first; column <= last; ++column, cell += 2 * kLanes) {
-    const Eight now = behind_both(*++edges);
-    store(cell, plus(load(cell), less(now, before)));
-    before = now;
+  const double *edges = columns.data() + first, *per_width = columns.per_width() + first;
+  // Nothing is behind the first edge, and both tents are before the last one.
+  Eight before = all(0), mean = all(0);
+  for (std::uint32_t column = first; column < last; ++column, cell += kLanes) {
+    const Eight x = all(*++edges - piece.from_x), now = plus(behind(a, x), behind(b, x));
+    const Eight area = times(less(now, before), all(*per_width++));
+    add_to(cell, less(area, mean));
+    before = now, mean = area;
   }
-  store(cell + kLanes, plus(load(cell + kLanes), plus(upper, lower)));
+  const Eight x = all(*++edges - piece.from_x), now = plus(times(upper, less(x, a.mean)), times(lower, less(x, b.mean)));
+  const Eight area = times(less(now, before), all(*per_width));
+  add_to(cell, less(area, mean));
+  add_to(cell + kLanes, less(plus(upper, lower), area));
 }
 
 /// Levels of one column in each row; what is not decided is noted.
@@ -128,9 +135,9 @@ LAMINA_LANES std::uint32_t put_faces(const BandTask& band, Eight share, std::uin
 LAMINA_LANES void sweep_columns(const BandTask& band, SweepState& state, const LevelSegment& columns, bool suspect,
                                 SweptBand& swept) {
   double* cell = band.cells->column(columns.first);
-  state.cover = plus(state.cover, load(cell + kLanes));
-  const Eight share = times(plus(state.cover, times(load(cell), all(band.per_width[columns.first]))), state.per_area);
-  store(cell, all(0)), store(cell + kLanes, all(0));
+  state.cover = plus(state.cover, load(cell));
+  const Eight share = times(state.cover, state.per_area);
+  store(cell, all(0));
   std::uint32_t undecided = 0, outside = 0;
   swept.level[columns.first] = levels_at(state, share, undecided, outside);
   if ((undecided | outside) == 0 && !suspect) [[likely]]
@@ -182,8 +189,8 @@ LAMINA_LANES void sweep_body(const BandTask& band, SweptBand& swept) {
       add_segment(next, at, swept);
     }
     double* cell = band.cells->column(span.end);
-    const Eight cover = plus(state.cover, load(cell + kLanes));
-    store(cell + kLanes, all(0));
+    const Eight cover = plus(state.cover, load(cell));
+    store(cell, all(0));
     const Eight winding = whole_below(plus(times(cover, state.per_area), all(0.5)));
     state.cover = times(winding, state.area);
     alignas(64) double whole[kLanes];

@@ -73,7 +73,7 @@ struct ColumnMarks {
   }
 };
 
-/// Columns of eight rows, all empty but while they are made. 128 bytes a column, of which those are touched that facets reach;
+/// Columns of eight rows, all empty but while they are made. 64 bytes a column, of which those are touched that facets reach;
 /// numbers of the rows are next to each other, a lane each.
 class BandCells {
  public:
@@ -86,9 +86,8 @@ class BandCells {
     const std::size_t beyond = reinterpret_cast<std::uintptr_t>(value_.data()) / sizeof(double) % kLanes;
     first_ = value_.data() + (kLanes - beyond) % kLanes;
   }
-  /// First nm^3 that facets add within the column, then nm^2 of facets that end before it: they add this times the width to it
-  /// and all behind.
-  double* column(std::uint32_t column) { return first_ + std::size_t{column} * 2 * kLanes; }
+  /// nm^2 by which the mean section of the solid in the column, across x, is larger than in the one before it.
+  double* column(std::uint32_t column) { return first_ + std::size_t{column} * kLanes; }
   /// Columns that hold facets, in any row; those that have numbers; those with facets that meet others.
   ColumnMarks held() { return marks(0); }
   ColumnMarks summed() { return marks(1); }
@@ -124,7 +123,7 @@ class BandCells {
   }
   void size(std::uint32_t columns) {
     columns_ = columns;
-    values_ = (std::size_t{columns} + 2) * 2 * kLanes;
+    values_ = (std::size_t{columns} + 2) * kLanes;
     words_ = columns / 64 + 2;
     groups_ = words_ / 64 + 1;
   }
@@ -193,7 +192,6 @@ struct SweptBand {
 
 /// Rows whose cells are complete. They are empty again once they are swept.
 struct BandTask {
-  const double* per_width;  // of columns
   std::uint32_t columns, rows;
   FillRule fill;
   alignas(64) std::array<double, kLanes> area, per_area;  // nm^2 of each row's section; 1 / that, 0 of rows beyond the bed

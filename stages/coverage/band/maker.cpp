@@ -323,7 +323,7 @@ void BandMaker::deposit(const BandSlab& slab, BandSums& sums) {
 }
 
 /// Runs between changes; those of level 0 are none.
-void BandMaker::append(const Changes& changes, std::uint32_t columns, Levels& out) const {
+void BandMaker::append(Changes changes, std::uint32_t columns, Levels& out) const {
   const std::size_t before = out.level.size(), maximum = before + changes.count;
   if (out.level.capacity() < maximum) {
     out.level.reserve(2 * maximum);
@@ -348,8 +348,7 @@ void BandMaker::append(const Changes& changes, std::uint32_t columns, Levels& ou
 }
 
 BandTask BandMaker::task(const BandSlab& slab, const BandSums& sums) {
-  BandTask band{.per_width = slab.edges.per_width(),
-                .columns = slab.edges.count(),
+  BandTask band{.columns = slab.edges.count(),
                 .rows = rows_.count,
                 .fill = slab.rule.fill,
                 .area = {},

@@ -168,7 +168,7 @@ class BandMaker {
   BandTask task(const BandSlab& slab, const BandSums& sums);
   void find_ties(const BandSlab& slab, BandTask& task);
   void resolve(const BandSlab& slab, CoverageReport& report);
-  void append(const Changes& changes, std::uint32_t columns, Levels& out) const;
+  void append(Changes changes, std::uint32_t columns, Levels& out) const;
 
   const BandKernels* kernels_ = nullptr;
   BandRows rows_;
