@@ -1,6 +1,9 @@
 #include "stages/coverage/coverage.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -45,7 +48,7 @@ std::int64_t units(double amount) { return static_cast<std::int64_t>(std::ceil(a
 /// the contributions of other facets begin or end with them.
 class HeldBound {
  public:
-  /// top_level  n. cost  some ten nanoseconds a facet
+  /// top_level  n. cost  some ten nanoseconds a facet; parallel
   HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level);
   /// Of a layer between two heights, nm in the frame of the mesh, but for its scratch_bytes. cost  O(1)
   LayerBound at(std::int64_t bottom, std::int64_t top) const;
@@ -55,6 +58,7 @@ class HeldBound {
  private:
   static constexpr std::size_t kMaxSlabs = 8192;
   static constexpr std::uint32_t kFinest = 12;  // 4 micrometres
+  static constexpr std::uint32_t kClustersAtOnce = 1024;
 
   /// Voxels, or levels x nm of height, in 1024ths, so that sums do not depend on their order.
   struct Sums {
@@ -71,6 +75,10 @@ class HeldBound {
     Sums floor;               // of flat facets at its lower end, which no layer from there on holds
     std::uint64_t begin = 0;  // facets whose lowest corner lies in slabs below
     std::uint64_t end = 0;    // whose highest one does, or where they end
+    void add(const Slab& more) {
+      below.add(more.below, 1), cut.add(more.cut, 1), floor.add(more.floor, 1);
+      begin += more.begin, end += more.end;
+    }
   };
   struct Facet;
   void add(const Triangle& facet, bool suspect);
@@ -115,10 +123,18 @@ HeldBound::HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const Pix
   while (slabs() > maximum) ++shift_;
   first_ = lowest >> shift_;
   slab_.resize(slabs() + 2);
-  Cluster slack;
-  for (std::uint32_t c = 0; c < bounds.size(); ++c) {
-    const Cluster& cluster = mesh.cluster(c, slack);
-    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) add(cluster.triangle(lane), (suspects[c] >> lane & 1) != 0);
+  tbb::enumerable_thread_specific<HeldBound> parts(*this);
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, mesh.cluster_count(), kClustersAtOnce), [&](const auto& range) {
+    HeldBound& part = parts.local();
+    Cluster slack;
+    for (std::uint32_t c = range.begin(); c < range.end(); ++c) {
+      const Cluster& cluster = mesh.cluster(c, slack);
+      for (std::uint32_t lane = 0; lane < kClusterSize; ++lane)
+        part.add(cluster.triangle(lane), (suspects[c] >> lane & 1) != 0);
+    }
+  });
+  for (const HeldBound& part : parts) {
+    for (std::size_t i = 0; i < slab_.size(); ++i) slab_[i].add(part.slab_[i]);
   }
   // Differences become what each slab has, and that what all below have.
   Sums here, cut, below;
