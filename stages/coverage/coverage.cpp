@@ -264,6 +264,13 @@ struct Copy {
 
 constexpr std::uint32_t kNoFacet = UINT32_MAX;
 
+/// Facets of the next band lie all over the memory of the layer.
+void prefetch(const SlabFacet& facet) {
+  const char* const first = reinterpret_cast<const char*>(&facet);
+  for (std::size_t byte = 0; byte < sizeof facet; byte += 64) __builtin_prefetch(first + byte);
+  __builtin_prefetch(first + sizeof facet - 1);
+}
+
 /// Boxes that each facet of a copy is compared with.
 constexpr std::size_t kMaxOthers = 64;
 
@@ -472,6 +479,8 @@ CoverageReport Coverage::layer(const Layer& layer, CoverageScratch& scratch, Lev
       scratch.live.push_back(at);
     }
     const std::uint32_t first = band * kBandRows, rows = std::min(state.grid.rows() - first, kBandRows);
+    for (std::uint32_t at = band > 0 ? scratch.first[band - 1] : kNoFacet; at != kNoFacet; at = scratch.next[at])
+      prefetch(scratch.facets[at]);
     if (scratch.maker.is_empty()) {
       for (std::uint32_t r = 0; r < rows; ++r) out.end_row();
     } else {
