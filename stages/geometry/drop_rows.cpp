@@ -1,6 +1,7 @@
 #include "stages/geometry/drop_rows.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <utility>
@@ -145,14 +146,20 @@ void DropPlane::spans(std::uint32_t number, WordSpans& spans) const {
   const LevelsView& zones = image_.zones;
   const DropPatterns& patterns = *image_.patterns;
   spans.span.clear(), spans.mixed.clear();
+  const std::uint32_t run = zones.row_offset[number], end_run = zones.row_offset[number + 1];
+  if (run == end_run) return;
+  constexpr std::uint64_t kFull = ~std::uint64_t{0};
+  std::array<std::array<std::uint64_t, 2>, 256> pattern_of;  // by level
+  for (std::size_t level = 0; level < patterns.zone.size(); ++level) {
+    const DropZone& zone = patterns.zone[level];
+    pattern_of[level] = zone.base > drop_ ? std::array{kFull, kFull} : std::array{std::uint64_t{0}, std::uint64_t{0}};
+    if (zone.base != drop_ || zone.extra != DropZone::Extra::kTile) continue;
+    std::copy_n(patterns.tile_row(zone, number), 2, pattern_of[level].begin());
+  }
   std::uint32_t at = 0;  // the word that is being made
   std::uint64_t word = 0;
-  for (std::uint32_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i) {
-    const DropZone& zone = patterns.zone[zones.level[i]];
-    const bool tile = zone.base == drop_ && zone.extra == DropZone::Extra::kTile;
-    if (zone.base <= drop_ && !tile) continue;
-    static constexpr std::uint64_t kFull[2] = {~std::uint64_t{0}, ~std::uint64_t{0}};
-    const std::uint64_t* const pattern = tile ? patterns.tile_row(zone, number) : kFull;
+  for (std::uint32_t i = run; i < end_run; ++i) {
+    const std::array<std::uint64_t, 2>& pattern = pattern_of[zones.level[i]];
     const std::uint32_t begin = zones.change[2 * std::size_t{i}], end = zones.change[2 * std::size_t{i} + 1];
     const std::uint32_t first = begin / 64, last = (end - 1) / 64;
     const std::uint64_t head = ~std::uint64_t{0} << begin % 64, tail = ~std::uint64_t{0} >> (63 - (end - 1) % 64);
@@ -162,8 +169,11 @@ void DropPlane::spans(std::uint32_t number, WordSpans& spans) const {
       continue;
     }
     spans.add(first, word | (head & pattern[first % 2]));
-    if (!tile) spans.add_span(first + 1, last, true);
-    for (std::uint32_t w = first + 1; tile && w < last; ++w) spans.add(w, pattern[w % 2]);
+    if ((pattern[0] & pattern[1]) == kFull) {
+      spans.add_span(first + 1, last, true);
+    } else if ((pattern[0] | pattern[1]) != 0) {
+      for (std::uint32_t w = first + 1; w < last; ++w) spans.add(w, pattern[w % 2]);
+    }
     at = last;
     word = tail & pattern[last % 2];
   }
@@ -290,22 +300,32 @@ std::uint64_t DropCounter::extra(std::uint8_t zone, std::uint32_t row, std::uint
     const CorePattern& core = patterns_->core;
     return count_kernel()(core, begin, end, core.of_row(row));
   }
-  const std::uint8_t* const before = before_.data() + (of.tile * std::size_t{kTileSide} + row % kTileSide) * kRow;
-  const auto up_to = [&](std::uint32_t column) {
-    return std::uint64_t{column / kTileSide} * before[kTileSide] + before[column % kTileSide];
-  };
-  return up_to(end) - up_to(begin);
+  return between(before(zone, row), begin, end);
+}
+
+const std::uint8_t* DropCounter::before(std::uint8_t zone, std::uint32_t row) const {
+  static constexpr std::array<std::uint8_t, kRow> kNone{};
+  const DropZone& of = patterns_->zone[zone];
+  if (of.extra == DropZone::Extra::kCore) return nullptr;
+  if (of.extra == DropZone::Extra::kNone) return kNone.data();
+  return before_.data() + (of.tile * std::size_t{kTileSide} + row % kTileSide) * kRow;
 }
 
 DropTotals::DropTotals(const DropImageView& image, const DropCounter& counter) {
   for (const DropZone& zone : image.patterns->zone) zones_.push_back({zone});
   const LevelsView& zones = image.zones;
+  std::array<const std::uint8_t*, 256> before;
+  ZoneTotal* const totals = zones_.data();
   for (std::uint32_t row = 0; row < zones.rows(); ++row) {
-    for (std::size_t i = zones.row_offset[row]; i < zones.row_offset[row + 1]; ++i) {
+    const std::size_t first = zones.row_offset[row], last = zones.row_offset[row + 1];
+    for (std::size_t z = 0; z < zones_.size() && first < last; ++z)
+      before[z] = counter.before(static_cast<std::uint8_t>(z), row);
+    for (std::size_t i = first; i < last; ++i) {
       const std::uint32_t begin = zones.change[2 * i], end = zones.change[2 * i + 1];
-      ZoneTotal& total = zones_[zones.level[i]];
-      total.pixels += end - begin;
-      total.extra += counter.extra(zones.level[i], row, begin, end);
+      const std::uint8_t level = zones.level[i], *const of_row = before[level];
+      totals[level].pixels += end - begin;
+      totals[level].extra +=
+          of_row != nullptr ? DropCounter::between(of_row, begin, end) : counter.extra(level, row, begin, end);
     }
   }
 }

@@ -71,6 +71,14 @@ class DropCounter {
   void start(const DropPatterns& patterns);
   /// Pixels [begin, end) of a zone in a row that get one drop more than its base. cost  a few operations; of a core O(pixels)
   std::uint64_t extra(std::uint8_t zone, std::uint32_t row, std::uint32_t begin, std::uint32_t end) const;
+  /// For between(): the pixels of a tile's row before each column that get one more. nullptr of a core.
+  const std::uint8_t* before(std::uint8_t zone, std::uint32_t row) const;
+  static std::uint64_t between(const std::uint8_t* before, std::uint32_t begin, std::uint32_t end) {
+    const auto up_to = [&](std::uint32_t column) {
+      return std::uint64_t{column / kTileSide} * before[kTileSide] + before[column % kTileSide];
+    };
+    return up_to(end) - up_to(begin);
+  }
   std::uint64_t drops(std::uint8_t zone, std::uint32_t row, std::uint32_t begin, std::uint32_t end) const {
     return std::uint64_t{patterns_->zone[zone].base} * (end - begin) + extra(zone, row, begin, end);
   }
