@@ -144,7 +144,10 @@ void BeadRaster::cover(const Reaching& bead, std::uint32_t first_row, std::uint3
     return cover_rows(bead, first_row, first, last);
   if (first < from - first_row) cover_rows(bead, first_row, first, from - first_row);
   if (to - first_row < last) cover_rows(bead, first_row, to - first_row, last);
-  decide(bead, first_row, undecided);
+  for (; undecided != 0; undecided &= undecided - 1) {
+    const auto r = static_cast<std::uint32_t>(std::countr_zero(undecided));
+    cover_rows(bead, first_row, r, r + 1);
+  }
 }
 
 /// Sets the bits of rows [first, last) of the band, which are between the discs.
@@ -168,29 +171,28 @@ bool BeadRaster::cover_line(const Straight& line, std::uint32_t first_row, std::
   return true;
 }
 
-/// Sets the bits of rows [first, last) of the band.
+/// Sets the bits of rows [first, last) of the band. They are no further than the radius from the middle line as far as that is
+/// no further above or below.
 void BeadRaster::cover_rows(const Reaching& bead, std::uint32_t first_row, std::uint32_t first, std::uint32_t last) {
-  if (kernels_->rows != nullptr && !bead.shape.square)
-    return decide(bead, first_row, kernels_->rows(bead.shape, rows_, first, last, words_.data(), touched_.data()));
-  if (kernels_->columns(bead.shape, first, last, rows_)) {
+  const BeadShape& shape = bead.shape;
+  const double below = std::clamp(rows_.y[last - 1] - shape.y0 - shape.radius, 0.0, shape.dy) * shape.slope;
+  const double above =
+      shape.dy > 0 ? std::clamp(rows_.y[first] - shape.y0 + shape.radius, 0.0, shape.dy) * shape.slope : shape.dx;
+  const double from = (std::min(below, above) - shape.radius) * shape.columns_per_nm + shape.first_column - 1;
+  const double to = (std::max(below, above) + shape.radius) * shape.columns_per_nm + shape.first_column + 1;
+  if (!(to >= 0 && from < shape.columns)) return;
+  const auto word = [&](double column) {
+    return static_cast<std::uint32_t>(std::clamp<double>(column, 0, shape.columns)) / kBeadWordBits;
+  };
+  if (kernels_->columns(shape, first, last, rows_)) {
     for (std::uint32_t r = first; r < last; ++r)
-      if (rows_.near[r] < bead.shape.tolerance) decide_row(bead, first_row + r, r);
+      if (rows_.near[r] < shape.tolerance) decide(bead, first_row + r, r);
   }
-  kernels_->set(rows_, first, last, words_.data(), touched_.data());
-}
-
-/// Sets the bits of rows of the band, exactly. undecided  a bit for each of these
-void BeadRaster::decide(const Reaching& bead, std::uint32_t first_row, std::uint64_t undecided) {
-  for (; undecided != 0; undecided &= undecided - 1) {
-    const auto r = static_cast<std::uint32_t>(std::countr_zero(undecided));
-    kernels_->columns(bead.shape, r, r + 1, rows_);
-    decide_row(bead, first_row + r, r);
-    kernels_->set(rows_, r, r + 1, words_.data(), touched_.data());
-  }
+  kernels_->set(rows_, first, last, {word(from), word(to)}, words_.data(), touched_.data());
 }
 
 /// The columns of an undecided row, exactly.
-void BeadRaster::decide_row(const Reaching& reaching, std::uint32_t row, std::uint32_t in_band) {
+void BeadRaster::decide(const Reaching& reaching, std::uint32_t row, std::uint32_t in_band) {
   const auto& [deposited, shape, straight] = reaching;
   const Bead bead = bead_of(deposited.a, deposited.b, deposited.width, deposited.ends);
   const std::int64_t y = grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row);

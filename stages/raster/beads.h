@@ -79,8 +79,7 @@ class BeadRaster {
   bool cover_line(const Straight& line, std::uint32_t first_row, std::uint32_t first, std::uint32_t last,
                   std::uint64_t& undecided);
   void cover_rows(const Reaching& bead, std::uint32_t first_row, std::uint32_t first, std::uint32_t last);
-  void decide(const Reaching& bead, std::uint32_t first_row, std::uint64_t undecided);
-  void decide_row(const Reaching& reaching, std::uint32_t row, std::uint32_t in_band);
+  void decide(const Reaching& reaching, std::uint32_t row, std::uint32_t in_band);
   void collect(std::uint32_t band_rows);
   void widen_rows();
 

@@ -23,6 +23,10 @@ struct Four {
   typedef double Doubles __attribute__((vector_size(32)));
   typedef std::int32_t Integers __attribute__((vector_size(16)));
 };
+struct Eight {
+  typedef double Doubles __attribute__((vector_size(64)));
+  typedef std::int32_t Integers __attribute__((vector_size(32)));
+};
 
 // By reference, so that no vector is passed in registers that another instruction set does not have.
 
@@ -91,7 +95,8 @@ LAMINA_BODY bool columns_body(const BeadShape& bead, std::uint32_t first, std::u
   Doubles nearest = Doubles{} + 1;
   // Image rows go down: y of the last row of a block is its lowest.
   const double low = bead.y0 + std::max(bead.left[0], bead.right[0]), high = bead.y0 + std::min(bead.left[1], bead.right[1]);
-  for (std::uint32_t r = first / kLanes * kLanes; r < last; r += kLanes) {
+  for (std::uint32_t next = first; next < last; next += kLanes) {
+    const std::uint32_t r = std::min(next, kBeadBandRows - kLanes);
     Doubles y, left, right;
     std::memcpy(&y, rows.y + r, sizeof y);
     y -= bead.y0;
@@ -111,7 +116,8 @@ bool columns_plain(const BeadShape& bead, std::uint32_t first, std::uint32_t las
   return columns_body<Two>(bead, first, last, rows);
 }
 
-void set_plain(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words, std::uint8_t* touched) {
+void set_plain(const BeadRows& rows, std::uint32_t first, std::uint32_t last, const std::array<std::uint32_t, 2>&,
+               std::uint32_t* words, std::uint8_t* touched) {
   for (std::uint32_t r = first; r < last; ++r) {
     if (rows.begin[r] >= rows.end[r]) continue;
     const auto begin = static_cast<std::uint32_t>(rows.begin[r]), end = static_cast<std::uint32_t>(rows.end[r]) - 1;
@@ -143,35 +149,26 @@ LAMINA_AVX2 bool columns_avx2(const BeadShape& bead, std::uint32_t first, std::u
   return columns_body<Four>(bead, first, last, rows);
 }
 
-LAMINA_AVX2 void set_avx2(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
-                          std::uint8_t* touched) {
-  constexpr int kRows = 8;
+LAMINA_AVX2 void set_avx2(const BeadRows& rows, std::uint32_t first, std::uint32_t last,
+                          const std::array<std::uint32_t, 2>& within, std::uint32_t* words, std::uint8_t* touched) {
+  constexpr std::uint32_t kRows = 8;
   const __m256i all = _mm256_set1_epi32(-1), none = _mm256_setzero_si256(), step = _mm256_set1_epi32(kBeadWordBits);
   const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256i begins = _mm256_set1_epi32(static_cast<int>(first)), ends = _mm256_set1_epi32(static_cast<int>(last));
-  for (std::uint32_t r = first / kRows * kRows; r < last; r += kRows) {
+  const __m256i before = _mm256_set1_epi32(static_cast<int>(within[0] * kBeadWordBits));
+  for (std::uint32_t w = within[0]; w <= within[1]; ++w) touched[w] = 1;
+  for (std::uint32_t next = first; next < last; next += kRows) {
+    const std::uint32_t r = std::min(next, kBeadBandRows - kRows);
     const __m256i row = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(r)));
-    const __m256i within = _mm256_andnot_si256(_mm256_cmpgt_epi32(begins, row), _mm256_cmpgt_epi32(ends, row));
-    __m256i end = _mm256_and_si256(within, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.end + r)));
-    __m256i begin = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.begin + r));
-    begin = _mm256_blendv_epi8(_mm256_set1_epi32(INT32_MAX), begin, within);
-    alignas(32) std::int32_t lowest[kRows], highest[kRows];
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(lowest), begin);
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(highest), end);
-    std::int32_t low = lowest[0], high = highest[0];
-    for (int k = 1; k < kRows; ++k) low = std::min(low, lowest[k]), high = std::max(high, highest[k]);
-    if (low >= high) continue;
-    const std::uint32_t from = static_cast<std::uint32_t>(low) / kBeadWordBits;
-    const std::uint32_t to = (static_cast<std::uint32_t>(high) - 1) / kBeadWordBits;
-    const __m256i before = _mm256_set1_epi32(static_cast<int>(from * kBeadWordBits));
-    begin = _mm256_sub_epi32(begin, before);
-    end = _mm256_sub_epi32(end, before);
-    for (std::uint32_t w = from; w <= to; ++w) {
+    const __m256i kept = _mm256_andnot_si256(_mm256_cmpgt_epi32(begins, row), _mm256_cmpgt_epi32(ends, row));
+    __m256i begin = _mm256_sub_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.begin + r)), before);
+    __m256i end = _mm256_sub_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(rows.end + r)), before);
+    end = _mm256_and_si256(kept, end);  // ends at 0: no bit
+    for (std::uint32_t w = within[0]; w <= within[1]; ++w) {
       const __m256i from_begin = _mm256_sllv_epi32(all, _mm256_max_epi32(begin, none));
       const __m256i from_end = _mm256_sllv_epi32(all, _mm256_max_epi32(end, none));
       auto* const at = reinterpret_cast<__m256i*>(words + std::size_t{w} * kBeadBandRows + r);
       _mm256_storeu_si256(at, _mm256_or_si256(_mm256_loadu_si256(at), _mm256_andnot_si256(from_end, from_begin)));
-      touched[w] = 1;
       begin = _mm256_sub_epi32(begin, step);
       end = _mm256_sub_epi32(end, step);
     }
@@ -241,77 +238,8 @@ LAMINA_AVX2 std::uint64_t changes_avx2(std::uint32_t* words, std::uint32_t* carr
 
 LAMINA_AVX512_BEGIN
 
-/// Half of the width of a disc in 8 rows.
-LAMINA_AVX512 __attribute__((always_inline)) inline __m512d disc(__m512d y, __m512d radius2) {
-  return _mm512_sqrt_pd(_mm512_max_pd(_mm512_sub_pd(radius2, _mm512_mul_pd(y, y)), _mm512_setzero_pd()));
-}
-
-/// Words from which on and up to which a bead with round ends may set bits in rows [first, last); none: the first is beyond.
-/// Of its middle line, no part further than its radius above or below: known before any root is.
-LAMINA_BODY std::array<std::uint32_t, 2> words_of(const BeadShape& bead, const BeadRows& rows, std::uint32_t first,
-                                                  std::uint32_t last) {
-  const double below = std::clamp(rows.y[last - 1] - bead.y0 - bead.radius, 0.0, bead.dy) * bead.slope;
-  const double above = bead.dy > 0 ? std::clamp(rows.y[first] - bead.y0 + bead.radius, 0.0, bead.dy) * bead.slope : bead.dx;
-  const double from = (std::min(below, above) - bead.radius) * bead.columns_per_nm + bead.first_column - 1;
-  const double to = (std::max(below, above) + bead.radius) * bead.columns_per_nm + bead.first_column + 1;
-  if (!(to >= 0 && from < bead.columns)) return {1, 0};
-  return {static_cast<std::uint32_t>(std::max(from, 0.0)) / kBeadWordBits,
-          static_cast<std::uint32_t>(std::min<double>(to, bead.columns)) / kBeadWordBits};
-}
-
-/// What columns_avx2 and set_avx2 do one after the other, 8 rows at a time in registers.
-LAMINA_AVX512 std::uint64_t rows_avx512(const BeadShape& bead, const BeadRows& rows, std::uint32_t first, std::uint32_t last,
-                                        std::uint32_t* words, std::uint8_t* touched) {
-  constexpr std::uint32_t kRows = 8;
-  const __m512d slope = _mm512_set1_pd(bead.slope), aside = _mm512_set1_pd(bead.aside), dx = _mm512_set1_pd(bead.dx);
-  const __m512d radius2 = _mm512_set1_pd(bead.radius2), tolerance = _mm512_set1_pd(bead.tolerance);
-  const __m512d scale = _mm512_set1_pd(bead.columns_per_nm), start = _mm512_set1_pd(bead.first_column);
-  const __m256i all = _mm256_set1_epi32(-1), none = _mm256_setzero_si256(), step = _mm256_set1_epi32(kBeadWordBits);
-  const double low = bead.y0 + std::max(bead.left[0], bead.right[0]), high = bead.y0 + std::min(bead.left[1], bead.right[1]);
-  const auto [from_word, to_word] = words_of(bead, rows, first, last);
-  if (from_word > to_word) return 0;
-  const __m256i before = _mm256_set1_epi32(static_cast<int>(from_word * kBeadWordBits));
-  std::uint64_t undecided = 0;
-  for (std::uint32_t next = first; next < last; next += kRows) {
-    const std::uint32_t r = std::min(next, kBeadBandRows - kRows);
-    const __m512d y = _mm512_sub_pd(_mm512_loadu_pd(rows.y + r), _mm512_set1_pd(bead.y0)), middle = _mm512_mul_pd(y, slope);
-    __m512d left = _mm512_sub_pd(middle, aside), right = _mm512_add_pd(middle, aside);
-    if (rows.y[r] > high) {
-      const __m512d reach = disc(_mm512_sub_pd(y, _mm512_set1_pd(bead.dy)), radius2);
-      left = _mm512_mask_sub_pd(left, _mm512_cmp_pd_mask(y, _mm512_set1_pd(bead.left[1]), _CMP_NLT_UQ), dx, reach);
-      right = _mm512_mask_add_pd(right, _mm512_cmp_pd_mask(y, _mm512_set1_pd(bead.right[1]), _CMP_NLT_UQ), dx, reach);
-    }
-    if (rows.y[r + kRows - 1] < low) {
-      const __m512d reach = disc(y, radius2);
-      left =
-          _mm512_mask_sub_pd(left, _mm512_cmp_pd_mask(y, _mm512_set1_pd(bead.left[0]), _CMP_LT_OQ), _mm512_setzero_pd(), reach);
-      right = _mm512_mask_mov_pd(right, _mm512_cmp_pd_mask(y, _mm512_set1_pd(bead.right[0]), _CMP_LT_OQ), reach);
-    }
-    const __m512d from = _mm512_add_pd(_mm512_mul_pd(left, scale), start),
-                  to = _mm512_add_pd(_mm512_mul_pd(right, scale), start);
-    __m256i begin = _mm512_cvttpd_epi32(from), end = _mm512_cvttpd_epi32(to);
-    const __m512d near =
-        _mm512_min_pd(_mm512_sub_pd(from, _mm512_cvtepi32_pd(begin)), _mm512_sub_pd(to, _mm512_cvtepi32_pd(end)));
-    std::uint32_t lanes = r < first ? 0xFFu << (first - r) & 0xFFu : 0xFFu;
-    if (r + kRows > last) lanes &= 0xFFu >> (r + kRows - last);
-    const std::uint32_t unsure = _mm512_cmp_pd_mask(near, tolerance, _CMP_LT_OQ) & lanes;
-    undecided |= std::uint64_t{unsure} << r;
-    const auto kept = static_cast<__mmask8>(lanes & ~unsure);
-    begin = _mm256_mask_max_epi32(_mm256_set1_epi32(INT32_MAX), kept, begin, none);
-    end = _mm256_maskz_min_epi32(kept, end, _mm256_set1_epi32(bead.columns));
-    begin = _mm256_sub_epi32(begin, before);
-    end = _mm256_sub_epi32(end, before);
-    for (std::uint32_t w = from_word; w <= to_word; ++w) {
-      const __m256i from_begin = _mm256_sllv_epi32(all, _mm256_max_epi32(begin, none));
-      const __m256i from_end = _mm256_sllv_epi32(all, _mm256_max_epi32(end, none));
-      auto* const at = reinterpret_cast<__m256i*>(words + std::size_t{w} * kBeadBandRows + r);
-      _mm256_storeu_si256(at, _mm256_or_si256(_mm256_loadu_si256(at), _mm256_andnot_si256(from_end, from_begin)));
-      touched[w] = 1;
-      begin = _mm256_sub_epi32(begin, step);
-      end = _mm256_sub_epi32(end, step);
-    }
-  }
-  return undecided;
+LAMINA_AVX512 bool columns_avx512(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows) {
+  return columns_body<Eight>(bead, first, last, rows);
 }
 
 LAMINA_AVX512 std::uint64_t line_avx512(const BeadLine& line, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
@@ -373,10 +301,10 @@ LAMINA_AVX512_END
 }  // namespace
 
 const BeadKernels& bead_kernels_for([[maybe_unused]] Isa isa) {
-  static constexpr BeadKernels kPlain{columns_plain, set_plain, nullptr, nullptr, changes_plain};
+  static constexpr BeadKernels kPlain{columns_plain, set_plain, nullptr, changes_plain};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr BeadKernels kAvx2{columns_avx2, set_avx2, nullptr, line_avx2, changes_avx2};
-  static constexpr BeadKernels kAvx512{columns_avx2, set_avx2, rows_avx512, line_avx512, changes_avx512};
+  static constexpr BeadKernels kAvx2{columns_avx2, set_avx2, line_avx2, changes_avx2};
+  static constexpr BeadKernels kAvx512{columns_avx512, set_avx2, line_avx512, changes_avx512};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif

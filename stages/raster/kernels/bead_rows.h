@@ -5,6 +5,7 @@
 // bead have their bits in neighbouring words, so a register takes many rows at once, at any angle of the bead.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "stages/data/choices.h"
@@ -48,11 +49,9 @@ struct BeadKernels {
   /// returns  whether any may be undecided
   bool (*columns)(const BeadShape& bead, std::uint32_t first, std::uint32_t last, BeadRows& rows);
   /// Sets the bits of [begin, end) in those rows. touched  of each column of words: becomes 1
-  void (*set)(const BeadRows& rows, std::uint32_t first, std::uint32_t last, std::uint32_t* words, std::uint8_t* touched);
-  /// Both, of a bead with round ends. nullptr: there is no faster way than one after the other
-  /// returns  a bit for each undecided row, of which no bit is set
-  std::uint64_t (*rows)(const BeadShape& bead, const BeadRows& rows, std::uint32_t first, std::uint32_t last,
-                        std::uint32_t* words, std::uint8_t* touched);
+  /// within  first and last column of words that may have any: known beforehand, no branch waits for begin and end
+  void (*set)(const BeadRows& rows, std::uint32_t first, std::uint32_t last, const std::array<std::uint32_t, 2>& within,
+              std::uint32_t* words, std::uint8_t* touched);
   /// Columns of rows [first, last) of a line, and their bits. nullptr: there is no faster way than both of the above
   /// returns  a bit for each undecided row, of which no bit is set
   std::uint64_t (*line)(const BeadLine& line, std::uint32_t first, std::uint32_t last, std::uint32_t* words,
