@@ -81,6 +81,10 @@ Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>&
     work.text.clear();
     return status;
   };
+  const auto append = [&](std::span<const std::byte> bytes) {
+    const Status status = flush();
+    return status ? work.file.append(bytes) : status;
+  };
   work.text.clear();
   work.timer->begin(layer);
   work.writer->begin_layer(cycle, work.text);
@@ -98,7 +102,11 @@ Status PrintProgram::write(const Layer& layer, const std::vector<std::uint32_t>&
       work.timer->sweep(static_cast<double>(program::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
                         sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
     }
-    if (writes || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
+    if (dialect_.has_motion) {
+      work.writer->sweep(sweep, vectors, work.text);
+    } else if (writes) {
+      if (Status status = work.writer->stream_sweep(sweep, vectors, work.text, append); !status) return status;
+    }
     return work.text.size() < kPiece ? Status() : flush();
   });
   if (!count) return count.error();

@@ -78,6 +78,30 @@ void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::si
   });
 }
 
+/// put_segments() for ProgramWriter::stream_sweep(), of vectors as long as in `vectors.bits` that do not turn.
+template <std::size_t kHead, class Head>
+Status stream_segments(const SweepVectors& vectors, bool backward, ProgramBytes& out, const ProgramWriter::Take& take,
+                       const Head& head) {
+  constexpr std::size_t kMaxCopied = 16 << 10;
+  const std::size_t stride = vectors.words * sizeof(std::uint64_t);
+  const auto bytes = std::as_bytes(std::span(vectors.bits));
+  Buffer<std::uint32_t> segment;  // position and count of each
+  for_each_segment(vectors, kHead, stride,
+                   [&](std::uint32_t position, std::uint32_t count) { segment.push_back(position), segment.push_back(count); });
+  for (std::size_t i = 0; i < segment.size(); i += 2) {
+    const std::size_t at = backward ? segment.size() - 2 - i : i;
+    out.resize(out.size() + kHead);
+    head(out.data() + out.size() - kHead, segment[at], segment[at + 1]);
+    const auto of_segment = bytes.subspan(segment[at] * stride, segment[at + 1] * stride);
+    if (of_segment.size() <= kMaxCopied) {
+      out.insert(out.end(), of_segment.begin(), of_segment.end());
+    } else if (Status status = take(of_segment); !status) {
+      return status;
+    }
+  }
+  return {};
+}
+
 /// The position of nozzle 0 across the scan, of the carriage in nm.
 inline std::int64_t across_nm(const Machine& machine, const HeadGrid& grid, std::int64_t line) {
   const double offset = machine.mounting.offset_mm[grid.scan_axis == ScanAxis::kX ? 1 : 0] * kNmPerMm;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -27,6 +28,12 @@ class ProgramWriter {
   virtual void begin_layer(const LayerCycle& cycle, ProgramBytes& out) = 0;
   /// Moves the head along one sweep; steps that fire nothing take no room.
   virtual void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) = 0;
+  /// The same without copies of long vectors: take(bytes) gets those that follow the bytes in `out`. errors  of `take`
+  using Take = std::function<Status(std::span<const std::byte>)>;
+  virtual Status stream_sweep(const Sweep& of, const SweepVectors& vectors, ProgramBytes& out, const Take&) {
+    sweep(of, vectors, out);
+    return {};
+  }
   virtual void end_layer(const LayerCycle& cycle, ProgramBytes& out) = 0;
   virtual void end(ProgramBytes& out) = 0;
 

@@ -262,5 +262,30 @@ TEST(DropSweeps, AreReported) {
       std::string::npos);
 }
 
+TEST(StreamedSweeps, HaveTheBytesOfWrittenOnes) {
+  for (const std::uint32_t nozzles : {20u, 64u, 100u}) {
+    const Machine machine = head_of(1, 100, nozzles);
+    const HeadGrid grid = grid_of_head(machine);
+    const auto writer = find_dialect(machine.dialect)->make_writer(machine, grid);
+    SweepVectors vectors{7, 9000, grid.words(), {0, 5, 10, 8000, 8500, 9000}, {}};
+    testing::Random random(nozzles);
+    for (std::uint32_t i = 0; i < vectors.steps * vectors.words; ++i) vectors.bits.push_back(random());
+    for (const bool backward : {false, true}) {
+      const Sweep sweep{.number = 3, .of = 9, .backward = backward};
+      ProgramBytes written{std::byte{1}}, streamed = written;
+      std::size_t taken = 0;
+      writer->sweep(sweep, vectors, written);
+      const auto take = [&](std::span<const std::byte> bytes) -> Status {
+        streamed.insert(streamed.end(), bytes.begin(), bytes.end());
+        taken += bytes.size();
+        return {};
+      };
+      ASSERT_TRUE(writer->stream_sweep(sweep, vectors, streamed, take));
+      EXPECT_EQ(written, streamed) << nozzles << " nozzles" << (backward ? ", backward" : "");
+      EXPECT_EQ(taken, nozzles == 20 ? 0 : 7990u * grid.words() * 8) << "only the long segment is passed on, if it has no gaps";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lamina::program

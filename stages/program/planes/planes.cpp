@@ -30,31 +30,46 @@ class PlanesWriter final : public BinaryWriter {
 
   // Planes of one sweep, in the order of the movement; inside of a plane steps increase.
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    const auto across = static_cast<std::uint32_t>(across_nm(machine_, grid_, sweep.first_line));
     if (const std::uint32_t bits = grid_.drop_bits; bits > 1) {
       put_segments<kGreyHead>(
           vectors, sweep.backward, false, words_ * 4, out,
           [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
             const std::uint32_t head[10] = {
-                kGrey,  8 + count * words_ * bits,  sweep.number, sweep.of, sweep.backward ? 1u : 0u,
-                across, vectors.first_step + begin, count,        words_,   bits};
+                kGrey,         8 + count * words_ * bits,  sweep.number, sweep.of, sweep.backward ? 1u : 0u,
+                across(sweep), vectors.first_step + begin, count,        words_,   bits};
             std::memcpy(to, head, kGreyHead);
           },
           bits);
       return;
     }
-    put_segments<kPlaneHead>(
-        vectors, sweep.backward, false, words_ * 4, out, [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
-          const std::uint32_t head[9] = {kPlane, 7 + count * words_,         sweep.number, sweep.of, sweep.backward ? 1u : 0u,
-                                         across, vectors.first_step + begin, count,        words_};
-          std::memcpy(to, head, kPlaneHead);
-        });
+    put_segments<kPlaneHead>(vectors, sweep.backward, false, words_ * 4, out, PlaneHead{sweep, vectors, across(sweep), words_});
+  }
+  Status stream_sweep(const Sweep& of, const SweepVectors& vectors, ProgramBytes& out, const Take& take) override {
+    if (grid_.drop_bits == 1 && vectors.words * 2 == words_)
+      return stream_segments<kPlaneHead>(vectors, of.backward, out, take, PlaneHead{of, vectors, across(of), words_});
+    sweep(of, vectors, out);
+    return {};
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override { put_numbers(out, {kEnd, 1, cycle.layer}); }
   void end(ProgramBytes& out) override { put_numbers(out, {kDone, 0}); }
 
  private:
+  /// Writes the head of a segment.
+  struct PlaneHead {
+    const Sweep& sweep;
+    const SweepVectors& vectors;
+    std::uint32_t across, words;
+    void operator()(std::byte* to, std::uint32_t begin, std::uint32_t count) const {
+      const std::uint32_t head[9] = {kPlane, 7 + count * words,          sweep.number, sweep.of, sweep.backward ? 1u : 0u,
+                                     across, vectors.first_step + begin, count,        words};
+      std::memcpy(to, head, kPlaneHead);
+    }
+  };
+  std::uint32_t across(const Sweep& sweep) const {
+    return static_cast<std::uint32_t>(across_nm(machine_, grid_, sweep.first_line));
+  }
+
   std::uint32_t words_;  // of 32 bits a vector
 };
 

@@ -21,6 +21,7 @@ namespace {
 // of 2 MiB halves what one of 512 KiB leaves.
 constexpr int kLevel = 1, kWindowLog = 21, kMaxWindowLog = 23;
 constexpr std::size_t kContentPiece = 256 << 10;
+constexpr std::size_t kCachedPiece = 64 << 10;  // is hashed and compressed while it is in a core's own cache
 // A frame's head with its content's size: magic number, descriptor, window, eight bytes of size.
 constexpr std::size_t kDescriptor = 4, kSizeOffset = 6, kSizeBytes = 8, kMaxHead = 18;
 constexpr unsigned char kSizeOfEightBytes = 0xC0;
@@ -126,9 +127,15 @@ Status ContentWriter::begin(const std::string& path, const FileOptions& options,
 
 Status ContentWriter::append(std::span<const std::byte> bytes) {
   State& state = *state_;
-  XXH3_128bits_update(state.hash.get(), bytes.data(), bytes.size());
   state.content += bytes.size();
-  return state.compresses ? state.compress(bytes, ZSTD_e_continue) : state.file->append(bytes);
+  while (!bytes.empty()) {
+    const auto piece = bytes.first(std::min(bytes.size(), kCachedPiece));
+    bytes = bytes.subspan(piece.size());
+    XXH3_128bits_update(state.hash.get(), piece.data(), piece.size());
+    const Status status = state.compresses ? state.compress(piece, ZSTD_e_continue) : state.file->append(piece);
+    if (!status) return status;
+  }
+  return {};
 }
 
 Result<FileDigest> ContentWriter::finish() {
