@@ -82,5 +82,27 @@ TEST(ContactGroups, AreThoseOfAllPairsOfEdgesForSmoothRoughAndTouchingContours) 
   EXPECT_GT(apart, 30);
 }
 
+TEST(ContactGroups, OfSeparateCopiesAreFoundByHalvingHoweverManyThereAre) {
+  constexpr std::uint32_t kSide = 50;
+  constexpr Nm kPitch = 2'100;
+  Contours contours;
+  for (std::uint32_t c = 0; c < kSide * kSide; ++c) {
+    const double x = kPitch * (c % kSide), y = kPitch * (c / kSide);
+    for (int k = 0; k < 40; ++k) {
+      const double angle = 2 * std::numbers::pi * k / 40;
+      contours.point.push_back({static_cast<Nm>(x + 1'000 * std::cos(angle)), static_cast<Nm>(y + 1'000 * std::sin(angle))});
+    }
+    contours.close();
+  }
+  for (std::uint32_t i = 40 * 7; i < 40 * 8; ++i) contours.point[i].x -= kPitch / 2;  // contour 7 meets contour 6
+  ContactScratch scratch;
+  ASSERT_TRUE(find_monotone_contacts(contours, scratch));
+  EXPECT_EQ(scratch.region[6], scratch.region[7]);
+  EXPECT_NE(scratch.region[5], scratch.region[6]);
+  Buffer<std::uint32_t> group;
+  EXPECT_TRUE(find_contacts(contours, scratch, group));
+  for (std::uint32_t c = 0; c < contours.size(); ++c) ASSERT_EQ(group[c], c == 6 || c == 7 ? 6 : kNoContact) << c;
+}
+
 }  // namespace
 }  // namespace lamina::test

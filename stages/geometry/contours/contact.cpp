@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 namespace lamina {
@@ -18,16 +19,23 @@ class ContactSearch {
   bool run() {
     scratch_.chain.clear();
     scratch_.contact.clear();
+    scratch_.box.clear();
     for (std::uint32_t c = 0; c < contours_.size(); ++c) {
       split(c);
       if (scratch_.chain.size() > max_chains_) return false;
     }
     auto& chains = scratch_.chain;
-    std::sort(chains.begin(), chains.end(), [](const MonotoneChain& a, const MonotoneChain& b) { return a.lo.x < b.lo.x; });
+    scratch_.region.resize(contours_.size());
+    separate(scratch_.box, &Point2::x, &Point2::y, kSeparations, false);
+    for (MonotoneChain& chain : chains) chain.region = scratch_.region[chain.contour];
+    std::sort(chains.begin(), chains.end(), [](const MonotoneChain& a, const MonotoneChain& b) {
+      return a.region != b.region ? a.region < b.region : a.lo.x < b.lo.x;
+    });
     auto& open = scratch_.open;
     open.clear();
     for (std::uint32_t i = 0; i < chains.size(); ++i) {
       const MonotoneChain& own = chains[i];
+      if (i > 0 && chains[i - 1].region != own.region) open.clear();
       std::size_t kept = 0;
       comparisons_left_ -= static_cast<std::int64_t>(open.size());
       for (const std::uint32_t other : open) {
@@ -45,7 +53,29 @@ class ContactSearch {
   }
 
  private:
+  static constexpr int kSeparations = 8;
+
+  /// Numbers the regions of contours that lines across one axis separate, then lines across the other one.
+  /// undivided  no line across the other axis separates any of them
+  void separate(std::span<ContourBox> boxes, Nm Point2::*across, Nm Point2::*along, int separations, bool undivided) {
+    std::sort(boxes.begin(), boxes.end(),
+              [across](const ContourBox& a, const ContourBox& b) { return a.lo.*across < b.lo.*across; });
+    for (std::size_t begin = 0, end = 0; begin < boxes.size(); begin = end) {
+      Nm reach = boxes[begin].hi.*across;
+      for (end = begin + 1; end < boxes.size() && boxes[end].lo.*across <= reach; ++end)
+        reach = std::max(reach, boxes[end].hi.*across);
+      const bool all = end - begin == boxes.size();
+      if (separations > 0 && end - begin > 1 && !(all && undivided)) {
+        separate(boxes.subspan(begin, end - begin), along, across, separations - 1, all);
+        continue;
+      }
+      for (std::size_t i = begin; i < end; ++i) scratch_.region[boxes[i].contour] = regions_;
+      ++regions_;
+    }
+  }
+
   void split(std::uint32_t c) {
+    ContourBox box{{INT32_MAX, INT32_MAX}, {INT32_MIN, INT32_MIN}, c};
     const std::uint32_t begin = contours_.offset[c], end = contours_.offset[c + 1];
     MonotoneChain chain{c, begin, 0, {}, {}};
     int along_x = 0, along_y = 0;
@@ -55,6 +85,8 @@ class ContactSearch {
         chain.lo = {std::min(a.x, b.x), std::min(a.y, b.y)};
         chain.hi = {std::max(a.x, b.x), std::max(a.y, b.y)};
         scratch_.chain.push_back(chain);
+        box.lo = {std::min(box.lo.x, chain.lo.x), std::min(box.lo.y, chain.lo.y)};
+        box.hi = {std::max(box.hi.x, chain.hi.x), std::max(box.hi.y, chain.hi.y)};
       }
       chain.begin = next;
       chain.edges = 0;
@@ -71,6 +103,7 @@ class ContactSearch {
       if (x == 0 && y == 0) finish(i + 1);
     }
     finish(end);
+    scratch_.box.push_back(box);
   }
 
   Point2 point(const MonotoneChain& chain, std::uint32_t k) const { return contours_.point[index(chain, k)]; }
@@ -105,6 +138,7 @@ class ContactSearch {
   ContactScratch& scratch_;
   std::size_t max_chains_;
   std::int64_t comparisons_left_;
+  std::uint32_t regions_ = 0;
 };
 
 /// Square cells of 2^shift nm over the box of all points.

@@ -14,6 +14,12 @@ namespace lamina {
 struct MonotoneChain {
   std::uint32_t contour, begin, edges;  // from point `begin` of all on, wrapping at the contour's end
   Point2 lo, hi;
+  std::uint32_t region = 0;  // chains of different regions are separated by lines along an axis
+};
+
+struct ContourBox {
+  Point2 lo, hi;
+  std::uint32_t contour;
 };
 
 /// Reused from layer to layer.
@@ -21,6 +27,8 @@ struct ContactScratch {
   // --- contours that are compared by halving
   Buffer<MonotoneChain> chain;
   Buffer<std::uint32_t> open;
+  Buffer<ContourBox> box;                                   // of contours, region by region
+  Buffer<std::uint32_t> region;                             // of each contour
   Buffer<std::pair<std::uint32_t, std::uint32_t>> contact;  // contours, one with itself too; some may come more than once
   // --- and by cells
   Buffer<std::uint32_t> offset;   // cells + 1
@@ -30,8 +38,8 @@ struct ContactScratch {
   Buffer<std::uint32_t> root;     // contour -> another one of its group
 
   std::uint64_t bytes() const {
-    return bytes_held(chain) + bytes_held(open) + bytes_held(contact) + bytes_held(offset) + bytes_held(edge) +
-           bytes_held(next) + bytes_held(contour) + bytes_held(root);
+    return bytes_held(chain) + bytes_held(open) + bytes_held(box) + bytes_held(region) + bytes_held(contact) +
+           bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root);
   }
 };
 
