@@ -78,8 +78,8 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
     for (std::uint32_t p = 0; p < stack.own.size(); ++p) {
       facets.clear();
       index.append(p, facets);
-      const slice::CrossedFacets crossed{triangles, nullptr, facets};
-      slice::cut(crossed, stack.own[p], cuts);
+      const slice::CrossedFacets crossed{triangles, nullptr, facets, part.meshes.front().closed};
+      slice::cut(triangles, facets, stack.own[p], cuts);
       benchmark::DoNotOptimize(cuts.at.data());
       if (until == Until::kCut) continue;
       closed.clear();

@@ -36,6 +36,9 @@ std::uint8_t rank_of(std::uint32_t first, std::uint32_t last, std::uint32_t plan
 }
 constexpr std::size_t kRanks = 66;
 
+constexpr std::size_t kCacheLine = 64;
+constexpr std::size_t kAhead = 8;  // groups
+
 std::uint32_t groups_of(const MeshBlocks& blocks) { return (blocks.cluster_count() + kIndexedTogether - 1) / kIndexedTogether; }
 
 }  // namespace
@@ -89,101 +92,100 @@ BlockPlanes::BlockPlanes(const MeshBlocks& blocks, std::span<const std::int64_t>
   }
 }
 
-/// Appends the facets of a cluster that a plane may cross, whose vertices are fetched early.
-std::uint32_t* BlockPlanes::near_in(std::uint32_t cluster, std::int64_t z, std::uint32_t* to) const {
-  const Box& box = blocks_.bounds()[cluster];
-  if (is_above_plane(box.lo.z, z) || !is_above_plane(box.hi.z, z)) return to;
-  const MeshBlocks::Indexed indexed = blocks_.indexed(cluster);
-  if (indexed.cluster == nullptr) {
-    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) *to++ = cluster * kClusterSize + lane;
-    return to;
-  }
-  const FacetSteps& steps = indexed.cluster->steps;
-  const std::uint8_t step = indexed.step_of(z + kPlaneReach);
-  std::uint8_t met[kClusterSize];
-  for (std::uint32_t i = 0; i < kClusterSize; ++i)
-    met[i] = static_cast<std::uint8_t>(step - steps.low[i]) <= steps.span[i] ? 1 : 0;
-  std::uint32_t near = 0;
-  for (std::uint32_t i = 0; i < kClusterSize; ++i) near |= std::uint32_t{met[i]} << i;
-  for (; near != 0; near &= near - 1) {
-    const auto lane = static_cast<std::uint32_t>(std::countr_zero(near));
-    for (const auto& corner : indexed.cluster->corner) __builtin_prefetch(indexed.vertex + corner[lane]);
-    *to++ = cluster * kClusterSize + lane;
-  }
-  return to;
-}
-
-/// Appends those facets that a plane crosses, and their ranks.
-void BlockPlanes::keep_crossed(std::span<const std::uint32_t> near, std::uint32_t plane, BlockScratch& scratch) const {
-  const std::int64_t z = planes_[plane];
-  const bool copies = counts_[plane] <= kManyCuts;
-  for (const std::uint32_t facet : near) {
-    const Triangle t = facet_of(blocks_, facet);
-    const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
-    if (is_above_plane(low, z) || !is_above_plane(high, z)) continue;
-    const auto [first, last] = first_at_or_above_.crossed(low, high);
-    scratch.facets.push_back(facet);
-    scratch.key.push_back(rank_of(first, last, plane));
-    if (copies) scratch.copies.push_back(t);
+/// Requests the memory of groups that are read soon: the boxes of the last one, and what is stored of the first.
+void BlockPlanes::fetch(std::span<const std::uint32_t> groups, std::int64_t z) const {
+  const auto* boxes = reinterpret_cast<const char*>(&blocks_.bounds()[groups.back() * kIndexedTogether]);
+  __builtin_prefetch(boxes);
+  __builtin_prefetch(boxes + kCacheLine);
+  const std::uint32_t from = groups.front() * kIndexedTogether,
+                      end = std::min(from + kIndexedTogether, blocks_.cluster_count());
+  for (std::uint32_t c = from; c < end; ++c) {
+    if (!meets(c, z)) continue;
+    const std::span<const char> stored = blocks_.stored(c);
+    __builtin_prefetch(stored.data());
+    __builtin_prefetch(stored.data() + kCacheLine);
   }
 }
 
-/// Puts what was found of one block from `begin` on in the order of the file. first  cluster of the block
-void BlockPlanes::sort_listed(std::uint32_t first, std::size_t begin, BlockScratch& scratch) const {
-  constexpr std::uint32_t kBits = 12, kRankBits = 7;
-  static_assert(1u << kBits == kBlockSize && 2 * kBits + kRankBits <= 32);
+/// Appends the facets of a group that may cross a plane, and requests their vertices.
+void BlockPlanes::find_near(std::uint32_t group, std::int64_t z, Buffer<std::uint32_t>& near) const {
+  const std::uint32_t from = group * kIndexedTogether, end = std::min(from + kIndexedTogether, blocks_.cluster_count());
+  for (std::uint32_t c = from; c < end; ++c) {
+    if (!meets(c, z)) continue;
+    const MeshBlocks::Indexed indexed = blocks_.indexed(c);
+    std::uint8_t met[kClusterSize];
+    if (indexed.cluster != nullptr) {
+      const FacetSteps& steps = indexed.cluster->steps;
+      const std::uint8_t step = indexed.step_of(z + kPlaneReach);
+      for (std::uint32_t i = 0; i < kClusterSize; ++i)
+        met[i] = static_cast<std::uint8_t>(step - steps.low[i]) <= steps.span[i] ? 1 : 0;
+    } else {
+      const Heights heights = heights_in(blocks_.listed(c));
+      for (std::uint32_t i = 0; i < kClusterSize; ++i)
+        met[i] = heights.low[i] <= z + kPlaneReach && heights.high[i] > z + kPlaneReach ? 1 : 0;
+    }
+    std::uint32_t lanes = 0;
+    for (std::uint32_t i = 0; i < kClusterSize; ++i) lanes |= std::uint32_t{met[i]} << i;
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+      near.push_back(c * kClusterSize + lane);
+      for (std::uint32_t k = 0; k < 3 && indexed.cluster != nullptr; ++k)
+        __builtin_prefetch(&indexed.vertex[indexed.cluster->corner[k][lane]]);
+    }
+  }
+}
+
+/// Puts what is near of a block in the order of the file. first  cluster of the block
+void BlockPlanes::sort_listed(std::uint32_t first, BlockScratch& scratch) const {
   const std::uint32_t base = first * kClusterSize, block = blocks_.listed_number(first, 0) / kBlockSize * kBlockSize;
   scratch.listed.clear();
-  for (std::size_t i = begin; i < scratch.facets.size(); ++i) {
-    const std::uint32_t facet = scratch.facets[i];
+  for (const std::uint32_t facet : scratch.near) {
     const std::uint32_t number = blocks_.listed_number(facet / kClusterSize, facet % kClusterSize) - block;
-    scratch.listed.push_back(number << (kBits + kRankBits) | (facet - base) << kRankBits | scratch.key[i]);
+    scratch.listed.push_back(number * kBlockSize + facet - base);
   }
   std::ranges::sort(scratch.listed);
-  for (std::size_t i = 0; i < scratch.listed.size(); ++i) {
-    scratch.facets[begin + i] = base + (scratch.listed[i] >> kRankBits & (kBlockSize - 1));
-    scratch.key[begin + i] = static_cast<std::uint8_t>(scratch.listed[i] & ((1u << kRankBits) - 1));
-    if (!scratch.copies.empty()) scratch.copies[begin + i] = facet_of(blocks_, scratch.facets[begin + i]);
-  }
+  for (std::size_t i = 0; i < scratch.listed.size(); ++i) scratch.near[i] = base + scratch.listed[i] % kBlockSize;
 }
 
-void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets,
-                       Buffer<Triangle>& copies) const {
-  scratch.groups.clear();
-  table_.append(plane, scratch.groups);
-  std::ranges::sort(scratch.groups);
-  scratch.facets.clear();
-  scratch.key.clear();
-  scratch.copies.clear();
-  if (counts_[plane] <= kManyCuts) ensure_capacity(scratch.copies, counts_[plane]);
-  ensure_capacity(scratch.facets, counts_[plane]);
-  ensure_capacity(scratch.key, counts_[plane]);
-  for (std::size_t g = 0, end = 0; g < scratch.groups.size(); g = end) {
+void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets, Buffer<std::uint32_t>& order,
+                       const std::function<void(std::span<const Triangle>)>& see) const {
+  const std::int64_t z = planes_[plane];
+  auto& groups = scratch.groups;
+  groups.clear();
+  table_.append(plane, groups);
+  std::ranges::sort(groups);
+  facets.clear();
+  scratch.rank.clear();
+  ensure_capacity(facets, counts_[plane]);
+  ensure_capacity(scratch.rank, counts_[plane]);
+  for (std::size_t g = 0; g < groups.size();) {
     constexpr std::uint32_t kInBlock = MeshBlocks::kClusters / kIndexedTogether;
-    const std::uint32_t block = scratch.groups[g] / kInBlock;
-    const std::size_t before = scratch.facets.size();
-    std::array<std::uint32_t, kBlockSize> near;
-    std::uint32_t* behind = near.data();
-    for (; end < scratch.groups.size() && scratch.groups[end] / kInBlock == block; ++end) {
-      const std::uint32_t from = scratch.groups[end] * kIndexedTogether;
-      for (std::uint32_t c = from; c < std::min(from + kIndexedTogether, blocks_.cluster_count()); ++c)
-        behind = near_in(c, planes_[plane], behind);
+    const std::uint32_t block = groups[g] / kInBlock, first_cluster = block * MeshBlocks::kClusters;
+    scratch.near.clear();
+    for (; g < groups.size() && groups[g] / kInBlock == block; ++g) {
+      if (g + 2 * kAhead < groups.size()) fetch(std::span(groups).subspan(g + kAhead, kAhead + 1), z);
+      find_near(groups[g], z, scratch.near);
     }
-    keep_crossed({near.data(), behind}, plane, scratch);
-    const std::uint32_t first = block * MeshBlocks::kClusters;
-    if (blocks_.indexed(first).cluster == nullptr) sort_listed(first, before, scratch);
+    if (blocks_.indexed(first_cluster).cluster == nullptr) sort_listed(first_cluster, scratch);
+    scratch.crossed.clear();
+    for (const std::uint32_t facet : scratch.near) {
+      const Triangle t = facet_of(blocks_, facet);
+      const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
+      if (is_above_plane(low, z) || !is_above_plane(high, z)) continue;
+      const auto [first, last] = first_at_or_above_.crossed(low, high);
+      scratch.rank.push_back(rank_of(first, last, plane));
+      facets.push_back(facet);
+      scratch.crossed.push_back(t);
+    }
+    see(scratch.crossed);
   }
   std::array<std::uint32_t, kRanks> position{};
-  for (const std::uint8_t rank : scratch.key) ++position[rank];
+  for (const std::uint8_t rank : scratch.rank) ++position[rank];
   std::uint32_t total = 0;
   for (std::uint32_t& of : position) total += std::exchange(of, total);
-  facets.resize(total);
-  copies.resize(scratch.copies.size());
-  for (std::size_t i = 0; i < total; ++i) {
-    const std::uint32_t at = position[scratch.key[i]]++;
-    facets[at] = scratch.facets[i];
-    if (!copies.empty()) copies[at] = scratch.copies[i];
-  }
+  ensure_capacity(order, total);
+  order.resize(total);
+  for (std::uint32_t i = 0; i < total; ++i) order[position[scratch.rank[i]]++] = i;
 }
 
 }  // namespace lamina::slice

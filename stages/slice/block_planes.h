@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <utility>
@@ -41,19 +42,16 @@ class PlaneFinder {
 /// Clusters that are indexed together: neighbours in the file.
 inline constexpr std::uint32_t kIndexedTogether = 4;
 
-/// More cuts than this get by with less memory, for some more time.
-inline constexpr std::size_t kManyCuts = 1 << 16;
-
 /// Buffers of a layer, reused.
 struct BlockScratch {
   Buffer<std::uint32_t> groups;  // of kIndexedTogether clusters
-  Buffer<std::uint32_t> facets;  // as they are found, and
-  Buffer<std::uint8_t> key;      // what they are sorted by
-  Buffer<Triangle> copies;       // of these, unless they are many
+  Buffer<std::uint32_t> near;    // facets of one block, by their numbers, and
+  Buffer<Triangle> crossed;      // those that the plane crosses
   Buffer<std::uint32_t> listed;  // of a block that is not in the order of its file
+  Buffer<std::uint8_t> rank;     // of each facet that is found: what it is sorted by
 
   std::uint64_t bytes() const {
-    return bytes_held(groups) + bytes_held(facets) + bytes_held(key) + bytes_held(copies) + bytes_held(listed);
+    return bytes_held(groups) + bytes_held(near) + bytes_held(crossed) + bytes_held(listed) + bytes_held(rank);
   }
 };
 
@@ -72,19 +70,26 @@ class BlockPlanes {
   BlockPlanes(const BlockPlanes&) = delete;
   BlockPlanes& operator=(const BlockPlanes&) = delete;
 
-  /// facets  become those that the plane crosses, for facet_of(), in the order in which a PlaneIndex of the file's list finds
-  ///         them: all that is made of facets depends on it
-  /// copies  become these facets, or nothing where they are more than kManyCuts
+  /// Calls see(triangles) for the facets that the plane crosses in the order of the file, block by block.
+  /// facets  become their numbers for facet_of(), in this order
+  /// order   becomes the order in which a PlaneIndex of the file's list finds them, on which all that is made of facets
+  /// depends:
+  ///         the n-th one is facets[order[n]]
   /// cost    O(F) where vertices are shared
-  void find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets, Buffer<Triangle>& copies) const;
+  void find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets, Buffer<std::uint32_t>& order,
+            const std::function<void(std::span<const Triangle>)>& see) const;
 
   std::uint64_t count(std::uint32_t plane) const { return counts_[plane]; }  // of facets that it crosses
   std::uint64_t bytes() const { return table_.bytes() + bytes_held(counts_) + planes_.size() * sizeof(std::int64_t); }
 
  private:
-  std::uint32_t* near_in(std::uint32_t cluster, std::int64_t z, std::uint32_t* to) const;
-  void keep_crossed(std::span<const std::uint32_t> near, std::uint32_t plane, BlockScratch& scratch) const;
-  void sort_listed(std::uint32_t first, std::size_t begin, BlockScratch& scratch) const;
+  bool meets(std::uint32_t cluster, std::int64_t z) const {
+    const Box& box = blocks_.bounds()[cluster];
+    return !is_above_plane(box.lo.z, z) && is_above_plane(box.hi.z, z);
+  }
+  void fetch(std::span<const std::uint32_t> groups, std::int64_t z) const;
+  void find_near(std::uint32_t group, std::int64_t z, Buffer<std::uint32_t>& near) const;
+  void sort_listed(std::uint32_t first, BlockScratch& scratch) const;
 
   const MeshBlocks& blocks_;
   std::vector<std::int64_t> planes_;

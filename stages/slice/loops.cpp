@@ -43,14 +43,6 @@ Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
   return static_cast<Nm>(from + whole - static_cast<std::int64_t>(kPositive));
 }
 
-/// Calls use(get), get(i) being facet i.
-template <class Use>
-void with_facets(const CrossedFacets& facets, const Cuts& cuts, Use&& use) {
-  if (!cuts.facets.empty()) return use([&](std::size_t i) -> const Triangle& { return cuts.facets[i]; });
-  if (facets.blocks != nullptr) return use([&](std::size_t i) { return facet_of(*facets.blocks, facets.at[i]); });
-  use([&](std::size_t i) -> const Triangle& { return facets.list[facets.at[i]]; });
-}
-
 /// The corners of a facet, the first alone on its side of the plane; the plane cuts the two edges that start there.
 struct Tip {
   Point3 own, next, previous;
@@ -82,32 +74,51 @@ Point2 crossing(const Edge& edge, std::int64_t z) {
   return {between(edge.low.x, edge.high.x, share, num, den), between(edge.low.y, edge.high.y, share, num, den)};
 }
 
-void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts) {
-  const std::size_t count = facets.at.size();
+namespace {
+
+void resize(Cuts& cuts, std::size_t count) {
   ensure_capacity(cuts.from_hash, count);
   ensure_capacity(cuts.to_hash, count);
   ensure_capacity(cuts.at, count);
   cuts.from_hash.resize(count);
   cuts.to_hash.resize(count);
   cuts.at.resize(count);
+  cuts.order.clear();
   cuts.level = {};
-  with_facets(facets, cuts, [&](auto&& facet) {
-    constexpr std::size_t kAhead = 16;  // facets of a list are anywhere in memory: prefetched before they are needed
-    for (std::size_t i = 0; i < count; ++i) {
-      if (facets.blocks == nullptr && i + kAhead < count) {
-        const auto* next = reinterpret_cast<const char*>(&facets.list[facets.at[i + kAhead]]);
-        __builtin_prefetch(next);
-        __builtin_prefetch(next + sizeof(Triangle) - 1);
-      }
-      const Triangle& t = facet(i);
-      const Tip tip(t, z);
-      const std::uint64_t own = hash_of(tip.own), next = hash_of(tip.next), previous = hash_of(tip.previous);
-      cuts.from_hash[i] = tip.above ? hash_of(next, own) : hash_of(own, previous);
-      cuts.to_hash[i] = tip.above ? hash_of(previous, own) : hash_of(own, next);
-      cuts.at[i] = crossing(tip.from(), z);
-      if (LevelFace::is_level(t.a.z - z, t.b.z - z, t.c.z - z)) [[unlikely]]
-        add_level(&t.a, cuts.level);
+}
+
+void cut_facet(const Triangle& t, std::int64_t z, std::size_t i, Cuts& cuts) {
+  const Tip tip(t, z);
+  const std::uint64_t own = hash_of(tip.own), next = hash_of(tip.next), previous = hash_of(tip.previous);
+  cuts.from_hash[i] = tip.above ? hash_of(next, own) : hash_of(own, previous);
+  cuts.to_hash[i] = tip.above ? hash_of(previous, own) : hash_of(own, next);
+  cuts.at[i] = crossing(tip.from(), z);
+  if (LevelFace::is_level(t.a.z - z, t.b.z - z, t.c.z - z)) [[unlikely]]
+    add_level(&t.a, cuts.level);
+}
+
+}  // namespace
+
+void cut(std::span<const Triangle> list, std::span<const std::uint32_t> at, std::int64_t z, Cuts& cuts) {
+  const std::size_t count = at.size();
+  resize(cuts, count);
+  constexpr std::size_t kAhead = 16;  // facets of a list are anywhere in memory: prefetched before they are needed
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i + kAhead < count) {
+      const auto* next = reinterpret_cast<const char*>(&list[at[i + kAhead]]);
+      __builtin_prefetch(next);
+      __builtin_prefetch(next + sizeof(Triangle) - 1);
     }
+    cut_facet(list[at[i]], z, i, cuts);
+  }
+}
+
+void cut(const BlockPlanes& planes, std::uint32_t plane, std::int64_t z, BlockScratch& scratch, Buffer<std::uint32_t>& facets,
+         Cuts& cuts) {
+  resize(cuts, planes.count(plane));
+  std::size_t i = 0;
+  planes.find(plane, scratch, facets, cuts.order, [&](std::span<const Triangle> crossed) {
+    for (const Triangle& t : crossed) cut_facet(t, z, i++, cuts);
   });
 }
 
@@ -127,12 +138,12 @@ namespace {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
 constexpr std::uint32_t kTaken = UINT32_MAX;  // of a slot: passed over, but the search continues after it
-constexpr std::uint8_t kHasPrevious = 1, kVisited = 2;
+constexpr std::uint8_t kHasPrevious = 1, kVisited = 2, kSharesHash = 4;
 
 /// For each cut the one that starts at the edge where it ends. Where several start there, at an edge of four or more
-/// facets, the first that is free.
-template <class Facet>
-void find_successors(const Facet& facet, const Cuts& cuts, std::int64_t z, ChainScratch& scratch) {
+/// facets, the first that is free. On a closed mesh as many cuts start at edges of one hash as end at them: where only one
+/// starts, both are at the same edge.
+void find_successors(const CrossedFacets& facets, const Cuts& cuts, std::int64_t z, ChainScratch& scratch) {
   const std::size_t count = cuts.size(), slots = count + count / 2 + 2;
   ensure_capacity(scratch.slot, slots);
   ensure_capacity(scratch.next, count);
@@ -141,18 +152,24 @@ void find_successors(const Facet& facet, const Cuts& cuts, std::int64_t z, Chain
   scratch.state.assign(count, 0);
   const auto first_slot = [&](std::uint32_t hash) { return static_cast<std::size_t>(hash * std::uint64_t{slots} >> 32); };
   const auto behind = [&](std::size_t position) { return position + 1 == slots ? 0 : position + 1; };
-  for (std::size_t i = 0; i < count; ++i) {
-    std::size_t position = first_slot(cuts.from_hash[i]);
-    while (scratch.slot[position] != 0) position = behind(position);
-    scratch.slot[position] = static_cast<std::uint32_t>(i + 1);
+  for (std::uint32_t n = 0; n < count; ++n) {
+    const std::uint32_t i = cuts.nth(n), hash = cuts.from_hash[i];
+    std::size_t position = first_slot(hash);
+    for (; scratch.slot[position] != 0; position = behind(position)) {
+      const std::uint32_t other = scratch.slot[position] - 1;
+      if (cuts.from_hash[other] == hash) scratch.state[i] = scratch.state[other] = kSharesHash;
+    }
+    scratch.slot[position] = i + 1;
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t hash = cuts.to_hash[i];
+  for (std::uint32_t n = 0; n < count; ++n) {
+    const std::uint32_t i = cuts.nth(n), hash = cuts.to_hash[i];
     std::uint32_t found = kNone;
     for (std::size_t position = first_slot(hash); scratch.slot[position] != 0; position = behind(position)) {
       if (scratch.slot[position] == kTaken) continue;
       const std::uint32_t other = scratch.slot[position] - 1;
-      if (cuts.from_hash[other] != hash || !(Tip(facet(other), z).from() == Tip(facet(i), z).to())) continue;
+      if (cuts.from_hash[other] != hash) continue;
+      const bool decided = facets.closed && (scratch.state[other] & kSharesHash) == 0;
+      if (!decided && !(Tip(facets[other], z).from() == Tip(facets[i], z).to())) continue;
       scratch.slot[position] = kTaken;
       scratch.state[other] |= kHasPrevious;
       found = other;
@@ -166,10 +183,11 @@ void find_successors(const Facet& facet, const Cuts& cuts, std::int64_t z, Chain
 
 void chain(const CrossedFacets& facets, const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed,
            Contours& open) {
-  with_facets(facets, cuts, [&](auto&& facet) { find_successors(facet, cuts, z, scratch); });
+  find_successors(facets, cuts, z, scratch);
   reserve_more(closed.point, cuts.size());
   const auto count = static_cast<std::uint32_t>(cuts.size());
-  for (std::uint32_t first = 0; first < count; ++first) {
+  for (std::uint32_t n = 0; n < count; ++n) {
+    const std::uint32_t first = cuts.nth(n);
     if ((scratch.state[first] & kHasPrevious) != 0) continue;
     std::uint32_t last = first;
     for (std::uint32_t i = first; i != kNone; i = scratch.next[i]) {
@@ -177,10 +195,11 @@ void chain(const CrossedFacets& facets, const Cuts& cuts, std::int64_t z, ChainS
       scratch.state[i] |= kVisited;
       last = i;
     }
-    with_facets(facets, cuts, [&](auto&& facet) { open.point.push_back(crossing(Tip(facet(last), z).to(), z)); });
+    open.point.push_back(crossing(Tip(facets[last], z).to(), z));
     open.close();
   }
-  for (std::uint32_t first = 0; first < count; ++first) {
+  for (std::uint32_t n = 0; n < count; ++n) {
+    const std::uint32_t first = cuts.nth(n);
     if ((scratch.state[first] & kVisited) != 0) continue;
     std::uint32_t i = first;
     do {

@@ -35,27 +35,34 @@ struct CrossedFacets {
   std::span<const Triangle> list;     // of the mesh, or
   const MeshBlocks* blocks;           // where this is not null, its blocks
   std::span<const std::uint32_t> at;  // numbers in the list, or those of facet_of()
+  bool closed;                        // the mesh is
+
+  Triangle operator[](std::size_t i) const { return blocks ? facet_of(*blocks, at[i]) : list[at[i]]; }
 };
 
-/// The cuts of one layer, in the order of the facets. Cut i is walked from an edge of facet i to another one with the solid on
-/// its left. Edges are read from the facets again where hashes of their names are equal: 16 bytes a cut instead of 72.
+/// The cuts of one layer. Cut i is walked from an edge of facet i to another one with the solid on its left. Edges are read
+/// from the facets again where hashes of their names do not decide: 16 bytes a cut instead of 72.
 struct Cuts {
-  Buffer<Triangle> facets;                   // of blocks, unless they are many
+  Buffer<std::uint32_t> order;               // in which cuts are chained; empty: as they are numbered
   Buffer<std::uint32_t> from_hash, to_hash;  // of the edges' names
   Buffer<Point2> at;                         // nm, where the edge that cut i comes from meets the plane
   LevelFace level;                           // horizontal faces among the facets
 
   std::size_t size() const { return at.size(); }
-  std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(from_hash) + bytes_held(to_hash) + bytes_held(at); }
+  std::uint32_t nth(std::uint32_t n) const { return order.empty() ? n : order[n]; }
+  std::uint64_t bytes() const { return bytes_held(order) + bytes_held(from_hash) + bytes_held(to_hash) + bytes_held(at); }
 };
 
 /// Where an edge meets height z, low.z being below the plane and high.z above it. Rounded to the nearest nm, halves towards
 /// +infinity on the way from the lower end; decided in integers.
 Point2 crossing(const Edge& edge, std::int64_t z);
 
-/// Cuts facets at height z. `cuts` is overwritten but for its facets: copies of these, or none.
+/// Cuts facets `at` of a list at height z. `cuts` is overwritten.
 /// cost  one division for a facet
-void cut(const CrossedFacets& facets, std::int64_t z, Cuts& cuts);
+void cut(std::span<const Triangle> list, std::span<const std::uint32_t> at, std::int64_t z, Cuts& cuts);
+/// Cuts facets of blocks, each while it is read: those that a plane crosses, which is at height z. facets  become their numbers
+void cut(const BlockPlanes& planes, std::uint32_t plane, std::int64_t z, BlockScratch& scratch, Buffer<std::uint32_t>& facets,
+         Cuts& cuts);
 
 // --- which facets a plane crosses, for planes known beforehand.
 

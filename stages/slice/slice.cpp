@@ -15,20 +15,25 @@
 namespace lamina::slice {
 namespace {
 
+/// Scratch of more cuts than this is given back, for what searches contacts.
+constexpr std::size_t kManyCuts = 1 << 16;
+
 /// The cuts of a source at a plane become chains: `closed`, and scratch.open. returns  how many there are
 std::size_t find_loops(const Mesh& mesh, const SourceMesh& source, std::span<const Nm> planes, std::uint32_t plane,
                        SectionScratch& scratch, Contours& closed) {
   const std::int64_t z = std::int64_t{planes[plane]} - source.z;
   scratch.facets.clear();
-  scratch.cuts.facets.clear();
-  source.blocks ? source.blocks->find(plane, scratch.blocks, scratch.facets, scratch.cuts.facets)
-                : source.list->append(plane, scratch.facets);
-  const CrossedFacets facets{mesh.triangles, mesh.blocks.get(), scratch.facets};
-  cut(facets, z, scratch.cuts);
+  if (source.blocks) {
+    cut(*source.blocks, plane, z, scratch.blocks, scratch.facets, scratch.cuts);
+  } else {
+    source.list->append(plane, scratch.facets);
+    cut(mesh.triangles, scratch.facets, z, scratch.cuts);
+  }
+  const CrossedFacets facets{mesh.triangles, mesh.blocks.get(), scratch.facets, mesh.closed};
   scratch.open.clear();
   chain(facets, scratch.cuts, z, scratch.chain, closed, scratch.open);
   const std::size_t count = facets.at.size();
-  if (count > kManyCuts) {  // what searches contacts takes their memory
+  if (count > kManyCuts) {
     const LevelFace level = scratch.cuts.level;
     scratch.facets = {}, scratch.blocks = {}, scratch.cuts = {}, scratch.chain = {};
     scratch.cuts.level = level;

@@ -1,6 +1,7 @@
 // tests/slice/test_slice.cpp: contours of small solids whose every corner is known.
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
 
 #include "stages/data/voxels.h"
@@ -207,8 +208,8 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
     for (std::int64_t z = -6000; z < 6000; z += 1 + static_cast<std::int64_t>(random() % static_cast<unsigned>(spread)))
       planes.push_back(z);
     const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
-    Buffer<std::uint32_t> found, facets;
-    Buffer<Triangle> copies;
+    Buffer<std::uint32_t> found, facets, order;
+    Buffer<Triangle> shown;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 200)) {
       found.clear();
       index.append(p, found);
@@ -249,18 +250,20 @@ TEST(PlaneIndex, OfBlocksFindsTheSameFacetsInTheSameOrderAsThatOfTheList) {
     const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
     const slice::BlockPlanes of_blocks(blocks, planes);
     slice::BlockScratch scratch;
-    Buffer<std::uint32_t> found, facets;
-    Buffer<Triangle> copies;
+    Buffer<std::uint32_t> found, facets, order;
+    Buffer<Triangle> shown;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 50)) {
       found.clear();
       index.append(p, found);
-      of_blocks.find(p, scratch, facets, copies);
+      shown.clear();
+      of_blocks.find(p, scratch, facets, order,
+                     [&](std::span<const Triangle> some) { shown.insert(shown.end(), some.begin(), some.end()); });
       ASSERT_EQ(of_blocks.count(p), found.size());
-      ASSERT_EQ(facets.size(), found.size());
-      ASSERT_EQ(copies.size(), found.size());
+      ASSERT_EQ(order.size(), found.size());
+      ASSERT_EQ(shown.size(), found.size());
       for (std::size_t i = 0; i < found.size(); ++i) {
-        ASSERT_EQ(slice::facet_of(blocks, facets[i]), triangles[found[i]]) << p << " " << i;
-        ASSERT_EQ(copies[i], triangles[found[i]]) << p << " " << i;
+        ASSERT_EQ(shown[order[i]], triangles[found[i]]) << p << " " << i;
+        ASSERT_EQ(slice::facet_of(blocks, facets[order[i]]), triangles[found[i]]) << p << " " << i;
       }
     }
   }
@@ -269,6 +272,28 @@ TEST(PlaneIndex, OfBlocksFindsTheSameFacetsInTheSameOrderAsThatOfTheList) {
     blocks.list_block(b, list);
     for (std::uint32_t i = 0; i < blocks.triangles_in(b); ++i) ASSERT_EQ(list[i], triangles[blocks.first_triangle(b) + i]);
   }
+}
+
+TEST(Chain, SeparatesEdgesWhoseHashesAreEqual) {
+  // Of 320,000 hashes of 32 bits some are equal.
+  constexpr std::uint32_t kCount = 80'000;
+  std::mt19937 random(3);
+  std::uniform_int_distribution<Nm> pick(1, 1'000'000'000);
+  const Triangles triangles = random_tetrahedra(kCount, [&, n = 0]() mutable {
+    const Nm side = n++ % 4 < 2 ? 1 : -1;
+    return Point3{pick(random), pick(random), side * pick(random)};
+  });
+  std::vector<std::uint32_t> at(triangles.size());
+  std::iota(at.begin(), at.end(), 0u);
+  std::ranges::shuffle(at, random);
+  slice::Cuts cuts;
+  slice::ChainScratch scratch;
+  Contours closed, open;
+  slice::cut(triangles, at, 0, cuts);
+  slice::chain({triangles, nullptr, at, true}, cuts, 0, scratch, closed, open);
+  EXPECT_EQ(open.size(), 0u);
+  ASSERT_EQ(closed.size(), kCount);
+  for (std::uint32_t c = 0; c < kCount; ++c) ASSERT_EQ(closed[c].size(), 4u);
 }
 
 TEST(Copies, MoveTheContoursOfALayerAFewTimesOnly) {
