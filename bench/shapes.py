@@ -142,8 +142,9 @@ def write_pages(path, count, side=512, dpi=600):
     """A TIFF of `count` uncompressed 1-bit pages, a square that moves from page to page in each."""
     with open(path, "wb") as file:
         file.write(struct.pack("<2sHI", b"II", 42, 8))
+        end, stride = 8, side // 8
         for page in range(count):
-            at, stride = file.tell(), side // 8
+            at = end
             tags = [(256, 3, side), (257, 3, side), (258, 3, 1), (259, 3, 1), (262, 3, 0), (273, 4, 0), (277, 3, 1), (278, 3, side),
                     (279, 4, stride * side), (282, 5, 0), (283, 5, 0)]
             fraction = at + 2 + 12 * len(tags) + 4

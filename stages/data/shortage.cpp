@@ -64,9 +64,7 @@ std::uint64_t refused_allocations() {
 
 void note_refused_block(std::uint64_t bytes) { refused_block = bytes; }
 
-std::uint64_t needed_address_space() {
-  return std::max(max_address_space() + refused_block.load(), limit_of(RLIMIT_AS));
-}
+std::uint64_t needed_address_space() { return std::max(max_address_space() + refused_block.load(), limit_of(RLIMIT_AS)); }
 
 bool is_shortage(int reason) { return reason == ENOMEM || reason == EMFILE || reason == ENFILE; }
 
@@ -91,7 +89,8 @@ Error shortage(int reason, const std::string& path) {
   last_reason = reason;
   if (reason == ENFILE) error.message = "too many open files in the system: needs one more; close other programs";
   if (reason == EMFILE)
-    error.message = fmt::format("too many open files: needs more than {}; raise the limit (ulimit -n)", limit_of(RLIMIT_NOFILE));
+    error.message =
+        fmt::format("too many open files: needs more than {}; raise the limit (ulimit -n)", limit_of(RLIMIT_NOFILE));
   if (!path.empty()) error.message.insert(0, path + ": ");
   return error;
 }

@@ -71,11 +71,12 @@ TEST_F(Memory, RunningOutOfItIsOneLineWithItsOwnCode) {
 TEST(Limits, ReadersThatLackMemoryOrOpenFilesNameWhatTheyNeed) {
   const Directory folder;
   int complete = 0, lacks_memory = 0, lacks_files = 0;
-  for (const char* input : {"images3/I02_gray8_trns_bg/layer_0000.png", "images3/I12_thumb_second/layer_0000.tif",
-                            "images3/I25b_pbm_trailing", "images3/J02_bmp_white_white", "quad_knot.obj",
-                            "nist_part_feature_open.stl", "arrow_scaled_mirrored.3mf"}) {
+  for (const char* input :
+       {"images3/I02_gray8_trns_bg/layer_0000.png", "images3/I12_thumb_second/layer_0000.tif", "images3/I25b_pbm_trailing",
+        "images3/J02_bmp_white_white", "quad_knot.obj", "nist_part_feature_open.stl", "arrow_scaled_mirrored.3mf"}) {
     std::string whole;
-    for (const std::string limit : {"-n 64", "-v 16000", "-v 19000", "-v 22000", "-v 26000", "-v 36000", "-n 4", "-n 5", "-n 8"}) {
+    for (const std::string limit :
+         {"-n 64", "-v 16000", "-v 19000", "-v 22000", "-v 26000", "-v 36000", "-n 4", "-n 5", "-n 8"}) {
       const std::string out = folder / "out", err = folder / "err";
       const int state = std::system(fmt::format("exec >{} 2>{} </dev/null; ulimit {}; exec {} info {}", out, err, limit,
                                                 LAMINA_PROGRAM, corpus_file(input))
@@ -90,7 +91,8 @@ TEST(Limits, ReadersThatLackMemoryOrOpenFilesNameWhatTheyNeed) {
         continue;
       }
       ASSERT_EQ(code, 6) << what;
-      EXPECT_TRUE(std::regex_search(what, std::regex(": needs more than [0-9]+( MiB of address space;|; raise the limit)"))) << what;
+      EXPECT_TRUE(std::regex_search(what, std::regex(": needs more than [0-9]+( MiB of address space;|; raise the limit)")))
+          << what;
       EXPECT_EQ(std::ranges::count(read_text(err), '\n'), 1) << what;
       ++(limit[1] == 'v' ? lacks_memory : lacks_files);
     }

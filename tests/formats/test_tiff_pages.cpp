@@ -22,8 +22,11 @@ void write_pages(const std::string& path, int count, const char* mode = "w") {
   TIFF* tiff = TIFFOpen(path.c_str(), mode);
   ASSERT_NE(tiff, nullptr);
   for (int page = 0; page < count; ++page) {
-    for (const auto& [tag, value] : {std::pair{TIFFTAG_IMAGEWIDTH, kSide}, {TIFFTAG_IMAGELENGTH, kSide}, {TIFFTAG_BITSPERSAMPLE, 1},
-                                     {TIFFTAG_SAMPLESPERPIXEL, 1}, {TIFFTAG_ROWSPERSTRIP, kSide},
+    for (const auto& [tag, value] : {std::pair{TIFFTAG_IMAGEWIDTH, kSide},
+                                     {TIFFTAG_IMAGELENGTH, kSide},
+                                     {TIFFTAG_BITSPERSAMPLE, 1},
+                                     {TIFFTAG_SAMPLESPERPIXEL, 1},
+                                     {TIFFTAG_ROWSPERSTRIP, kSide},
                                      {TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE}})
       TIFFSetField(tiff, tag, value);
     for (int row = 0; row < kSide; ++row) {

@@ -269,7 +269,7 @@ Result<ImageKind> kind_of(const std::string& path, std::uint64_t page) {
   if (!file->read_at(0, std::span(reinterpret_cast<char*>(head), std::min<std::uint64_t>(sizeof head, file->size()))))
     return Error{Fault::kInput, path + ": cannot be read; use a complete image"};
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(head, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) 
+  if (begins("II", 2) || begins("MM", 2))
     return report_shortages(path, [&] { return tiff_kind(file->descriptor(), path, page); });
   if (begins("\x89PNG", 4)) return ImageKind{"PNG", head[24], head[25] == 3 ? "by its palette" : "0 is black", "deflate"};
   if (begins("BM", 2)) return ImageKind{"BMP", head[28], "by its palette", "none"};

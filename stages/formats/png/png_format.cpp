@@ -417,8 +417,7 @@ Result<Image> read_png(int file, std::uint64_t bytes, const std::string& path, i
   png_destroy_read_struct(&reader, &info, nullptr);
   if (!whole) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole {}PNG: {}; plan the layer again", path,
-                                                   threshold > 0 || sink != nullptr ? "" : "1-bit ",
-                                                   source->message)};
+                                                   threshold > 0 || sink != nullptr ? "" : "1-bit ", source->message)};
   }
   return image_of(*source->builder, source->columns, source->dpi_x, source->dpi_y);
 }

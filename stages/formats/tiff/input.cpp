@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <utility>
 
 namespace lamina::formats::tiff {
 namespace {
@@ -18,15 +19,15 @@ tmsize_t Input::read(thandle_t handle, void* to, tmsize_t count) {
   auto* const bytes = static_cast<std::uint8_t*>(to);
   tmsize_t all = 0;
   while (all < count) {
-    const ssize_t got = ::pread(input.file_, bytes + all, static_cast<std::size_t>(count - all),
-                                static_cast<off_t>(input.position_) + all);
+    const ssize_t got =
+        ::pread(input.file_, bytes + all, static_cast<std::size_t>(count - all), static_cast<off_t>(input.position_) + all);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) break;
     all += got;
   }
-  for (std::uint64_t at = input.position_; at < std::min<std::uint64_t>(input.header_.size(), input.position_ + static_cast<std::uint64_t>(all)); ++at)
-    bytes[at - input.position_] = input.header_[at];
-  input.position_ += static_cast<std::uint64_t>(all);
+  const std::uint64_t begin = std::exchange(input.position_, input.position_ + static_cast<std::uint64_t>(all));
+  for (std::uint64_t at = begin; at < std::min<std::uint64_t>(input.header_.size(), input.position_); ++at)
+    bytes[at - begin] = input.header_[at];
   return all;
 }
 
@@ -44,7 +45,8 @@ void Input::name_first_directory(std::uint64_t page) {
   const bool low_first = header_[0] == 'I', big = header_[low_first ? 2 : 3] == kBigTiff;
   const std::size_t size = big ? 8 : 4;
   if (!big) header_.resize(2 * size);
-  for (std::size_t i = 0; i < size; ++i) header_[size + i] = static_cast<std::uint8_t>(page >> 8 * (low_first ? i : size - 1 - i));
+  for (std::size_t i = 0; i < size; ++i)
+    header_[size + i] = static_cast<std::uint8_t>(page >> 8 * (low_first ? i : size - 1 - i));
 }
 
 Input::Input(int file, const std::string& path, std::uint64_t page) : file_(file) {
@@ -55,8 +57,8 @@ Input::Input(int file, const std::string& path, std::uint64_t page) : file_(file
   size_ = static_cast<std::uint64_t>(status.st_size);
   TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
   handle_.reset(TIFFClientOpenExt(
-      path.c_str(), "rCm", this, read, [](thandle_t, void*, tmsize_t) -> tmsize_t { return 0; }, seek, [](thandle_t) { return 0; },
-      size_of, nullptr, nullptr, options.get()));
+      path.c_str(), "rCm", this, read, [](thandle_t, void*, tmsize_t) -> tmsize_t { return 0; }, seek,
+      [](thandle_t) { return 0; }, size_of, nullptr, nullptr, options.get()));
 }
 
 }  // namespace lamina::formats::tiff

@@ -32,8 +32,9 @@ Status check_address_space(const std::string& program) {
   constexpr rlim_t kNeeded = 512;  // MiB
   rlimit limit{};
   if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur >= kNeeded << 20) return {};
-  return Error{Fault::kMemory, fmt::format("{}: out of memory: needs more than {} MiB of address space; raise the limit (ulimit -v)",
-                                           program, kNeeded)};
+  return Error{
+      Fault::kMemory,
+      fmt::format("{}: out of memory: needs more than {} MiB of address space; raise the limit (ulimit -v)", program, kNeeded)};
 }
 
 /// The program in this one's folder, or its name for PATH.
