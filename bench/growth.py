@@ -2,8 +2,8 @@
 
     scripts/bench growth                writes bench/growth.md and the slopes in bench/README.md; about fifteen minutes on two cores
     scripts/bench growth --only NAME    this series only (can be repeated); no page is written. Names: triangles, layers, pixels, copies,
-                                        meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs; pages-info,
-                                        pages-convert, pages-jet: of a multi-page TIFF
+                                        meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs; overlaps-info,
+                                        overlaps-jet; pages-info, pages-convert, pages-jet: of a multi-page TIFF
     --program FILE                      a lamina; else build/release/lamina, built first
     --runs N                            runs of a job; the minimum counts (default 3)
     --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
@@ -78,6 +78,8 @@ class Jobs:
             yield from self.batch()
         elif name.startswith("pages-"):
             yield from self.pages(name.split("-")[1])
+        elif name.startswith("overlaps"):
+            yield from self.overlaps(name)
         elif "-" not in name:
             for x, words in getattr(self, name)():
                 yield x, ["jet", *words]
@@ -128,6 +130,14 @@ class Jobs:
                 shapes.write_knot(paths[-1], 1000, 0.05 - 0.01 * len(paths) / 1000)
             yield count, [*paths, *LARGE_BED, "--dpi", "600", "--layer", "0.06", *GAP[:2 * (count > 1)]]
 
+    def overlaps(self, name):
+        """Items of a 3MF build, each 1 um from another one: `info`. All at one position: `jet`."""
+        information = name == "overlaps-info"
+        for count in [100, 200, 400, 800, 1600, 3200] if information else powers(100, 100_000):
+            path = self.path("overlaps.3mf")
+            shapes.write_items(path, count, 0.001 if information else 0)
+            yield count, ["info", path] if information else ["jet", path, *BED, "--dpi", "600", "--layer", "0.5"]
+
     def threads(self):
         """Of knot800k's job."""
         path, _ = self.knot(800_000)
@@ -159,7 +169,7 @@ def without(words, *options):
 
 SERIES = ["triangles", "layers", "pixels", "copies", "meshes", "threads",
           *(f"{product}-{size}" for product, (_, _, sizes) in PRODUCTS.items() for size in sizes), "batch-jobs",
-          "pages-info", "pages-convert", "pages-jet"]
+          "overlaps-info", "overlaps-jet", "pages-info", "pages-convert", "pages-jet"]
 MEASURES = ["wall", "processor", "peak"]
 
 

@@ -17,6 +17,8 @@ def about(name):
     """Size and job of a series."""
     if name == "batch-jobs":
         return "jobs", "of a batch, dry runs of a cube"
+    if name in ("overlaps-info", "overlaps-jet"):
+        return "items", "of a 3MF build, " + ("1 um apart: `info`" if name == "overlaps-info" else "at one position: `jet`")
     if "-" not in name:
         return ABOUT[name]
     if name.startswith("pages-"):

@@ -6,6 +6,7 @@ import itertools
 import math
 import os
 import struct
+import zipfile
 
 HEADER = b"binary STL made by bench/shapes.py".ljust(80, b" ")
 ZERO, END = bytes(12), bytes(2)  # normal; attribute word
@@ -158,3 +159,17 @@ def write_pages(path, count, side=512, dpi=600):
                 solid = side // 4 <= row < side // 2
                 left = (page % (stride // 2)) * solid
                 file.write(bytes(left) + b"\xff" * (stride // 2 * solid) + bytes(stride - left - stride // 2 * solid))
+
+
+def write_items(path, count, step):
+    """A 3MF file whose build has `count` items of one cube of 10 mm, each `step` mm further along the diagonal."""
+    corners = list(itertools.product((0, 10), repeat=3))
+    facets = [(0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5)]
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
+        package.writestr("_rels/.rels", '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship '
+                         'Target="/3D/a.model" Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>')
+        package.writestr("3D/a.model", "".join([
+            '<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources><object id="1"><mesh><vertices>',
+            *(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in corners), "</vertices><triangles>",
+            *(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in facets), "</triangles></mesh></object></resources><build>",
+            *(f'<item objectid="1" transform="1 0 0 0 1 0 0 0 1 {step * i:.6f} {step * i:.6f} 0"/>' for i in range(count)), "</build></model>"]))

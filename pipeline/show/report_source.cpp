@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <span>
 
 #include "pipeline/check/job_files.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/plan/sections.h"
 #include "stages/formats/gcode/read_gcode.h"
 #include "stages/geometry/run_rows.h"
 #include "stages/raster/beads.h"
+#include "stages/slice/deep.h"
 #include "stages/support/hash/hash.h"
 
 namespace lamina::pipeline {
@@ -231,8 +234,31 @@ Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const Ma
   return scene;
 }
 
+namespace {
+
+/// Where instances overlap deeply, every ray would meet all of them: of those close together, one is shown.
+std::vector<Instance> shown_instances(const Scene& scene, std::uint32_t maximum) {
+  constexpr std::size_t kShown = 256;
+  std::vector<Box> boxes;
+  Box all;
+  for (const Instance& instance : scene.instances) all.add(boxes.emplace_back(box_of(scene, instance)));
+  std::vector<Instance> shown = scene.instances;
+  if (!slice::overlaps_deeply(boxes)) return shown;
+  std::int64_t step = std::max({all.width(), all.depth(), all.height()}) / (4 * maximum) + 1;
+  for (; shown.size() > kShown && step < 2 * kNmReach; step *= 2) {
+    std::set<std::array<std::int64_t, 4>> positions;
+    std::erase_if(shown, [&](const Instance& instance) {
+      const Point3& at = instance.offset;
+      return !positions.insert({instance.mesh, at.x / step, at.y / step, at.z / step}).second;
+    });
+  }
+  return shown;
+}
+
+}  // namespace
+
 Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t maximum) {
-  const Result<view::Caster> caster = view::Caster::build(scene.meshes, scene.instances);
+  const Result<view::Caster> caster = view::Caster::build(scene.meshes, shown_instances(scene, maximum));
   if (!caster) return caster.error();
   return std::array{caster->render(view::ViewSide::kTop, maximum), caster->render(view::ViewSide::kFront, maximum),
                     caster->render(view::ViewSide::kRight, maximum)};

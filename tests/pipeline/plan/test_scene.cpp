@@ -73,6 +73,19 @@ TEST(Scene, FarAwayPartReachesTheFarCornerWithoutOverflow) {
   EXPECT_EQ(box_of(scene, 2).lo, (Point3{2'141'000'000, 2'146'000'000, 0}));
 }
 
+TEST(Scene, OfManyOverlapsAtOnePositionEachPartHasAFewNotes) {
+  const Directory directory;
+  test::write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 10});
+  Job job;
+  job.parts.assign(500, {.path = directory / "a.stl", .at_mm = {{5, 5}}});
+  const Scene scene = loaded(job);
+  EXPECT_EQ(scene.parts[0].notes.size(), 0u);
+  EXPECT_EQ(scene.parts[1].notes.size(), 1u);
+  for (std::size_t part = 4; part < scene.parts.size(); ++part) {
+    EXPECT_EQ(scene.parts[part].notes.size(), 4u) << part;  // three others, and that there are more
+  }
+}
+
 TEST(Scene, OverlapsOfRequestedPositionsAreNoted) {
   const Directory directory;
   test::write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 10});
