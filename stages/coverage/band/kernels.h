@@ -25,22 +25,16 @@ struct ColumnMarks {
   std::uint64_t *word, *group;
   std::uint32_t words;
 
+  /// Bits of the columns from `first` to `last`, in a word that has one of them.
+  static std::uint64_t bits(std::uint32_t w, std::uint32_t first, std::uint32_t last) {
+    const std::uint64_t all = ~std::uint64_t{0}, from = w == first / 64 ? all << first % 64 : all;
+    return w == last / 64 ? from & all >> (63 - last % 64) : from;
+  }
   void mark(std::uint32_t first, std::uint32_t last) const {
-    const std::uint64_t from = ~std::uint64_t{0} << first % 64, to = ~std::uint64_t{0} >> (63 - last % 64);
-    std::uint32_t w = first / 64;
-    const std::uint32_t end = last / 64;
-    group[w / 64] |= std::uint64_t{1} << w % 64;
-    if (w == end) {
-      word[w] |= from & to;
-      return;
-    }
-    word[w] |= from;
-    for (++w; w < end; ++w) {
-      word[w] = ~std::uint64_t{0};
+    for (std::uint32_t w = first / 64; w <= last / 64; ++w) {
       group[w / 64] |= std::uint64_t{1} << w % 64;
+      word[w] |= bits(w, first, last);
     }
-    word[end] |= to;
-    group[end / 64] |= std::uint64_t{1} << end % 64;
   }
   static constexpr std::uint32_t kNone = UINT32_MAX;
   /// The first marked column at or behind `column`, or kNone.
@@ -102,11 +96,8 @@ class BandCells {
   }
   void clear_sloped() { sloped_.assign(std::size_t{words_} * kLanes, 0); }
   void mark_sloped(std::uint32_t lane, std::uint32_t first, std::uint32_t last) {
-    for (std::uint32_t w = first / 64; w <= last / 64; ++w) {
-      const std::uint64_t from = w == first / 64 ? ~std::uint64_t{0} << first % 64 : ~std::uint64_t{0};
-      const std::uint64_t to = w == last / 64 ? ~std::uint64_t{0} >> (63 - last % 64) : ~std::uint64_t{0};
-      sloped_[std::size_t{w} * kLanes + lane] |= from & to;
-    }
+    for (std::uint32_t w = first / 64; w <= last / 64; ++w)
+      sloped_[std::size_t{w} * kLanes + lane] |= ColumnMarks::bits(w, first, last);
   }
   static std::uint64_t bytes_of(std::uint32_t columns) {
     BandCells cells;

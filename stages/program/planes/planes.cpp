@@ -47,8 +47,7 @@ class PlanesWriter final : public BinaryWriter {
   Status stream_sweep(const Sweep& of, const SweepVectors& vectors, ProgramBytes& out, const Take& take) override {
     if (grid_.drop_bits == 1 && vectors.words * 2 == words_)
       return stream_segments<kPlaneHead>(vectors, of.backward, out, take, PlaneHead{of, vectors, across(of), words_});
-    sweep(of, vectors, out);
-    return {};
+    return ProgramWriter::stream_sweep(of, vectors, out, take);
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override { put_numbers(out, {kEnd, 1, cycle.layer}); }
