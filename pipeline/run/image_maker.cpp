@@ -159,7 +159,8 @@ class ImageMaker : public Maker {
 
   std::vector<MakerStep> steps() override {
     std::vector<MakerStep> steps;
-    const auto add = [&](std::string_view name, auto step, bool of_kept = true) {
+    bool of_kept = true;
+    const auto add = [&](std::string_view name, auto step) {
       steps.push_back({name, [this, step, of_kept](std::uint32_t layer, const Ticket& ticket) {
                          if (!of_kept && is_kept(layer)) return Status();
                          return step(plan_.layer(layer), work_[ticket.work], made_[ticket.record]);
@@ -204,36 +205,31 @@ class ImageMaker : public Maker {
         return inspector_->bytes_needed(work_[ticket.work].images.runs);
       };
     }
+    of_kept = false;
     const auto dose_needs = [this](std::uint32_t layer, const Ticket& ticket) -> Result<std::uint64_t> {
       const ImageWork& work = work_[ticket.work].images;
       const Layer of = plan_.layer(layer);
       return bytes_of(of, plan_.images->dose.parted_pixels(work.runs, work.drops)) - bytes_of(of, 0) +
              work_[ticket.work].inspected.bytes();
     };
-    add(
-        "dose",
-        [this](const Layer& layer, Work& work, Made& made) {
-          if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
-          // What walls and fillings left out is no bleed.
-          if (plan_.images->dose.bleeds() && !plan_.images->beads) checks_.add_left(layer, work.images.runs);
-          if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
-          if (parts_) parts_->count(work.images, made.notes, made.record);
-          return Status();
-        },
-        false);
+    add("dose", [this](const Layer& layer, Work& work, Made& made) {
+      if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
+      // What walls and fillings left out is no bleed.
+      if (plan_.images->dose.bleeds() && !plan_.images->beads) checks_.add_left(layer, work.images.runs);
+      if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
+      if (parts_) parts_->count(work.images, made.notes, made.record);
+      return Status();
+    });
     if (plan_.images->dose.parts_pixels()) steps.back().needs = dose_needs;
     if (plan_.job.dry_run) {
       add("program",
           [this](const Layer&, Work& work, Made& made) { return files_.program(images_of(work), work.files, made.record); });
       return steps;
     }
-    add(
-        "encode",
-        [this](const Layer&, Work& work, Made& made) { return files_.encode(images_of(work), work.files, made.record); },
-        false);
-    add(
-        "store",
-        [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); }, false);
+    add("encode",
+        [this](const Layer&, Work& work, Made& made) { return files_.encode(images_of(work), work.files, made.record); });
+    add("store",
+        [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); });
     return steps;
   }
   bool records_from_work() const override { return inspector_->on(); }

@@ -97,14 +97,9 @@ void add(const Json& json, const Shown& shown, ReportLayers& detected) {
     if (warning.contains("layer")) reported.layer = shown.layer(warning.at("layer"));
   }
   const Json& found = json.at("inspection");
-  constexpr std::array<std::pair<const char*, const char*>, 8> kKinds = {{{"islands", "mm2"},
-                                                                          {"loose", "mm3"},
-                                                                          {"hollows", "mm3"},
-                                                                          {"drains", "mm3"},
-                                                                          {"thin", "mm2"},
-                                                                          {"roofs", "mm2"},
-                                                                          {"gaps", "mm2"},
-                                                                          {"contacts", "mm2"}}};
+  constexpr std::array<std::pair<const char*, const char*>, 8> kKinds = {
+      {{"islands", "mm2"}, {"loose", "mm3"}, {"hollows", "mm3"}, {"drains", "mm3"},
+       {"thin", "mm2"}, {"roofs", "mm2"}, {"gaps", "mm2"}, {"contacts", "mm2"}}};
   for (const auto& [code, unit] : kKinds) {
     if (!found.at(code).contains("locations")) continue;
     for (const Json& position : found.at(code).at("locations"))

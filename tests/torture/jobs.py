@@ -130,7 +130,7 @@ def table_jobs():
                 before.insert(0, maker)
                 wanted += maker[:maker.index("-o")]
         # Tables of measurements may be filled in by now, and are not replaced.
-        fills_in = words[0] == "calibrate" and "directory" in row["kind"]
+        fills_in = row["lock"] == "/widths.csv"
         resumes = "product" in row["kind"] and words[0] in ("jet", "slice", "extrude", "batch") and "3mf" not in words
         again = ["--resume"] if resumes else [] if words[0] == "merge" else ["--overwrite"]
         jobs.append(Job(row["call"], words, [*words, *again], before=before, inputs=inputs,

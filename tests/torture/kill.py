@@ -75,12 +75,13 @@ def compare(files, ref, tally, name):
 def main(program, settings, draw):
     tally = Tally("kill -9")
     program.keeps_temporary = True
+    folder = os.path.join(settings.work, "trial")  # one for all, since saved jobs have the paths of parts
     for job in settings.jobs:
         try:
-            ref = jobs.reference(program, job, os.path.join(settings.work, "whole"))
+            ref = jobs.reference(program, job, folder)
         except AssertionError as why:
             tally.fault(job.name, "wrong", str(why))
             continue
         for _ in range(settings.trials):
-            one_trial(program, job, ref, os.path.join(settings.work, "trial"), tally, draw)
+            one_trial(program, job, ref, folder, tally, draw)
     return tally
