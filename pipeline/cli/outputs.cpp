@@ -60,6 +60,8 @@ constexpr OwnFile kOwnFiles[] = {
     {"machines", "--target", false, {"^orientation target"}},
     {"stream", "-o,--output", true, {}},
 };
+/// Commands whose -o is a directory that they make, or may be.
+constexpr std::string_view kMakesFolders[] = {"jet", "slice", "convert", "merge", "manual", "calibrate", "batch"};
 
 /// The folder of a file, or of what a link leads to.
 std::optional<FileId> folder_id(const std::string& file) {
@@ -165,11 +167,9 @@ Status check_outputs(std::span<const InputFile> inputs, std::span<const std::str
 }
 
 Status check_folder(std::string_view flag, const std::string& file) {
-  const fs::path folder = fs::path(file).parent_path();
-  std::error_code ignored;
-  if (folder.empty() || fs::is_directory(folder, ignored)) return {};
-  return failure(Fault::kOutput, "{} {}: there is no folder {}; make it or choose another place", flag, one_line(file),
-                 one_line(folder.string()));
+  const Status status = file.empty() || is_stream(file) ? Status() : check_can_write(file, false);
+  if (status) return {};
+  return failure(status.error().fault, "{} {}", flag, status.error().message);
 }
 
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {
@@ -202,6 +202,13 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
   }
   if (Status status = check_apart(arguments); !status) return status;
   if (Status status = check_outputs(inputs_of(arguments, operands), outputs); !status) return status;
+  for (const std::string_view flag : kOutputs) {
+    const std::string path = arguments.text(flag);
+    if (path.empty() || is_stream(path)) continue;
+    const bool is_folder = flag == "-o,--output" && std::ranges::find(kMakesFolders, command) != std::end(kMakesFolders);
+    if (const Status status = is_folder ? check_can_write(path, true) : check_folder(flag.substr(0, flag.find(',')), path); !status)
+      return status;
+  }
   for (const OwnFile& own : kOwnFiles) {
     if ((!own.command.empty() && own.command != command) || !arguments.has(own.flag)) continue;
     const std::string path = arguments.text(own.flag);

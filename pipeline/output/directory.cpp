@@ -88,7 +88,11 @@ Result<bool> is_directory(const std::string& output) {
   count(Decision::kOutput);
   std::error_code error;
   const fs::file_status status = fs::status(output, error);
-  if (!fs::exists(status) || fs::is_directory(status)) return fs::exists(status);
+  if (fs::is_directory(status)) return true;
+  if (!fs::exists(status)) {
+    if (const Status made = check_can_write(output, true); !made) return made.error();
+    return false;
+  }
   return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", output)};
 }
 

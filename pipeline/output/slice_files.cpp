@@ -233,7 +233,8 @@ std::string slice_file_name(const Job& job) {
   // part.stl.gz is part
   const std::string name =
       fs::path(stem).extension() == ".stl" || fs::path(stem).extension() == ".obj" ? fs::path(stem).stem().string() : stem;
-  return fmt::format("{}{}", name.empty() ? "part" : name, slice_extension(job));
+  // Next to it are NAME.json and NAME.json.part.
+  return fmt::format("{}{}", name.empty() ? "part" : short_name(name, 240 - slice_extension(job).size()), slice_extension(job));
 }
 
 Status check_slice_output(const Job& job) {

@@ -98,10 +98,14 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
     return Error{Fault::kUsage, fmt::format("-o {}: is not a file, and {} needs one; name a file", job.output,
                                             sml ? "the layer table of an SML file" : "--resume")};
   }
+  if (Status status = job.dry_run ? Status() : check_can_write(job.output, false); !status) return status;
   if (Status status = check_not_being_written(job.output); !status) return status;
   if (Status status = LayeredFile::check_part(job.output, manifest_path(job)); !status) return status;
   if (job.overwrite || (job.resume && has_record(manifest_path(job)))) return {};
-  std::vector<std::string> names{job.output, manifest_path(job)};
+  // A record whose toolpaths are gone is that of lamina, and replaced.
+  const bool gone = !fs::exists(fs::symlink_status(job.output, error)) && has_manifest_head(manifest_path(job));
+  std::vector<std::string> names{job.output};
+  if (!gone) names.push_back(manifest_path(job));
   if (sml) names.push_back(table_path(job));
   for (const std::string& name : names) {
     if (!fs::exists(fs::symlink_status(name, error))) continue;

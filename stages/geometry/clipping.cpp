@@ -82,11 +82,11 @@ Result<Contours> guarded(Act&& act) {
 /// failure  what the error says
 Result<Contours> combine(const ContoursView& contours, const ContoursView& with, clip::ClipType how,
                          clip::PolyFillType rule = clip::pftNonZero,
-                         const char* failure = "a difference or intersection failed") {
+                         const char* failure = "a difference or intersection failed", bool simple = true) {
   if (contours.size() == 0) return Contours();
   return guarded([&](Contours& out) -> Status {
     const Point2 by = middle_of(contours);
-    clip::Clipper clipper(clip::ioStrictlySimple);
+    clip::Clipper clipper(simple ? clip::ioStrictlySimple : 0);
     clipper.AddPaths(to_clipper(contours, by), clip::ptSubject, true);
     clipper.AddPaths(to_clipper(with, by), clip::ptClip, true);
     clip::PolyTree tree;
@@ -217,11 +217,11 @@ Status Offset::append_piece(const ContoursView& contours, std::uint32_t begin, s
 
 }  // namespace
 
-Result<Contours> contour_union(const ContoursView& contours, FillRule rule) {
+Result<Contours> contour_union(const ContoursView& contours, FillRule rule, bool simple) {
   const clip::PolyFillType type = rule == FillRule::kEvenOdd    ? clip::pftEvenOdd
                                   : rule == FillRule::kPositive ? clip::pftPositive
                                                                 : clip::pftNonZero;
-  return combine(contours, {}, clip::ctUnion, type, "the union failed");
+  return combine(contours, {}, clip::ctUnion, type, "the union failed", simple);
 }
 
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {

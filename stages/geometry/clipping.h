@@ -14,7 +14,8 @@ namespace lamina {
 /// followed by its holes.
 /// errors  kInternal if Clipper refuses the contours
 /// cost    O((P + X) log P) for P points and X crossings
-Result<Contours> contour_union(const ContoursView& contours, FillRule rule);
+/// simple   false: contours of the result may touch at corners; true costs the square of the points of a contour
+Result<Contours> contour_union(const ContoursView& contours, FillRule rule, bool simple = true);
 
 /// The region of clean contours less that of others, which may overlap each other: where they share an edge nothing is
 /// left of it. In the order of contour_union.

@@ -28,7 +28,7 @@ Result<Contours> combine_pairwise(std::vector<Contours> sets, FillRule rule, std
       } else if (other.size() > 0) {
         one.append(other);
         if (points != nullptr) *points += one.point.size();
-        auto both = contour_union(one, of_pair);
+        auto both = contour_union(one, of_pair, false);
         if (!both) return both.error();
         one = std::move(*both);
         tidy(one);

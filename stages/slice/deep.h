@@ -19,7 +19,8 @@ inline constexpr std::uint64_t kDeep = 64;
 /// cost  O(N log N + P), for P pairs that overlap in x, and no more than kDeep pairs that overlap for each box
 bool overlaps_deeply(std::span<const Box> boxes);
 
-/// What is solid by the rule of the summed windings of sets of clean contours. Equal sets are not combined.
+/// What is solid by the rule of the summed windings of sets of clean contours. Equal sets are not combined. Contours of the
+/// result are clean but for corners at which they touch.
 /// sets    emptied
 /// points  becomes the number of points in all boolean operations
 /// errors  kInternal of the clipping library

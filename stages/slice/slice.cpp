@@ -183,6 +183,7 @@ Status Slicer::combine_members(std::span<const Placed> members, std::uint32_t pl
   auto combined = combine_pairwise(std::move(sets), options_.fill_rule);
   if (!combined) return combined.error();
   all = std::move(*combined);
+  if (const auto merged = nest_apart(all, options_.fill_rule, scratch); !merged) return merged.error();
   report.merged += 1;
   return finish(all, scratch);
 }

@@ -385,6 +385,22 @@ bool is_stream(const std::string& path) {
   return path == "-" || (there && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
 }
 
+Status check_can_write(const std::string& path, bool makes_folders) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path folder = fs::absolute(path, error);
+  if (fs::is_symlink(folder, error)) folder = fs::weakly_canonical(folder, error);
+  if (!makes_folders || !folder.has_filename()) folder = folder.parent_path();
+  while (makes_folders && !fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+  const auto refused = [&](const std::string& why) { return Error{Fault::kOutput, fmt::format("{}: {}", path, why)}; };
+  if (!fs::exists(folder, error))
+    return refused(fmt::format("there is no folder {}; make it or choose another place", fs::path(path).parent_path().string()));
+  if (!fs::is_directory(folder, error)) return refused(folder.string() + " is no folder; choose another place");
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    return refused(fmt::format("no file can be made in {}: {}; choose another place", folder.string(), std::strerror(errno)));
+  return {};
+}
+
 bool is_replaceable(const std::string& path, std::span<const std::string_view> marks) {
   if (!is_file(path)) return true;
   const auto file = FileReader::open(path, {});

@@ -128,6 +128,13 @@ bool is_file(const std::string& path);
 /// Whether the name leads to a device, a pipe or a socket, or is "-", standard output.
 bool is_stream(const std::string& path);
 
+/// Whether a file or directory can be made under a name, before the work for it. makes_folders  those above it too
+/// errors  kOutput: no folder, no folder that may be written to
+Status check_can_write(const std::string& path, bool makes_folders);
+
+/// A name of at most `max_bytes` for files: a longer one is cut between characters of UTF-8 and ends in its hash.
+std::string short_name(const std::string& name, std::size_t max_bytes);
+
 /// Whether the file is absent, empty, or contains one of `marks` in its first 4 KiB. A leading ^ requires the mark at the
 /// start of the file; empty marks are ignored.
 bool is_replaceable(const std::string& path, std::span<const std::string_view> marks);

@@ -23,7 +23,10 @@ namespace {
 
 Error not_started(const std::string& program, int reason) {
   if (is_shortage(reason)) return shortage(reason, program);
-  return {Fault::kInternal, fmt::format("{}: {}; install it next to lamina or in PATH", program, std::strerror(reason))};
+  const bool absent = reason == ENOENT || reason == EACCES || reason == ELIBACC || reason == ENOTDIR || reason == ENOEXEC;
+  return {absent ? Fault::kUsage : reason == EAGAIN ? Fault::kMemory : Fault::kInternal,
+          fmt::format("{}: {}; install the Debian package {}, or put the program next to lamina or in PATH", program,
+                      std::strerror(reason), program)};
 }
 
 /// OpenImageIO and OpenCV name some hundred libraries, whose constructors end the program if memory runs out.

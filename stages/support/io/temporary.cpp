@@ -59,9 +59,20 @@ std::string random_digits() {
 
 /// What temporary names of a file begin with.
 std::string stem_of(const std::string& name) {
-  if (name.size() <= kLongestName) return name;
-  return name.substr(0, kLongestName - 33) + "-" + hex(hash_bytes(std::as_bytes(std::span(name))));
+  return short_name(name, kLongestName);
 }
+
+}  // namespace
+
+std::string short_name(const std::string& name, std::size_t max_bytes) {
+  if (name.size() <= max_bytes) return name;
+  const std::string digits = "-" + hex(hash_bytes(std::as_bytes(std::span(name))));
+  std::size_t kept = max_bytes - digits.size();
+  while (kept > 0 && (static_cast<unsigned char>(name[kept]) & 0xC0) == 0x80) --kept;  // within a character
+  return name.substr(0, kept) + digits;
+}
+
+namespace {
 
 enum class Lock { kHeld, kTaken, kGone };
 
