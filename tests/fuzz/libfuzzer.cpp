@@ -59,7 +59,7 @@ int LLVMFuzzerInitialize(int* count, char*** words) {
 }
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  chosen->run({reinterpret_cast<const char*>(data), size});
+  run_target(*chosen, {reinterpret_cast<const char*>(data), size});
   return 0;
 }
 

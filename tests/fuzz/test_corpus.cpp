@@ -28,7 +28,7 @@ class Fuzz : public testing::TestWithParam<std::string> {
   }
   bool accepts(std::string_view bytes) const {
     try {
-      return target().run(bytes);
+      return run_target(target(), bytes);
     } catch (const BrokenLaw& broken) {
       ADD_FAILURE() << broken.what();
       return false;
@@ -51,6 +51,21 @@ TEST_P(Fuzz, AcceptsItsSeedsAndKeepsItsLawsForTheStoredCorpus) {
     SCOPED_TRACE(entry.path().string());
     if (entry.is_regular_file()) accepts(bytes_of(entry.path()));
   }
+}
+
+// The law of work is one: a reader of a file that reads it again for each of its pages breaks it.
+TEST(FuzzCorpus, ReadingAFileManyTimesBreaksTheLawOfWork) {
+  Target greedy;
+  greedy.run = [](std::string_view bytes) {
+    MemoryFile file("pages.tif");
+    const fs::path path = file.hold(bytes);
+    std::size_t sum = 0;
+    for (int page = 0; page < 20; ++page) sum += bytes_of(path).size();
+    return sum > 0;
+  };
+  if (!fs::exists("/proc/self/io")) GTEST_SKIP() << "the system does not count bytes";
+  EXPECT_TRUE(run_target(greedy, std::string(10'000, 'x')));
+  EXPECT_THROW(run_target(greedy, std::string(1'000'000, 'x')), BrokenLaw);
 }
 
 TEST(FuzzCorpus, EveryFolderBelongsToATarget) {
