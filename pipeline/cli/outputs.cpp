@@ -206,7 +206,8 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
     const std::string path = arguments.text(flag);
     if (path.empty() || is_stream(path)) continue;
     const bool is_folder = flag == "-o,--output" && std::ranges::find(kMakesFolders, command) != std::end(kMakesFolders);
-    if (const Status status = is_folder ? check_can_write(path, true) : check_folder(flag.substr(0, flag.find(',')), path); !status)
+    if (const Status status = is_folder ? check_can_write(path, true) : check_folder(flag.substr(0, flag.find(',')), path);
+        !status)
       return status;
   }
   for (const OwnFile& own : kOwnFiles) {

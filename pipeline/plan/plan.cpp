@@ -337,9 +337,11 @@ namespace {
 Status choose_images(bool machine, Job& job) {
   const bool geometry = has_images_of_geometry(job, machine);
   if (job.image_content == ImageContent::kGeometry && !geometry) {
-    return usage("--images geometry: {}; use --images drops",
-                 machine ? "the drops do not follow from one 1-bit image a layer (several materials or doses, formulas, levels, a grey format)"
-                         : "without a machine no other file has the drops");
+    return usage(
+        "--images geometry: {}; use --images drops",
+        machine
+            ? "the drops do not follow from one 1-bit image a layer (several materials or doses, formulas, levels, a grey format)"
+            : "without a machine no other file has the drops");
   }
   const bool dithers = job.dose.core < 1 || (job.dose.dithered && (job.levels > 0 || job.dose.saturation_percent));
   const bool named = std::ranges::find(job.named, "image.format") != job.named.end();

@@ -58,8 +58,9 @@ void drop_repeated(FillRule rule, Scene& scene) {
   for (std::size_t p = 0; p < of_part.size(); ++p) {
     if (of_part[p] == 0) continue;
     scene.parts[p].notes.push_back(
-        {false, fmt::format("{} of its objects {} exactly where another one of the same mesh is, and {} left out: no pixel changes",
-                            readable_count(of_part[p]), of_part[p] == 1 ? "is" : "are", of_part[p] == 1 ? "is" : "are")});
+        {false,
+         fmt::format("{} of its objects {} exactly where another one of the same mesh is, and {} left out: no pixel changes",
+                     readable_count(of_part[p]), of_part[p] == 1 ? "is" : "are", of_part[p] == 1 ? "is" : "are")});
   }
 }
 

@@ -124,8 +124,7 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
   const auto manifest = std::make_shared<const Manifest>(source.manifest);
   source.layer = [directory, manifest, machine, expected](std::uint32_t position, bool timed) -> Result<ReportLayer> {
     const LayerRecord& record = manifest->layers[position];
-    if (expected->remakes())
-      return read_dosed(directory, manifest->head, record, *expected, timed ? &*machine : nullptr);
+    if (expected->remakes()) return read_dosed(directory, manifest->head, record, *expected, timed ? &*machine : nullptr);
     if (is_one_bit(manifest->head) && (!machine || !timed)) return read_bits(directory, manifest->head, record);
     auto runs = read_layer(directory, manifest->head, record, *expected);
     if (!runs) return runs.error();
@@ -136,7 +135,7 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
   };
   const std::uint32_t planes = std::max(1u, head.max_drops);
   source.bytes = [manifest, expected, replay = machine ? machine->bytes_of_replay(planes) : 0](std::uint32_t position,
-                                                                                              bool timed) {
+                                                                                               bool timed) {
     const ManifestHead& of = manifest->head;
     const LayerRecord& record = manifest->layers[position];
     const std::uint64_t more = replay > 0 && timed ? replay + 2 * record.program.bytes : 0;

@@ -40,9 +40,7 @@ class Grouping {
     }
     const std::int64_t longest = std::max({around.width(), around.depth(), around.height()});
     const auto axis = longest == around.width() ? &Point3::x : longest == around.depth() ? &Point3::y : &Point3::z;
-    const auto key = [&](std::uint32_t i) {
-      return std::pair(std::int64_t{boxes_[i].lo.*axis} + boxes_[i].hi.*axis, i);
-    };
+    const auto key = [&](std::uint32_t i) { return std::pair(std::int64_t{boxes_[i].lo.*axis} + boxes_[i].hi.*axis, i); };
     const std::uint32_t middle = begin + (end - begin) / 2;
     std::ranges::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, {}, key);
     const std::uint32_t left = build(begin, middle), right = build(middle, end);
@@ -53,7 +51,8 @@ class Grouping {
   }
   bool is_one(Node& node) {
     if (!node.one)
-      node.one = nodes_[node.left].one && nodes_[node.right].one && find(nodes_[node.left].first) == find(nodes_[node.right].first);
+      node.one =
+          nodes_[node.left].one && nodes_[node.right].one && find(nodes_[node.left].first) == find(nodes_[node.right].first);
     return node.one;
   }
   void join(std::uint32_t a, std::uint32_t b) {

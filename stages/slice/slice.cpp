@@ -64,8 +64,9 @@ Status clean_alone(Contours& contours, FillRule rule, SectionScratch& scratch) {
 
 bool overlap_deeply(std::span<const Mesh> meshes, std::span<const Instance> instances) {
   std::vector<Box> boxes;
-  for (const auto& [mesh, by] : instances) {
-    const Box& own = meshes[mesh].bounds;
+  for (const Instance& instance : instances) {
+    const Box& own = meshes[instance.mesh].bounds;
+    const Point3& by = instance.offset;
     const auto moved = [&](const Point3& p) { return Point3{p.x + by.x, p.y + by.y, p.z + by.z}; };
     boxes.push_back(own.empty() ? own : Box{moved(own.lo), moved(own.hi)});
   }
@@ -135,7 +136,8 @@ void Slicer::group(std::span<const std::uint32_t> body_of) {
     if (members.size() == 1) ++alone_[members.front().source];
     if (members.size() <= kDeep) continue;
     std::vector<Instance> together;
-    for (const auto& [source, by] : members) together.push_back({(*sources_)[source].mesh, {by.x, by.y, (*sources_)[source].z}});
+    for (const auto& [source, by] : members)
+      together.push_back({(*sources_)[source].mesh, {by.x, by.y, (*sources_)[source].z}});
     deep_[b] = overlap_deeply(meshes_, together);
   }
 }

@@ -48,7 +48,8 @@ TEST_F(MissingScan, AProgramWithoutItsLibrariesIsMissingToo) {
 }
 
 TEST_F(MissingScan, PreviewWithoutItsProgramIsWrongUseAndNamesThePackage) {
-  const std::string command = "cd '" + directory_.path().string() + "' && PATH=/nowhere bin/lamina preview chart -o x.png >said 2>&1";
+  const std::string command =
+      "cd '" + directory_.path().string() + "' && PATH=/nowhere bin/lamina preview chart -o x.png >said 2>&1";
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 2);
   EXPECT_NE(read_text(directory_ / "said").find("install the Debian package lamina-preview"), std::string::npos);
 }

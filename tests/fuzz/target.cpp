@@ -17,7 +17,8 @@ void wanted(bool held, const char* what) {
   std::abort();
 }
 
-/// Bytes that the process has read so far; 0 if the system does not say. A descriptor that stays open, for it is read twice a run.
+/// Bytes that the process has read so far; 0 if the system does not say. A descriptor that stays open, for it is read twice a
+/// run.
 std::uint64_t bytes_read() {
   static const int counters = ::open("/proc/self/io", O_RDONLY | O_CLOEXEC);
   char text[64] = "";
@@ -30,7 +31,7 @@ std::uint64_t bytes_read() {
 bool run_target(const Target& target, std::string_view bytes) {
   const std::uint64_t before = bytes_read();
   const bool accepted = target.run(bytes);
-  law(bytes_read() - before <= 8 * bytes.size() + (1 << 20), "more bytes are read than 8 times the input's and a mebibyte");
+  law(bytes_read() - before <= 8 * bytes.size() + (1 << 17), "more bytes are read than 8 times the input's and 128 KiB");
   return accepted;
 }
 

@@ -40,8 +40,8 @@ inline void law(bool holds, const char* what) {
   if (!holds) throw BrokenLaw(what);
 }
 
-/// Runs a target under the law of work: of `size` bytes it reads at most 8 * size + 1 MiB from files, by the count of the system.
-/// Not checked where the system does not count. throws  BrokenLaw
+/// Runs a target under the law of work: of `size` bytes it reads at most 8 * size + 128 KiB from files, by the count of the
+/// system. Not checked where the system does not count. throws  BrokenLaw
 bool run_target(const Target& target, std::string_view bytes);
 
 /// Choices that follow from the bytes, so that every file of the corpus means the same for ever.

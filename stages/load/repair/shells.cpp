@@ -32,8 +32,8 @@ WindingTree::Point normal_of(const Indexed& mesh, std::uint32_t facet) {
   return length > 0 ? WindingTree::Point{n[0] / length, n[1] / length, n[2] / length} : n;
 }
 
-/// Joins the facets at an edge that more than two share, each that is walked forward with one that is walked back: those that are of
-/// one shell already, then those that continue each other most evenly. So each shell stays closed.
+/// Joins the facets at an edge that more than two share, each that is walked forward with one that is walked back: those that
+/// are of one shell already, then those that continue each other most evenly. So each shell stays closed.
 void join_pairs(const Indexed& mesh, const Side* begin, const Side* end, DisjointSets& sets) {
   struct Pair {
     double score;
@@ -131,7 +131,8 @@ class ShellContainment {
     // Within the facet: at a sharp edge of the outer shell, on which this one lies, the winding number is anything.
     constexpr double kThird = 1.0 / 3, kNear = 0.96, kOff = 0.02, kHalf = 0.49;
     return inside({kThird, kThird, kThird}) && inside({kNear, kOff, kOff}) && inside({kOff, kNear, kOff}) &&
-           inside({kOff, kOff, kNear}) && inside({kHalf, kHalf, kOff}) && inside({kOff, kHalf, kHalf}) && inside({kHalf, kOff, kHalf});
+           inside({kOff, kOff, kNear}) && inside({kHalf, kHalf, kOff}) && inside({kOff, kHalf, kHalf}) &&
+           inside({kHalf, kOff, kHalf});
   }
 
   std::span<const Triangle> triangles_;
@@ -252,9 +253,9 @@ bool turn_shells(Mesh& mesh, const std::string& prefix, std::vector<Note>& notes
   const std::uint32_t turned = turn_inverted_shells(mesh);
   if (turned > 0) {
     mesh.blocks.reset();
-    notes.push_back({true, fmt::format("{}{} inside out, and turned over: no other shell contains {}", prefix,
-                                       turned == 1 ? "a shell is" : fmt::format("{} shells are", turned),
-                                       turned == 1 ? "it" : "them")});
+    notes.push_back(
+        {true, fmt::format("{}{} inside out, and turned over: no other shell contains {}", prefix,
+                           turned == 1 ? "a shell is" : fmt::format("{} shells are", turned), turned == 1 ? "it" : "them")});
   } else if (mesh.blocks) {
     mesh.triangles = {};
   }

@@ -58,9 +58,7 @@ std::string random_digits() {
 }
 
 /// What temporary names of a file begin with.
-std::string stem_of(const std::string& name) {
-  return short_name(name, kLongestName);
-}
+std::string stem_of(const std::string& name) { return short_name(name, kLongestName); }
 
 }  // namespace
 
