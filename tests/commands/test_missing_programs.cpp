@@ -54,5 +54,29 @@ TEST_F(MissingScan, PreviewWithoutItsProgramIsWrongUseAndNamesThePackage) {
   EXPECT_NE(read_text(directory_ / "said").find("install the Debian package lamina-preview"), std::string::npos);
 }
 
+TEST(Names, ARecordWhoseToolpathsAreGoneIsReplacedAndNothingElse) {
+  const Directory directory;
+  write_box(directory / "part.stl", {0, 0, 0}, {5, 5, 2});
+  const auto code = [&] {
+    return run_lamina(words_of("extrude part.stl --machine anet-a8 --quiet -o p.gcode"), directory.path()).code;
+  };
+  EXPECT_EQ(code(), 0);
+  EXPECT_EQ(code(), 2);
+  fs::remove(directory / "p.gcode");
+  EXPECT_EQ(code(), 0);
+  fs::remove(directory / "p.gcode");
+  write_text(directory / "p.gcode.json", "{}");
+  EXPECT_EQ(code(), 2);
+}
+
+TEST(Names, APartOf250BytesIsSlicedToANameThatEndsBetweenCharacters) {
+  const Directory directory;
+  std::string name;
+  while (name.size() < 246) name += "\u00e4";
+  write_box(directory / (name + ".stl"), {0, 0, 0}, {5, 5, 2});
+  EXPECT_EQ(run_lamina({"slice", name + ".stl", "--quiet", "-o", "out"}, directory.path()).code, 0);
+  EXPECT_EQ(run_lamina({"verify", "out"}, directory.path()).code, 0);
+}
+
 }  // namespace
 }  // namespace lamina::test

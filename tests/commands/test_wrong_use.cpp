@@ -132,7 +132,7 @@ TEST_F(WrongUse, MissingThingsAreNamed) {
   refused(2, {"merge", "."}, {"-o OUT"});
   refused(4, {"design", "--pore", "0.12x0.9", "--machine", "anet-a8", "-o", "absent/x.toml"}, {"there is no folder absent"});
   // Inputs need not exist: outputs are checked before they are read.
-  for (const std::string command : {"export", "extrude", "heights", "report", "stream", "design"})
+  for (const std::string command : {"export", "extrude", "heights", "report", "stream"})
     refused(4, {command, "absent-input", "-o", "absent/x.stl"}, {"there is no folder absent"});
   for (const std::string command : {"jet", "slice", "convert", "merge", "batch"})
     refused(4, {command, "absent-input", "-o", "/dev/null/x"}, {"/dev/null is no folder"});
