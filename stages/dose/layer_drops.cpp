@@ -206,6 +206,37 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
   mark_core(work.shares, second, full, work.zones);
 }
 
+/// Level 1 for the pixels of an image, 2 for those of its core, which erosion left of it.
+void mark_runs(const RunsView& image, const RunsView& core, Levels& result) {
+  result.columns = image.columns;
+  result.row_offset.assign(std::size_t{image.rows()} + 1, 0);
+  const std::size_t maximum = image.change.size() / 2 + core.change.size() + 1;
+  result.change.resize(2 * maximum), result.level.resize(maximum);
+  std::uint32_t* change = result.change.data();
+  std::uint8_t* level = result.level.data();
+  const auto put = [&](std::uint32_t begin, std::uint32_t end, std::uint8_t of) {
+    change[0] = begin, change[1] = end, *level = of;  // an empty one is overwritten
+    const std::size_t any = begin < end ? 1 : 0;
+    change += 2 * any, level += any;
+  };
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const auto runs = image.row(r), inside = core.row(r);
+    std::size_t k = 0;
+    for (std::size_t i = 0; i + 1 < runs.size(); i += 2) {
+      std::uint32_t at = runs[i];
+      for (; k < inside.size() && inside[k] < runs[i + 1]; k += 2) {
+        put(at, inside[k], 1);
+        put(inside[k], inside[k + 1], 2);
+        at = inside[k + 1];
+      }
+      put(at, runs[i + 1], 1);
+    }
+    result.row_offset[r + 1] = static_cast<std::uint32_t>(level - result.level.data());
+  }
+  result.change.resize(static_cast<std::size_t>(change - result.change.data()));
+  result.level.resize(static_cast<std::size_t>(level - result.level.data()));
+}
+
 /// What pixels get of the drops of work.zones.
 void dither_zones(std::span<const Drops24> drops, std::uint32_t layer, DropWork& work) {
   make_zones(drops, layer, work.patterns);
@@ -219,10 +250,14 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
                         DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
   const bool core = dose.requested_shell != dose.requested_inside;
-  if (rules.full == 0) levels_of(image, 1, core ? work.shares : work.zones);
-  if (core) {
+  if (rules.full == 0 && core) {
+    erode(image, rules.shell, second);
+    mark_runs(image, second, work.zones);
+  } else if (rules.full == 0) {
+    levels_of(image, 1, work.zones);
+  } else if (core) {
     mark_shell(rules, image, full, second, work);
-  } else if (rules.full > 0) {
+  } else {
     std::swap(work.shares, work.zones);
   }
   std::vector<Drops24> drops(std::size_t{2} * full + 1);
@@ -291,8 +326,8 @@ Result<ZoneSums> drops_of_deposited(const DropRules& rules, const Sheet& sheet,
 }
 
 void drops_of_core(const DropRules& rules, double share, std::uint32_t layer, const Runs& image, Runs& second, DropWork& work) {
-  levels_of(image, 1, work.shares);
-  mark_shell(rules, image, 1, second, work);
+  erode(image, rules.shell, second);
+  mark_runs(image, second, work.zones);
   make_core(share, layer, work.patterns);
   work.counter.start(work.patterns);
   work.drops.assign(1, {work.zones, &work.patterns});

@@ -24,16 +24,20 @@ std::uint64_t core_bits(std::uint32_t value, std::uint32_t step, std::uint32_t t
   return bits;
 }
 
-LAMINA_BODY std::uint64_t core_word(const CorePattern& core, std::uint32_t value) {
-  if (core.words.empty()) return core_bits(value, core.column_step, core.threshold);
-  const CoreWord& of = core.words[value / kCoreInterval];
+LAMINA_BODY std::uint64_t word_of(const CoreWord& of, std::uint32_t value) {
   const std::uint64_t first = value >= of.turn[0] ? 1 : 0, second = value >= of.turn[1] ? 1 : 0;
   return of.bits ^ first << of.bit[0] ^ second << of.bit[1];
 }
+LAMINA_BODY std::uint64_t core_word(const CorePattern& core, std::uint32_t value) {
+  if (core.words.empty()) return core_bits(value, core.column_step, core.threshold);
+  return word_of(core.words[value / kCoreInterval], value);
+}
 
-/// Calls take(word, bits) for the words of the bits [begin, end) of a row, of which bit b has the value first + b * column_step.
+/// Calls take(word, bits) for the words of the bits [begin, end) of a row, of which bit b has the value first + b *
+/// column_step.
 template <class Take>
-LAMINA_BODY void for_core_words(const CorePattern& core, std::uint64_t begin, std::uint64_t end, std::uint32_t first, Take take) {
+LAMINA_BODY void for_core_words(const CorePattern& core, std::uint64_t begin, std::uint64_t end, std::uint32_t first,
+                                Take take) {
   const std::uint64_t last = (end - 1) / 64;
   const std::uint32_t step = 64 * core.column_step;
   std::uint64_t word = begin / 64, mask = ~std::uint64_t{0} << (begin % 64);
@@ -124,22 +128,91 @@ void DropPlane::row(std::uint32_t number, std::span<std::uint64_t> words) const 
     add(image_.patterns->zone[zones.level[i]], number, zones.change[2 * i], zones.change[2 * i + 1], words.data());
 }
 
-void DropPlane::set_words(std::uint32_t number, std::span<std::uint64_t> words, Buffer<RowSpan>& spans) const {
-  constexpr std::size_t kNear = 4;  // spans that are nearer are one
-  const LevelsView& zones = image_.zones;
-  const std::size_t before = spans.size();
-  for (std::size_t i = zones.row_offset[number]; i < zones.row_offset[number + 1]; ++i) {
-    const std::uint32_t begin = zones.change[2 * i], end = zones.change[2 * i + 1];
-    std::size_t first = begin / 64;
-    const std::size_t last = std::size_t{end - 1} / 64 + 1;
-    if (spans.size() > before && spans.back().end + kNear >= first) {
-      first = std::exchange(spans.back().end, last);
+namespace {
+
+/// A row of words from its runs; spans that are nearer than a few words are one.
+struct SpanWriter {
+  std::uint64_t* words;
+  Buffer<RowSpan>& spans;
+  std::size_t at = 0;  // the word that is being made, of the last span
+  std::uint64_t word = 0;
+  bool any = false;
+
+  void start(std::size_t first) {
+    constexpr std::size_t kNear = 4;
+    if (any && first == at) return;
+    end();
+    if (any && at + 1 + kNear >= first) {
+      for (std::size_t w = at + 1; w < first; ++w) words[w] = 0;
     } else {
-      spans.push_back({first, last});
+      spans.push_back({first, first});
     }
-    std::fill(words.begin() + static_cast<std::ptrdiff_t>(first), words.begin() + static_cast<std::ptrdiff_t>(last), 0);
-    add(image_.patterns->zone[zones.level[i]], number, begin, end, words.data());
+    at = first, word = 0, any = true;
   }
+  /// of(word)  its bits
+  template <class Bits>
+  LAMINA_BODY void put(std::uint32_t begin, std::uint32_t end, const Bits& of) {
+    const std::size_t first = begin / 64, last = (std::size_t{end} - 1) / 64;
+    start(first);
+    const std::uint64_t head = ~std::uint64_t{0} << begin % 64, tail = ~std::uint64_t{0} >> (63 - (end - 1) % 64);
+    if (first == last) {
+      word |= of(first) & head & tail;
+      return;
+    }
+    words[first] = word | (of(first) & head);
+    for (std::size_t w = first + 1; w < last; ++w) words[w] = of(w);
+    at = last, word = of(last) & tail;
+  }
+  void end() {
+    if (!any) return;
+    words[at] = word;
+    spans.back().end = at + 1;
+  }
+};
+
+LAMINA_BODY void set_words_body(const DropImageView& image, std::uint32_t drop, std::uint32_t row, SpanWriter writer) {
+  const LevelsView& zones = image.zones;
+  const DropPatterns& patterns = *image.patterns;
+  const CorePattern& core = patterns.core;
+  const std::uint32_t value = core.of_row(row), step = 64 * core.column_step;
+  const CoreWord* const table = core.words.empty() ? nullptr : core.words.data();
+  for (std::size_t i = zones.row_offset[row]; i < zones.row_offset[row + 1]; ++i) {
+    const DropZone& zone = patterns.zone[zones.level[i]];
+    const std::uint32_t begin = zones.change[2 * i], end = zones.change[2 * i + 1];
+    if (zone.base > drop) {
+      writer.put(begin, end, [](std::size_t) { return ~std::uint64_t{0}; });
+    } else if (zone.base == drop && zone.extra == DropZone::Extra::kTile) {
+      const std::uint64_t* const tile = patterns.tile_row(zone, row);
+      writer.put(begin, end, [&](std::size_t word) { return tile[word % 2]; });
+    } else if (zone.base == drop && zone.extra == DropZone::Extra::kCore) {
+      writer.put(begin, end, [&](std::size_t word) {
+        const std::uint32_t first = value + static_cast<std::uint32_t>(word) * step;
+        return table == nullptr ? core_bits(first, core.column_step, core.threshold)
+                                : word_of(table[first / kCoreInterval], first);
+      });
+    }
+  }
+  writer.end();
+}
+void set_words_plain(const DropImageView& image, std::uint32_t drop, std::uint32_t row, const SpanWriter& writer) {
+  set_words_body(image, drop, row, writer);
+}
+#if defined(LAMINA_WIDE_KERNELS)
+LAMINA_AVX2 void set_words_avx2(const DropImageView& image, std::uint32_t drop, std::uint32_t row, const SpanWriter& writer) {
+  set_words_body(image, drop, row, writer);
+}
+#endif
+auto set_words_kernel() {
+#if defined(LAMINA_WIDE_KERNELS)
+  if (widest_isa() >= Isa::kAvx2) return set_words_avx2;
+#endif
+  return set_words_plain;
+}
+
+}  // namespace
+
+void DropPlane::set_words(std::uint32_t number, std::span<std::uint64_t> words, Buffer<RowSpan>& spans) const {
+  set_words_kernel()(image_, drop_, number, {words.data(), spans});
 }
 
 void DropPlane::spans(std::uint32_t number, WordSpans& spans) const {

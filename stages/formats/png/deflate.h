@@ -65,16 +65,24 @@ constexpr std::array<std::uint8_t, kSymbols> word_lengths(const std::array<std::
 /// bit comes first, so it stands lowest here.
 template <std::size_t kSymbols>
 constexpr std::array<BitString, kSymbols> words_of(const std::array<std::uint8_t, kSymbols>& lengths) {
+  constexpr std::uint32_t kMaxLength = 15;
   std::array<BitString, kSymbols> words{};
-  std::uint32_t code = 0;
-  for (std::uint32_t length = 1; length <= 15; ++length, code <<= 1) {
-    for (std::size_t s = 0; s < kSymbols; ++s) {
-      if (lengths[s] != length) continue;
-      std::uint32_t turned = 0;
-      for (std::uint32_t bit = 0; bit < length; ++bit) turned |= (code >> bit & 1) << (length - 1 - bit);
-      words[s] = BitString(turned, length);
-      ++code;
-    }
+  std::array<std::uint32_t, kMaxLength + 1> next{};
+  for (const std::uint8_t length : lengths) ++next[length];
+  for (std::uint32_t length = 0, code = 0, count = 0; length <= kMaxLength; ++length) {
+    code = (code + count) << 1;
+    count = length > 0 ? next[length] : 0;
+    next[length] = code;
+  }
+  for (std::size_t s = 0; s < kSymbols; ++s) {
+    const std::uint32_t length = lengths[s];
+    if (length == 0) continue;
+    std::uint32_t turned = next[length]++;
+    turned = (turned & 0x5555) << 1 | (turned >> 1 & 0x5555);
+    turned = (turned & 0x3333) << 2 | (turned >> 2 & 0x3333);
+    turned = (turned & 0x0F0F) << 4 | (turned >> 4 & 0x0F0F);
+    turned = (turned & 0x00FF) << 8 | turned >> 8;
+    words[s] = BitString(turned >> (kMaxLength + 1 - length), length);
   }
   return words;
 }

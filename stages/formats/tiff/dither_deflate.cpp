@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <functional>
 
 #include "stages/geometry/isa.h"
 #include "stages/geometry/targets.h"
@@ -22,23 +23,14 @@ struct RowsBack {
   std::ptrdiff_t bytes;
 };
 constexpr RowsBack kBack[][2] = {{{20, 1}, {9, 13}}, {{11, -12}, {2, -25}}};
-constexpr std::size_t kLane = 32;  // bytes that sums are made of at a time
+constexpr std::size_t kNear = 512;  // parts that are nearer are one
+constexpr std::size_t kLane = 32;   // bytes that sums are made of at a time
 static_assert(std::endian::native == std::endian::little);
 
 std::uint64_t word_at(const std::byte* at) {
   std::uint64_t word = 0;
   std::memcpy(&word, at, sizeof word);
   return word;
-}
-
-/// The first byte from `at` on that is not the one `distance` before it, or, if all before `part` are, one of the next 8.
-const std::byte* repeats_end(const std::byte* at, const std::byte* part, const std::byte* end, std::size_t distance) {
-  for (; at < part && end - at >= 8; at += 8) {
-    const std::uint64_t differs = word_at(at) ^ word_at(at - distance);
-    if (differs != 0) return at + std::countr_zero(differs) / 8;
-  }
-  while (at < part && *at == *(at - distance)) ++at;
-  return at;
 }
 
 struct AdlerSums {
@@ -60,8 +52,8 @@ LAMINA_AVX2 std::uint64_t sum_of(__m256i of) {
 }
 LAMINA_AVX2 AdlerSums lanes_avx2(const std::uint8_t* at, std::size_t lanes) {
   const __m256i zero = _mm256_setzero_si256(), ones = _mm256_set1_epi16(1);
-  const __m256i weights = _mm256_setr_epi8(32, 31, 30, 29, 28, 27, 26, 25, 24, 23, 22, 21, 20, 19, 18, 17, 16, 15, 14, 13, 12, 11,
-                                           10, 9, 8, 7, 6, 5, 4, 3, 2, 1);
+  const __m256i weights = _mm256_setr_epi8(32, 31, 30, 29, 28, 27, 26, 25, 24, 23, 22, 21, 20, 19, 18, 17, 16, 15, 14, 13, 12,
+                                           11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1);
   __m256i bytes = zero, rows = zero, weighted = zero;
   for (; lanes > 0; --lanes, at += kLane) {
     const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(at));
@@ -104,6 +96,75 @@ std::uint32_t adler_of(std::span<const std::byte> bytes, std::span<const RowSpan
   return static_cast<std::uint32_t>(sums % kModulus << 16 | sum % kModulus);
 }
 
+/// Literals that are few are counted and put without a branch: their numbers vary.
+bool is_short(const StripPiece& piece) {
+  return piece.literals <= StripCode::kFew && piece.match >= png::kShortestMatch && piece.match <= png::kLongestMatch;
+}
+
+LAMINA_BODY void count_body(std::span<const StripPiece> pieces, const std::byte* at, StripWeights& weights) {
+  std::array<std::array<std::array<std::uint32_t, 512>, 2>, 2> counts{};  // increments of one number do not follow each other
+  std::size_t odd = 0;
+  for (const StripPiece& piece : pieces) {
+    auto& of = counts[odd ^= 1];
+    if (is_short(piece)) {
+      ++of[0][StripCode::index_of(at, 0, piece.literals)], ++of[1][StripCode::index_of(at, 1, piece.literals)];
+    } else {
+      for (std::size_t i = 0; i < piece.literals; ++i) ++of[i % 2][static_cast<std::size_t>(at[i])];
+    }
+    count_match(piece.match, weights);
+    at += piece.literals + piece.match;
+  }
+  for (const auto& half : counts) {
+    for (const auto& of : half)
+      std::transform(weights.begin(), weights.begin() + 256, of.begin(), weights.begin(), std::plus());
+  }
+}
+
+LAMINA_BODY void put_body(std::span<const StripPiece> pieces, const std::byte* at, const StripCode& code,
+                          png::BitWriter& writer) {
+  png::BitWriter fast = writer;  // its address is unknown elsewhere
+  for (const StripPiece& piece : pieces) {
+    if (is_short(piece)) {
+      code.put_few(at, piece.literals, piece.match, piece.distance, fast);
+      at += piece.literals + piece.match;
+      continue;
+    }
+    writer = fast;
+    code.put(at, piece.literals, writer);
+    at += piece.literals + piece.match;
+    const std::uint32_t rest = code.put_match(piece.match, piece.distance, writer);
+    code.put(at - rest, rest, writer);
+    fast = writer;
+  }
+  writer = fast;
+}
+
+struct PieceKernels {
+  void (*count)(std::span<const StripPiece>, const std::byte*, StripWeights&);
+  void (*put)(std::span<const StripPiece>, const std::byte*, const StripCode&, png::BitWriter&);
+};
+void count_plain(std::span<const StripPiece> pieces, const std::byte* at, StripWeights& weights) {
+  count_body(pieces, at, weights);
+}
+void put_plain(std::span<const StripPiece> pieces, const std::byte* at, const StripCode& code, png::BitWriter& writer) {
+  put_body(pieces, at, code, writer);
+}
+#if defined(LAMINA_WIDE_KERNELS)
+LAMINA_AVX2 void count_avx2(std::span<const StripPiece> pieces, const std::byte* at, StripWeights& weights) {
+  count_body(pieces, at, weights);
+}
+LAMINA_AVX2 void put_avx2(std::span<const StripPiece> pieces, const std::byte* at, const StripCode& code,
+                          png::BitWriter& writer) {
+  put_body(pieces, at, code, writer);
+}
+#endif
+PieceKernels piece_kernels() {
+#if defined(LAMINA_WIDE_KERNELS)
+  if (widest_isa() >= Isa::kAvx2) return {count_avx2, put_avx2};
+#endif
+  return {count_plain, put_plain};
+}
+
 }  // namespace
 
 std::size_t DitherDeflate::compress_rows(RowBits& image, std::uint32_t begin, std::uint32_t end, std::size_t stride,
@@ -122,13 +183,14 @@ std::size_t DitherDeflate::compress_rows(RowBits& image, std::uint32_t begin, st
   return length;
 }
 
-/// Parts of the bytes outside of which all are 0 and repeat; whole lanes where they do not end with the bytes.
+/// Parts of the bytes outside of which all are 0, as are some before and after each; whole lanes where they do not end with the
+/// bytes.
 void DitherDeflate::find_parts(std::size_t size, std::span<const RowSpan> set) {
   parts_.clear();
   for (const RowSpan& of : set) {
     if (of.begin >= of.end) continue;
-    std::size_t begin = of.begin;
-    if (!parts_.empty() && parts_.back().end >= begin) {
+    std::size_t begin = of.begin > 2 * kLane ? of.begin - kLane : 0;
+    if (!parts_.empty() && parts_.back().end + kNear >= begin) {
       if (parts_.back().end >= of.end + kCore) continue;
       begin = parts_.back().begin;
       parts_.pop_back();
@@ -142,19 +204,19 @@ void DitherDeflate::find_parts(std::size_t size, std::span<const RowSpan> set) {
 /// golden ratio is almost whole (dose/dither.h). With some rows its multiples come nearer. Words of some places vote
 /// whether it is a core.
 void DitherDeflate::choose_distances(std::span<const std::byte> bytes, std::size_t stride) {
-  constexpr std::size_t kStep = 40;
+  constexpr std::size_t kStep = 40, kVotes = 256;
   std::size_t tile = 0, core = 0, at = kStep;
   for (const RowSpan& part : parts_) {
     at = std::max(at, (part.begin + kStep - 8) / kStep * kStep);  // words outside of the parts have no vote
-    for (; at < part.end && at + 8 <= bytes.size(); at += kStep) {
+    for (; at < part.end && at + 8 <= bytes.size() && tile + core < kVotes; at += kStep) {
       const std::uint64_t word = word_at(bytes.data() + at);
       const bool as_tile = word == word_at(bytes.data() + at - kTile), as_core = word == word_at(bytes.data() + at - kCore);
       tile += as_tile && !as_core, core += as_core && !as_tile;
     }
   }
   code_.clear_distances();
+  code_.add_distance(1);
   if (core <= 2 * tile) return code_.add_distance(kTile);
-  code_.add_distance(kCore);
   for (const auto& choices : kBack) {
     for (const RowsBack& of : choices) {
       const std::size_t distance = of.rows * stride + static_cast<std::size_t>(of.bytes);  // of small rows: very large
@@ -163,79 +225,20 @@ void DitherDeflate::choose_distances(std::span<const std::byte> bytes, std::size
       break;
     }
   }
-}
-
-/// The longest of the matches that begin at `at`; of one that is long enough no other distance is compared.
-/// part  the first that ends after `at`, as far as the caller knows; moves on
-DitherDeflate::DitherMatch DitherDeflate::longest_match(std::span<const std::byte> bytes, const std::byte* at,
-                                                  std::size_t& part) const {
-  constexpr std::ptrdiff_t kLongEnough = 64;
-  const std::byte *const data = bytes.data(), *const end = data + bytes.size();
-  const auto distances = code_.distances();
-  DitherMatch longest{at, 0};
-  for (const std::byte* stop = at;;) {
-    while (part < parts_.size() && data + parts_[part].end <= stop) ++part;
-    if (part == parts_.size()) return {end, 0};
-    const std::byte* const part_end = data + parts_[part].end;
-    longest.end = stop = repeats_end(std::max(stop, data + parts_[part].begin), part_end, end, distances[0].bytes);
-    if (stop < part_end) break;
-  }
-  for (std::uint32_t d = 1; d < distances.size() && longest.end - at < kLongEnough; ++d) {
-    if (at - data < static_cast<std::ptrdiff_t>(distances[d].bytes)) continue;
-    const std::byte* const stop = repeats_end(at, end, end, distances[d].bytes);
-    if (stop > longest.end) longest = {stop, d};
-  }
-  return longest;
-}
-
-/// Whether no distance repeats the 8 bytes at `at`.
-bool DitherDeflate::is_new(std::span<const std::byte> bytes, const std::byte* at) const {
-  for (const StripDistance& distance : code_.distances()) {
-    if (at - bytes.data() >= static_cast<std::ptrdiff_t>(distance.bytes) && word_at(at) == word_at(at - distance.bytes))
-      return false;
-  }
-  return true;
+  code_.add_distance(kCore);
 }
 
 void DitherDeflate::find_pieces(std::span<const std::byte> bytes) {
   pieces_.clear();
-  const auto distances = code_.distances();
-  std::array<std::array<std::uint32_t, 256>, 4> counts{};
-  const std::byte* const end = bytes.data() + bytes.size();
-  const std::byte *literals = bytes.data(), *at = literals + std::min(distances[0].bytes, bytes.size());
-  std::size_t part = 0;
-  weights_.fill(1);
-  while (true) {
-    while (end - at >= 8 && is_new(bytes, at)) at += 8;
-    if (end - at < 8) at = end;
-    const DitherMatch match = longest_match(bytes, at, part);
-    const auto distance = static_cast<std::ptrdiff_t>(distances[match.distance].bytes);
-    const std::byte* begin = at;
-    if (match.end > at) {
-      while (begin > literals && begin - bytes.data() > distance && *(begin - 1) == *(begin - 1 - distance)) --begin;
-    }
-    const auto length = static_cast<std::uint32_t>(match.end - begin);
-    pieces_.push_back({static_cast<std::uint32_t>(begin - literals), length, match.distance});
-    const std::byte* literal = literals;
-    for (; begin - literal >= 4; literal += 4) {
-      for (std::size_t i = 0; i < 4; ++i) ++counts[i][static_cast<std::uint8_t>(literal[i])];
-    }
-    for (; literal < begin; ++literal) ++counts[0][static_cast<std::uint8_t>(*literal)];
-    count_match(length, weights_);
-    literals = at = match.end;
-    if (at == end) break;
+  std::size_t literals = 0;
+  const std::size_t first = parts_.empty() ? bytes.size() : parts_.front().begin;
+  if (first > 1) pieces_.push_back({1, static_cast<std::uint32_t>(first - 1), 0}), literals = first;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    literals = matches_.add({bytes, code_.distances(), parts_[p].begin, parts_[p].end}, literals, pieces_);
+    const std::size_t next = p + 1 < parts_.size() ? parts_[p + 1].begin : bytes.size();
+    if (next > parts_[p].end) pieces_.back().match += static_cast<std::uint32_t>(next - parts_[p].end), literals = next;
   }
-  for (std::size_t b = 0; b < 256; ++b) weights_[b] += counts[0][b] + counts[1][b] + counts[2][b] + counts[3][b];
-}
-
-void DitherDeflate::put_pieces(std::span<const std::byte> bytes, png::BitWriter& writer) const {
-  const std::byte* at = bytes.data();
-  for (const Piece& piece : pieces_) {
-    code_.put(at, piece.literals, writer);
-    at += piece.literals + piece.match;
-    const std::uint32_t rest = code_.put_match(piece.match, piece.distance, writer);
-    code_.put(at - rest, rest, writer);
-  }
+  pieces_.push_back({static_cast<std::uint32_t>(bytes.size() - literals), 0, 0});
 }
 
 std::size_t DitherDeflate::compress(std::span<const std::byte> bytes, std::size_t stride, std::span<const RowSpan> set,
@@ -243,9 +246,13 @@ std::size_t DitherDeflate::compress(std::span<const std::byte> bytes, std::size_
   find_parts(bytes.size(), set);
   choose_distances(bytes, stride);
   find_pieces(bytes);
-  code_.make(weights_);
+  const PieceKernels kernels = piece_kernels();
+  StripWeights weights;
+  weights.fill(1);
+  kernels.count(pieces_, bytes.data(), weights);
+  code_.make(weights);
   png::BitWriter writer = code_.start(out);
-  put_pieces(bytes, writer);
+  kernels.put(pieces_, bytes.data(), code_, writer);
   return static_cast<std::size_t>(code_.finish(adler_of(bytes, parts_), writer) - out);
 }
 

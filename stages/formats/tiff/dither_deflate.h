@@ -1,17 +1,18 @@
 // stages/formats/tiff/dither_deflate.h: deflate of dithered 1-bit images, whose rows repeat at known distances.
 //
 // The blue-noise tile is 128 pixels wide (stages/dose/blue_noise.h), and its rows repeat after 128 rows, out of reach of
-// deflate's window: the only distance is 16, at which empty areas repeat too. A core (stages/dose/dither.h) nearly repeats after
-// some rows and columns. Bytes that repeat at no distance are literals in a code of each strip. Sources: RFC 1951 (deflate), RFC 1950 (zlib), TIFF 6.0 and its Technical Note 2 (compression 8).
+// deflate's window: the only distances are 16, and 1 for what is empty or full. A core (stages/dose/dither.h) nearly repeats
+// after some rows and columns. Bytes that repeat at no distance are literals in a code of each strip. Sources: RFC 1951
+// (deflate), RFC 1950 (zlib), TIFF 6.0 and its Technical Note 2 (compression 8).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "stages/data/bit_rows.h"
 #include "stages/formats/tiff/strip_code.h"
+#include "stages/formats/tiff/strip_matches.h"
 #include "stages/geometry/bits.h"
 
 namespace lamina::formats::tiff {
@@ -31,26 +32,15 @@ class DitherDeflate {
   std::size_t compress(std::span<const std::byte> bytes, std::size_t stride, std::span<const RowSpan> set, std::byte* out);
 
  private:
-  struct Piece {
-    std::uint32_t literals, match;  // so many bytes, and then a match of so many
-    std::uint32_t distance;         // number of its distance
-  };
-  struct DitherMatch {
-    const std::byte* end;
-    std::uint32_t distance;
-  };
   void find_parts(std::size_t size, std::span<const RowSpan> set);
   void choose_distances(std::span<const std::byte> bytes, std::size_t stride);
-  DitherMatch longest_match(std::span<const std::byte> bytes, const std::byte* at, std::size_t& part) const;
-  bool is_new(std::span<const std::byte> bytes, const std::byte* at) const;
   void find_pieces(std::span<const std::byte> bytes);
-  void put_pieces(std::span<const std::byte> bytes, png::BitWriter& writer) const;
 
   Buffer<std::byte> strip_;
   Buffer<RowSpan> set_;  // of the strip, where it is not 0
   Buffer<RowSpan> parts_;
-  std::vector<Piece> pieces_;
-  StripWeights weights_{};
+  Buffer<StripPiece> pieces_;
+  StripMatches matches_;
   StripCode code_;  // its first distance repeats what is empty
 };
 

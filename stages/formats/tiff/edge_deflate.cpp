@@ -86,7 +86,8 @@ void EdgeDeflate::add_repeated(std::uint64_t word, std::size_t bytes) {
   } else if (bytes < kMinMatch) {
     return put_literals(word, bytes);
   } else {
-    pieces_.push_back({static_cast<std::uint32_t>(used_ - std::exchange(taken_, used_)), static_cast<std::uint32_t>(bytes), true});
+    pieces_.push_back(
+        {static_cast<std::uint32_t>(used_ - std::exchange(taken_, used_)), static_cast<std::uint32_t>(bytes), true});
   }
   const std::uint64_t turned = turn_bytes(word);
   sum(reinterpret_cast<const std::byte*>(&turned), bytes);
@@ -97,7 +98,8 @@ void EdgeDeflate::end_equal() {
   const std::uint64_t value = full_ ? 255 : 0, word = full_ ? ~std::uint64_t{0} : 0, match = std::exchange(equal_, 0) - 1;
   if (match < kMinMatch) return put_literals(word, match + 1);
   put_literals(word, 1);
-  pieces_.push_back({static_cast<std::uint32_t>(used_ - std::exchange(taken_, used_)), static_cast<std::uint32_t>(match), false});
+  pieces_.push_back(
+      {static_cast<std::uint32_t>(used_ - std::exchange(taken_, used_)), static_cast<std::uint32_t>(match), false});
   sums_ += match * sum_ + value * (match * (match + 1) / 2);
   sum_ += value * match;
   if (sum_ >= kLarge || sums_ >= kLarge) sum_ %= kModulus, sums_ %= kModulus;
@@ -127,7 +129,7 @@ std::size_t EdgeDeflate::finish(std::byte* out) {
   weights.fill(1);
   for (const EdgePiece& piece : pieces_) count_whole_match(piece.match, weights);
   for (std::size_t b = 0; b < 256; ++b) weights[b] += counts_[0][b] + counts_[1][b];
-  if (weights != weights_) code_.make(weights_ = weights);  // empty strips are alike
+  code_.make(weights);
   png::BitWriter writer = code_.start(out);
   const std::byte* at = literals_.data();
   for (const EdgePiece& piece : pieces_) {

@@ -46,7 +46,6 @@ class EdgeDeflate {
   std::size_t equal_ = 0;             // their number
   std::uint64_t sum_ = 1, sums_ = 0;  // Adler's (RFC 1950)
   std::array<std::array<std::uint32_t, 256>, 2> counts_;
-  StripWeights weights_{};
   StripCode code_;
 };
 

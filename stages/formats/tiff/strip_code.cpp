@@ -11,6 +11,12 @@ using png::BitWriter;
 
 constexpr std::size_t kMaxCode = 15;
 
+constexpr auto kLengthClass = [] {
+  std::array<png::LengthClass, png::kLongestMatch + 1> of{};
+  for (std::uint32_t length = png::kShortestMatch; length < of.size(); ++length) of[length] = png::length_class(length);
+  return of;
+}();
+
 /// As png::word_lengths() of at most 15 bits: weights are flattened until that is so.
 std::array<std::uint8_t, png::kSymbols> code_lengths(std::array<std::uint32_t, png::kSymbols> weights) {
   while (true) {
@@ -23,7 +29,8 @@ std::array<std::uint8_t, png::kSymbols> code_lengths(std::array<std::uint32_t, p
 /// Takes a match of 3 bytes or more apart into some of 3 to 258.
 template <class Take>
 void for_matches(std::size_t length, Take take) {
-  for (; length >= png::kLongestMatch + png::kShortestMatch; length -= png::kLongestMatch) take(std::size_t{png::kLongestMatch});
+  for (; length >= png::kLongestMatch + png::kShortestMatch; length -= png::kLongestMatch)
+    take(std::size_t{png::kLongestMatch});
   if (length > png::kLongestMatch) take(length - png::kShortestMatch);
   take(length > png::kLongestMatch ? std::size_t{png::kShortestMatch} : length);
 }
@@ -31,13 +38,12 @@ void for_matches(std::size_t length, Take take) {
 }  // namespace
 
 void count_whole_match(std::size_t length, StripWeights& weights) {
-  for_matches(length, [&](std::size_t match) { ++weights[png::length_class(static_cast<std::uint32_t>(match)).symbol]; });
+  for_matches(length, [&](std::size_t match) { ++weights[kLengthClass[match].symbol]; });
 }
 
 void count_match(std::size_t length, StripWeights& weights) {
-  weights[285] += static_cast<std::uint32_t>(length / png::kLongestMatch);
-  const auto rest = static_cast<std::uint32_t>(length % png::kLongestMatch);
-  if (rest >= png::kShortestMatch) ++weights[png::length_class(rest).symbol];
+  for (; length > png::kLongestMatch; length -= png::kLongestMatch) ++weights[285];
+  if (length >= png::kShortestMatch) ++weights[kLengthClass[length].symbol];
 }
 
 void StripCode::add_distance(std::size_t bytes) {
@@ -49,18 +55,25 @@ void StripCode::add_distance(std::size_t bytes) {
 }
 
 void StripCode::make(const StripWeights& weights) {
+  if (weights != weights_) make_symbols(weights);  // empty strips are alike
+  // Distances have words of one bit; 1 and 1; 1, 2 and 2; or 1, 2, 3 and 3.
+  distance_lengths_ = {};
+  for (std::size_t d = 0; d < distances_; ++d)
+    distance_lengths_[distance_[d].symbol] =
+        static_cast<std::uint8_t>(std::max<std::size_t>(1, std::min(d + 1, distances_ - 1)));
+  const auto backs = png::words_of(distance_lengths_);
+  for (StripDistance& of : std::span(distance_).first(distances_))
+    of.word = join(backs[of.symbol], BitString(of.extra, of.extra_bits));
+}
+
+void StripCode::make_symbols(const StripWeights& weights) {
+  weights_ = weights;
   lengths_ = code_lengths(weights);
   const auto words = png::words_of(lengths_);
   for (std::size_t b = 0; b < 256; ++b) byte_[b] = words[b];
   end_ = words[png::kEndOfBlock];
-  // Distances have the words 0; 0 and 1; or 0, 10 and 11: those of lower symbols come first.
-  distance_lengths_ = {};
-  for (std::size_t d = 0; d < distances_; ++d) distance_lengths_[distance_[d].symbol] = d == 0 || distances_ == 2 ? 1 : 2;
-  const auto backs = png::words_of(distance_lengths_);
-  for (StripDistance& of : std::span(distance_).first(distances_))
-    of.word = join(backs[of.symbol], BitString(of.extra, of.extra_bits));
   for (std::uint32_t length = png::kShortestMatch; length <= png::kLongestMatch; ++length) {
-    const png::LengthClass found = png::length_class(length);
+    const png::LengthClass& found = kLengthClass[length];
     match_[length] = join(words[found.symbol], BitString(found.extra, found.extra_bits));
   }
 }
@@ -104,14 +117,6 @@ void StripCode::put(const std::byte* at, std::size_t count, BitWriter& writer) c
   const std::byte* const end = at + count;
   for (; end - at >= 3; at += 3) writer.put(join(join(of_byte(at[0]), of_byte(at[1])), of_byte(at[2])));
   for (; at < end; ++at) writer.put(of_byte(*at));
-}
-
-std::uint32_t StripCode::put_match(std::size_t length, std::size_t distance, BitWriter& writer) const {
-  const BitString back = distance_[distance].word, longest = join(match_[png::kLongestMatch], back);
-  for (; length >= png::kLongestMatch; length -= png::kLongestMatch) writer.put(longest);
-  if (length < png::kShortestMatch) return static_cast<std::uint32_t>(length);
-  writer.put(join(match_[length], back));
-  return 0;
 }
 
 void StripCode::put_whole_match(std::size_t length, std::size_t distance, BitWriter& writer) const {
