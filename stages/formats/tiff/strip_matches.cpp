@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
 #include "stages/geometry/isa.h"
 #include "stages/geometry/targets.h"
@@ -15,7 +14,6 @@ namespace lamina::formats::tiff {
 namespace {
 
 constexpr std::size_t kBlock = 64;  // bytes of a word of a mask
-static_assert(std::endian::native == std::endian::little);
 
 /// Bit i: whether byte i of a block is that of the other one.
 struct EqualPlain {
@@ -28,14 +26,7 @@ struct EqualPlain {
       equal |= std::uint64_t{static_cast<std::uint32_t>(_mm_movemask_epi8(same))} << i;
     }
 #else
-    constexpr std::uint64_t kLow = 0x7F7F'7F7F'7F7F'7F7F;
-    for (std::size_t i = 0; i < kBlock; i += 8) {
-      std::uint64_t one, other;
-      std::memcpy(&one, a + i, sizeof one);
-      std::memcpy(&other, b + i, sizeof other);
-      const std::uint64_t differs = one ^ other, zeros = ~(((differs & kLow) + kLow) | differs | kLow) >> 7;
-      equal |= zeros * 0x0102'0408'1020'4080u >> 56 << i;
-    }
+    for (std::size_t i = 0; i < kBlock; ++i) equal |= std::uint64_t{a[i] == b[i]} << i;
 #endif
     return equal;
   }
