@@ -34,7 +34,12 @@ double projected_area(const Triangle& t) {
          2;
 }
 
-std::int64_t units(double amount) { return static_cast<std::int64_t>(std::ceil(amount * kUnit * (1 + 1e-9))); }
+/// Rounded up.
+std::int64_t units(double amount) {
+  const double scaled = amount * kUnit * (1 + 1e-9);
+  const auto whole = static_cast<std::int64_t>(scaled);
+  return whole + (static_cast<double>(whole) < scaled ? 1 : 0);
+}
 
 /// Sums over the facets of a mesh by slabs of height, 2^k nm high and no more than kMaxSlabs; 112 bytes a slab.
 ///
@@ -84,7 +89,7 @@ class HeldBound {
   void add(const Triangle& facet, bool suspect);
   void add_edge(const Facet& facet, const Point3& a, const Point3& b);
   void add_parts(const Facet& facet);
-  void spread(std::int64_t first, std::int64_t end, const Sums& within, const Sums& cut);
+  void spread(std::int64_t first, std::int64_t end, const Sums& within);
   Slab& slab(std::int64_t number) { return slab_[static_cast<std::size_t>(number + 1)]; }
   std::int64_t slab_of(std::int64_t z) const { return (z >> shift_) - first_; }
 
@@ -173,9 +178,8 @@ void HeldBound::add(const Triangle& facet, bool suspect) {
 }
 
 /// Adds to each of the slabs [first, end).
-void HeldBound::spread(std::int64_t first, std::int64_t end, const Sums& within, const Sums& cut) {
-  slab(first).below.add(within, 1), slab(first).cut.add(cut, 1);
-  slab(end).below.add(within, -1), slab(end).cut.add(cut, -1);
+void HeldBound::spread(std::int64_t first, std::int64_t end, const Sums& within) {
+  slab(first).below.add(within, 1), slab(end).below.add(within, -1);
 }
 
 void HeldBound::add_edge(const Facet& facet, const Point3& a, const Point3& b) {
@@ -185,7 +189,7 @@ void HeldBound::add_edge(const Facet& facet, const Point3& a, const Point3& b) {
   const Sums way = facet.way(x, y, rise > height ? height / rise : 1);
   const std::int64_t first = slab_of(a.z);
   if (rise == 0 && (first + first_) << shift_ == a.z) return slab(first).floor.add(way, 1);
-  spread(first, slab_of(std::max<std::int64_t>(a.z, std::int64_t{b.z} - 1)) + 1, way, {});
+  spread(first, slab_of(std::max<std::int64_t>(a.z, std::int64_t{b.z} - 1)) + 1, way);
 }
 
 void HeldBound::add_parts(const Facet& f) {
@@ -197,7 +201,7 @@ void HeldBound::add_parts(const Facet& f) {
   };
   if (rise == 0) {
     if ((first + first_) << shift_ == f.t.a.z) return slab(first).floor.add(within(1), 1);
-    return spread(first, first + 1, within(1), {});
+    return spread(first, first + 1, within(1));
   }
   // The cut through the middle corner ends on the edge between the other two.
   const double at = (middle - low) / rise;
@@ -213,14 +217,21 @@ void HeldBound::add_parts(const Facet& f) {
   };
   const double height = std::ldexp(1.0, static_cast<int>(shift_));
   const std::int64_t slabs = slab_of(std::int64_t{f.t.c.z} - 1) + 1 - first, parts = std::min(slabs, kMaxParts);
+  Sums of_part{}, of_cut{};  // of the part below
+  std::int64_t from = first;
+  double bottom = low, tent_at_bottom = tent(low);
   for (std::int64_t p = 0; p < parts; ++p) {
-    const std::int64_t from = first + slabs * p / parts, end = first + slabs * (p + 1) / parts;
-    const double bottom = std::max(low, static_cast<double>((from + first_) << shift_));
-    const double top = std::min(high, static_cast<double>((end + first_) << shift_));
-    const double maximum = bottom <= middle && middle <= top ? 1 : std::max(tent(bottom), tent(top));
+    const std::int64_t end = first + slabs * (p + 1) / parts;
+    const double top = std::min(high, static_cast<double>((end + first_) << shift_)), tent_at_top = tent(top);
+    const double maximum = bottom <= middle && middle <= top ? 1 : std::max(tent_at_bottom, tent_at_top);
     const double share = end - from == 1 ? below(top) - below(bottom) : 2 * maximum * height / rise;
-    spread(from, end, within(std::min(1.0, share)), f.way(x, y, maximum));
+    Slab& slab_from = slab(from);
+    slab_from.below.add(of_part, -1), slab_from.cut.add(of_cut, -1);
+    of_part = within(std::min(1.0, share)), of_cut = f.way(x, y, maximum);
+    slab_from.below.add(of_part, 1), slab_from.cut.add(of_cut, 1);
+    from = end, bottom = top, tent_at_bottom = tent_at_top;
   }
+  slab(from).below.add(of_part, -1), slab(from).cut.add(of_cut, -1);
 }
 
 LayerBound HeldBound::at(std::int64_t bottom, std::int64_t top) const {
