@@ -390,7 +390,7 @@ Status check_can_write(const std::string& path, bool makes_folders) {
   std::error_code error;
   fs::path folder = fs::absolute(path, error);
   if (fs::is_symlink(folder, error)) folder = fs::weakly_canonical(folder, error);
-  if (!makes_folders || !folder.has_filename()) folder = folder.parent_path();
+  if (!makes_folders || !folder.has_filename() || fs::is_regular_file(folder, error)) folder = folder.parent_path();
   while (makes_folders && !fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   const auto refused = [&](const std::string& why) { return Error{Fault::kOutput, fmt::format("{}: {}", path, why)}; };
   if (!fs::exists(folder, error))
