@@ -37,7 +37,7 @@ std::uint8_t rank_of(std::uint32_t first, std::uint32_t last, std::uint32_t plan
 constexpr std::size_t kRanks = 66;
 
 constexpr std::size_t kCacheLine = 64;
-constexpr std::size_t kAhead = 8;  // groups
+constexpr std::size_t kGroupsAhead = 8;
 
 std::uint32_t groups_of(const MeshBlocks& blocks) { return (blocks.cluster_count() + kIndexedTogether - 1) / kIndexedTogether; }
 
@@ -163,7 +163,7 @@ void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::u
     const std::uint32_t block = groups[g] / kInBlock, first_cluster = block * MeshBlocks::kClusters;
     scratch.near.clear();
     for (; g < groups.size() && groups[g] / kInBlock == block; ++g) {
-      if (g + 2 * kAhead < groups.size()) fetch(std::span(groups).subspan(g + kAhead, kAhead + 1), z);
+      if (g + 2 * kGroupsAhead < groups.size()) fetch(std::span(groups).subspan(g + kGroupsAhead, kGroupsAhead + 1), z);
       find_near(groups[g], z, scratch.near);
     }
     if (blocks_.indexed(first_cluster).cluster == nullptr) sort_listed(first_cluster, scratch);
