@@ -167,7 +167,9 @@ Status check_outputs(std::span<const InputFile> inputs, std::span<const std::str
 }
 
 Status check_folder(std::string_view flag, const std::string& file) {
-  const Status status = file.empty() || is_stream(file) ? Status() : check_can_write(file, false);
+  const std::string name = fs::path(file).filename().string();  // commands refuse those of directories
+  const bool is_named = !name.empty() && name != "." && name != "..";
+  const Status status = is_named && !is_stream(file) ? check_can_write(file, false) : Status();
   if (status) return {};
   return failure(status.error().fault, "{} {}", flag, status.error().message);
 }
