@@ -206,8 +206,12 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
   if (Status status = check_outputs(inputs_of(arguments, operands), outputs); !status) return status;
   for (const std::string_view flag : kOutputs) {
     const std::string path = arguments.text(flag);
-    if (path.empty() || is_stream(path)) continue;
-    const bool is_folder = flag == "-o,--output" && std::ranges::find(kMakesFolders, command) != std::end(kMakesFolders);
+    std::error_code ignored;
+    const bool is_main = flag == kOutputs[0];
+    if (path.empty() || is_stream(path) || (is_main && arguments.has("--dry-run"))) continue;
+    // A merge into a whole job writes nothing.
+    if (is_main && command == "merge" && fs::is_directory(path, ignored)) continue;
+    const bool is_folder = is_main && std::ranges::find(kMakesFolders, command) != std::end(kMakesFolders);
     if (const Status status = is_folder ? check_can_write(path, true) : check_folder(flag.substr(0, flag.find(',')), path);
         !status)
       return status;

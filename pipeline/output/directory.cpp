@@ -84,20 +84,20 @@ Result<OtherRuns> check_manifests(const Job& job, const Claim* claim) {
 
 }  // namespace
 
-Result<bool> is_directory(const std::string& output) {
+Result<bool> is_directory(const Job& job) {
   count(Decision::kOutput);
   std::error_code error;
-  const fs::file_status status = fs::status(output, error);
+  const fs::file_status status = fs::status(job.output, error);
   if (fs::is_directory(status)) return true;
   if (!fs::exists(status)) {
-    if (const Status made = check_can_write(output, true); !made) return made.error();
+    if (const Status made = job.dry_run ? Status() : check_can_write(job.output, true); !made) return made.error();
     return false;
   }
-  return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", output)};
+  return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
 }
 
 Status check_output(const Job& job) {
-  if (const auto there = is_directory(job.output); !there || !*there) return there ? Status() : there.error();
+  if (const auto there = is_directory(job); !there || !*there) return there ? Status() : there.error();
   const auto found = check_manifests(job, nullptr);
   if (!found) return found.error();
   const bool known = job.resume && has_record(job.output + "/" + manifest_name(job));

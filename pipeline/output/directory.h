@@ -25,8 +25,8 @@ std::string manifest_name(const Job& job);
 ///         of the same split. kOutput if the directory's path is a file, or another run is writing into it
 Status check_output(const Job& job);
 
-/// Whether an output directory is there. errors  kOutput if its path is a file
-Result<bool> is_directory(const std::string& output);
+/// Whether an output directory is there. errors  kOutput if its path is a file, or it cannot be made
+Result<bool> is_directory(const Job& job);
 
 /// Creates the directory and claims it for the rest of the run, or for the job's shard of it. Fails if another run took it
 /// while this one loaded its parts. errors  kUsage, kOutput

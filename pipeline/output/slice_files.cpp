@@ -238,7 +238,7 @@ std::string slice_file_name(const Job& job) {
 }
 
 Status check_slice_output(const Job& job) {
-  if (const auto there = is_directory(job.output); !there || !*there) return there ? Status() : there.error();
+  if (const auto there = is_directory(job); !there || !*there) return there ? Status() : there.error();
   std::error_code error;
   if (Status busy = check_not_being_written(job.output + "/manifest.json"); !busy) return busy;
   const std::vector<ManifestFile> manifests = find_manifests(job.output);

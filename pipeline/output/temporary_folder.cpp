@@ -3,9 +3,12 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
+#include <string_view>
 #include <utility>
 
 namespace lamina::pipeline {
@@ -14,7 +17,16 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string lock_of(const std::string& folder) { return folder + "/lock"; }
+constexpr std::string_view kDigits = "XXXXXX";
+
+std::string lock_of(const std::string& folder) { return folder + "/.lamina-lock"; }
+
+bool is_own(const fs::path& path, const std::string& stem) {
+  const std::string name = path.filename().string();
+  struct stat status {};
+  return name.size() == stem.size() + kDigits.size() && name.starts_with(stem) && ::lstat(path.c_str(), &status) == 0 &&
+         S_ISDIR(status.st_mode) && status.st_uid == ::geteuid();
+}
 
 /// Removes folders of killed runs: those without a locked file.
 void remove_abandoned(const fs::path& position, const std::string& stem) {
@@ -22,7 +34,7 @@ void remove_abandoned(const fs::path& position, const std::string& stem) {
   for (fs::directory_iterator entry(position, error), end; !error && entry != end; entry.increment(error)) {
     const fs::path path = entry->path();
     std::error_code ignored;
-    if (!path.filename().string().starts_with(stem) || !fs::is_directory(entry->symlink_status(ignored))) continue;
+    if (!is_own(path, stem)) continue;
     const int lock = ::open(lock_of(path.string()).c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
     if (lock < 0) {
       fs::remove(path, ignored);  // fails if it has files
@@ -41,16 +53,19 @@ TemporaryFolder::TemporaryFolder(const std::string& purpose) {
   const fs::path position = fs::temp_directory_path(none);
   if (none) return;
   remove_abandoned(position, stem);
-  for (int tries = 0; tries < 16 && path_.empty(); ++tries) {
-    std::string name = (position / (stem + "XXXXXX")).string();
+  for (int tries = 0; tries < 16; ++tries) {
+    std::string name = (position / (stem + std::string(kDigits))).string();
     if (mkdtemp(name.data()) == nullptr) return;
     lock_ = ::open(lock_of(name).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    // Another run may have removed it before it had its lock.
-    if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) == 0 && ::access(lock_of(name).c_str(), F_OK) == 0) {
+    // Another run may lock and remove it first. A file system without locks has nobody who removes it.
+    const bool taken = lock_ < 0 || (::flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK);
+    if (!taken && ::access(lock_of(name).c_str(), F_OK) == 0) {
       path_ = name;
-    } else if (lock_ >= 0) {
-      ::close(std::exchange(lock_, -1));
+      return;
     }
+    if (lock_ >= 0) ::close(std::exchange(lock_, -1));
+    ::unlink(lock_of(name).c_str());
+    ::rmdir(name.c_str());
   }
 }
 

@@ -118,7 +118,7 @@ Beads::Expected Beads::expected(std::uint32_t index) const {
 std::uint64_t Beads::bytes_expected(std::uint32_t layer) const {
   const std::uint64_t rows = grid_.rows();
   const auto [beads, spans] = expected(layer);
-  const std::uint64_t of_beads = 64 * beads + 4 * rows;  // a bead and its place take 44 bytes
+  const std::uint64_t of_beads = 64 * beads + 4 * rows;  // a bead and its index take 44 bytes
   const std::uint64_t at_once = 2 * (spans + raster::kBeadBandRows * beads) / std::max<std::uint64_t>(rows, 1);  // in a band
   const std::uint64_t of_band = raster::BeadRaster::band_bytes(grid_, at_once);
   const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);  // second, inner

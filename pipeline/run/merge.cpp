@@ -172,8 +172,10 @@ Status remove_shard_manifests(const std::string& output) {
 
 /// Of a whole job, whose directory may be one to read only.
 Status end_earlier_merge(const std::string& output) {
-  if (std::ranges::none_of(find_manifests(output), [](const ManifestFile& file) { return file.shard.has_value(); })) return {};
-  auto claim = Claim::take((fs::path(output) / "manifest.json").string(), output);
+  const std::string manifest = (fs::path(output) / "manifest.json").string();
+  const auto is_of_shard = [](const ManifestFile& file) { return file.shard.has_value(); };
+  if (std::ranges::none_of(find_manifests(output), is_of_shard) && !is_file(sections_path(manifest))) return {};
+  auto claim = Claim::take(manifest, output);
   return claim ? remove_shard_manifests(output) : Status(claim.error());
 }
 
@@ -238,7 +240,11 @@ Result<MergeReport> merge(const MergeRequest& request) {
   if (shards->empty()) return unmatched(fmt::format("{}: contains no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
   if (Status status = check(*shards, request.allow_empty, report); !status) return status.error();
+  const std::size_t before = report.warnings.size();
   const std::optional<Json> inspection = inspect(*shards, report.warnings);
+  const auto is_output = [&](const Shard& shard) { return same_file(shard.directory, output); };
+  if (!inspection && report.warnings.size() > before && std::ranges::any_of(*shards, is_output))
+    return unmatched(report.warnings.back().text + "; without inspection, merge into another directory");
   if (Status status = checks::refuse_warnings(report.warnings); request.strict && !status) return status.error();
   if (Status status = inspection ? check_inspection_file(output) : Status(); !status) return status.error();
 

@@ -55,9 +55,9 @@ inline constexpr std::size_t kTriangleSlack = 32;
 
 // --- a vertex and a sampling plane: the one rule of every section (bitmaps, contours, the areas of sections).
 //
-// File formats hold 24 bits of a coordinate, and rotations round: vertices of one horizontal face differ by some nanometres, so a
-// plane through them would meet half of its triangles. A vertex up to kPlaneReach above a plane therefore counts as in the plane,
-// for this plane alone and in all triangles at once: the mesh stays closed, and no surface moves by more than that.
+// File formats hold 24 bits of a coordinate, and rotations round: vertices of one horizontal face differ by some nanometres, so
+// a plane through them would meet half of its triangles. A vertex up to kPlaneReach above a plane therefore counts as in the
+// plane, for this plane alone and in all triangles at once: the mesh stays closed, and no surface moves by more than that.
 
 constexpr bool is_above_plane(std::int64_t z, std::int64_t plane) { return z > plane + kPlaneReach; }
 
@@ -73,7 +73,8 @@ struct Mesh {
   std::string name;  // file, and the object in it where a file holds several
   Buffer<Triangle> triangles;
   std::uint32_t repaired_from = UINT32_MAX;  // >= triangles.size() when nothing was added
-  bool closed = true;  // every edge is walked as often one way as the other; false only where repair was off
+  bool closed =
+      true;  // every edge is walked as often one way as the other, on which slicing relies; false where repair was off
   Box bounds;
   std::uint64_t fingerprint = 0;  // of the triangles in any order (load/diagnose.h)
   /// Volume of the triangles, caps included. Shells that overlap count as often as they overlap, hollows count

@@ -89,6 +89,7 @@ class Scan {
     above_.resize(point_.size());
     for (std::uint32_t c = 0; c < region.size(); ++c) {
       const std::uint32_t begin = region.offset[c], end = region.offset[c + 1];
+      if (begin == end) continue;
       auto line = static_cast<std::uint32_t>(std::ranges::lower_bound(at_, std::int64_t{point_[begin].y}) - at_.begin());
       for (std::uint32_t i = begin; i < end; ++i) {
         while (line < at_.size() && at_[line] < point_[i].y) ++line;

@@ -148,7 +148,7 @@ void BlockPlanes::sort_listed(std::uint32_t first, BlockScratch& scratch) const 
 }
 
 void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets, Buffer<std::uint32_t>& order,
-                       const std::function<void(std::span<const Triangle>)>& see) const {
+                       const std::function<void(std::span<const Triangle>)>& take) const {
   const std::int64_t z = planes_[plane];
   auto& groups = scratch.groups;
   groups.clear();
@@ -177,7 +177,7 @@ void BlockPlanes::find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::u
       facets.push_back(facet);
       scratch.crossed.push_back(t);
     }
-    see(scratch.crossed);
+    take(scratch.crossed);
   }
   std::array<std::uint32_t, kRanks> position{};
   for (const std::uint8_t rank : scratch.rank) ++position[rank];

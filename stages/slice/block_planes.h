@@ -70,14 +70,13 @@ class BlockPlanes {
   BlockPlanes(const BlockPlanes&) = delete;
   BlockPlanes& operator=(const BlockPlanes&) = delete;
 
-  /// Calls see(triangles) for the facets that the plane crosses in the order of the file, block by block.
+  /// Calls take(triangles) for the facets that the plane crosses in the order of the file, block by block.
   /// facets  become their numbers for facet_of(), in this order
-  /// order   becomes the order in which a PlaneIndex of the file's list finds them, on which all that is made of facets
-  /// depends:
-  ///         the n-th one is facets[order[n]]
+  /// order   becomes the order in which a PlaneIndex of the file's list finds them, on which all results depend: the n-th one
+  ///         is facets[order[n]]
   /// cost    O(F) where vertices are shared
   void find(std::uint32_t plane, BlockScratch& scratch, Buffer<std::uint32_t>& facets, Buffer<std::uint32_t>& order,
-            const std::function<void(std::span<const Triangle>)>& see) const;
+            const std::function<void(std::span<const Triangle>)>& take) const;
 
   std::uint64_t count(std::uint32_t plane) const { return counts_[plane]; }  // of facets that it crosses
   std::uint64_t bytes() const { return table_.bytes() + bytes_held(counts_) + planes_.size() * sizeof(std::int64_t); }

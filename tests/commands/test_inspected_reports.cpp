@@ -294,6 +294,16 @@ TEST_F(InspectedReports, ThatCannotBeMadeAreReportedByTheMerge) {
   write_text(directory_ / "s2/inspection-2-of-2.zst", sections);
   EXPECT_EQ(merged({}).code, 0);
   EXPECT_TRUE(tree_text(directory_ / "m") == whole);
+  // A merge into a shard's own directory would remove what the remedy needs.
+  fs::remove(directory_ / "s2/inspection-2-of-2.zst");
+  const std::string before = tree_text(directory_ / "s1") + tree_text(directory_ / "s2");
+  const Outcome refused = lamina({"merge", "s1", "s2", "-o", "s1"});
+  EXPECT_EQ(refused.code, 5);
+  EXPECT_NE(refused.err.find("; without inspection, merge into another directory"), std::string::npos) << refused.err;
+  EXPECT_EQ(tree_text(directory_ / "s1") + tree_text(directory_ / "s2"), before);
+  shard("2", {"--resume", "--inspect"});
+  EXPECT_EQ(lamina({"merge", "s1", "s2", "-o", "s1"}).code, 0);
+  EXPECT_TRUE(tree_text(directory_ / "s1") == whole);
 }
 
 }  // namespace

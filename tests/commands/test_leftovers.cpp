@@ -77,21 +77,24 @@ TEST(TemporaryFolder, OfAKilledRunIsRemovedAndThatOfALiveOneStays) {
   const char* before = std::getenv("TMPDIR");
   const std::string kept = before != nullptr ? before : "";
   ::setenv("TMPDIR", directory.path().c_str(), 1);
-  for (const char* name : {"lamina_test_killed", "lamina_test_empty", "lamina_test_live", "lamina_other_killed"})
+  for (const char* name : {"lamina_test_killed", "lamina_test_vacant", "lamina_test_living", "lamina_other_killed"})
     fs::create_directory(directory / name);
-  for (const char* name : {"lamina_test_killed", "lamina_test_live", "lamina_other_killed"})
-    write_text(directory / (std::string(name) + "/lock"), "");
+  fs::create_directory(directory / "lamina_test_notes");  // somebody's
+  for (const char* name : {"lamina_test_killed", "lamina_test_living", "lamina_test_notes", "lamina_other_killed"})
+    write_text(directory / (std::string(name) + "/.lamina-lock"), "");
   write_text(directory / "lamina_test_killed/block.gcode", "torn");
-  const int live = ::open((directory / "lamina_test_live/lock").c_str(), O_WRONLY);
+  const int live = ::open((directory / "lamina_test_living/.lamina-lock").c_str(), O_WRONLY);
   ASSERT_EQ(::flock(live, LOCK_EX), 0);
   {
     const pipeline::TemporaryFolder folder("test"), other("test");
     EXPECT_TRUE(folder.status().ok() && other.status().ok());
-    EXPECT_TRUE(fs::exists(folder.file("lock")) && fs::exists(other.file("lock"))) << "not those of each other";
+    EXPECT_TRUE(fs::exists(folder.file(".lamina-lock")) && fs::exists(other.file(".lamina-lock"))) << "not those of each other";
     EXPECT_FALSE(fs::exists(directory / "lamina_test_killed"));
-    EXPECT_FALSE(fs::exists(directory / "lamina_test_empty"));
+    EXPECT_FALSE(fs::exists(directory / "lamina_test_vacant"));
   }
-  EXPECT_EQ(files_below(directory.path()), (std::vector<std::string>{"lamina_other_killed/lock", "lamina_test_live/lock"}));
+  EXPECT_EQ(files_below(directory.path()),
+            (std::vector<std::string>{"lamina_other_killed/.lamina-lock", "lamina_test_living/.lamina-lock",
+                                      "lamina_test_notes/.lamina-lock"}));
   ::close(live);
   kept.empty() ? ::unsetenv("TMPDIR") : ::setenv("TMPDIR", kept.c_str(), 1);
 }

@@ -136,6 +136,13 @@ TEST_F(WrongUse, MissingThingsAreNamed) {
     refused(4, {command, "absent-input", "-o", "absent/x.stl"}, {"there is no folder absent"});
   for (const std::string command : {"jet", "slice", "convert", "merge", "batch"})
     refused(4, {command, "absent-input", "-o", "/dev/null/x"}, {"/dev/null is no folder"});
+  // A dry run writes nothing.
+  for (const Words& command : {Words{"extrude", "--machine", "anet-a8"}, Words{"jet", "--layer", "1"}, Words{"slice"}}) {
+    Words words{command.front(), "part.stl", "--dry-run", "-o",
+                command.front() == "extrude" ? "absent/x.gcode" : "/dev/null/x"};
+    words.insert(words.end(), command.begin() + 1, command.end());
+    EXPECT_EQ(run_lamina(words, directory_.path()).code, 0) << command.front();
+  }
 }
 
 TEST_F(WrongUse, JobFileWithNanIsRefusedByLine) {

@@ -394,11 +394,10 @@ Status check_can_write(const std::string& path, bool makes_folders) {
   while (makes_folders && !fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   const auto refused = [&](const std::string& why) { return Error{Fault::kOutput, fmt::format("{}: {}", path, why)}; };
   if (!fs::exists(folder, error))
-    return refused(
-        fmt::format("there is no folder {}; make it or choose another place", fs::path(path).parent_path().string()));
-  if (!fs::is_directory(folder, error)) return refused(folder.string() + " is no folder; choose another place");
+    return refused(fmt::format("there is no folder {}; make it or name another one", fs::path(path).parent_path().string()));
+  if (!fs::is_directory(folder, error)) return refused(folder.string() + " is no folder; name another one");
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    return refused(fmt::format("no file can be made in {}: {}; choose another place", folder.string(), std::strerror(errno)));
+    return refused(fmt::format("no file can be made in {}: {}; name another folder", folder.string(), std::strerror(errno)));
   return {};
 }
 

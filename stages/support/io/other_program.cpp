@@ -24,7 +24,9 @@ namespace {
 Error not_started(const std::string& program, int reason) {
   if (is_shortage(reason)) return shortage(reason, program);
   const bool absent = reason == ENOENT || reason == EACCES || reason == ELIBACC || reason == ENOTDIR || reason == ENOEXEC;
-  return {absent ? Fault::kUsage : reason == EAGAIN ? Fault::kMemory : Fault::kInternal,
+  return {absent             ? Fault::kUsage
+          : reason == EAGAIN ? Fault::kMemory
+                             : Fault::kInternal,
           fmt::format("{}: {}; install the Debian package {}, or put the program next to lamina or in PATH", program,
                       std::strerror(reason), program)};
 }
@@ -32,7 +34,7 @@ Error not_started(const std::string& program, int reason) {
 /// OpenImageIO and OpenCV name some hundred libraries, whose constructors end the program if memory runs out.
 /// errors  kMemory: the limit on address space is below what they take in Debian 12
 Status check_address_space(const std::string& program) {
-  constexpr rlim_t kNeeded = 512;  // MiB
+  constexpr rlim_t kNeeded = 450;  // MiB
   rlimit limit{};
   if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur >= kNeeded << 20) return {};
   return Error{
