@@ -45,8 +45,8 @@ def powers(first, last):
 # Options of each product, and the sizes that a series varies. `slice` and `extrude` have no pixels.
 PRODUCTS = {
     "levels": ("jet", ["--levels", "4"], ["copies", "layers", "triangles", "pixels"]),
-    "saturation": ("jet", ["--saturation", "70"], ["copies", "layers", "triangles", "pixels"]),
-    "program": ("jet", ["--machine", "production-1200", "--margin", "0", "--saturation", "70"], ["copies", "layers"]),
+    "dither": ("jet", ["--core", "0.7"], ["copies", "layers", "triangles", "pixels"]),
+    "program": ("jet", ["--machine", "production-1200", "--margin", "0", "--saturation", "70"], ["copies", "layers", "triangles"]),
     "fill": ("jet", ["--fill", "raster", "--walls", "2", "--bead", "0.2"], ["copies", "layers", "triangles", "pixels"]),
     "inspect": ("jet", ["--inspect"], ["copies", "layers", "triangles", "pixels"]),
     "slice": ("slice", [], ["copies", "layers", "triangles"]),

@@ -9,7 +9,7 @@ ABOUT = {
     "meshes": ("different parts", "of 1,000 triangles each in files of their own, 20 layers of 89 million pixels"),
     "threads": ("threads", "knot800k: 800,000 triangles, 472 layers of 22.3 million pixels"),
 }
-PRODUCTS = {"levels": "`--levels 4`", "saturation": "`--saturation 70`", "program": "`--saturation 70` on production-1200", "fill": "`--fill raster`, two walls",
+PRODUCTS = {"levels": "`--levels 4`", "dither": "`--core 0.7`", "program": "`--saturation 70` on production-1200", "fill": "`--fill raster`, two walls",
             "inspect": "`--inspect`", "slice": "`slice`", "extrude": "`extrude`"}
 
 
