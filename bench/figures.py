@@ -70,18 +70,13 @@ DESCRIPTION = {
 }
 
 
-def limit_of(root, name, result):
-    """Seconds of the limit of --timing: of the result, or of the same job in those of growth; None without either."""
-    shares = (load(root, "growth") or {}).get("shares", {})
-    return result.get("limit") or shares.get(name, {}).get("limit")
-
-
-def times_the_limit(root, name, result, wall):
-    limit = limit_of(root, name, result)
+def times_the_limit(result, wall):
+    """A multiple of the limit of --timing of the same run, or - without one."""
+    limit = result.get("limit")
     return f"{wall / limit:.1f}" if limit else "-"
 
 
-def time_rows(root, results):
+def time_rows(results):
     for name, result in results:
         rays, contours = result["lamina"]["rays-tiff-g4"], result["lamina"]["contours-tiff-g4"]
         peer = result.get("prusa")
@@ -89,7 +84,7 @@ def time_rows(root, results):
         yield [f"`{name}`: {DESCRIPTION[name]}", f"{result['layers']} of {result['columns']} x {result['rows']}",
                spread(peer) if peer else "-", spread(rays), f"{peer['wall'] / rays['wall']:.1f}" if peer else "-",
                spread(contours), f"{peer['wall'] / contours['wall']:.1f}" if peer else "-", str(result["target"]),
-               times_the_limit(root, name, result, rays["wall"]), times_the_limit(root, name, result, contours["wall"]),
+               times_the_limit(result, rays["wall"]), times_the_limit(result, contours["wall"]),
                f"{pixels / rays['wall'] / 1e9:.1f}"]
 
 
@@ -118,9 +113,9 @@ def stage_rows(results):
                 [part.get("threads", {}).get(step, part.get(older, 0)) for step, older in STEPS]]
 
 
-def limit_rows(root, results):
+def limit_rows(results):
     for name, result in results:
-        if limit := limit_of(root, name, result):
+        if limit := result.get("limit"):
             yield [f"`{name}`", f"{1e3 * limit:.1f} ms", seconds(result["lamina"]["rays-tiff-g4"]["wall"]) + " s"]
 
 
@@ -131,9 +126,9 @@ def mslicer_text(root, results):
         if "mslicer" not in result:
             continue
         peer, ours = result["mslicer"], result["lamina"]["rays-tiff-g4"]
-        rows.append([f"`{name}`", spread(peer), f"{seconds(peer['processor'])} s", times_the_limit(root, name, result, peer["wall"]),
+        rows.append([f"`{name}`", spread(peer), f"{seconds(peer['processor'])} s", times_the_limit(result, peer["wall"]),
                      f"{peer['peak_mib']:.0f} MiB", f"{peer['pixels_different']} of {peer['images_compared']} layers", spread(ours),
-                     f"{seconds(ours['processor'])} s", times_the_limit(root, name, result, ours["wall"]),
+                     f"{seconds(ours['processor'])} s", times_the_limit(result, ours["wall"]),
                      f"{peer['wall'] / ours['wall']:.1f}"])
     yield "## mslicer"
     yield ""
@@ -212,7 +207,7 @@ def lines(root, cases):
     yield "## Time"
     yield ""
     yield from table(["job", "layers", "PrusaSlicer", "lamina, rays", "times as fast", "lamina, contours", "times as fast",
-                      "meant", "times the limit, rays", "the same, contours", "Gpx/s, rays"], time_rows(root, results))
+                      "meant", "times the limit, rays", "the same, contours", "Gpx/s, rays"], time_rows(results))
     yield "## Peak resident memory and processor time"
     yield ""
     yield from table(["job", "PrusaSlicer", "lamina, rays", "part of it", "processor time, PrusaSlicer", "rays", "contours",
@@ -242,9 +237,9 @@ def lines(root, cases):
     yield ("The limit of `--timing`, on one thread: reading the part's file, writing files of the same sizes (temporary name, rename), "
            "and touching each crossing of a row with the part's surface once, in memory.")
     yield ""
-    yield from table(["job", "limit", "the whole job, rays"], limit_rows(root, results))
+    yield from table(["job", "limit", "the whole job, rays"], limit_rows(results))
     yield from memory_text(root)
-    yield from growth_page.readme(load(root, "growth"))
+    yield from growth_page.readme(load(root, "growth"), {commit for commit, _ in stamps})
     yield "## Again"
     yield ""
     yield "    scripts/bench             # an hour on two slow cores; nearly all of it is the peer's"

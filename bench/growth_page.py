@@ -103,12 +103,16 @@ def lines(found):
         yield from bounds(found)
 
 
-def readme(found):
-    """A section of bench/README.md."""
+def readme(found, commits):
+    """A section of bench/README.md, whose other figures are of these commits. Figures of another commit are in growth.md alone."""
     if not found:
         return
     yield "## Growth"
     yield ""
+    if commits != {found["commit"]}:
+        yield "Time and memory against copies, layers, pixels, triangles, parts, jobs and threads: [growth.md](growth.md)."
+        yield ""
+        return
     yield (f"Slopes in log-log over the upper two decades (1 is linear), commit {found['commit']}, {found['date']}; all figures in "
            "[growth.md](growth.md).")
     yield ""
