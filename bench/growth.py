@@ -89,6 +89,9 @@ class Jobs:
             for x, words in getattr(self, size)():
                 if x > min(MAX_SIZE[size] ** (2 if size == "pixels" else 1), MAX_COPIES.get(product, 1e9) if size == "copies" else 1e9):
                     break
+                if name == "program-layers":
+                    # 70 % in the last job: so that all layers have as many drops.
+                    options = [*options[:-1], f"{70 * x / 2000:g}"]
                 if command != "jet" or "--machine" in options:
                     words = without(words, "--dpi", *(["--bed"] if "--machine" in options else []))
                 yield x, [command, *words, *options]

@@ -24,6 +24,8 @@ def about(name):
     if name.startswith("pages-"):
         return "pages", f"`{name[6:]}` of one TIFF, 512 x 512 pixels a page"
     product, size = name.split("-")
+    if name == "program-layers":
+        return "layers", "a print program of production-1200, a knot of 100,000 triangles, as many drops in each layer"
     return ABOUT[size][0], f"{PRODUCTS[product]}, {ABOUT[size][1]}"
 
 

@@ -78,10 +78,8 @@ std::uint64_t LayerMeasures::run_bytes() const {
 }
 
 std::uint64_t Measures::ShortColumns::bytes() const {
-  std::uint64_t total = bodies.bytes() + bytes_of(all) + bytes_of(next) + bytes_of(wide) + bytes_held(ended) +
-                        bytes_held(within) + scratch.bytes();
-  for (const Strip& strip : strips) total += bytes_of(strip.footprint);
-  return total;
+  return bodies.bytes() + footprints.bytes() + bytes_of(footprint) + bytes_of(near) + bytes_of(wide) + bytes_held(ended) +
+         bytes_held(within) + scratch.bytes();
 }
 
 Measures::Measures(const PixelGrid& grid, std::int64_t min_nm, std::int64_t drain_nm)
@@ -141,7 +139,7 @@ std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measure
   constexpr std::uint64_t kOfSpan = 40, kOfRegion = 120;
   const LayerMeasures& of = measures;
   return 3 * of.run_bytes() + thin_.columns.need(of.solid.narrow, thin_.base, kOfRegion) +
-         slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) + short_.need(image, of.powder, kOfSpan) +
+         slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) + short_.need(image, kOfSpan) +
          channel_columns_.need(of.channels);
 }
 
@@ -299,8 +297,9 @@ void Measures::add_hidden(const LayerMeasures& measures) {
 }
 
 void Measures::add_channels(const Layer& layer, const RunsView& channels, Follower& powder) {
-  channel_columns_.add(layer, channels, std::int64_t{layer.bottom} + layer.thickness - 6 * drain_nm_ / 10);
-  const RunsView tall = channel_columns_.tall();
+  const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
+  channel_columns_.add(top, channels, top - 6 * drain_nm_ / 10);
+  const RunsView tall = channel_columns_.combined();
   channels_.find(tall);
   EndChannel rules{*this, powder, !begun_};
   channels_.add(layer, tall, rules);
@@ -333,22 +332,14 @@ void Measures::end_flat(const Layer& layer, std::span<const ColumnSpan> ended, M
   for (const ColumnSpan& span : ended) {
     if (std::int64_t{layer.bottom} - span.bottom < min_nm_) flat.ended.push_back(span);
   }
-  while (!flat.strips.empty() && layer.bottom - flat.strips.front().z > 2 * min_nm_) flat.strips.pop_front();
   flat.within.clear();
   if (!flat.ended.empty()) {
-    ShortColumns::Strip& strip = flat.strips.emplace_back();
-    strip.z = layer.bottom;
-    footprint(flat.ended, columns_, rows_, strip.footprint);
-    copy_runs(strip.footprint, flat.all);
-    for (std::size_t i = 0; i + 1 < flat.strips.size(); ++i) {
-      combine(flat.all, flat.strips[i].footprint, SetOperation::kUnion, flat.next);
-      std::swap(flat.all, flat.next);
-    }
-    if (set_pixels(flat.all) >= std::uint64_t{disc.columns} * disc.rows.size() / 2) {
-      if (keep_near_wide(flat.all, disc, flat.next)) {
-        open(flat.next, disc, flat.scratch, flat.wide);
-        clip(flat.ended, flat.wide, flat.within);
-      }
+    footprint(flat.ended, columns_, rows_, flat.footprint);
+    flat.footprints.add(layer.bottom, flat.footprint, std::int64_t{layer.bottom} - 2 * min_nm_ - 1);
+    const RunsView all = flat.footprints.combined();
+    if (set_pixels(all) >= std::uint64_t{disc.columns} * disc.rows.size() / 2 && keep_near_wide(all, disc, flat.near)) {
+      open(flat.near, disc, flat.scratch, flat.wide);
+      clip(flat.ended, flat.wide, flat.within);
     }
   }
   EndFlat rules{*this, kind};
@@ -363,7 +354,7 @@ void Measures::add(const Layer& layer, const RunsView& image, const RunsView& be
   if (min_nm_ > 0) {
     add_upright(layer, image, below, measures.solid.narrow, Measured::kThin, thin_);
     add_upright(layer, measures.powder, powder.below(), measures.gaps.narrow, Measured::kGap, slots_upright_);
-    short_.add(layer, image, measures.powder, window_);
+    short_.add(layer, image, window_);
     end_flat(layer, short_.solid(), Measured::kRoof, roofs_flat_);
     end_flat(layer, short_.powder(), Measured::kGap, gaps_flat_);
     necks_.find(measures.necks);

@@ -24,8 +24,8 @@
 #include "stages/checks/bodies.h"
 #include "stages/checks/columns.h"
 #include "stages/checks/short_spans.h"
+#include "stages/checks/sliding_window.h"
 #include "stages/checks/thin.h"
-#include "stages/checks/young.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
@@ -106,13 +106,9 @@ class Measures {
   };
   /// Columns that are short.
   struct ShortColumns {
-    struct Strip {
-      std::int64_t z = 0;
-      Runs footprint;
-    };
     ColumnBodies bodies;
-    std::deque<Strip> strips;  // of the last layers
-    Runs all, next, wide;
+    SlidingWindow footprints{SetOperation::kUnion};  // of the last layers
+    Runs footprint, near, wide;
     Buffer<ColumnSpan> ended, within;
     ThinScratch scratch;
     std::uint64_t bytes() const;
@@ -148,7 +144,7 @@ class Measures {
   Upright thin_, slots_upright_;
   ShortSpans short_;
   ShortColumns roofs_flat_, gaps_flat_;
-  TallColumns channel_columns_;
+  SlidingWindow channel_columns_{SetOperation::kIntersection};  // by the top of a layer
   Follower channels_{false}, necks_{true}, hidden_{true};
   Runs inner_, both_inner_,
       sampled_;              // inner pixels of the layer below, and those of it that are also two layers below; samples

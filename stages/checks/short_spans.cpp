@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "stages/checks/thin.h"
-
 namespace lamina::checks {
 namespace {
 
@@ -107,6 +105,53 @@ void ShortSpans::cut(std::uint32_t row, bool set, bool endless, Buffer<ColumnSpa
             [](const ColumnSpan& a, const ColumnSpan& b) { return a.begin < b.begin; });
 }
 
+/// The parts of what ends that are within a row of an image.
+void ShortSpans::keep_within(std::span<const std::uint32_t> image) {
+  rest_.clear();
+  std::size_t i = 0;
+  for (const Range& range : ending_) {
+    while (i < image.size() && image[i + 1] <= range.begin) i += 2;
+    for (std::size_t k = i; k < image.size() && image[k] < range.end; k += 2)
+      rest_.push_back({std::max(range.begin, image[k]), std::min(range.end, image[k + 1])});
+  }
+  std::swap(ending_, rest_);
+}
+
+/// The parts of what ends that are outside of it.
+void ShortSpans::keep_outside(std::span<const std::uint32_t> image) {
+  rest_.clear();
+  std::size_t i = 0;
+  for (const Range& range : ending_) {
+    std::uint32_t begin = range.begin;
+    while (i < image.size() && image[i + 1] <= begin) i += 2;
+    for (std::size_t k = i; k < image.size() && image[k] < range.end; k += 2) {
+      if (begin < image[k]) rest_.push_back({begin, image[k]});
+      begin = std::max(begin, image[k + 1]);
+    }
+    if (begin < range.end) rest_.push_back({begin, range.end});
+  }
+  std::swap(ending_, rest_);
+}
+
+/// Cuts what ends in a row. tall  columns that begin in the lowest layer are not short
+void ShortSpans::end_row(std::uint32_t row, std::span<const std::uint32_t> image, bool tall, const PixelBox& window) {
+  const auto before = below_.back().image.view().row(row);
+  const bool many = !recent_.empty();
+  ending_.clear();
+  for_difference(before, image, [&](std::uint32_t begin, std::uint32_t end) { ending_.push_back({begin, end}); });
+  if (many && tall && !ending_.empty()) keep_outside(recent_.all().row(row));
+  cut(row, true, tall, solid_);
+  ending_.clear();
+  if (row < window.top || row >= window.bottom) return;
+  for_difference(image, before, [&](std::uint32_t begin, std::uint32_t end) {
+    begin = std::max(begin, window.left);
+    end = std::min(end, window.right);
+    if (begin < end) ending_.push_back({begin, end});
+  });
+  if (many && !ending_.empty()) keep_within(recent_.any().row(row));
+  cut(row, false, true, powder_);
+}
+
 void ShortSpans::end_rows(const Layer& layer, const RunsView& image, const PixelBox& window) {
   solid_.clear();
   powder_.clear();
@@ -116,50 +161,29 @@ void ShortSpans::end_rows(const Layer& layer, const RunsView& image, const Pixel
   const RunsView last = below_.back().image;
   for (std::uint32_t r = 0; r < last.rows(); ++r) {
     const auto now = r < image.rows() ? image.row(r) : std::span<const std::uint32_t>(), before = last.row(r);
-    if (now.empty() && before.empty()) continue;
-    if (below_.size() > 1 && steady(r, now, tall)) continue;
-    ending_.clear();
-    for_difference(before, now, [&](std::uint32_t begin, std::uint32_t end) { ending_.push_back({begin, end}); });
-    cut(r, true, tall, solid_);
-    ending_.clear();
-    if (r < window.top || r >= window.bottom) continue;
-    for_difference(now, before, [&](std::uint32_t begin, std::uint32_t end) {
-      begin = std::max(begin, window.left);
-      end = std::min(end, window.right);
-      if (begin < end) ending_.push_back({begin, end});
-    });
-    cut(r, false, true, powder_);
+    if (std::ranges::equal(now, before)) continue;
+    if (recent_.empty() && below_.size() > 1 && steady(r, now, tall)) continue;
+    end_row(r, now, tall, window);
   }
 }
 
-/// Gives the layers below to columns that are followed one by one.
-void ShortSpans::follow(const Layer& next, const PixelBox& window) {
-  young_.emplace();
-  Runs powder;
-  const bool tall = std::int64_t{next.bottom} - below_[0].layer.bottom >= height_nm_;
-  for (std::size_t j = 0; j < below_.size(); ++j) {
-    const auto& [layer, image] = below_[j];
-    complement(image, window, powder);
-    young_->solid.add(layer, image, std::int64_t{layer.bottom} - height_nm_, j == 0 && tall);
-    young_->powder.add(layer, powder, std::int64_t{layer.bottom} - height_nm_, j == 0);
-  }
-  below_ = {};
-  unused_ = {};
-}
-
-void ShortSpans::add(const Layer& layer, const RunsView& image, const RunsView& powder, const PixelBox& window) {
-  // The lowest layer is the last one of which columns are tall.
+/// The lowest layer becomes the last one of which columns are tall.
+void ShortSpans::forget(const Layer& layer) {
   while (below_.size() > 1 && std::int64_t{layer.bottom} - below_[1].layer.bottom >= height_nm_) {
     unused_.push_back(std::move(below_.front()));
-    below_.erase(below_.begin());
+    below_.pop_front();
   }
-  if (!young_ && below_.size() > kMaxLayers) follow(layer, window);
-  if (young_) {
-    young_->solid.add(layer, image, std::int64_t{layer.bottom} - height_nm_, false);
-    young_->powder.add(layer, powder, std::int64_t{layer.bottom} - height_nm_, false);
-    return;
+  if (!recent_.empty()) {
+    recent_.forget(std::int64_t{layer.bottom} - height_nm_, below_.size());
+  } else if (below_.size() > kMaxLayers) {
+    for (const Below& one : below_) recent_.add(one.layer, one.image);
   }
+}
+
+void ShortSpans::add(const Layer& layer, const RunsView& image, const PixelBox& window) {
+  forget(layer);
   end_rows(layer, image, window);
+  if (!recent_.empty()) recent_.add(layer, image);
   if (unused_.empty()) unused_.emplace_back();
   below_.push_back(std::move(unused_.back()));
   unused_.pop_back();
@@ -168,27 +192,24 @@ void ShortSpans::add(const Layer& layer, const RunsView& image, const RunsView& 
 }
 
 void ShortSpans::finish(const Layer& above) {
-  if (young_) return young_->solid.finish();
+  forget(above);
   end_rows(above, {}, {0, 0, 0, 0});
 }
 
-std::uint64_t ShortSpans::need(const RunsView& image, const RunsView& powder, std::uint64_t of_ended) const {
-  if (young_) return young_->solid.need(image, of_ended) + young_->powder.need(powder, of_ended);
+std::uint64_t ShortSpans::need(const RunsView& image, std::uint64_t of_ended) const {
   // Of noise a span ends for each run of the last two layers, in a buffer that doubles.
   const std::uint64_t runs = image.change.size() / 2 + (below_.empty() ? 0 : below_.back().image.change.size() / 2);
   std::uint64_t total = image.change.size_bytes() + image.row_offset.size_bytes() + 2 * runs * sizeof(ColumnSpan) +
-                        (solid_.size() + powder_.size()) * of_ended;
+                        (solid_.size() + powder_.size()) * of_ended + (recent_.empty() ? 0 : recent_.need(image));
   for (const Below& one : below_) total += 4 * (one.image.change.size() + one.image.row_offset.size());
   return total;
 }
 
 std::uint64_t ShortSpans::bytes() const {
-  std::uint64_t total = bytes_held(solid_) + bytes_held(powder_) + bytes_held(ending_) + bytes_held(rest_);
-  if (young_) total += young_->solid.bytes() + young_->powder.bytes();
-  for (const std::vector<Below>* list : {&below_, &unused_}) {
-    total += list->capacity() * sizeof(Below);
-    for (const Below& one : *list) total += bytes_of(one.image);
-  }
+  std::uint64_t total = bytes_held(solid_) + bytes_held(powder_) + bytes_held(ending_) + bytes_held(rest_) + recent_.bytes() +
+                        below_.size() * sizeof(Below) + unused_.capacity() * sizeof(Below);
+  for (const Below& one : below_) total += bytes_of(one.image);
+  for (const Below& one : unused_) total += bytes_of(one.image);
   return total;
 }
 

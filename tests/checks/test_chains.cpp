@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "stages/checks/chains.h"
+#include "stages/checks/recent_pixels.h"
 #include "stages/checks/short_spans.h"
 #include "stages/checks/simple_chains.h"
+#include "stages/checks/sliding_window.h"
 #include "stages/checks/thin.h"
-#include "stages/checks/young.h"
 #include "stages/geometry/combine.h"
 #include "tests/checks/volume.h"
 
@@ -180,45 +181,58 @@ class ColumnHeights : public testing::Test {
   }
 };
 
-TEST_F(ColumnHeights, AreThoseOfPixels) {
+/// Pixels that are set in all of the last layers, or in any of them.
+Runs pixels_of_last(const Volume& volume, std::uint32_t first, std::uint32_t last, bool all) {
+  Volume result{volume.columns, volume.rows, 1, std::vector<std::uint8_t>(std::size_t{volume.columns} * volume.rows)};
+  for (std::uint32_t i = 0; i < result.set.size(); ++i) {
+    bool set = all;
+    for (std::uint32_t l = first; l <= last; ++l) {
+      const bool one = volume.at(i % volume.columns, i / volume.columns, l);
+      set = all ? set && one : set || one;
+    }
+    result.set[i] = set ? 1 : 0;
+  }
+  return result.layer(0);
+}
+
+TEST(SlidingWindows, GiveWhatTheirImagesShareAndTheirUnion) {
   std::mt19937 random(9);
-  for (int k = 0; k < 60; ++k) {
-    const Volume volume = moving_shapes(random, 23, 11, 14, k % 3 == 0 ? 0 : k % 3 == 1 ? 30 : 85);
-    const auto from = static_cast<std::int64_t>(drawn(random, 6));  // tall: as many layers and one more
-    const bool endless = k % 2 == 1;
-    YoungColumns young;
-    TallColumns tall;
-    for (std::uint32_t l = 0; l <= volume.layers; ++l) {
-      SCOPED_TRACE(std::to_string(k) + " layer " + std::to_string(l));
-      const Layer layer{l, static_cast<Nm>(l), 1};
-      const Runs image = l < volume.layers ? volume.layer(l) : Volume{23, 11, 1, std::vector<std::uint8_t>(253, 0)}.layer(0);
-      if (l == volume.layers) {
-        young.finish();
-      } else {
-        young.add(layer, image, std::int64_t{l} - from, endless);
-        tall.add(layer, image, std::int64_t{l} - from);
+  for (int k = 0; k < 40; ++k) {
+    const Volume volume = moving_shapes(random, 23, 11, 40, k % 3 == 0 ? 0 : k % 3 == 1 ? 30 : 85);
+    const std::uint32_t layers = 1 + drawn(random, 35);  // of the window
+    SlidingWindow all(SetOperation::kIntersection), any(SetOperation::kUnion);
+    std::uint32_t first = 0;
+    for (std::uint32_t l = 0; l < volume.layers; ++l) {
+      if (k % 4 == 1 && drawn(random, 20) == 0) first = l;  // all others are forgotten at once
+      first = std::max(first, l + 1 < layers ? 0 : l + 1 - layers);
+      const Runs image = volume.layer(l);
+      // The last one stays, even if it should not.
+      if (k % 8 == 2) first = l;
+      const std::int64_t from = k % 8 == 2 ? 3 * std::int64_t{l} : 3 * std::int64_t{first} - 1;
+      all.add(3 * l, image, from);
+      any.add(3 * l, image, from);
+      ASSERT_EQ(text_of(all.combined()), text_of(pixels_of_last(volume, first, l, true))) << k << " layer " << l;
+      ASSERT_EQ(text_of(any.combined()), text_of(pixels_of_last(volume, first, l, false))) << k << " layer " << l;
+    }
+  }
+}
+
+TEST(RecentPixels, AreOfTheWindowAndAtMostAQuarterMore) {
+  std::mt19937 random(12);
+  for (int k = 0; k < 40; ++k) {
+    const Volume volume = moving_shapes(random, 23, 11, 60, k % 3 == 0 ? 0 : k % 3 == 1 ? 30 : 85);
+    const std::uint32_t window = 4 + drawn(random, 30);
+    RecentPixels recent;
+    for (std::uint32_t l = 0; l < volume.layers; ++l) {
+      recent.forget(std::int64_t{l} - window, window);
+      recent.add({l, static_cast<Nm>(l), 1}, volume.layer(l));
+      const auto first = static_cast<std::uint32_t>(recent.bottom());
+      ASSERT_LE(first, l < window ? 0 : l - window);
+      if (l >= 2 * window) {
+        ASSERT_GE(first + window + window / 4, l);
       }
-      Volume short_ended{23, 11, 1, std::vector<std::uint8_t>(253, 0)}, as_tall = short_ended, endless_tall = short_ended;
-      for (std::uint32_t r = 0; r < 11; ++r) {
-        for (std::uint32_t c = 0; c < 23; ++c) {
-          const std::int64_t below = l == 0 ? 0 : height(volume, c, r, l - 1, endless);
-          if (!volume.at(c, r, l) && below > 0 && below <= from) short_ended.set[r * 23 + c] = static_cast<std::uint8_t>(below);
-          if (height(volume, c, r, l, endless) > from) as_tall.set[r * 23 + c] = 1;
-          if (height(volume, c, r, l, true) > from) endless_tall.set[r * 23 + c] = 1;
-        }
-      }
-      Volume ended{23, 11, 1, std::vector<std::uint8_t>(253, 0)};
-      for (const ColumnSpan& span : young.ended()) {
-        EXPECT_EQ(span.first_layer, static_cast<std::uint32_t>(span.bottom));
-        for (std::uint32_t c = span.begin; c < span.end; ++c) {
-          EXPECT_EQ(ended.set[span.row * 23 + c], 0);
-          ended.set[span.row * 23 + c] = static_cast<std::uint8_t>(std::int64_t{l} - span.bottom);
-        }
-      }
-      EXPECT_EQ(ended.set, short_ended.set);
-      if (l == volume.layers) continue;
-      EXPECT_EQ(text_of(young.tall()), text_of(as_tall.layer(0)));
-      EXPECT_EQ(text_of(tall.tall()), text_of(endless_tall.layer(0)));
+      ASSERT_EQ(text_of(recent.all()), text_of(pixels_of_last(volume, first, l, true))) << k << " layer " << l;
+      ASSERT_EQ(text_of(recent.any()), text_of(pixels_of_last(volume, first, l, false))) << k << " layer " << l;
     }
   }
 }
@@ -245,7 +259,7 @@ TEST_F(ColumnHeights, OfShortOnesAreThoseOfPixels) {
       SCOPED_TRACE(std::to_string(k) + " layer " + std::to_string(l));
       const Layer layer{l, bottom[l], 1};
       if (l < layers) {
-        columns.add(layer, volume.layer(l), powder.layer(l), window);
+        columns.add(layer, volume.layer(l), window);
       } else {
         columns.finish(layer);
       }
@@ -261,11 +275,11 @@ TEST_F(ColumnHeights, OfShortOnesAreThoseOfPixels) {
         }
         std::uint32_t before = 0;
         for (const ColumnSpan& span : set ? columns.solid() : columns.powder()) {
+          EXPECT_LT(bottom[l] - span.bottom, height_nm);
           EXPECT_EQ(span.bottom, bottom[span.first_layer]);
           EXPECT_GE(span.row * 23 + span.begin, before);
           before = span.row * 23 + span.end;
-          for (std::uint32_t c = span.begin; c < span.end && bottom[l] - span.bottom < height_nm; ++c)
-            ended[span.row * 23 + c] = span.first_layer;
+          for (std::uint32_t c = span.begin; c < span.end; ++c) ended[span.row * 23 + c] = span.first_layer;
         }
         ASSERT_EQ(ended, expected) << (set ? "material" : "powder");
       }
