@@ -16,7 +16,7 @@ void include(const RunsView& image, SetOperation operation, Runs& result, Runs& 
 
 }  // namespace
 
-void RecentPixels::add_block(const Block& block) {
+void RecentPixels::add_block(const LayerBlock& block) {
   include(block.all, SetOperation::kIntersection, all_, spare_);
   include(block.any, SetOperation::kUnion, any_, spare_);
 }
@@ -46,14 +46,14 @@ void RecentPixels::add(const Layer& layer, const RunsView& image) {
     if (unused_.empty()) unused_.emplace_back();
     blocks_.push_back(std::move(unused_.back()));
     unused_.pop_back();
-    Block& block = blocks_.back();
+    LayerBlock& block = blocks_.back();
     block.bottom = layer.bottom;
     block.layers = 1;
     copy_runs(image, block.all);
     copy_runs(image, block.any);
     return;
   }
-  Block& block = blocks_.back();
+  LayerBlock& block = blocks_.back();
   ++block.layers;
   include(image, SetOperation::kIntersection, block.all, spare_);
   include(image, SetOperation::kUnion, block.any, spare_);
@@ -62,15 +62,15 @@ void RecentPixels::add(const Layer& layer, const RunsView& image) {
 std::uint64_t RecentPixels::need(const RunsView& image) const {
   const auto size = [](const RunsView& runs) { return runs.change.size_bytes() + runs.row_offset.size_bytes(); };
   std::uint64_t total = 8 * size(image) + 2 * (size(all_) + size(any_));
-  for (const Block& block : blocks_) total += size(block.all) + size(block.any);
+  for (const LayerBlock& block : blocks_) total += size(block.all) + size(block.any);
   return total;
 }
 
 std::uint64_t RecentPixels::bytes() const {
-  std::uint64_t total =
-      bytes_of(all_) + bytes_of(any_) + bytes_of(spare_) + blocks_.size() * sizeof(Block) + unused_.capacity() * sizeof(Block);
-  for (const Block& block : blocks_) total += bytes_of(block.all) + bytes_of(block.any);
-  for (const Block& block : unused_) total += bytes_of(block.all) + bytes_of(block.any);
+  std::uint64_t total = bytes_of(all_) + bytes_of(any_) + bytes_of(spare_) + blocks_.size() * sizeof(LayerBlock) +
+                        unused_.capacity() * sizeof(LayerBlock);
+  for (const LayerBlock& block : blocks_) total += bytes_of(block.all) + bytes_of(block.any);
+  for (const LayerBlock& block : unused_) total += bytes_of(block.all) + bytes_of(block.any);
   return total;
 }
 

@@ -32,15 +32,15 @@ class RecentPixels {
   std::uint64_t bytes() const;
 
  private:
-  struct Block {
+  struct LayerBlock {
     std::int64_t bottom = 0;
     std::size_t layers = 0;
     Runs all, any;
   };
-  void add_block(const Block& block);
+  void add_block(const LayerBlock& block);
 
-  std::deque<Block> blocks_;  // the oldest first
-  std::vector<Block> unused_;
+  std::deque<LayerBlock> blocks_;  // the oldest first
+  std::vector<LayerBlock> unused_;
   std::size_t block_layers_ = 1;
   Runs all_, any_, spare_;
 };

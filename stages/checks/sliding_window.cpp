@@ -61,7 +61,7 @@ std::uint64_t SlidingWindow::need(const RunsView& image) const {
   const auto size = [](const RunsView& runs) { return runs.change.size_bytes() + runs.row_offset.size_bytes(); };
   std::uint64_t total = 6 * size(image) + 3 * size(later_);
   for (const Element& one : oldest_) total += size(one.image);
-  for (const Block& block : blocks_) {
+  for (const ImageBlock& block : blocks_) {
     total += size(block.all);
     for (const Element& one : block.elements) total += size(one.image);
   }
@@ -76,8 +76,8 @@ std::uint64_t SlidingWindow::bytes() const {
   };
   count(oldest_);
   count(unused_);
-  for (const Block& block : blocks_) {
-    total += sizeof(Block) + bytes_of(block.all);
+  for (const ImageBlock& block : blocks_) {
+    total += sizeof(ImageBlock) + bytes_of(block.all);
     count(block.elements);
   }
   return total;

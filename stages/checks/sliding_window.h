@@ -38,7 +38,7 @@ class SlidingWindow {
     std::int64_t position = 0;
     Runs image;
   };
-  struct Block {
+  struct ImageBlock {
     std::vector<Element> elements;
     Runs all;
   };
@@ -46,8 +46,8 @@ class SlidingWindow {
   void open_oldest();
 
   SetOperation operation_;
-  std::vector<Element> oldest_;  // combined with those after them of their block; the last one is the oldest
-  std::deque<Block> blocks_;     // those after it, the oldest first
+  std::vector<Element> oldest_;    // combined with those after them of their block; the last one is the oldest
+  std::deque<ImageBlock> blocks_;  // those after it, the oldest first
   std::vector<Element> unused_;
   std::size_t count_ = 0;          // of images
   Runs later_, spare_, combined_;  // all blocks_

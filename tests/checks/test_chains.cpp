@@ -217,7 +217,7 @@ TEST(SlidingWindows, GiveWhatTheirImagesShareAndTheirUnion) {
   }
 }
 
-TEST(RecentPixels, AreOfTheWindowAndAtMostAQuarterMore) {
+TEST(RecentPixels, AreOfTheWindowAndOfNoMoreThanAQuarterBeyond) {
   std::mt19937 random(12);
   for (int k = 0; k < 40; ++k) {
     const Volume volume = moving_shapes(random, 23, 11, 60, k % 3 == 0 ? 0 : k % 3 == 1 ? 30 : 85);
