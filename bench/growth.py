@@ -3,7 +3,7 @@
     scripts/bench growth                writes bench/growth.md and the slopes in bench/README.md; about fifteen minutes on two cores
     scripts/bench growth --only NAME    this series only (can be repeated); no page is written. Names: triangles, layers, pixels, copies,
                                         meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs; overlaps-info,
-                                        overlaps-jet; pages-info, pages-convert, pages-jet: of a multi-page TIFF
+                                        overlaps-near, overlaps-jet; pages-info, pages-convert, pages-jet: of a multi-page TIFF
     --program FILE                      a lamina; else build/release/lamina, built first
     --runs N                            runs of a job; the minimum counts (default 3)
     --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
@@ -134,11 +134,11 @@ class Jobs:
             yield count, [*paths, *LARGE_BED, "--dpi", "600", "--layer", "0.06", *GAP[:2 * (count > 1)]]
 
     def overlaps(self, name):
-        """Items of a 3MF build, each 1 um from another one: `info`. All at one position: `jet`."""
-        information = name == "overlaps-info"
+        """Items of a 3MF build at one position: `info` and `jet`. Each 1 um from another one: `info`."""
+        information, step = name != "overlaps-jet", 0.001 if name == "overlaps-near" else 0
         for count in [100, 200, 400, 800, 1600, 3200] if information else powers(100, 100_000):
             path = self.path("overlaps.3mf")
-            shapes.write_items(path, count, 0.001 if information else 0)
+            shapes.write_items(path, count, step)
             yield count, ["info", path] if information else ["jet", path, *BED, "--dpi", "600", "--layer", "0.5"]
 
     def threads(self):
@@ -172,7 +172,7 @@ def without(words, *options):
 
 SERIES = ["triangles", "layers", "pixels", "copies", "meshes", "threads",
           *(f"{product}-{size}" for product, (_, _, sizes) in PRODUCTS.items() for size in sizes), "batch-jobs",
-          "overlaps-info", "overlaps-jet", "pages-info", "pages-convert", "pages-jet"]
+          "overlaps-info", "overlaps-near", "overlaps-jet", "pages-info", "pages-convert", "pages-jet"]
 MEASURES = ["wall", "processor", "peak"]
 
 

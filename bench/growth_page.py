@@ -17,8 +17,9 @@ def about(name):
     """Size and job of a series."""
     if name == "batch-jobs":
         return "jobs", "of a batch, dry runs of a cube"
-    if name in ("overlaps-info", "overlaps-jet"):
-        return "items", "of a 3MF build, " + ("1 um apart: `info`" if name == "overlaps-info" else "at one position: `jet`")
+    if name.startswith("overlaps-"):
+        where = "1 um apart" if name == "overlaps-near" else "at one position"
+        return "items", f"of a 3MF build, {where}: `{'jet' if name == 'overlaps-jet' else 'info'}`"
     if "-" not in name:
         return ABOUT[name]
     if name.startswith("pages-"):

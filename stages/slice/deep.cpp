@@ -1,5 +1,6 @@
 #include "stages/slice/deep.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "stages/geometry/boxes.h"
@@ -15,29 +16,58 @@ bool overlaps_deeply(std::span<const Box> boxes) {
   return left == 0;
 }
 
-Result<Contours> combine_pairwise(std::vector<Contours> sets, FillRule rule, std::uint64_t* points) {
-  // Sets wind once about what is solid and never about the rest.
-  const FillRule of_pair = rule == FillRule::kEvenOdd ? rule : FillRule::kNonzero;
-  for (; sets.size() > 1; sets.resize((sets.size() + 1) / 2)) {
-    for (std::size_t i = 0; i + 1 < sets.size(); i += 2) {
-      Contours &one = sets[i], &other = sets[i + 1];
-      if (one.point == other.point && one.offset == other.offset) {
-        if (rule == FillRule::kEvenOdd) one.clear();
-      } else if (one.size() == 0) {
-        one = std::move(other);
-      } else if (other.size() > 0) {
-        one.append(other);
-        if (points != nullptr) *points += one.point.size();
-        auto both = contour_union(one, of_pair, false);
-        if (!both) return both.error();
-        one = std::move(*both);
-        tidy(one);
+namespace {
+
+constexpr std::size_t kTogether = 8;
+
+/// Combines sets into the first of them; equal ones need no combining. all  scratch
+Status combine_few(std::span<Contours> sets, FillRule rule, Contours& all, std::uint64_t& points) {
+  std::size_t differing = 0;
+  all.clear();
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    if (sets[i].size() == 0) continue;
+    const auto equal = std::ranges::find_if(
+        sets.first(i), [&](const Contours& other) { return other.point == sets[i].point && other.offset == sets[i].offset; });
+    if (equal == sets.begin() + static_cast<std::ptrdiff_t>(i)) {
+      ++differing;
+    } else {
+      if (rule == FillRule::kEvenOdd) {
+        equal->clear();
+        --differing;
       }
-      other = {};
-      if (i > 0) sets[i / 2] = std::exchange(one, {});
+      sets[i].clear();
     }
-    if (sets.size() % 2 == 1) sets[sets.size() / 2] = std::exchange(sets.back(), {});
   }
+  for (Contours& set : sets) all.append(set);
+  if (differing > 1) {
+    points += all.point.size();
+    auto combined = contour_union(all, rule, false);
+    if (!combined) return combined.error();
+    all = std::move(*combined);
+    tidy(all);
+  }
+  for (Contours& set : sets) set = {};
+  std::swap(sets[0], all);
+  return {};
+}
+
+}  // namespace
+
+Result<Contours> combine_in_groups(std::vector<Contours> sets, FillRule rule, std::uint64_t* points) {
+  // Sets wind once about what is solid and never about the rest.
+  const FillRule of_few = rule == FillRule::kEvenOdd ? rule : FillRule::kNonzero;
+  std::uint64_t counted = 0;
+  Contours all;
+  while (sets.size() > 1) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < sets.size(); i += kTogether, ++kept) {
+      const std::span<Contours> few = std::span(sets).subspan(i, std::min(kTogether, sets.size() - i));
+      if (Status status = combine_few(few, of_few, all, counted); !status) return status.error();
+      if (i > kept) sets[kept] = std::exchange(sets[i], {});
+    }
+    sets.resize(kept);
+  }
+  if (points != nullptr) *points += counted;
   return sets.empty() ? Contours() : std::move(sets.front());
 }
 

@@ -1,5 +1,5 @@
 // stages/slice/deep.h: bodies of instances that overlap many times, such as copies at one position. Their contours are combined
-// pair by pair: all at once they would meet in as many points as there are pairs of instances.
+// in small groups: all at once they would meet in as many points as there are pairs of instances.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 namespace lamina::slice {
 
 /// Boxes of a body overlap deeply if they do in more pairs than this for each box on average.
-inline constexpr std::uint64_t kDeep = 64;
+inline constexpr std::uint64_t kDeep = 16;
 
 /// cost  O(N log N + P), for P pairs that overlap in x, and no more than kDeep pairs that overlap for each box
 bool overlaps_deeply(std::span<const Box> boxes);
@@ -25,6 +25,6 @@ bool overlaps_deeply(std::span<const Box> boxes);
 /// points  becomes the number of points in all boolean operations
 /// errors  kInternal of the clipping library
 /// cost    O(P log P log N) for N sets whose unions have no more than P points
-Result<Contours> combine_pairwise(std::vector<Contours> sets, FillRule rule, std::uint64_t* points = nullptr);
+Result<Contours> combine_in_groups(std::vector<Contours> sets, FillRule rule, std::uint64_t* points = nullptr);
 
 }  // namespace lamina::slice

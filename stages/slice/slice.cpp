@@ -182,7 +182,7 @@ Status Slicer::combine_members(std::span<const Placed> members, std::uint32_t pl
     }
     append_moved(own, by, sets[i]);
   }
-  auto combined = combine_pairwise(std::move(sets), options_.fill_rule);
+  auto combined = combine_in_groups(std::move(sets), options_.fill_rule);
   if (!combined) return combined.error();
   all = std::move(*combined);
   if (const auto merged = nest_apart(all, options_.fill_rule, scratch); !merged) return merged.error();
@@ -285,7 +285,7 @@ Result<double> surplus_area(std::span<const SharedMesh> shared, bool deep, std::
     for (const Point2 by : offsets) append_moved(scratch.closed, by, all);
   }
   if (deep) {
-    auto combined = combine_pairwise(std::move(sets), FillRule::kNonzero);
+    auto combined = combine_in_groups(std::move(sets), FillRule::kNonzero);
     if (!combined) return combined.error();
     return square_mm(doubled_area(*combined) - wound);
   }

@@ -82,7 +82,7 @@ TEST(Deep, BooleanOperationsHaveFewPointsForEachSet) {
       sets[i].close();
     }
     std::uint64_t points = 0;
-    ASSERT_TRUE(combine_pairwise(std::move(sets), FillRule::kNonzero, &points).ok());
+    ASSERT_TRUE(combine_in_groups(std::move(sets), FillRule::kNonzero, &points).ok());
     EXPECT_LE(points, 100 * count);  // of pairs, (count^2)
   }
 }
