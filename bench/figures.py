@@ -71,7 +71,7 @@ DESCRIPTION = {
 
 
 def times_the_limit(result, wall):
-    """A multiple of the limit of --timing of the same run, or - without one."""
+    """A multiple of the limit of --timing at the same commit, or - without one."""
     limit = result.get("limit")
     return f"{wall / limit:.1f}" if limit else "-"
 

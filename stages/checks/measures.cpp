@@ -140,7 +140,7 @@ std::uint64_t Measures::need(const RunsView& image, const LayerMeasures& measure
   const LayerMeasures& of = measures;
   return 3 * of.run_bytes() + thin_.columns.need(of.solid.narrow, thin_.base, kOfRegion) +
          slots_upright_.columns.need(of.gaps.narrow, slots_upright_.base, kOfRegion) + short_.need(image, kOfSpan) +
-         channel_columns_.need(of.channels);
+         channel_columns_.need(of.channels) + roofs_flat_.footprints.need({}) + gaps_flat_.footprints.need({});
 }
 
 struct Measures::EndUpright {

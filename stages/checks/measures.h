@@ -14,7 +14,8 @@
 //   width,
 //             that does not reach the outside, in a hollow that does
 //
-// cost    O(runs) a layer and that of discs; memory of a layer and of the columns that continue
+// cost    O(runs) a layer and that of discs; memory of the layers that the minimum wall, twice that
+//         and the drain take, where they differ
 #pragma once
 
 #include <cstdint>

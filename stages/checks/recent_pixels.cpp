@@ -1,7 +1,9 @@
 #include "stages/checks/recent_pixels.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "stages/checks/bodies.h"  // copy_runs, bytes_of
 #include "stages/geometry/combine.h"
 
 namespace lamina::checks {
@@ -9,9 +11,10 @@ namespace {
 
 constexpr std::size_t kBlocks = 4;  // of a height
 
+/// Buffers are copied, not swapped, so that each has the capacity that it needs.
 void include(const RunsView& image, SetOperation operation, Runs& result, Runs& spare) {
   combine(result, image, operation, spare);
-  std::swap(result, spare);
+  copy_runs(spare, result);
 }
 
 }  // namespace

@@ -25,6 +25,10 @@ void for_difference(std::span<const std::uint32_t> set, std::span<const std::uin
   }
 }
 
+bool equal(const RunsView& a, const RunsView& b) {
+  return std::ranges::equal(a.row_offset, b.row_offset) && std::ranges::equal(a.change, b.change);
+}
+
 }  // namespace
 
 /// Whether no short column ends in a row: all layers have as many runs there, and none moves out and back. Where it does not
@@ -183,6 +187,7 @@ void ShortSpans::forget(const Layer& layer) {
 void ShortSpans::add(const Layer& layer, const RunsView& image, const PixelBox& window) {
   forget(layer);
   end_rows(layer, image, window);
+  if (!below_.empty() && equal(below_.back().image, image)) return;
   if (!recent_.empty()) recent_.add(layer, image);
   if (unused_.empty()) unused_.emplace_back();
   below_.push_back(std::move(unused_.back()));

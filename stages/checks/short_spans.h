@@ -58,7 +58,7 @@ class ShortSpans {
   void keep_outside(std::span<const std::uint32_t> image);
 
   std::int64_t height_nm_;
-  std::deque<Below> below_;  // the last layers, the lowest first
+  std::deque<Below> below_;  // the last layers, the lowest first; of layers in sequence with equal images the first one
   std::vector<Below> unused_;
   RecentPixels recent_;  // of layers that include below_; empty while these are few
   Buffer<ColumnSpan> solid_, powder_;

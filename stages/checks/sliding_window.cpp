@@ -2,11 +2,14 @@
 
 #include <utility>
 
+#include "stages/checks/bodies.h"  // copy_runs, bytes_of
+
 namespace lamina::checks {
 
+/// Buffers are copied, not swapped, so that an element has the capacity that it needs.
 void SlidingWindow::include(const RunsView& image, Runs& result) {
   combine(result, image, operation_, spare_);
-  std::swap(result, spare_);
+  copy_runs(spare_, result);
 }
 
 /// The first block becomes the one whose images are forgotten.
@@ -37,15 +40,12 @@ void SlidingWindow::add(std::int64_t position, const RunsView& image, std::int64
   } else {
     include(image, blocks_.back().all);
   }
-  if (unused_.empty()) unused_.emplace_back();
-  Element& element = blocks_.back().elements.emplace_back(std::move(unused_.back()));
-  unused_.pop_back();
+  Element& element = blocks_.back().elements.emplace_back();
   element.position = position;
   copy_runs(image, element.image);
   for (++count_; count_ > 1; --count_) {
     if (oldest_.empty() && blocks_.front().elements.front().position <= from) open_oldest();
     if (oldest_.empty() || oldest_.back().position > from) break;
-    unused_.push_back(std::move(oldest_.back()));
     oldest_.pop_back();
   }
   if (oldest_.empty()) {
@@ -75,7 +75,6 @@ std::uint64_t SlidingWindow::bytes() const {
     for (const Element& one : elements) total += bytes_of(one.image);
   };
   count(oldest_);
-  count(unused_);
   for (const ImageBlock& block : blocks_) {
     total += sizeof(ImageBlock) + bytes_of(block.all);
     count(block.elements);

@@ -48,7 +48,6 @@ class SlidingWindow {
   SetOperation operation_;
   std::vector<Element> oldest_;    // combined with those after them of their block; the last one is the oldest
   std::deque<ImageBlock> blocks_;  // those after it, the oldest first
-  std::vector<Element> unused_;
   std::size_t count_ = 0;          // of images
   Runs later_, spare_, combined_;  // all blocks_
 };

@@ -11,7 +11,7 @@ namespace lamina::slice {
 
 bool overlaps_deeply(std::span<const Box> boxes) {
   if (boxes.size() <= kDeep) return false;
-  std::uint64_t left = kDeep * boxes.size();
+  std::uint64_t left = kDeep * boxes.size() + 1;
   for_each_overlap(boxes, [&](auto, auto) { return --left > 0; });
   return left == 0;
 }
@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kTogether = 8;
 
 /// Combines sets into the first of them; equal ones need no combining. all  scratch
-Status combine_few(std::span<Contours> sets, FillRule rule, Contours& all, std::uint64_t& points) {
+Status combine_few(std::span<Contours> sets, FillRule rule, Contours& all, CombineWork& work) {
   std::size_t differing = 0;
   all.clear();
   for (std::size_t i = 0; i < sets.size(); ++i) {
@@ -40,7 +40,8 @@ Status combine_few(std::span<Contours> sets, FillRule rule, Contours& all, std::
   }
   for (Contours& set : sets) all.append(set);
   if (differing > 1) {
-    points += all.point.size();
+    work.points += all.point.size();
+    work.pairs += differing * (differing - 1) / 2;
     auto combined = contour_union(all, rule, false);
     if (!combined) return combined.error();
     all = std::move(*combined);
@@ -53,10 +54,10 @@ Status combine_few(std::span<Contours> sets, FillRule rule, Contours& all, std::
 
 }  // namespace
 
-Result<Contours> combine_in_groups(std::vector<Contours> sets, FillRule rule, std::uint64_t* points) {
+Result<Contours> combine_in_groups(std::vector<Contours> sets, FillRule rule, CombineWork* work) {
   // Sets wind once about what is solid and never about the rest.
   const FillRule of_few = rule == FillRule::kEvenOdd ? rule : FillRule::kNonzero;
-  std::uint64_t counted = 0;
+  CombineWork counted;
   Contours all;
   while (sets.size() > 1) {
     std::size_t kept = 0;
@@ -67,7 +68,7 @@ Result<Contours> combine_in_groups(std::vector<Contours> sets, FillRule rule, st
     }
     sets.resize(kept);
   }
-  if (points != nullptr) *points += counted;
+  if (work != nullptr) *work = {work->points + counted.points, work->pairs + counted.pairs};
   return sets.empty() ? Contours() : std::move(sets.front());
 }
 

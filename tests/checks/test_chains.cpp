@@ -208,11 +208,30 @@ TEST(SlidingWindows, GiveWhatTheirImagesShareAndTheirUnion) {
       const Runs image = volume.layer(l);
       // The last one stays, even if it should not.
       if (k % 8 == 2) first = l;
-      const std::int64_t from = k % 8 == 2 ? 3 * std::int64_t{l} : 3 * std::int64_t{first} - 1;
+      const std::int64_t from = k % 8 == 2 ? 3 * std::int64_t{l} : 3 * std::int64_t{first} - (k % 2 == 0 ? 1 : 3);
       all.add(3 * l, image, from);
       any.add(3 * l, image, from);
       ASSERT_EQ(text_of(all.combined()), text_of(pixels_of_last(volume, first, l, true))) << k << " layer " << l;
       ASSERT_EQ(text_of(any.combined()), text_of(pixels_of_last(volume, first, l, false))) << k << " layer " << l;
+    }
+  }
+}
+
+/// Unions are larger than their images, and no buffer of one is kept for an image.
+TEST(SlidingWindows, HoldAboutWhatTheyNeed) {
+  for (const bool apart : {false, true}) {
+    SlidingWindow any(SetOperation::kUnion);
+    Runs image;
+    image.columns = 100'000;
+    image.row_offset = {0, 40};
+    image.change.resize(40);
+    for (std::uint32_t l = 0; l < 800; ++l) {
+      for (std::uint32_t i = 0; i < 40; ++i) image.change[i] = 5000 * (i / 2) + (apart ? 4 * l : 0) + i % 2;
+      const std::uint64_t need = any.need(image);
+      any.add(l, image, std::int64_t{l} - 200);
+      if (l > 20) {
+        ASSERT_LE(any.bytes(), 2 * need) << l;
+      }
     }
   }
 }

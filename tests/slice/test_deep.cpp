@@ -73,7 +73,12 @@ TEST(Deep, TheUnionOfManyCopiesHasItsKnownAreaByEveryRule) {
   }
 }
 
-TEST(Deep, BooleanOperationsHaveFewPointsForEachSet) {
+TEST(Deep, MoreThanSixteenOverlapsForEachBoxAreDeep) {
+  EXPECT_FALSE(overlaps_deeply(boxes_of(cube(), stairs(33, 1000))));  // 33 x 32 / 2 pairs
+  EXPECT_TRUE(overlaps_deeply(boxes_of(cube(), stairs(34, 1000))));
+}
+
+TEST(Deep, BooleanOperationsHaveFewPointsAndPairsForEachSet) {
   for (const std::uint32_t count : {500u, 1000u}) {
     std::vector<Contours> sets(count);
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -81,9 +86,10 @@ TEST(Deep, BooleanOperationsHaveFewPointsForEachSet) {
       sets[i].point = {{by, by}, {by + kSide, by}, {by + kSide, by + kSide}, {by, by + kSide}};
       sets[i].close();
     }
-    std::uint64_t points = 0;
-    ASSERT_TRUE(combine_in_groups(std::move(sets), FillRule::kNonzero, &points).ok());
-    EXPECT_LE(points, 100 * count);  // of pairs, (count^2)
+    CombineWork work;
+    ASSERT_TRUE(combine_in_groups(std::move(sets), FillRule::kNonzero, &work).ok());
+    EXPECT_LE(work.points, 20 * count);  // one after the other: count^2
+    EXPECT_LE(work.pairs, 5 * count);    // all at once: count^2 / 2
   }
 }
 
