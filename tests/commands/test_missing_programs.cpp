@@ -72,7 +72,7 @@ TEST(Names, ARecordWhoseToolpathsAreGoneIsReplacedAndNothingElse) {
 TEST(Names, APartOf250BytesIsSlicedToANameThatEndsBetweenCharacters) {
   const Directory directory;
   std::string name;
-  while (name.size() < 246) name += "\u00e4";
+  while (name.size() < 250) name += "\u00e4";
   write_box(directory / (name + ".stl"), {0, 0, 0}, {5, 5, 2});
   EXPECT_EQ(run_lamina({"slice", name + ".stl", "--quiet", "-o", "out"}, directory.path()).code, 0);
   EXPECT_EQ(run_lamina({"verify", "out"}, directory.path()).code, 0);
