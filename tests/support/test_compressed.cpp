@@ -87,6 +87,9 @@ TEST_F(Compressed, DamagedAndFalseFramesAreRefused) {
   EXPECT_EQ(refusal(stored), "read");
   EXPECT_EQ(refusal(""), "is no Zstandard frame");
   EXPECT_EQ(refusal("some text"), "is no Zstandard frame");
+  // An empty frame of format 0.7, and one without content that is skipped (RFC 8878, section 3.1.2).
+  EXPECT_EQ(refusal(std::string("\x27\xB5\x2F\xFD\0\1\x20\0\0", 9)), "is no Zstandard frame");
+  EXPECT_EQ(refusal(std::string("\x50\x2A\x4D\x18\0\0\0\0", 8)), "is no Zstandard frame");
   for (const std::size_t left : {stored.size() - 1, stored.size() / 2, std::size_t{14}})
     EXPECT_EQ(refusal(stored.substr(0, left)), "ends within its frame") << left;
   EXPECT_EQ(refusal(stored + "x"), "has bytes after its frame");

@@ -25,6 +25,7 @@ constexpr std::size_t kCachedPiece = 64 << 10;  // is hashed and compressed whil
 // A frame's head with its content's size: magic number, descriptor, window, eight bytes of size.
 constexpr std::size_t kDescriptor = 4, kSizeOffset = 6, kSizeBytes = 8, kMaxHead = 18;
 constexpr unsigned char kSizeOfEightBytes = 0xC0;
+constexpr std::string_view kMagic = "\x28\xB5\x2F\xFD";
 
 using HashState = std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)>;
 
@@ -191,7 +192,9 @@ Result<std::optional<std::uint64_t>> stated_size(const FileReader& file) {
   std::array<char, kMaxHead> head{};
   const std::size_t there = std::min<std::size_t>(head.size(), file.size());
   const bool read = file.read_at(0, std::span(head.data(), there));
-  const unsigned long long size = read ? ZSTD_getFrameContentSize(head.data(), there) : ZSTD_CONTENTSIZE_ERROR;
+  // libzstd also reads frames of its formats before RFC 8878, and skips frames without content.
+  const bool begins = read && there >= kMagic.size() && std::ranges::equal(kMagic, std::span(head).first(kMagic.size()));
+  const unsigned long long size = begins ? ZSTD_getFrameContentSize(head.data(), there) : ZSTD_CONTENTSIZE_ERROR;
   if (size == ZSTD_CONTENTSIZE_ERROR) return damaged_content(file.path(), "is no Zstandard frame");
   return size == ZSTD_CONTENTSIZE_UNKNOWN ? std::optional<std::uint64_t>() : std::optional<std::uint64_t>(size);
 }
