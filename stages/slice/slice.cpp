@@ -260,11 +260,12 @@ std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
 
 namespace {
 
-/// A mesh at a height, and where its copies stand.
+/// A mesh at a height, and the positions of its copies; where contours are combined in groups each position once.
 struct SharedMesh {
   const Mesh& mesh;
   const SourceMesh& source;
   std::vector<Point2> by;
+  std::int64_t copies = 0;
 };
 
 Result<double> surplus_area(std::span<const SharedMesh> shared, bool deep, std::span<const Nm> planes, std::uint32_t plane,
@@ -272,10 +273,10 @@ Result<double> surplus_area(std::span<const SharedMesh> shared, bool deep, std::
   all.clear();
   __int128 wound = 0;
   std::vector<Contours> sets;
-  for (const auto& [mesh, source, offsets] : shared) {
+  for (const auto& [mesh, source, offsets, copies] : shared) {
     scratch.closed.clear();
     find_loops(mesh, source, planes, plane, scratch, scratch.closed);
-    wound += doubled_area(scratch.closed) * static_cast<std::int64_t>(offsets.size());
+    wound += doubled_area(scratch.closed) * copies;
     if (deep) {
       if (Status status = clean_alone(scratch.closed, FillRule::kNonzero, scratch); !status) return status.error();
       for (const Point2 by : offsets) append_moved(scratch.closed, by, sets.emplace_back());
@@ -300,10 +301,16 @@ Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::spa
   std::vector<std::uint32_t> source_of;
   const std::vector<SourceMesh> sources = find_sources(meshes, instances, planes, source_of);
   std::vector<SharedMesh> shared;
-  for (const SourceMesh& source : sources) shared.push_back({meshes[source.mesh], source, {}});
+  for (const SourceMesh& source : sources) shared.push_back({meshes[source.mesh], source, {}, 0});
   for (std::size_t i = 0; i < instances.size(); ++i)
     shared[source_of[i]].by.push_back({instances[i].offset.x, instances[i].offset.y});
   const bool deep = overlap_deeply(meshes, instances);
+  for (SharedMesh& one : shared) {
+    one.copies = std::ssize(one.by);
+    if (!deep) continue;
+    std::ranges::sort(one.by, {}, [](const Point2& p) { return std::pair(p.x, p.y); });
+    one.by.erase(std::ranges::unique(one.by).begin(), one.by.end());
+  }
   std::vector<double> areas(planes.size());
   std::vector<Status> status(planes.size());
   struct Scratch {

@@ -98,6 +98,11 @@ TEST(Deep, SurplusOfCopiesIsTheUnionLessTheSum) {
   const auto areas = surplus_areas(std::span(&mesh, 1), stairs(1000, 1000), std::vector<Nm>{kSide / 2});
   ASSERT_TRUE(areas.ok());
   EXPECT_NEAR(areas->front(), 100 + 999 * 19.999e-3 - 1000 * 100, 1e-6);
+  std::vector<Instance> instances = stairs(1000, 1000);
+  for (std::size_t i = 0; i < 300; ++i) instances.push_back(instances[i % 3]);
+  const auto repeated = surplus_areas(std::span(&mesh, 1), instances, std::vector<Nm>{kSide / 2});
+  ASSERT_TRUE(repeated.ok());
+  EXPECT_NEAR(repeated->front(), 100 + 999 * 19.999e-3 - 1300 * 100, 1e-6);
 }
 
 TEST(Deep, CopiesOfAMeshThatIsInsideOutAreRefused) {
