@@ -4,6 +4,7 @@
     scripts/bench growth --only NAME    this series only (can be repeated); no page is written. Names: triangles, layers, pixels, copies,
                                         meshes, threads of 1-bit jobs; PRODUCT-SIZE as in levels-copies; batch-jobs; overlaps-info,
                                         overlaps-near, overlaps-jet; pages-info, pages-convert, pages-jet: of a multi-page TIFF
+    --keep                              with --only: these series replace those of the page, which names their commit
     --program FILE                      a lamina; else build/release/lamina, built first
     --runs N                            runs of a job; the minimum counts (default 3)
     --max TRIANGLES                    the largest part (default 10 million); --cache, --models: the parts of scripts/bench
@@ -136,7 +137,7 @@ class Jobs:
     def overlaps(self, name):
         """Items of a 3MF build at one position: `info` and `jet`. Each 1 um from another one: `info`."""
         information, step = name != "overlaps-jet", 0.001 if name == "overlaps-near" else 0
-        for count in [100, 200, 400, 800, 1600, 3200] if information else powers(100, 100_000):
+        for count in [100, 200, 400, 800, 1600, 3200] if information else powers(100, 500_000):
             path = self.path("overlaps.3mf")
             shapes.write_items(path, count, step)
             yield count, ["info", path] if information else ["jet", path, *BED, "--dpi", "600", "--layer", "0.5"]
@@ -236,6 +237,7 @@ def too_steep(series):
 def read_options(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", action="append", choices=[*SERIES, "shares"])
+    parser.add_argument("--keep", action="store_true")
     parser.add_argument("--program")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--max", type=float, default=1e7)
@@ -247,6 +249,13 @@ def read_options(arguments):
         options.program = os.path.join(ROOT, "build/release/lamina")
     options.program = os.path.abspath(options.program)
     return options
+
+
+def kept_with(record, found):
+    """A record of all series in which those that were measured again replace the others."""
+    measured = {name: dict(series, commit=found["commit"], date=found["date"]) for name, series in found["series"].items()}
+    whole = {**record["series"], **measured}
+    return dict(record, series={name: whole[name] for name in SERIES if name in whole})
 
 
 def main(arguments):
@@ -267,13 +276,15 @@ def main(arguments):
             shares = shares_of_parts(options.program, os.path.join(os.path.abspath(options.cache), "parts"), work)
     after, ended = busy_and_total(), os.times()
     own = sum(ended[:4]) - sum(begun[:4])
-    steep = too_steep(series)
-    found = {"series": series, "shares": shares, "steepest": STEEPEST, "worse": steep, "commit": commit,
+    found = {"series": series, "shares": shares, "steepest": STEEPEST, "commit": commit,
              "date": time.strftime("%Y-%m-%d"), "machine": figures.machine(options.cache), "runs": options.runs,
              "others": max(0.0, after[0] - before[0] - own) / (after[1] - before[1])}
+    if options.only and options.keep:
+        found = kept_with(figures.load(ROOT, "growth"), found)
+    steep = found["worse"] = too_steep(found["series"])
     text = "\n".join(growth_page.lines(found)).rstrip() + "\n"
     print(text)
-    if not options.only:
+    if not options.only or options.keep:
         figures.save(ROOT, "growth", found)
         with open(os.path.join(ROOT, "bench/growth.md"), "w", encoding="utf-8") as file:
             file.write(text)

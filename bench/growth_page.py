@@ -79,6 +79,15 @@ def bounds(found):
                       "limit, ms"], rows)
 
 
+def of_other_commits(found):
+    """A sentence about series that were measured again."""
+    again = {}
+    for name, series in found["series"].items():
+        if "commit" in series:
+            again.setdefault((series["commit"], series["date"]), []).append(" against ".join(reversed(about(name))))
+    return "".join(f" At commit {commit} on {date}: " + "; ".join(names) + "." for (commit, date), names in again.items())
+
+
 def lines(found):
     where = found["machine"]
     yield "# Growth"
@@ -87,7 +96,7 @@ def lines(found):
     yield ""
     yield (f"{where['processor']}, {where['cores']} cores, {where['memory_gib']} GiB; {where['system']}, kernel {where['kernel']}. Commit "
            f"{found['commit']} on {found['date']}. The least of {found['runs']} runs of whole processes; parts in the page cache, "
-           f"outputs in memory. Other programs used {100 * found['others']:.0f} % of the processors.")
+           f"outputs in memory. Other programs used {100 * found['others']:.0f} % of the processors.{of_other_commits(found)}")
     yield ""
     yield ("A slope is that of least squares in log-log over the upper two decades: of what a job takes beyond the smallest of its "
            "series against what it has beyond it. 1 is linear; what grows by less than a tenth is flat.")
