@@ -124,6 +124,7 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePosition) {
       {"M83\nG1 Xnan E1\n", "line 2: 'nan' is not a number"},
       {"G1 X1..2 E1\n", "line 1: '.2 E1' is no word of a move"},
       {"G1 X1000000000 E1\n", "line 1: a bead at 1e+09 mm; beds are at most 2000 mm wide"},
+      {"M83\nG1 X1 E-100\nG2 I9999999999999999 E10\n", "line 3: a bead at 6.28319e+07 mm; beds are at most 2000 mm wide"},
       {";WIDTH:wide\nG1 X1 E1\n", "line 1: 'wide' is not a length"},
   };
   for (const auto& [text, reported] : files) {

@@ -607,6 +607,8 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
                 false,
                 0,
                 true};
+  // Also while what was retracted is fed again: beyond the bed an arc may have any number of chords.
+  if (!within_reach(piece)) return false;
   chord_ = chord_ < arc_.chords() ? chord_ + 1 : 0;
   return (from.x != to.x || from.y != to.y) && deposit(piece, bead);
 }
