@@ -221,7 +221,10 @@ Result<Contours> contour_union(const ContoursView& contours, FillRule rule, bool
   const clip::PolyFillType type = rule == FillRule::kEvenOdd    ? clip::pftEvenOdd
                                   : rule == FillRule::kPositive ? clip::pftPositive
                                                                 : clip::pftNonZero;
-  return combine(contours, {}, clip::ctUnion, type, "the union failed", simple);
+  auto region = combine(contours, {}, clip::ctUnion, type, "the union failed", simple);
+  if (!region || rule != FillRule::kEvenOdd) return region;
+  // By even-odd, Clipper turns some of the contours the wrong way where edges of its input coincide. Edges of a region do not.
+  return combine(*region, {}, clip::ctUnion, type, "the union failed", simple);
 }
 
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {
