@@ -48,7 +48,7 @@ std::vector<std::string> gcode_seeds() {
       "G3 X9 Y9 I5 J5 E3\n;CURA_PROFILE_STRING:eJzLSaxMLYrPSM1MzyixNdAz5ChPzMmJL8nITM7OSy0uBgpZcOTll8SnZeYk5qbmlcSnZALpktQiW0sOTDEjPQtTTGEjWwOexBwgIy+xJLMsFQB98Sn4\n"};
 }
 
-const Registered kGcode({"gcode", read_gcode, gcode_seeds, "stages/formats/gcode/read_gcode stages/support/text", ".gcode",
+const Registered kGcode({"gcode", read_gcode, gcode_seeds, "stages/formats/gcode stages/support/text", ".gcode",
                          "gcode.dict", 2048});
 
 }  // namespace
