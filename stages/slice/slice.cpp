@@ -309,7 +309,7 @@ Result<std::vector<double>> surplus_areas(std::span<const Mesh> meshes, std::spa
     one.copies = std::ssize(one.by);
     if (!deep) continue;
     std::ranges::sort(one.by, {}, [](const Point2& p) { return std::pair(p.x, p.y); });
-    one.by.erase(std::ranges::unique(one.by).begin(), one.by.end());
+    one.by.erase(std::unique(one.by.begin(), one.by.end()), one.by.end());
   }
   std::vector<double> areas(planes.size());
   std::vector<Status> status(planes.size());
