@@ -168,13 +168,21 @@ TEST(OffsetContours, HolesCountAnywhereInTheList) {
     for (const FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
       const auto merged = contour_union(boxes(set), rule);
       ASSERT_TRUE(merged.ok());
-      unordered += is_ordered_by_outer(*merged) ? 0 : 1;
-      const auto moved = offset_contours(*merged, -200'000);
-      ASSERT_TRUE(moved.ok());
-      EXPECT_NEAR(square_mm(doubled_area(*moved)), clippers_area_mm2(*merged, -200'000), 1e-3) << "round " << round;
+      EXPECT_TRUE(is_ordered_by_outer(*merged)) << "round " << round;
+      Contours backwards;  // the last contour first: holes without their outer one before them
+      for (std::uint32_t c = merged->size(); c-- > 0;) {
+        backwards.point.insert(backwards.point.end(), (*merged)[c].begin(), (*merged)[c].end());
+        backwards.close();
+      }
+      unordered += is_ordered_by_outer(backwards) ? 0 : 1;
+      for (const Contours& given : {*merged, backwards}) {
+        const auto moved = offset_contours(given, -200'000);
+        ASSERT_TRUE(moved.ok());
+        EXPECT_NEAR(square_mm(doubled_area(*moved)), clippers_area_mm2(*merged, -200'000), 1e-3) << "round " << round;
+      }
     }
   }
-  EXPECT_GE(unordered, 2);
+  EXPECT_GE(unordered, 100);
 }
 
 }  // namespace
