@@ -14,12 +14,11 @@
 //   width,
 //             that does not reach the outside, in a hollow that does
 //
-// cost    O(runs) a layer and that of discs; memory of the layers that the minimum wall, twice that
-//         and the drain take, where they differ
+// cost    O(runs) a layer and that of discs; memory of the images of the last layers, as many as
+//         twice the minimum wall or 0.6 of the drain takes; of equal ones once for the minimum wall
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <vector>
 
 #include "stages/checks/bodies.h"
