@@ -279,14 +279,76 @@ Result<slice::SectionReport> Sections::section(const slice::Slicer& slicer, cons
 Status Sections::slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const {
   const ScheduledLayer& scheduled = schedule_.layers[index];
   const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
-  auto report = section(slicer, scheduled, scratch, work, work.contours);
-  if (!report) return report.error();
-  // Bodies of other parts have nothing in this layer.
-  work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
-  work.report = *report;
+  if (neighbours_->capacity > 0) {
+    const auto shared = share(index, scratch);
+    if (!shared) return shared.error();
+    work.contours = (*shared)->contours;
+    work.report = (*shared)->report;
+  } else {
+    auto report = section(slicer, scheduled, scratch, work, work.contours);
+    if (!report) return report.error();
+    // Bodies of other parts have nothing in this layer.
+    work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
+    work.report = *report;
+  }
   if (!part_slicer_) return {};
   const auto again = section(*part_slicer_, scheduled, scratch, work, work.parts);
   return again ? Status() : Status(again.error());
+}
+
+void Sections::keep_neighbours(std::uint32_t count) { neighbours_->capacity = std::max(neighbours_->capacity, count); }
+
+std::uint64_t Sections::shared_bytes() const {
+  const std::lock_guard lock(neighbours_->mutex);
+  std::uint64_t total = 0;
+  for (const auto& [index, shared] : neighbours_->kept) {
+    total += bytes_held(shared->contours.contours.point) + bytes_held(shared->contours.contours.offset);
+  }
+  return total;
+}
+
+std::optional<std::uint32_t> Sections::above(std::uint32_t index) const {
+  for (std::uint32_t next = index + 1; next < schedule_.layers.size(); ++next) {
+    if (schedule_.layers[next].part == schedule_.layers[index].part) return next;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::uint32_t> Sections::below(std::uint32_t index) const {
+  for (std::uint32_t next = index; next-- > 0;) {
+    if (schedule_.layers[next].part == schedule_.layers[index].part) return next;
+  }
+  return std::nullopt;
+}
+
+Result<std::shared_ptr<const Sections::SharedContours>> Sections::shared_contours(std::uint32_t index) const {
+  auto scratch = scratches_->take();
+  auto shared = share(index, *scratch);
+  scratches_->give_back(std::move(scratch));
+  return shared;
+}
+
+Result<std::shared_ptr<const Sections::SharedContours>> Sections::share(std::uint32_t index,
+                                                                        slice::SectionScratch& scratch) const {
+  Neighbours& neighbours = *neighbours_;
+  {
+    const std::lock_guard lock(neighbours.mutex);
+    if (const auto found = neighbours.kept.find(index); found != neighbours.kept.end()) return found->second;
+  }
+  // Another thread may be cutting the layer as well: waiting for it would idle, and both get the same.
+  Work work;
+  const ScheduledLayer& scheduled = schedule_.layers[index];
+  const slice::Slicer& slicer = own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part];
+  const auto report = section(slicer, scheduled, scratch, work, work.contours);
+  if (!report) return report.error();
+  // Bodies of other parts have nothing in this layer.
+  work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
+  auto shared = std::make_shared<const SharedContours>(SharedContours{std::move(work.contours), *report});
+  const std::lock_guard lock(neighbours.mutex);
+  neighbours.kept.try_emplace(index, shared);
+  // Layers are made upwards: the lowest one is needed least.
+  while (neighbours.kept.size() > std::max(neighbours.capacity, 1u)) neighbours.kept.erase(neighbours.kept.begin());
+  return shared;
 }
 
 Status Sections::contours(std::uint32_t index, Work& work) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -70,6 +71,19 @@ class Sections {
   /// Contours, and the filling if the job has one. Pure: independent of thread and order. Patterns are anchored to the parts:
   /// what copies at one height have alike is filled once, and moved.
   Status layer(std::uint32_t index, Work& work) const;
+  /// The contours of a layer without a filling, shared with the layers that need them because they are next to it. Pure; those
+  /// of the last layers are kept, as many as keep_neighbours() was called with. errors  of Slicer::layer
+  struct SharedContours {
+    slice::LayerContours contours;
+    slice::SectionReport report;
+  };
+  Result<std::shared_ptr<const SharedContours>> shared_contours(std::uint32_t index) const;
+  /// Layers at a time whose contours shared_contours() keeps; 0 to begin with. Before the first layer.
+  void keep_neighbours(std::uint32_t count);
+  std::uint64_t shared_bytes() const;
+  /// The layer that is printed on layer `index` of the same part, and the one that it is printed on; none at the ends.
+  std::optional<std::uint32_t> above(std::uint32_t index) const;
+  std::optional<std::uint32_t> below(std::uint32_t index) const;
   /// The two halves of layer(): contours and regions, then their filling. The bound of the filling's memory needs the first.
   Status contours(std::uint32_t index, Work& work) const;
   Status fill(std::uint32_t index, Work& work) const;
@@ -116,8 +130,16 @@ class Sections {
     void give_back(std::unique_ptr<slice::SectionScratch> scratch);
   };
 
-  Sections() : scratches_(std::make_unique<Scratches>()) {}
+  /// Contours of the last layers, of any thread.
+  struct Neighbours {
+    std::mutex mutex;
+    std::uint32_t capacity = 0;
+    std::map<std::uint32_t, std::shared_ptr<const SharedContours>> kept;
+  };
+
+  Sections() : scratches_(std::make_unique<Scratches>()), neighbours_(std::make_unique<Neighbours>()) {}
   std::unique_ptr<Scratches> scratches_;
+  std::unique_ptr<Neighbours> neighbours_;
   const Scene* scene_ = nullptr;
   LayerSchedule schedule_;
   Containment containment_ = Containment::kAcross;
@@ -130,6 +152,7 @@ class Sections {
   std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
   Status slice_layer(std::uint32_t index, slice::SectionScratch& scratch, Work& work) const;
+  Result<std::shared_ptr<const SharedContours>> share(std::uint32_t index, slice::SectionScratch& scratch) const;
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
   Result<slice::SectionReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled,
